@@ -1,0 +1,43 @@
+// The neighbour pairs of one neighbour-list build, and for each disk its pairs in the order of the
+// partners' IDs.
+//
+// A pair is evaluated once; then each disk adds up its pairs in the order of IDs. The sum is therefore
+// the same to the bit for any number of ranks, any order of the atoms in memory and newton on or off.
+
+#ifndef FAULTGOUGE_CONTACT_PAIRS_H
+#define FAULTGOUGE_CONTACT_PAIRS_H
+
+#include "lmptype.h"
+
+#include <vector>
+
+namespace LAMMPS_NS {
+class NeighList;
+}
+
+namespace faultgouge {
+
+struct PairForce {
+  double x, y;          // on the first disk; the second one feels the opposite
+  double tangential;    // f_t, the same for both: their torques are -R f_t
+};
+
+class ContactPairs {
+public:
+  // list: half list that holds the pairs with ghosts at both their owners (newton off)
+  void build(const LAMMPS_NS::NeighList &list, const LAMMPS_NS::tagint *tag, int nlocal, bool with_slips);
+
+  int size() const { return static_cast<int>(first.size()); }
+
+  // pairs of the owned disk i: entries start[i] .. start[i+1] of row, as 2*pair + (1 if i is the second)
+  std::vector<int> start, row;
+  std::vector<int> first, second;                          // local indices of a pair's disks
+  std::vector<LAMMPS_NS::tagint> first_tag, second_tag;    // and their IDs
+  std::vector<PairForce> force;
+  std::vector<double> slip;      // only with_slips
+  std::vector<char> touching;    // only with_slips
+};
+
+}    // namespace faultgouge
+
+#endif

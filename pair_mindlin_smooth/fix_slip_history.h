@@ -1,0 +1,64 @@
+// The slips of the contacts, kept with the disks: fix slip/history, made by pair mindlin/smooth.
+//
+// Row i of the per-atom array is [own ID, partner ID, slip, partner ID, slip, ..., 0, 0]: the contacts of
+// disk i in the order of the partners' IDs; both partners keep theirs. It is up to date whenever no run is
+// under way, moves with the disks between ranks, and goes through restart files. Written from outside
+// (library scatter) it takes effect at the next run's setup.
+
+#ifndef LMP_FIX_SLIP_HISTORY_H
+#define LMP_FIX_SLIP_HISTORY_H
+
+#include "fix.h"
+
+namespace LAMMPS_NS {
+
+// who holds the current slips while a run is under way
+class SlipSource {
+public:
+  // puts them into the fix, if they are not there yet
+  virtual void store_slips() = 0;
+
+protected:
+  ~SlipSource() = default;
+};
+
+class FixSlipHistory : public Fix {
+public:
+  static constexpr const char *ID = "slips";
+
+  FixSlipHistory(class LAMMPS *, int, char **);
+  ~FixSlipHistory() override;
+
+  int setmask() override;
+  void init() override;
+  void post_run() override;
+
+  void set_source(SlipSource *s) { source = s; }
+  void check_owners() const;
+  void clear(int i);
+  void append(int i, tagint partner, double slip);
+  const double *find(int i, tagint partner) const;    // its slip, or nullptr where there is no contact
+
+  void grow_arrays(int) override;
+  void copy_arrays(int, int, int) override;
+  void set_arrays(int) override;
+  int pack_exchange(int, double *) override;
+  int unpack_exchange(int, double *) override;
+  int pack_restart(int, double *) override;
+  void unpack_restart(int, int) override;
+  int size_restart(int) override;
+  int maxsize_restart() override;
+  double memory_usage() override;
+
+private:
+  SlipSource *source = nullptr;
+  int capacity;    // contacts that a row holds
+  int nmax = 0;
+
+  void set_capacity(int);
+  int count(int i) const;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

@@ -1,0 +1,208 @@
+#include "fix_wall_mindlin_smooth.h"
+
+#include "atom.h"
+#include "domain.h"
+#include "error.h"
+#include "memory.h"
+#include "update.h"
+
+#include <algorithm>
+#include <cstring>
+
+using namespace LAMMPS_NS;
+using namespace FixConst;
+using faultgouge::MindlinLaw;
+
+FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg)
+{
+  if (narg != 8) error->all(FLERR, "fix wall/mindlin/smooth takes KN KT MU ylo COORD, but got {} arguments", narg - 3);
+  law.kn = utils::numeric(FLERR, arg[3], false, lmp);
+  law.kt = utils::numeric(FLERR, arg[4], false, lmp);
+  law.mu = utils::numeric(FLERR, arg[5], false, lmp);
+  if (!law.valid())
+    error->all(FLERR, "fix wall/mindlin/smooth: KN must be positive, KT and MU not negative, all finite (got {} {} {})",
+               arg[3], arg[4], arg[5]);
+  if (strcmp(arg[6], "ylo") != 0)
+    error->all(FLERR, "fix wall/mindlin/smooth knows a floor only: use ylo COORD instead of {}", arg[6]);
+  height = utils::numeric(FLERR, arg[7], false, lmp);
+  if (!std::isfinite(height)) error->all(FLERR, "fix wall/mindlin/smooth: ylo must be finite, not {}", arg[7]);
+
+  if (!atom->radius_flag || !atom->omega_flag || !atom->torque_flag)
+    error->all(FLERR, "fix wall/mindlin/smooth needs disks with radius and spin: use atom_style sphere");
+
+  restart_peratom = 1;
+  create_attribute = 1;
+  peratom_flag = 1;
+  peratom_freq = 1;
+  size_peratom_cols = COLUMNS;
+  maxexchange = COLUMNS;
+  scalar_flag = 1;
+  global_freq = 1;
+  extscalar = 1;
+  energy_global_flag = 1;
+  grow_arrays(atom->nmax);
+  atom->add_callback(Atom::GROW);
+  atom->add_callback(Atom::RESTART);
+  for (int i = 0; i < atom->nlocal; i++) set_arrays(i);
+}
+
+FixWallMindlinSmooth::~FixWallMindlinSmooth()
+{
+  atom->delete_callback(id, Atom::GROW);
+  atom->delete_callback(id, Atom::RESTART);
+  memory->destroy(array_atom);
+}
+
+int FixWallMindlinSmooth::setmask()
+{
+  return POST_FORCE | MIN_POST_FORCE;
+}
+
+void FixWallMindlinSmooth::init()
+{
+  if (domain->dimension != 2) error->all(FLERR, "fix wall/mindlin/smooth is for disks in the plane: use dimension 2");
+  if (domain->periodicity[1])
+    error->all(FLERR, "fix wall/mindlin/smooth needs a box that is not periodic in y: use boundary p f p");
+  has_friction = law.frictional();
+  if (has_friction && update->whichflag == 2)
+    error->all(FLERR, "fix wall/mindlin/smooth with friction cannot be minimized, since its forces depend on the path: "
+                      "relax with fix overdamped/disc, or minimize with mu = 0");
+}
+
+void FixWallMindlinSmooth::setup(int vflag)
+{
+  post_force(vflag);
+}
+
+void FixWallMindlinSmooth::min_setup(int vflag)
+{
+  post_force(vflag);
+}
+
+void FixWallMindlinSmooth::min_post_force(int vflag)
+{
+  post_force(vflag);
+}
+
+void FixWallMindlinSmooth::post_force(int /*vflag*/)
+{
+  if (has_friction)
+    contact_forces<true>();
+  else
+    contact_forces<false>();
+}
+
+template <bool FRICTION> void FixWallMindlinSmooth::contact_forces()
+{
+  const bool advance = !update->setupflag;    // at setup the disks have not moved
+  const double dt = update->dt;
+  const double limit_ratio = FRICTION ? law.slip_limit_ratio() : 0.0;
+  energy = 0.0;
+  for (int i = 0; i < atom->nlocal; i++) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    double *contact = array_atom[i];
+    const double radius = atom->radius[i];
+    const double overlap = radius - (atom->x[i][1] - height);
+    if (overlap <= 0.0) {
+      if (contact[OVERLAP] > 0.0) set_arrays(i);
+      continue;
+    }
+    const double normal = law.normal_force(overlap);
+    energy += law.normal_energy(overlap);
+    atom->f[i][1] += normal;
+
+    if constexpr (FRICTION) {
+      const double limit = limit_ratio * overlap;
+      double slip = contact[OVERLAP] > 0.0 ? contact[SLIP] : 0.0;
+      if (advance) {
+        if (contact[OVERLAP] > 0.0) slip -= (atom->v[i][0] + radius * atom->omega[i][2]) * dt;
+        slip = faultgouge::clamp_slip(slip, limit);
+      }
+      const double tangential = law.tangential_force(normal, slip, limit);
+      atom->f[i][0] -= tangential;
+      atom->torque[i][2] -= radius * tangential;
+      contact[TANGENTIAL] = tangential;
+      contact[SLIP] = slip;
+      contact[SLIP_RATIO] = slip / limit;
+    }
+    contact[NORMAL] = normal;
+    contact[NX] = 0.0;
+    contact[NY] = 1.0;
+    contact[OVERLAP] = overlap;
+  }
+}
+
+double FixWallMindlinSmooth::compute_scalar()
+{
+  double total;
+  MPI_Allreduce(&energy, &total, 1, MPI_DOUBLE, MPI_SUM, world);
+  return total;
+}
+
+void *FixWallMindlinSmooth::extract(const char *name, int &dim)
+{
+  dim = 0;
+  if (strcmp(name, "kn") == 0) return &law.kn;
+  if (strcmp(name, "kt") == 0) return &law.kt;
+  if (strcmp(name, "mu") == 0) return &law.mu;
+  return nullptr;
+}
+
+void FixWallMindlinSmooth::grow_arrays(int n)
+{
+  memory->grow(array_atom, n, COLUMNS, "wall/mindlin/smooth:array");
+  for (int i = nmax; i < n; i++) set_arrays(i);
+  nmax = n;
+}
+
+void FixWallMindlinSmooth::copy_arrays(int i, int j, int /*delflag*/)
+{
+  std::copy(array_atom[i], array_atom[i] + COLUMNS, array_atom[j]);
+}
+
+void FixWallMindlinSmooth::set_arrays(int i)
+{
+  std::fill(array_atom[i], array_atom[i] + COLUMNS, 0.0);
+}
+
+int FixWallMindlinSmooth::pack_exchange(int i, double *buf)
+{
+  std::copy(array_atom[i], array_atom[i] + COLUMNS, buf);
+  return COLUMNS;
+}
+
+int FixWallMindlinSmooth::unpack_exchange(int nlocal, double *buf)
+{
+  std::copy(buf, buf + COLUMNS, array_atom[nlocal]);
+  return COLUMNS;
+}
+
+// LAMMPS finds a fix's data in a restart file by the length that starts each record
+int FixWallMindlinSmooth::pack_restart(int i, double *buf)
+{
+  buf[0] = COLUMNS + 1;
+  return 1 + pack_exchange(i, buf + 1);
+}
+
+void FixWallMindlinSmooth::unpack_restart(int nlocal, int nth)
+{
+  double *extra = atom->extra[nlocal];
+  int m = 0;
+  for (int i = 0; i < nth; i++) m += static_cast<int>(extra[m]);
+  unpack_exchange(nlocal, extra + m + 1);
+}
+
+int FixWallMindlinSmooth::size_restart(int /*nlocal*/)
+{
+  return COLUMNS + 1;
+}
+
+int FixWallMindlinSmooth::maxsize_restart()
+{
+  return COLUMNS + 1;
+}
+
+double FixWallMindlinSmooth::memory_usage()
+{
+  return static_cast<double>(nmax) * COLUMNS * sizeof(double);
+}

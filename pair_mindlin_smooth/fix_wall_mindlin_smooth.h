@@ -1,0 +1,54 @@
+// fix ID group wall/mindlin/smooth KN KT MU ylo COORD
+//
+// The flat floor at y = COORD below the disks: the law of mindlin_law.h with n = (0, 1), tau = (-1, 0).
+// Each disk has one slip. The per-atom array has the columns of pair mindlin/smooth's single():
+// f_n, f_t, slip, slip/slip_limit, n_x, n_y, overlap, and zeros for a disk that does not touch.
+
+#ifndef LMP_FIX_WALL_MINDLIN_SMOOTH_H
+#define LMP_FIX_WALL_MINDLIN_SMOOTH_H
+
+#include "fix.h"
+#include "mindlin_law.h"
+
+namespace LAMMPS_NS {
+
+class FixWallMindlinSmooth : public Fix {
+public:
+  FixWallMindlinSmooth(class LAMMPS *, int, char **);
+  ~FixWallMindlinSmooth() override;
+
+  int setmask() override;
+  void init() override;
+  void setup(int) override;
+  void min_setup(int) override;
+  void post_force(int) override;
+  void min_post_force(int) override;
+  double compute_scalar() override;
+  void *extract(const char *, int &) override;
+
+  void grow_arrays(int) override;
+  void copy_arrays(int, int, int) override;
+  void set_arrays(int) override;
+  int pack_exchange(int, double *) override;
+  int unpack_exchange(int, double *) override;
+  int pack_restart(int, double *) override;
+  void unpack_restart(int, int) override;
+  int size_restart(int) override;
+  int maxsize_restart() override;
+  double memory_usage() override;
+
+private:
+  enum Column { NORMAL, TANGENTIAL, SLIP, SLIP_RATIO, NX, NY, OVERLAP, COLUMNS };
+
+  faultgouge::MindlinLaw law;
+  double height;
+  double energy = 0.0;    // elastic energy of this rank's contacts
+  bool has_friction = false;
+  int nmax = 0;
+
+  template <bool FRICTION> void contact_forces();
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

@@ -1,0 +1,54 @@
+// pair_style mindlin/smooth KN KT MU
+//
+// Frictional disks in the plane: the law of mindlin_law.h with a slip history in fix slip/history. With
+// MU = 0 or KT = 0 there is no tangential force, no history and no fix.
+
+#ifndef LMP_PAIR_MINDLIN_SMOOTH_H
+#define LMP_PAIR_MINDLIN_SMOOTH_H
+
+#include "contact_pairs.h"
+#include "fix_slip_history.h"
+#include "mindlin_law.h"
+#include "pair.h"
+
+namespace LAMMPS_NS {
+
+class PairMindlinSmooth : public Pair, public SlipSource {
+public:
+  PairMindlinSmooth(class LAMMPS *);
+  ~PairMindlinSmooth() override;
+
+  void settings(int, char **) override;
+  void coeff(int, char **) override;
+  void init_style() override;
+  double init_one(int, int) override;
+  void reinit() override;
+  void compute(int, int) override;
+  double single(int, int, int, int, double, double, double, double &) override;
+  void *extract(const char *, int &) override;
+  void write_restart(FILE *) override;
+  void read_restart(FILE *) override;
+  void write_restart_settings(FILE *) override;
+  void read_restart_settings(FILE *) override;
+  double memory_usage() override;
+
+  void store_slips() override;
+
+private:
+  faultgouge::MindlinLaw law;
+  faultgouge::ContactPairs pairs;
+  FixSlipHistory *history = nullptr;
+  bool has_friction = false;           // as compiled into this run, at init
+  bool slips_in_fix = true;            // false while pairs.slip is newer
+  double *largest_radius = nullptr;    // of each type
+
+  void allocate();
+  void rebuild_pairs();
+  template <bool FRICTION, bool ADVANCE> void contact_forces();
+  template <bool FRICTION> void sum_forces();
+  void tally();
+};
+
+}    // namespace LAMMPS_NS
+
+#endif
