@@ -53,6 +53,14 @@ void FixSlipHistory::post_run()
   init();
 }
 
+int FixSlipHistory::modify_param(int narg, char **arg)
+{
+  if (strcmp(arg[0], "capacity") != 0) return 0;
+  if (narg < 2) error->all(FLERR, "fix_modify {} capacity takes the number of contacts of a disk", id);
+  set_capacity(std::max(capacity, utils::inumeric(FLERR, arg[1], false, lmp)));
+  return 2;
+}
+
 // delete_atoms and reset_atoms renumber the disks, and partners would be taken for others
 void FixSlipHistory::check_owners() const
 {

@@ -32,6 +32,7 @@ public:
   int setmask() override;
   void init() override;
   void post_run() override;
+  int modify_param(int, char **) override;    // fix_modify slips capacity N: room for N contacts a disk
 
   void set_source(SlipSource *s) { source = s; }
   void check_owners() const;

@@ -1,0 +1,1 @@
+"""The LAMMPS input decks: settle.in, ramp.in, perturb.in, and the parts that they include."""

