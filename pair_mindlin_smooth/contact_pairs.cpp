@@ -1,25 +1,79 @@
 #include "contact_pairs.h"
 
-#include "lammps.h"
+#include "atom.h"
+#include "domain.h"
 #include "neigh_list.h"
 
 #include <algorithm>
+#include <cmath>
+#include <unordered_map>
 
 using namespace LAMMPS_NS;
 
 namespace faultgouge {
 
-void ContactPairs::build(const NeighList &list, const tagint *tag, int nlocal, bool with_slips)
+namespace {
+
+// from ID to the index of an owned disk, -1 if it is owned elsewhere
+class OwnedDisks {
+public:
+  explicit OwnedDisks(Atom &a) : atom(a)
+  {
+    if (atom.map_style != Atom::MAP_NONE) return;
+    for (int i = 0; i < atom.nlocal; i++) index[atom.tag[i]] = i;
+  }
+
+  int find(tagint tag) const
+  {
+    if (atom.map_style != Atom::MAP_NONE) {
+      const int i = atom.map(tag);
+      return i < atom.nlocal ? i : -1;
+    }
+    const auto found = index.find(tag);
+    return found == index.end() ? -1 : found->second;
+  }
+
+private:
+  Atom &atom;
+  std::unordered_map<tagint, int> index;    // only where LAMMPS keeps no map
+};
+
+ContactPairs::Image image_between(Vector seen, Vector original, const Domain &domain)
 {
+  return {static_cast<signed char>(std::lround((seen.x - original.x) / domain.prd[0])),
+          static_cast<signed char>(std::lround((seen.y - original.y) / domain.prd[1]))};
+}
+
+}    // namespace
+
+void ContactPairs::build(const NeighList &list, Atom &atom, const Domain &domain, const std::vector<Vector> &original,
+                         bool with_slips)
+{
+  const int nlocal = atom.nlocal;
+  const OwnedDisks owned(atom);
   first.clear();
   second.clear();
+  image.clear();
   start.assign(nlocal + 1, 0);
   for (int ii = 0; ii < list.inum; ii++) {
     const int i = list.ilist[ii];
     for (int jj = 0; jj < list.numneigh[i]; jj++) {
-      const int j = list.firstneigh[i][jj] & NEIGHMASK;
+      int j = list.firstneigh[i][jj] & NEIGHMASK;
+      Image shift{0, 0};
+      if (j >= nlocal) {
+        const double *seen = atom.x[j];
+        const int own = owned.find(atom.tag[j]);
+        if (own >= 0) {
+          if (own <= i) continue;    // the pair is listed from its other side, too
+          j = own;
+          shift = image_between({seen[0], seen[1]}, {atom.x[own][0], atom.x[own][1]}, domain);
+        } else if (!original.empty()) {
+          shift = image_between({seen[0], seen[1]}, original[j], domain);
+        }
+      }
       first.push_back(i);
       second.push_back(j);
+      image.push_back(shift);
       start[i + 1]++;
       if (j < nlocal) start[j + 1]++;
     }
@@ -31,8 +85,8 @@ void ContactPairs::build(const NeighList &list, const tagint *tag, int nlocal, b
   second_tag.resize(size());
   std::vector<int> next(start.begin(), start.end() - 1);
   for (int p = 0; p < size(); p++) {
-    first_tag[p] = tag[first[p]];
-    second_tag[p] = tag[second[p]];
+    first_tag[p] = atom.tag[first[p]];
+    second_tag[p] = atom.tag[second[p]];
     row[next[first[p]]++] = 2 * p;
     if (second[p] < nlocal) row[next[second[p]]++] = 2 * p + 1;
   }

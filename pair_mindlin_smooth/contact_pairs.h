@@ -1,19 +1,23 @@
 // The neighbour pairs of one neighbour-list build, and for each disk its pairs in the order of the
 // partners' IDs.
 //
-// A pair is evaluated once; then each disk adds up its pairs in the order of IDs. The sum is therefore
-// the same to the bit for any number of ranks, any order of the atoms in memory and newton on or off.
+// A pair is evaluated once by each rank that owns one of its disks, a periodic image standing for its
+// original; then each disk adds up its pairs in the order of IDs. The sum is therefore the same to the bit
+// for any number of ranks, any order of the atoms in memory and newton on or off.
 
 #ifndef FAULTGOUGE_CONTACT_PAIRS_H
 #define FAULTGOUGE_CONTACT_PAIRS_H
 
 #include "lmptype.h"
+#include "mindlin_law.h"
 
 #include <vector>
 
 namespace LAMMPS_NS {
+class Atom;
+class Domain;
 class NeighList;
-}
+}    // namespace LAMMPS_NS
 
 namespace faultgouge {
 
@@ -25,13 +29,19 @@ struct PairForce {
 class ContactPairs {
 public:
   // list: half list that holds the pairs with ghosts at both their owners (newton off)
-  void build(const LAMMPS_NS::NeighList &list, const LAMMPS_NS::tagint *tag, int nlocal, bool with_slips);
+  // original: coordinates of disks owned elsewhere, before LAMMPS shifted them by box lengths
+  void build(const LAMMPS_NS::NeighList &list, LAMMPS_NS::Atom &atom, const LAMMPS_NS::Domain &domain,
+             const std::vector<Vector> &original, bool with_slips);
 
   int size() const { return static_cast<int>(first.size()); }
 
   // pairs of the owned disk i: entries start[i] .. start[i+1] of row, as 2*pair + (1 if i is the second)
   std::vector<int> start, row;
-  std::vector<int> first, second;                          // local indices of a pair's disks
+  std::vector<int> first, second;    // local indices; a ghost only if owned elsewhere
+  struct Image {
+    signed char x, y;    // box lengths between the second disk and its image that the first one meets
+  };
+  std::vector<Image> image;
   std::vector<LAMMPS_NS::tagint> first_tag, second_tag;    // and their IDs
   std::vector<PairForce> force;
   std::vector<double> slip;      // only with_slips

@@ -28,6 +28,7 @@ PairMindlinSmooth::PairMindlinSmooth(LAMMPS *lmp) : Pair(lmp)
   finitecutflag = 1;
   no_virial_fdotr_compute = 1;    // forces act on owned disks only, so that a sum over ghosts would miss some
   centroidstressflag = CENTROID_SAME;
+  comm_forward = 2;
 }
 
 PairMindlinSmooth::~PairMindlinSmooth()
@@ -137,7 +138,7 @@ void PairMindlinSmooth::rebuild_pairs()
     store_slips();
     history->check_owners();
   }
-  pairs.build(*list, atom->tag, atom->nlocal, has_friction);
+  pairs.build(*list, *atom, *domain, original, has_friction);
   if (!has_friction) return;
   for (int p = 0; p < pairs.size(); p++)
     if (const double *slip = history->find(pairs.first[p], pairs.second_tag[p])) {
@@ -149,6 +150,7 @@ void PairMindlinSmooth::rebuild_pairs()
 void PairMindlinSmooth::compute(int eflag, int vflag)
 {
   ev_init(eflag, vflag);
+  if (comm->nprocs > 1 && (domain->xperiodic || domain->yperiodic)) communicate_originals();
   if (neighbor->ago == 0) rebuild_pairs();
 
   // at setup the disks have not moved since the slips were last advanced
@@ -167,9 +169,40 @@ void PairMindlinSmooth::compute(int eflag, int vflag)
   if (evflag) tally();
 }
 
+void PairMindlinSmooth::communicate_originals()
+{
+  original.resize(atom->nlocal + atom->nghost);
+  for (int i = 0; i < atom->nlocal; i++) original[i] = {atom->x[i][0], atom->x[i][1]};
+  comm->forward_comm(this);
+}
+
+int PairMindlinSmooth::pack_forward_comm(int n, int *list, double *buf, int /*pbc_flag*/, int * /*pbc*/)
+{
+  for (int k = 0; k < n; k++) {
+    buf[2 * k] = original[list[k]].x;
+    buf[2 * k + 1] = original[list[k]].y;
+  }
+  return 2 * n;
+}
+
+void PairMindlinSmooth::unpack_forward_comm(int n, int first, double *buf)
+{
+  for (int k = 0; k < n; k++) original[first + k] = {buf[2 * k], buf[2 * k + 1]};
+}
+
+// from the second disk of a pair to the first
+inline faultgouge::Vector PairMindlinSmooth::branch(int p) const
+{
+  const int i = pairs.first[p], j = pairs.second[p];
+  const double *const xi = atom->x[i], *const xj = atom->x[j];
+  const auto image = pairs.image[p];
+  if (image.x == 0 && image.y == 0) return {xi[0] - xj[0], xi[1] - xj[1]};
+  const faultgouge::Vector other = j < atom->nlocal ? faultgouge::Vector{xj[0], xj[1]} : original[j];
+  return {(xi[0] - other.x) - image.x * domain->prd[0], (xi[1] - other.y) - image.y * domain->prd[1]};
+}
+
 template <bool FRICTION, bool ADVANCE> void PairMindlinSmooth::contact_forces()
 {
-  const double *const *const x = atom->x;
   const double *const *const v = atom->v;
   const double *const *const omega = atom->omega;
   const double *const radius = atom->radius;
@@ -179,7 +212,7 @@ template <bool FRICTION, bool ADVANCE> void PairMindlinSmooth::contact_forces()
 
   for (int p = 0, n = pairs.size(); p < n; p++) {
     const int i = pairs.first[p], j = pairs.second[p];
-    const double rx = x[i][0] - x[j][0], ry = x[i][1] - x[j][1];
+    const auto [rx, ry] = branch(p);
     const double reach = radius[i] + radius[j];
     const double rsq = rx * rx + ry * ry;
     double r, overlap;
@@ -242,7 +275,7 @@ void PairMindlinSmooth::tally()
     const PairForce &contact = pairs.force[p];
     if (contact.x == 0.0 && contact.y == 0.0) continue;
     const int i = pairs.first[p], j = pairs.second[p];
-    const double rx = atom->x[i][0] - atom->x[j][0], ry = atom->x[i][1] - atom->x[j][1];
+    const auto [rx, ry] = branch(p);
     const double overlap = atom->radius[i] + atom->radius[j] - std::sqrt(rx * rx + ry * ry);
     ev_tally_xyz(i, j, atom->nlocal, 0, law.normal_energy(overlap), 0.0, contact.x, contact.y, 0.0, rx, ry, 0.0);
   }

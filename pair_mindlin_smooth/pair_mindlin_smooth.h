@@ -31,6 +31,8 @@ public:
   void write_restart_settings(FILE *) override;
   void read_restart_settings(FILE *) override;
   double memory_usage() override;
+  int pack_forward_comm(int, int *, double *, int, int *) override;
+  void unpack_forward_comm(int, int, double *) override;
 
   void store_slips() override;
 
@@ -42,8 +44,14 @@ private:
   bool slips_in_fix = true;            // false while pairs.slip is newer
   double *largest_radius = nullptr;    // of each type
 
+  // LAMMPS adds box lengths to the coordinates of ghosts, with a rounding that depends on which of two disks
+  // is the ghost; with the original coordinates both owners of a pair find the same to the bit
+  std::vector<faultgouge::Vector> original;
+
   void allocate();
   void rebuild_pairs();
+  void communicate_originals();
+  faultgouge::Vector branch(int pair) const;
   template <bool FRICTION, bool ADVANCE> void contact_forces();
   template <bool FRICTION> void sum_forces();
   void tally();

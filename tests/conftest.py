@@ -1,0 +1,58 @@
+"""What tests share: LAMMPS as a user runs it, and the reference packing."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import MindlinLaw, Packing
+from faultgouge.analysis.packing import touching
+
+BIN = Path(sys.executable).parent
+REFERENCE = Path(__file__).parent / "reference" / "packing7.json"
+
+
+@pytest.fixture(scope="session")
+def reference() -> dict:
+    """The numbers of an independent code for one packing."""
+    return json.loads(REFERENCE.read_text())
+
+
+@pytest.fixture
+def reference_packing(reference: dict) -> Callable[[float], Packing]:
+    """The reference packing with zero slips, for a friction coefficient."""
+
+    def make(mu: float) -> Packing:
+        position = np.column_stack([reference["x"], reference["y"]])
+        radius = np.array(reference["radius"])
+        return Packing(
+            position=position,
+            radius=radius,
+            top=np.isin(np.arange(len(radius)), reference["top"]),
+            box_length=reference["box_length"],
+            law=MindlinLaw(kn=reference["kn"], kt=reference["kt"], mu=mu),
+            fy=reference["fy_per_top_disk"],
+            contacts=touching(position, radius, reference["box_length"]),
+        )
+
+    return make
+
+
+@pytest.fixture
+def lmp(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess]:
+    """Runs an input script (text or file) with the command line program, in tmp_path."""
+
+    def run(script: str | Path, *arguments: str, ranks: int = 1) -> subprocess.CompletedProcess:
+        if isinstance(script, str):
+            file = tmp_path / "script.in"
+            file.write_text(script)
+        else:
+            file = script
+        command = [BIN / "mpiexec", "-n", str(ranks), BIN / "lmp", "-in", file, "-log", "none", *arguments]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+
+    return run

@@ -1,0 +1,92 @@
+"""One trajectory, to the bit: over ranks, newton, sorting, restarts and whatever looks on."""
+
+import pytest
+
+from faultgouge.pywrap.engine import DECKS
+
+HEAD = """
+newton          {newton}
+variable        decks index {decks}
+variable        fx index 3.0
+include         {decks}/system.in
+atom_modify     sort {sort} 0.0
+timestep        2e-3
+"""
+START = HEAD + """
+fix             move all nve/disc 1.0
+{extra}
+"""
+# a layer that is torn off: contacts slide, open and close, disks go round the periodic box, and the
+# neighbour lists are built some 360 times
+RUN = """
+run             2000
+write_dump      all custom middle id x y vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g
+{middle}
+run             2000
+write_dump      all custom end id x y vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g
+"""
+DEFAULTS = {"newton": "on", "sort": "1000", "extra": "", "middle": "", "decks": DECKS}
+
+
+@pytest.fixture
+def trajectory(lmp, tmp_path):
+    def run(*, script=START + RUN, ranks=1, **changes):
+        done = lmp(script.format(**{**DEFAULTS, **changes}), ranks=ranks)
+        assert done.returncode == 0, done.stdout[-2000:]
+        return (tmp_path / "middle").read_text(), (tmp_path / "end").read_text()
+
+    return run
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"ranks": 2},
+        {"newton": "off"},
+        {"newton": "off", "ranks": 2},
+        {"sort": "0"},
+        {"sort": "50", "ranks": 2},
+        {"extra": "run 0\n" * 20},
+        {
+            "extra": "compute seen all pair/local p1 p2 p3 p4 p5 p6 p7 cutoff radius\n"
+            "dump seen all local 1 seen.* index c_seen[*]"
+        },
+    ],
+    ids=["2 ranks", "newton off", "newton off, 2 ranks", "no sorting", "sorting, 2 ranks", "run 0", "pair/local"],
+)
+def test_same_trajectory(trajectory, changes):
+    straight = trajectory()
+    assert straight[0] != straight[1]
+    assert trajectory(**changes) == straight
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_restart_in_the_same_process(trajectory, ranks):
+    again = """
+write_restart   middle.restart
+clear
+variable        restart index middle.restart
+""" + HEAD.format(**DEFAULTS) + """
+fix             move all nve/disc 1.0
+"""
+    assert trajectory(ranks=ranks, middle=again) == trajectory()
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_restart_in_a_new_process(trajectory, lmp, tmp_path, ranks):
+    straight = trajectory(ranks=ranks, middle="write_restart middle.restart")
+    (tmp_path / "end").unlink()
+    second = (START + RUN[RUN.index("{middle}") :]).format(
+        **{**DEFAULTS, "middle": ""}
+    )
+    done = lmp(second, "-var", "restart", "middle.restart", ranks=3 - ranks)
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert (tmp_path / "end").read_text() == straight[1] == trajectory()[1]
+
+
+def test_restart_without_the_plugin_says_so(lmp, trajectory, monkeypatch):
+    trajectory(middle="write_restart middle.restart")
+    # the entry point prepends the plugin's folder, so that it is unloaded here instead
+    done = lmp("plugin unload pair mindlin/smooth\nread_restart middle.restart\n")
+    assert done.returncode != 0
+    assert "mindlin/smooth" in done.stdout
