@@ -115,11 +115,6 @@ class Engine:
         self._lammps.close()
 
     @property
-    def law(self) -> object:
-        """The contact law."""
-        return self._static.law
-
-    @property
     def packing(self) -> Packing:
         """The configuration as it stands, with its slips and its load."""
         position = self._gather("x", 3)[:, :2]
@@ -136,8 +131,14 @@ class Engine:
 
     def set_fx(self, fx: float) -> None:
         """Set the force along x on each disk of the upper layer."""
+        fx = float(fx)
         self._static = replace(self._static, fx=fx)
         self._command(f"fix load top addforce {fx!r} {-self._static.fy!r} 0.0")
+
+    def restore(self, packing: Packing) -> None:
+        """Put the disks, slips and load of a packing back, to the bit."""
+        self._write(packing)
+        self.set_fx(packing.fx)
 
     def settle(self, force_tolerance: float) -> None:
         """Let a loose start settle under the load (deck part bed.in)."""
@@ -318,7 +319,7 @@ class Engine:
 
     def _variables(self, **values: object) -> None:
         for name, value in values.items():
-            text = repr(value) if isinstance(value, float) else str(value)
+            text = repr(float(value)) if isinstance(value, float) else str(value)
             self._command(f"variable {name} delete")
             self._command(f'variable {name} index "{text}"')
 

@@ -1,0 +1,252 @@
+"""The command ``faultgouge``.
+
+Results go to files and, with --json, to standard output; progress and messages go to standard error, from rank 0
+alone. Exit codes: 1 for a computation that failed, 2 for bad input. What is heavy is imported by the command that
+needs it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
+from rich.console import Console
+
+if TYPE_CHECKING:
+    from faultgouge.pywrap import Equilibrium, Scene
+
+T = TypeVar("T")
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    help="Remote triggering in a stressed layer of frictional disks: simulate with LAMMPS, analyse, reproduce.",
+    epilog="Example: [bold]faultgouge reproduce -o results[/bold]",
+)
+
+ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)]
+Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted one is continued.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+
+@app.command(epilog="Example: [bold]faultgouge settle paper.toml -o run.h5[/bold]")
+def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
+    """Settle the packing of a scene under its load, at F_x = 0."""
+    from faultgouge.pywrap import Record
+    from faultgouge.pywrap import settle as settle_packing
+
+    wanted = _scene(scene)
+    with Record(output, wanted) as record:
+        if record.last is None:
+            with _status("settling"):
+                record.append(settle_packing(wanted))
+    assert record.last is not None
+    packing = record.last.packing
+    _say(
+        f"{len(packing)} disks, {len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers; "
+        f"residual {record.last.residual:.2g} (rounding floor {record.last.floor:.2g}); written to {output}"
+    )
+
+
+@app.command(epilog="Example: [bold]mpiexec -n 2 faultgouge ramp paper.toml -o run.h5[/bold]")
+def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False) -> None:
+    """Raise F_x from equilibrium to equilibrium, each stored as it is reached."""
+    from faultgouge.pywrap import Record
+    from faultgouge.pywrap import ramp as ramp_up
+    from faultgouge.pywrap.stages import loads
+
+    wanted = _scene(scene)
+    with Record(output, wanted) as record:
+        total = len(loads(wanted.ramp)) if wanted.ramp else None
+        done = 0 if record.last is None or wanted.ramp is None else round(record.last.fx / wanted.ramp.step) + 1
+        for equilibrium in _progress(ramp_up(wanted, record.last), "equilibria", total, done):
+            record.append(equilibrium)
+    _say(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")  # type: ignore[union-attr]
+    if as_json:
+        _print_json({"equilibria": _equilibria(output)})
+
+
+@app.command(epilog="Example: [bold]faultgouge perturb paper.toml -o run.h5[/bold]")
+def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
+    """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t)."""
+    from faultgouge.pywrap import Record, SceneError, reach
+    from faultgouge.pywrap import perturb as run_undamped
+
+    wanted = _scene(scene)
+    if wanted.perturb is None:
+        raise SceneError(f"{scene}: the scene has no section [perturb]: add it, with fx and time")
+    if output.exists():
+        raise SceneError(f"{output} exists: an undamped run starts from rest, so give another name or delete it")
+    with Record(output, wanted) as record:
+        start: Equilibrium | None = None
+        for start in _progress(reach(wanted, wanted.perturb.fx), "equilibria"):
+            pass
+        assert start is not None
+        record.append(start)
+        batch = []
+        for sample in _progress(run_undamped(wanted, start), "samples"):
+            batch.append(sample)
+            if len(batch) == 100:
+                record.append_series(batch)
+                batch = []
+        record.append_series(batch)
+    _say(f"D = {sample.msd:.3g} after t = {sample.time:g}; written to {output}")
+    if as_json:
+        from faultgouge.analysis import RunFile
+
+        with RunFile(output) as file:
+            _print_json({name: column.tolist() for name, column in file.series("undamped").items()})
+
+
+@app.command(epilog="Example: [bold]faultgouge spectrum run.h5 --json[/bold]")
+def spectrum(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.")],
+    frame: Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")] = -1,
+    as_json: AsJson = False,
+) -> None:
+    """Eigenvalues of a stored packing, its complex pairs and its rattlers."""
+    from faultgouge.analysis import RunFile, read_dump
+    from faultgouge.analysis import spectrum as eigenvalues_of
+
+    if file.suffix == ".disks":
+        packing = read_dump(file, frame=frame)
+    else:
+        with RunFile(file) as run:
+            packing = run.packing(frame)
+    result = eigenvalues_of(packing)
+    pairs = [
+        {
+            "eigenvalue": [pair.eigenvalue.real, pair.eigenvalue.imag],
+            "condition": pair.condition,
+            "overlap": pair.overlap,
+            "growth_rate": pair.growth_rate,
+            "frequency": pair.frequency,
+        }
+        for pair in result.pairs
+    ]
+    if as_json:
+        _print_json(
+            {
+                "eigenvalues": [[value.real, value.imag] for value in result.eigenvalues.tolist()],
+                "pairs": pairs,
+                "rattlers": result.rattlers.tolist(),
+                "fx": packing.fx,
+                "residual": packing.residual,
+                "noise_pairs": result.noise_pairs,
+            }
+        )
+        return
+    real = result.eigenvalues.real
+    print(
+        f"F_x = {packing.fx:g}: {len(real)} eigenvalues from {real.min():.6g} to {real.max():.6g}, "
+        f"{len(result.rattlers)} rattlers left out"
+    )
+    for pair in pairs:
+        print(
+            f"complex pair {pair['eigenvalue'][0]:.10g} +- {pair['eigenvalue'][1]:.10g} i: "
+            f"D grows as exp({pair['growth_rate']:.6g} t), |y^H x| = {pair['overlap']:.2g}"
+        )
+    if not pairs:
+        print("no complex pair: linearly stable")
+    if result.noise_pairs:
+        print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
+
+
+def main() -> None:
+    """Run the command; what goes wrong is said in one sentence."""
+    try:
+        app(standalone_mode=False)
+    except KeyboardInterrupt:
+        _stop("interrupted: what was written is kept, and the same command goes on from there", 130)
+    except Exception as error:
+        _stop(_sentence(error), _exit_code(error))
+
+
+def _exit_code(error: Exception) -> int:
+    """2 for bad input, 1 for a computation that failed; anything else is a bug and keeps its traceback."""
+    if hasattr(error, "exit_code"):  # typer's own: usage errors and exits
+        return int(error.exit_code)
+    names = {base.__name__ for base in type(error).__mro__}
+    if names & {"SceneError", "PackingFileError"}:
+        return 2
+    if names & {"NoEquilibriumError", "EngineError", "OnsetError", "OSError"}:
+        return 1
+    raise error
+
+
+def _sentence(error: Exception) -> str:
+    show = getattr(error, "format_message", None)
+    return (show() if show else str(error)).strip()
+
+
+def _stop(sentence: str, code: int) -> None:
+    if sentence and _is_root():
+        Console(stderr=True, soft_wrap=True, highlight=False).print(f"[bold red]Error:[/bold red] ", end="")
+        print(sentence, file=sys.stderr)
+    sys.exit(code)
+
+
+def _is_root() -> bool:
+    return int(os.environ.get("PMI_RANK", "0")) == 0
+
+
+def _scene(path: Path) -> Scene:
+    from faultgouge.pywrap.scene import Scene
+
+    return Scene.from_toml(path)
+
+
+def _equilibria(path: Path) -> list[dict[str, Any]]:
+    from faultgouge.analysis import RunFile
+
+    with RunFile(path) as file:
+        names = ("fx", "residual", "floor", "evaluations")
+        rows = zip(*(file.observable(name).tolist() for name in names), strict=True)
+        return [
+            dict(zip(names, row, strict=True)) | {"contacts": len(file.packing(k).contacts)}
+            for k, row in enumerate(rows)
+        ]
+
+
+def _print_json(value: dict[str, Any]) -> None:
+    if _is_root():
+        print(json.dumps(value, indent=1))
+
+
+def _say(message: str) -> None:
+    if _is_root():
+        print(message, file=sys.stderr)
+
+
+@contextmanager
+def _status(what: str) -> Iterator[None]:
+    console = Console(stderr=True)
+    if not (_is_root() and console.is_terminal):
+        yield
+        return
+    with console.status(what):
+        yield
+
+
+def _progress(items: Iterable[T], what: str, total: int | None = None, done: int = 0) -> Iterator[T]:
+    """The items, with a progress bar on a terminal."""
+    console = Console(stderr=True)
+    if not (_is_root() and console.is_terminal):
+        yield from items
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task(what, total=total, completed=done)
+        for item in items:
+            progress.advance(task)
+            yield item
