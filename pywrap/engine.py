@@ -226,7 +226,9 @@ class Engine:
     def advance(self, steps: int) -> Motion:
         """Go on with the undamped dynamics by so many steps."""
         self._command(f"run {steps} pre no post no")
-        return Motion(self._gather("x", 3)[:, :2], self._gather("v", 3)[:, :2], self._gather("omega", 3)[:, 2])
+        return Motion(
+            self._gather("x", 3)[:, :2], self._gather("v", 3)[:, :2], self._gather("omega", 3)[:, 2]
+        )
 
     def _load(self, packing: Packing) -> None:
         law = packing.law

@@ -1,16 +1,15 @@
-r"""Where a settling starts: disks that touch nothing yet, the upper layer in one row above them.
+r"""Where a settling starts: disks that touch nothing yet, the upper layer above them.
 
-The disks have equal shares of the given radii. The smallest of them make the upper layer, evenly spaced along
-x; the others are shuffled over the cells of a lattice that is wide enough for the largest disk, each at a
+The disks have equal shares of the given radii, the upper layer too, where they take turns. It is evenly spaced
+along x, in as many tiers as it takes to keep its disks apart: a layer that is wider than the box when stretched
+out closes it, and cannot sink into the bed. The others are shuffled over the cells of a lattice that is wide enough for the largest disk, each at a
 random place inside its own cell. So no two disks overlap, whatever the seed, at a cost that grows as their
 number. The paper says only "loosely packed disks". A layer as open as this one, of which a third is filled,
 does not carry: without weight of their own the disks give way, and an upper layer that is loaded alone sinks
 to the floor. A settling from here has to lay a bed first.
 """
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +61,7 @@ def loose_start(
     radii : tuple of float
         Radii, length; each is given to an equal share of the disks, a remainder to the first ones.
     top : int
-        Number of disks in the upper layer: the last ones by index, the smallest ones by size.
+        Number of disks in the upper layer, the last ones by index.
     width : float
         Width of the box, 0 <= x < width, length.
     seed : int
@@ -77,22 +76,20 @@ def loose_start(
     Raises
     ------
     ValueError
-        If the upper layer has more disks than there are or does not fit the width in one row, or if a disk is
-        wider than the box.
+        If the upper layer has more disks than there are, or a disk is wider than the box.
     """
     if not 0 <= top <= disks or disks < 1:
         raise ValueError(f"an upper layer of {top} disks cannot be made from {disks}")
-    sizes = np.sort(np.resize(radii, disks))
+    sizes = np.resize(np.sort(radii), disks)
     row, bulk = sizes[:top], sizes[top:]
-    if 2 * sizes[-1] > width:
-        raise ValueError(f"a disk of radius {sizes[-1]} is wider than the box of width {width}")
-    if top and 2 * row[-1] * top > width:
-        raise ValueError(f"{top} disks of radius {row[-1]} do not fit into one row of width {width}")
+    diameter = 2 * sizes.max()
+    if diameter > width:
+        raise ValueError(f"a disk of radius {sizes.max()} is wider than the box of width {width}")
 
     generator = np.random.Generator(np.random.PCG64(seed))
     bulk = generator.permutation(bulk)
-    columns = max(1, int(width / (CELL * 2 * sizes[-1])))
-    side = np.array([width / columns, CELL * 2 * sizes[-1]])
+    columns = max(1, int(width / (CELL * diameter)))
+    side = np.array([width / columns, CELL * diameter])
     full, rest = divmod(len(bulk), columns)
     # In the last, incomplete row the free cells are as random as the disks.
     cells = np.concatenate(
@@ -102,81 +99,14 @@ def loose_start(
     room = side - 2 * bulk[:, None]
     inside = corner + bulk[:, None] + room * generator.random((len(bulk), 2))
 
-    spacing = width / max(top, 1)
-    height = side[1] * (full + (rest > 0)) + (row[-1] if top else 0.0)
-    above = np.column_stack([spacing * (np.arange(top) + 0.5), np.full(top, height)])
+    order = np.arange(top)
+    # as many tiers as divide the layer, so that its ends do not meet across the periodic side
+    tiers = next((t for t in range(1, top + 1) if top % t == 0 and diameter * top <= t * width), 1)
+    height = side[1] * (full + (rest > 0)) + diameter * (order % tiers + 0.5)
+    above = np.column_stack([width * (order + 0.5) / max(top, 1), height])
     return Start(
         position=np.concatenate([inside, above]),
         radius=np.concatenate([bulk, row]),
         top=np.arange(disks) >= len(bulk),
         box_length=width if periodic else None,
     )
-
-
-def read_start(path: Path) -> Start:
-    """Disks from a JSON file.
-
-    Parameters
-    ----------
-    path : Path
-        A file with the keys x, y and radius (lists of N numbers), top (indices of the upper layer's disks
-        counted from 0, or N booleans) and box_length (a number, or null where the sides are open). Other keys
-        are left alone.
-
-    Returns
-    -------
-    Start
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or is no JSON, a key is missing, lists differ in length, a number is not
-        finite, a radius is not positive, the upper layer names a disk that does not exist, or the box is
-        under two largest diameters; one sentence that does not name the file.
-    """
-    try:
-        stored = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ValueError(f"the file cannot be read ({error.strerror})") from None
-    except ValueError as error:
-        raise ValueError(f"the file is not valid JSON ({error})") from None
-    keys = ("x", "y", "radius", "top", "box_length")
-    missing = [key for key in keys if not isinstance(stored, dict) or key not in stored]
-    if missing:
-        raise ValueError(f"the file lacks {' and '.join(missing)}; it needs the keys {', '.join(keys)}")
-
-    x, y, radius = (_numbers(key, stored[key]) for key in ("x", "y", "radius"))
-    if not len(x) == len(y) == len(radius) > 0:
-        raise ValueError(
-            f"x, y and radius have {len(x)}, {len(y)} and {len(radius)} values, not one for each disk"
-        )
-    if radius.min() <= 0:
-        raise ValueError(f"disk {radius.argmin()} has the radius {radius.min()}, which is not above 0")
-    length = stored["box_length"]
-    if length is not None:
-        length = _numbers("box_length", [length])[0].item()
-        if length < 4 * radius.max():
-            raise ValueError(f"box_length = {length} is under two largest diameters, {4 * radius.max()}")
-    return Start(np.column_stack([x, y]), radius, _mask(stored["top"], len(x)), length)
-
-
-def _numbers(key: str, values: object) -> NDArray[np.float64]:
-    if not isinstance(values, list) or any(
-        isinstance(v, bool) or not isinstance(v, (int, float)) for v in values
-    ):
-        raise ValueError(f"{key} holds something that is not a number")
-    array = np.array(values, dtype=np.float64)
-    if not np.isfinite(array).all():
-        raise ValueError(f"{key} holds a number that is not finite")
-    return array
-
-
-def _mask(top: object, disks: int) -> NDArray[np.bool_]:
-    """The upper layer as N booleans, from N booleans or from indices."""
-    if isinstance(top, list) and len(top) == disks and all(type(entry) is bool for entry in top):
-        return np.array(top)
-    if not isinstance(top, list) or any(type(entry) is not int or not 0 <= entry < disks for entry in top):
-        raise ValueError(f"top is neither {disks} booleans nor a list of indices from 0 to {disks - 1}")
-    mask = np.zeros(disks, dtype=bool)
-    mask[top] = True
-    return mask

@@ -37,7 +37,8 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from .loose import Start, loose_start, read_start
+from ..analysis import MindlinLaw, PackingFileError, read_packing
+from .loose import Start, loose_start
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -67,9 +68,9 @@ class GeneratedPacking(_Section):
     disks : int
         Number of disks N, the upper layer included; at most ten millions, a slip of the pen beyond.
     radii : tuple of float
-        Radii, length, each for an equal share of the disks; the smallest disks make the upper layer.
+        Radii, length, each for an equal share of the disks, upper layer included.
     top : int
-        Number of disks in the upper layer: free disks, one row at the start, the load on each. The paper
+        Number of disks in the upper layer: free disks, above all others at the start, the load on each. The paper
         gives no number.
     width : float
         Width of the box, length. The paper gives none; this one makes 100 disks about square.
@@ -119,14 +120,11 @@ class StoredPacking(_Section):
     Attributes
     ----------
     file : Path
-        JSON with the keys of `pywrap.loose.read_start`, or a run.h5. In a scene, a relative path counts from
-        the folder of the scene's file; here it is absolute.
-    settle_friction : bool
-        As in `GeneratedPacking`, should the packing be settled further.
+        JSON as `analysis.read_packing` takes it, or a run.h5. In a scene, a relative path counts from the
+        folder of the scene's file; here it is absolute.
     """
 
     file: Annotated[Path, Field(strict=False)]
-    settle_friction: bool = False
 
     @field_validator("file")
     @classmethod
@@ -137,12 +135,13 @@ class StoredPacking(_Section):
             with path.open("rb") as stream:
                 head = stream.read(len(HDF5_SIGNATURE))
             if path.suffix == ".json":
-                read_start(path)
+                any_law = MindlinLaw(kn=1.0, kt=0.0, mu=0.0)  # the file says nothing about forces
+                read_packing(path, any_law)
         except OSError as error:
             says = f"cannot be read at {path} ({error.strerror}): correct the name"
             raise _refusal("", f'= "{file}" {says}') from None
-        except ValueError as error:
-            raise _refusal("", f'= "{file}" is refused because {error}: correct the file') from None
+        except PackingFileError as error:
+            raise _refusal("", f'= "{file}" is refused: {str(error).rstrip(".")}') from None
         if path.suffix != ".json" and head != HDF5_SIGNATURE:
             raise _refusal("", f'= "{file}" is neither HDF5 nor named .json: give a run.h5 or a packing.json')
         return path
@@ -558,7 +557,7 @@ def _unknown_key(path: list[str], stored: bool) -> str:
         return f"{key} is no key of a scene: the nearest is {nearest}"
     section = above[0]
     if section in homes and stored:
-        return f"packing.{key} cannot stand beside packing.file, which settles it: leave one of them out"
+        return f"packing.{key} cannot stand beside packing.file, which decides it: leave one of them out"
     if homes:
         return f"{section}.{key} is no key of [{section}]: the nearest is {homes[0]}.{key}"
     keys = [name for model in SECTIONS[section] for name in model.model_fields]

@@ -71,9 +71,15 @@ def settle(scene: Scene, mu: float | None = None, communicator: MPI.Comm | None 
         If the packing does not come to rest.
     """
     law = MindlinLaw(scene.law.kn, scene.law.kt, scene.law.mus[0] if mu is None else mu)
-    packing = _settled(scene, law, communicator) if isinstance(scene.packing, GeneratedPacking) else _stored(scene, law)
+    packing = (
+        _settled(scene, law, communicator)
+        if isinstance(scene.packing, GeneratedPacking)
+        else _stored(scene, law)
+    )
     with Engine(packing, communicator) as engine:
-        return equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), packing.fx)
+        return equilibrate(
+            engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), packing.fx
+        )
 
 
 def ramp(
@@ -139,6 +145,48 @@ def next_equilibrium(engine: Engine, last: Equilibrium, fx: float, scene: Scene)
         )
     packing = engine.packing
     return Equilibrium(packing, relaxation.residual, rounding_floor(packing), relaxation.steps)
+
+
+class Path:
+    """Equilibria of a scene as a function of F_x, computed when they are asked for.
+
+    Beyond the largest F_x so far the ramp is continued and the equilibrium kept; in between, the equilibrium
+    follows from the kept one just below, and is not kept.
+
+    Parameters
+    ----------
+    engine : Engine
+        LAMMPS with the packing of `start`.
+    start : Equilibrium
+        Where the ramp begins.
+    scene : Scene
+        With a section [ramp], for its method and force tolerance.
+    """
+
+    def __init__(self, engine: Engine, start: Equilibrium, scene: Scene) -> None:
+        self._engine, self._scene = engine, scene
+        self.kept = [start]
+
+    def __call__(self, fx: float) -> Packing:
+        """The packing in equilibrium at fx."""
+        below = next((each for each in reversed(self.kept) if each.fx <= fx), self.kept[0])
+        if below.fx == fx:
+            return below.packing
+        found = next_equilibrium(self._engine, below, fx, self._scene)
+        if fx > self.kept[-1].fx:
+            self.kept.append(found)
+        return found.packing
+
+    def climb(self, forces: NDArray[np.float64]) -> Iterator[Equilibrium]:
+        """The equilibria at increasing forces, up to the last one that the packing bears."""
+        for fx in forces:
+            try:
+                self(float(fx))
+            except NoEquilibriumError:
+                if len(self.kept) < 2:
+                    raise
+                return
+            yield self.kept[-1]
 
 
 @dataclass(frozen=True)
@@ -227,7 +275,10 @@ def perturb(
         raise SceneError(f"perturb.time = {settings.time:g} is shorter than one step, {dt:.4g}: run longer")
     every = max(1, int(settings.time / dt / samples))
     inertia = packing.inertia_factor * packing.mass * packing.radius**2
-    with Engine(packing, communicator) as engine, engine.undamped(dt, settings.amplitude, settings.omega or 0.0):
+    with (
+        Engine(packing, communicator) as engine,
+        engine.undamped(dt, settings.amplitude, settings.omega or 0.0),
+    ):
         for k in range(1, int(settings.time / dt / every) + 1):
             motion = engine.advance(every)
             yield Sample(
@@ -243,7 +294,9 @@ def perturb(
 def reach(scene: Scene, fx: float, communicator: MPI.Comm | None = None) -> Iterator[Equilibrium]:
     """The equilibria of a ramp up to and with fx, by the steps of the scene's ramp or, without one, of 1e-3."""
     step = scene.ramp.step if scene.ramp else 1e-3
-    settings = (scene.ramp or Ramp(until=max(fx, step))).model_copy(update={"step": step, "until": max(fx, step)})
+    settings = (scene.ramp or Ramp(until=max(fx, step))).model_copy(
+        update={"step": step, "until": max(fx, step)}
+    )
     bounded = scene.model_copy(update={"ramp": settings})
     last = None
     for last in ramp(bounded, communicator=communicator):
@@ -315,7 +368,9 @@ class Record:
     def _open(self, packing: Packing) -> RunFile:
         if self._file is None:
             exists = self.path.exists() and self.last is not None
-            self._file = RunFile(self.path, "a") if exists else RunFile.create(self.path, packing, self._attributes())
+            self._file = (
+                RunFile(self.path, "a") if exists else RunFile.create(self.path, packing, self._attributes())
+            )
         return self._file
 
     def _attributes(self) -> dict[str, str | int]:
@@ -323,7 +378,10 @@ class Record:
             "scene": json.dumps(self.scene.resolved()),
             "seed": getattr(self.scene.packing, "seed", -1),
             "ranks": self.communicator.size,
-            **{f"version_{name}": version(name) for name in ("faultgouge", "lammps", "numpy", "scipy", "h5py")},
+            **{
+                f"version_{name}": version(name)
+                for name in ("faultgouge", "lammps", "numpy", "scipy", "h5py")
+            },
         }
 
     def __enter__(self) -> Record:
@@ -352,7 +410,9 @@ def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None) -> Pa
         engine.settle(SETTLING_TOLERANCE * scene.load.fy / 3)
         packing = engine.packing
         try:
-            packing = equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), 0.0).packing
+            packing = equilibrate(
+                engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), 0.0
+            ).packing
         except NoEquilibriumError as error:
             raise NoEquilibriumError(
                 f"the packing did not settle (a disk feels {packing.residual:.2g}): try another seed, or more disks in "
@@ -373,9 +433,7 @@ def _stored(scene: Scene, law: MindlinLaw) -> Packing:
         with RunFile(path) as file:
             if len(file) == 0:
                 raise PackingFileError(f"{path} has no equilibrium in it")
-            packing = replace(
-                file.packing(0), law=law, inertia_factor=scene.inertia_factor, fy=scene.load.fy
-            )
+            packing = replace(file.packing(0), law=law, inertia_factor=scene.inertia_factor, fy=scene.load.fy)
     if packing.residual > OUT_OF_BALANCE * scene.load.fy:
         raise SceneError(
             f"{path}: the packing is not in balance, a disk feels {packing.residual:.3g} under fy = {scene.load.fy:g}: "

@@ -32,8 +32,12 @@ app = typer.Typer(
     epilog="Example: [bold]faultgouge reproduce -o results[/bold]",
 )
 
-ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)]
-Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted one is continued.")]
+ScenePath = Annotated[
+    Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)
+]
+Out = Annotated[
+    Path, typer.Option("-o", "--output", help="The file to write; an interrupted one is continued.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
@@ -66,7 +70,9 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     wanted = _scene(scene)
     with Record(output, wanted) as record:
         total = len(loads(wanted.ramp)) if wanted.ramp else None
-        done = 0 if record.last is None or wanted.ramp is None else round(record.last.fx / wanted.ramp.step) + 1
+        done = (
+            0 if record.last is None or wanted.ramp is None else round(record.last.fx / wanted.ramp.step) + 1
+        )
         for equilibrium in _progress(ramp_up(wanted, record.last), "equilibria", total, done):
             record.append(equilibrium)
     _say(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")  # type: ignore[union-attr]
@@ -84,7 +90,9 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     if wanted.perturb is None:
         raise SceneError(f"{scene}: the scene has no section [perturb]: add it, with fx and time")
     if output.exists():
-        raise SceneError(f"{output} exists: an undamped run starts from rest, so give another name or delete it")
+        raise SceneError(
+            f"{output} exists: an undamped run starts from rest, so give another name or delete it"
+        )
     with Record(output, wanted) as record:
         start: Equilibrium | None = None
         for start in _progress(reach(wanted, wanted.perturb.fx), "equilibria"):
@@ -157,11 +165,59 @@ def spectrum(
     if not pairs:
         print("no complex pair: linearly stable")
     if result.noise_pairs:
-        print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
+        print(
+            f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real"
+        )
+
+
+@app.command(epilog="Example: [bold]faultgouge onset paper.toml --json[/bold]")
+def onset(
+    scene: ScenePath,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Also write the JSON to this file.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """The onset F_x^c and the windows of complex eigenvalues, for each friction coefficient of the scene."""
+    from faultgouge.studies.onsets import onset_run
+
+    wanted = _scene(scene)
+    found = []
+    for mu in wanted.law.mus:
+        with _status(f"mu = {mu:g}: ramp and onset"):
+            run = onset_run(wanted, mu)
+        found.append({"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond})
+        _say(f"mu = {mu:g}: F_x^c = {run.onset.fx_c:.12g} +- {run.onset.error:.1g}")
+    result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
+    if output and _is_root():
+        output.write_text(json.dumps(result, indent=1) + "\n")
+    if as_json:
+        _print_json(result)
+
+
+@app.command(epilog="Example: [bold]faultgouge reproduce -o results[/bold]")
+def reproduce(
+    scene: Annotated[
+        Path | None, typer.Argument(metavar="[SCENE]", help="Another scene than the one that ships.")
+    ] = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="The folder for figures, numbers and report.")
+    ] = Path("results"),
+) -> None:
+    """The paper's protocol on one packing: figures 1, 3, 4, numbers and a report."""
+    from importlib.resources import files
+
+    from faultgouge.studies.reproduce import reproduce as run_protocol
+
+    run_protocol(_scene(scene or Path(str(files("faultgouge") / "scenes" / "paper.toml"))), output, _say)
+    _say(f"written: {output}/report.md")
 
 
 def main() -> None:
     """Run the command; what goes wrong is said in one sentence."""
+    # one thread for BLAS: its threads cost more than they bring at these sizes, and results do not depend on them
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     try:
         app(standalone_mode=False)
     except KeyboardInterrupt:
@@ -189,7 +245,7 @@ def _sentence(error: Exception) -> str:
 
 def _stop(sentence: str, code: int) -> None:
     if sentence and _is_root():
-        Console(stderr=True, soft_wrap=True, highlight=False).print(f"[bold red]Error:[/bold red] ", end="")
+        Console(stderr=True, soft_wrap=True, highlight=False).print("[bold red]Error:[/bold red] ", end="")
         print(sentence, file=sys.stderr)
     sys.exit(code)
 

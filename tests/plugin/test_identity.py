@@ -12,10 +12,13 @@ include         {decks}/system.in
 atom_modify     sort {sort} 0.0
 timestep        2e-3
 """
-START = HEAD + """
+START = (
+    HEAD
+    + """
 fix             move all nve/disc 1.0
 {extra}
 """
+)
 # a layer that is torn off: contacts slide, open and close, disks go round the periodic box, and the
 # neighbour lists are built some 360 times
 RUN = """
@@ -52,7 +55,15 @@ def trajectory(lmp, tmp_path):
             "dump seen all local 1 seen.* index c_seen[*]"
         },
     ],
-    ids=["2 ranks", "newton off", "newton off, 2 ranks", "no sorting", "sorting, 2 ranks", "run 0", "pair/local"],
+    ids=[
+        "2 ranks",
+        "newton off",
+        "newton off, 2 ranks",
+        "no sorting",
+        "sorting, 2 ranks",
+        "run 0",
+        "pair/local",
+    ],
 )
 def test_same_trajectory(trajectory, changes):
     straight = trajectory()
@@ -62,13 +73,17 @@ def test_same_trajectory(trajectory, changes):
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_restart_in_the_same_process(trajectory, ranks):
-    again = """
+    again = (
+        """
 write_restart   middle.restart
 clear
 variable        restart index middle.restart
-""" + HEAD.format(**DEFAULTS) + """
+"""
+        + HEAD.format(**DEFAULTS)
+        + """
 fix             move all nve/disc 1.0
 """
+    )
     assert trajectory(ranks=ranks, middle=again) == trajectory()
 
 
@@ -76,9 +91,7 @@ fix             move all nve/disc 1.0
 def test_restart_in_a_new_process(trajectory, lmp, tmp_path, ranks):
     straight = trajectory(ranks=ranks, middle="write_restart middle.restart")
     (tmp_path / "end").unlink()
-    second = (START + RUN[RUN.index("{middle}") :]).format(
-        **{**DEFAULTS, "middle": ""}
-    )
+    second = (START + RUN[RUN.index("{middle}") :]).format(**{**DEFAULTS, "middle": ""})
     done = lmp(second, "-var", "restart", "middle.restart", ranks=3 - ranks)
     assert done.returncode == 0, done.stdout[-2000:]
     assert (tmp_path / "end").read_text() == straight[1] == trajectory()[1]

@@ -1,0 +1,701 @@
+r"""Onset of complex eigenvalues along a ramp of the load: windows, solved for and not scanned.
+
+Two real eigenvalues of a non-symmetric operator A(F) may meet at an exceptional point and leave the axis as a
+complex pair. Their difference goes as the square root of the distance, which root finders and scans handle
+badly, but on the invariant subspace that the two span, with 2 x 2 block B, the discriminant
+
+.. math::
+
+    D(F) = (\lambda_1 - \lambda_2)^2 = \mathrm{tr}^2 B - 4 \det B = (B_{11} - B_{22})^2 + 4 B_{12} B_{21}
+
+goes through zero linearly and stays smooth and real on both sides. B is the two-sided projection
+:math:`(U^T V)^{-1} U^T A V` on orthonormal bases V, U of the right and the left invariant subspace: neither
+degrades where the eigenvectors themselves become parallel, and the last form of D does not cancel. A few
+secant steps give ten digits.
+
+**Identity.** Modes at neighbouring loads a, b are assigned by :math:`|x_a^H x_b|\,|y_a^H y_b|` over unit
+right and left vectors, so modes that cross do not swap names. (:math:`|y_a^H x_b|`, the obvious weight,
+vanishes at the very point that is sought.)
+
+**Windows narrower than the increment.** With the sensitivities :math:`\lambda' = y^H A' x / y^H x`, A' the
+difference of both ends, a pair has :math:`D' = 2 (\lambda_1 - \lambda_2)(\lambda_1' - \lambda_2')` at either
+end. Two modes that pass each other would dip to D = 0 in between; the product of their couplings decides
+between an avoided crossing and a window of width proportional to its root. A cubic is drawn through both
+values and slopes, and a parabola through either slope and both values; where the lowest, less their
+disagreement, is negative, an equilibrium is computed at the predicted minimum and both halves are examined
+again, until no window wider than a stated width can hide. The same is done where the assignment is
+inconsistent.
+
+**Coalescence or not.** An edge is a coalescence if D passes through zero along a straight line at distances
+far below the increment, and there :math:`|y^H x| \to 0`; a mere crossing touches D = 0 without a change of
+sign. If D jumps, the equilibrium itself does: a contact opened, closed or slid. The edge is then located by
+bisection, and says so.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import eig
+from scipy.optimize import brentq, linear_sum_assignment
+
+from .packing import Floats, Indices, Packing
+from .spectrum import Complexes, believable, dynamical_matrix, unit_rounding
+from .stiffness import Form
+
+Pair = tuple[int, int]
+Kind = Literal["coalescence", "contact change", "start", "scan"]
+
+
+class OnsetError(RuntimeError):
+    """No complex pair appears on the given loads."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """An interval of loads on which one pair of eigenvalues is complex.
+
+    Attributes
+    ----------
+    fx_onset : float
+        Load at which the pair becomes complex, force per top disk.
+    fx_end : float or None
+        Load at which it is real again; None if it is complex at the largest load.
+    eigenvalue : float
+        The double eigenvalue at the onset (the real part of the pair if it does not coalesce there), 1 /
+        time^2.
+    error : float
+        Uncertainty of fx_onset: twice the scatter of the discriminant over its slope for a coalescence, the
+        bracket otherwise; and what the equilibria's residual r amounts to. A packing out of balance by r is
+        the exact equilibrium of other loads, and if the discriminant is as sensitive to any force as to those
+        of the n top disks, fx is uncertain by r / n^(1/2). How the path of equilibria depends on the
+        increments is not in it.
+    end_error : float or None
+        The same for fx_end.
+    overlap : float
+        Smallest |y^H x| met at the onset; it vanishes at an exceptional point, to the root of the rounding
+        error.
+    kind : {"coalescence", "contact change", "start", "scan"}
+        What begins the window: two real eigenvalues that meet; a jump of the equilibrium; nothing, as the
+        pair is complex at the smallest load; or unknown, in a scan.
+    """
+
+    fx_onset: float
+    fx_end: float | None
+    eigenvalue: float
+    error: float
+    end_error: float | None
+    overlap: float
+    kind: Kind
+
+    def as_dict(self) -> dict[str, Any]:
+        """The keys of the JSON contract: fx_onset, fx_end, lambda, error, kind."""
+        return {
+            "fx_onset": self.fx_onset,
+            "fx_end": self.fx_end,
+            "lambda": self.eigenvalue,
+            "error": self.error,
+            "kind": self.kind,
+        }
+
+
+@dataclass(frozen=True)
+class Onset:
+    """The windows of complex eigenvalues along a ramp.
+
+    Attributes
+    ----------
+    windows : tuple of Window
+        By increasing onset; at least one.
+    """
+
+    windows: tuple[Window, ...]
+
+    @property
+    def fx_c(self) -> float:
+        """F_x^c, the first onset, force per top disk."""
+        return self.windows[0].fx_onset
+
+    @property
+    def error(self) -> float:
+        """Uncertainty of fx_c."""
+        return self.windows[0].error
+
+    def as_dict(self) -> dict[str, Any]:
+        """{"fx_c", "error", "windows": [...]} of plain numbers, for JSON."""
+        return {
+            "fx_c": self.fx_c,
+            "error": self.error,
+            "windows": [window.as_dict() for window in self.windows],
+        }
+
+
+def find_onset(
+    equilibrium: Callable[[float], Packing],
+    forces: ArrayLike,
+    *,
+    form: Form = "consistent",
+    narrowest: float | None = None,
+) -> Onset:
+    """Every window of complex eigenvalues between the smallest and the largest load.
+
+    Parameters
+    ----------
+    equilibrium : callable
+        fx -> Packing in equilibrium. It is called with the given loads in increasing order, and between calls
+        for the loads a and b with loads between a and b, in any order; there it best starts from its
+        equilibrium at a.
+    forces : array_like, shape (S,)
+        The increasing loads of the ramp, force per top disk.
+    form : {"consistent", "paper"}
+        As in :func:`~faultgouge.analysis.stiffness_matrix`.
+    narrowest : float, optional
+        Windows narrower than this are not looked for, force; 1e-7 of the largest |load| by default. Such a
+        pair would grow more slowly than any run can show.
+
+    Returns
+    -------
+    Onset
+
+    Raises
+    ------
+    OnsetError
+        If all eigenvalues are real at every load.
+    ValueError
+        If the loads are not at least two increasing numbers.
+    """
+
+    unbalanced: dict[float, float] = {}
+
+    def operator(fx: float) -> Floats:
+        packing = equilibrium(fx)
+        unbalanced[fx] = packing.residual / float(np.sqrt(max(1, packing.top.sum())))
+        return full_operator(packing, form)
+
+    def balance(fx: float) -> float:
+        return unbalanced[min(unbalanced, key=lambda known: abs(known - fx))]
+
+    windows = tuple(
+        replace(
+            window,
+            error=window.error + balance(window.fx_onset),
+            end_error=None if window.fx_end is None else (window.end_error or 0.0) + balance(window.fx_end),
+        )
+        for window in complex_windows(operator, forces, narrowest=narrowest)
+    )
+    if not windows:
+        largest = float(np.asarray(forces, dtype=np.float64)[-1])
+        raise OnsetError(
+            f"No pair of eigenvalues becomes complex up to fx = {largest:.17g}: raise the largest load."
+        )
+    return Onset(windows)
+
+
+def complex_windows(
+    operator: Callable[[float], Floats], forces: ArrayLike, *, narrowest: float | None = None
+) -> tuple[Window, ...]:
+    """Windows of complex eigenvalues of a one-parameter family of matrices.
+
+    Parameters
+    ----------
+    operator : callable
+        fx -> ndarray, shape (n, n), in coordinates that do not depend on fx. Zero rows are left out.
+    forces, narrowest
+        As in :func:`find_onset`.
+
+    Returns
+    -------
+    tuple of Window
+        By increasing onset; may be empty.
+
+    Raises
+    ------
+    ValueError
+        If the loads are not at least two increasing numbers.
+    """
+    loads = _increasing(forces)
+
+    def modes(fx: float) -> Modes:
+        return Modes.of(fx, operator(fx))
+
+    here = modes(float(loads[0]))
+    windows = _Windows(here)
+    search = _Search(modes, 1e-7 * np.abs(loads).max() if narrowest is None else narrowest, windows)
+    for load in loads[1:]:
+        there = modes(float(load))
+        search.walk(here, there)
+        here = there
+    return windows.all()
+
+
+def scan_windows(packings: Sequence[Packing], form: Form = "consistent") -> tuple[Window, ...]:
+    """Windows that stored equilibria show by themselves, each edge uncertain by half its increment.
+
+    Parameters
+    ----------
+    packings : sequence of Packing
+        Equilibria of increasing fx, at least two.
+    form : {"consistent", "paper"}
+        As in :func:`~faultgouge.analysis.stiffness_matrix`.
+
+    Returns
+    -------
+    tuple of Window
+        Edges are midpoints between the last equilibrium on one side and the first on the other; kind is
+        "scan". Windows between two equilibria are missed, which is what :func:`find_onset` is for.
+
+    Raises
+    ------
+    ValueError
+        If the loads do not increase.
+    """
+    _increasing([packing.fx for packing in packings])
+    states = [Modes.of(packing.fx, full_operator(packing, form)) for packing in packings]
+    windows = _Windows(states[0])
+    for here, there in pairwise(states):
+        windows.advance(
+            _Step(here, there), lambda step, _, image: step.halfway(step.there.block(image), "scan"), "scan"
+        )
+    return windows.all()
+
+
+def follow(packings: Iterable[Packing], form: Form = "consistent") -> Complexes:
+    """Eigenvalues along a ramp, each mode in a column of its own.
+
+    Parameters
+    ----------
+    packings : iterable of Packing
+        Equilibria along a ramp, close enough for modes to be recognised.
+    form : {"consistent", "paper"}
+        As in :func:`~faultgouge.analysis.stiffness_matrix`.
+
+    Returns
+    -------
+    ndarray of complex, shape (S, E)
+        Column k follows the k-th lowest eigenvalue of the first packing; nan from where a mode is gone.
+    """
+    rows: list[Complexes] = []
+    before: Modes | None = None
+    for packing in packings:
+        modes = Modes.of(packing.fx, full_operator(packing, form))
+        if before is None:
+            columns = np.arange(len(modes.values))
+        else:
+            partner = assign(before, modes)
+            columns = np.where(columns >= 0, partner[columns], -1)
+        rows.append(np.where(columns >= 0, modes.values[columns], np.nan))
+        before = modes
+    return np.array(rows)
+
+
+def full_operator(packing: Packing, form: Form = "consistent") -> Floats:
+    """A = M^(-1/2) K M^(-1/2) as a dense array, shape (3N, 3N), with its zero rows; 1 / time^2."""
+    sparse, active = dynamical_matrix(packing, form)
+    matrix = np.zeros((3 * len(packing),) * 2)
+    matrix[np.ix_(active, active)] = sparse.toarray()
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The modes of the operator at one load.
+
+    Attributes
+    ----------
+    fx : float
+        The load.
+    matrix : ndarray, shape (n, n)
+        The operator A, 1 / time^2.
+    values : ndarray of complex, shape (E,)
+        Eigenvalues by real part, then imaginary part. Complex pairs that are rounding noise have lost their
+        imaginary parts.
+    right, left : ndarray of complex, shape (n, E)
+        Unit vectors in columns.
+    partner : ndarray of int, shape (E,)
+        Index of the complex conjugate; -1 for a real eigenvalue.
+    """
+
+    fx: float
+    matrix: Floats
+    values: Complexes
+    right: Complexes
+    left: Complexes
+    partner: Indices
+
+    @classmethod
+    def of(cls, fx: float, matrix: Floats) -> "Modes":
+        """Solve the dense eigenproblem, without the coordinates whose rows are zero."""
+        active = np.flatnonzero(np.any(matrix != 0, axis=1))
+        size, count = len(matrix), len(active)
+        right, left = np.zeros((2, size, count), dtype=np.complex128)
+        if count == 0:
+            return cls(fx, matrix, np.zeros(0, complex), right, left, np.zeros(0, int))
+        values, left[active], right[active] = eig(matrix[np.ix_(active, active)], left=True, right=True)
+        order = np.lexsort((values.imag, values.real))
+        values, right, left = values[order], right[:, order], left[:, order]
+        rounding = unit_rounding(matrix)
+        partner = np.full(count, -1)
+        for k in np.flatnonzero(values.imag > 0):
+            conjugate = int(np.argmin(np.abs(values - values[k].conj())))
+            if believable(values[k], abs(np.vdot(left[:, k], right[:, k])), rounding):
+                partner[k], partner[conjugate] = conjugate, k
+            else:
+                values[[k, conjugate]] = values[k].real
+        return cls(fx, matrix, values, right, left, partner)
+
+    @property
+    def complex_pairs(self) -> list[Pair]:
+        """Indices of the members of each pair, the one with positive imaginary part first."""
+        return [(int(k), int(self.partner[k])) for k in np.flatnonzero(self.values.imag > 0)]
+
+    def block(self, pair: Pair) -> "Block":
+        """The 2 x 2 block on the invariant subspace of two modes."""
+        modes = list(pair)
+        v, u = _span(self.right[:, modes]), _span(self.left[:, modes])
+        b = np.linalg.solve(u.T @ v, u.T @ (self.matrix @ v))
+        overlap = np.abs(np.sum(self.left[:, modes].conj() * self.right[:, modes], axis=0)).min()
+        return Block(
+            mean=float(0.5 * (b[0, 0] + b[1, 1])),
+            discriminant=float((b[0, 0] - b[1, 1]) ** 2 + 4 * b[0, 1] * b[1, 0]),
+            overlap=float(overlap),
+            right=v,
+            left=u,
+        )
+
+    def nearest(self, block: "Block") -> Pair:
+        """The two modes that lie closest to the subspaces of a block at a neighbouring load."""
+        weight = np.linalg.norm(block.right.T @ self.right, axis=0) * np.linalg.norm(
+            block.left.T @ self.left, axis=0
+        )
+        first, second = np.argsort(weight)[-2:]
+        return int(first), int(second)
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """The 2 x 2 block of a pair: half its trace, discriminant, smaller |y^H x|, bases of shape (n, 2)."""
+
+    mean: float
+    discriminant: float
+    overlap: float
+    right: Floats
+    left: Floats
+
+
+def assign(here: Modes, there: Modes) -> Indices:
+    """Which mode there each mode here has become.
+
+    Parameters
+    ----------
+    here, there : Modes
+        Modes at two neighbouring loads.
+
+    Returns
+    -------
+    ndarray of int, shape (E,)
+        Index there; -1 where there are fewer modes there. The assignment maximises the sum of |x^H x'| |y^H
+        y'|.
+    """
+    weight = np.abs(here.right.conj().T @ there.right) * np.abs(here.left.conj().T @ there.left)
+    rows, columns = linear_sum_assignment(weight, maximize=True)
+    partner = np.full(len(here.values), -1)
+    partner[rows] = columns
+    # Members of one pair have the same weights: let the one above the axis stay above.
+    for up, down in here.complex_pairs:
+        if (
+            partner[up] >= 0
+            and there.partner[partner[up]] == partner[down]
+            and there.values[partner[up]].imag < 0
+        ):
+            partner[[up, down]] = partner[[down, up]]
+    return partner
+
+
+class _Step:
+    """Two neighbouring loads, the assignment of their modes, and what may happen in between."""
+
+    def __init__(self, here: Modes, there: Modes) -> None:
+        self.here, self.there = here, there
+        self.forward = assign(here, there)
+        self.backward = np.full(len(there.values), -1)
+        known = self.forward >= 0
+        self.backward[self.forward[known]] = np.flatnonzero(known)
+        self.staying: list[tuple[Pair, Pair]] = []
+        self.opening: list[tuple[Pair, Pair]] = []
+        self.closing: list[tuple[Pair, Pair]] = []
+        self.lost: list[Pair] = []
+        self.found: list[Pair] = []
+        for pair in here.complex_pairs:
+            image = (int(self.forward[pair[0]]), int(self.forward[pair[1]]))
+            if min(image) < 0 or not self._same_plane(pair, image):
+                self.lost.append(pair)
+            elif there.partner[image[0]] == image[1]:
+                self.staying.append((pair, image))
+            elif there.partner[image[0]] == there.partner[image[1]] == -1:
+                self.closing.append((pair, image))
+            else:
+                self.lost.append(pair)
+        arrived = {image for _, image in self.staying}
+        for image in there.complex_pairs:
+            if image in arrived:
+                continue
+            pair = (int(self.backward[image[0]]), int(self.backward[image[1]]))
+            real = min(pair) >= 0 and here.partner[pair[0]] == here.partner[pair[1]] == -1
+            if real and self._same_plane(pair, image):
+                self.opening.append((pair, image))
+            else:
+                self.found.append(image)
+
+    def _same_plane(self, pair: Pair, image: Pair) -> bool:
+        """Whether both planes are the same rather than not: all principal angles below 60 degrees."""
+        before, after = self.here.block(pair), self.there.block(image)
+        right = np.linalg.svd(before.right.T @ after.right, compute_uv=False)
+        left = np.linalg.svd(before.left.T @ after.left, compute_uv=False)
+        return bool(min(right[-1], left[-1]) > 0.5)
+
+    @property
+    def consistent(self) -> bool:
+        """Whether every complex pair at one end is recognised at the other."""
+        return not self.lost and not self.found
+
+    def halfway(self, block: Block, kind: Kind) -> "_Edge":
+        """An edge somewhere in this step."""
+        half = 0.5 * (self.there.fx - self.here.fx)
+        return _Edge(self.here.fx + half, half, block.mean, block.overlap, kind)
+
+    def hidden_window(self, narrowest: float) -> float | None:
+        """Load where a window wider than `narrowest`, or a gap in one, most likely hides; None if nowhere."""
+        here, there = self.here, self.there
+        known = np.flatnonzero(self.forward >= 0)
+        # Only neighbours can meet: consider those that are so at an end, and those that change order.
+        a, b = here.values[known], there.values[self.forward[known]]
+        p, q = np.triu_indices(len(known), 1)
+        rank = np.empty(len(known), int)
+        rank[np.argsort(b.real)] = np.arange(len(known))
+        near = (q - p == 1) | (np.abs(rank[q] - rank[p]) == 1) | (rank[q] < rank[p])
+        real_a, real_b = here.partner[known] < 0, there.partner[self.forward[known]] < 0
+        alone = real_a[p] & real_a[q] & real_b[p] & real_b[q]
+        staying = (here.partner[known[p]] == known[q]) & (
+            there.partner[self.forward[known[p]]] == self.forward[known[q]]
+        )
+        kept = (near & alone) | staying
+        if not np.any(kept):
+            return None
+        p, q = p[kept], q[kept]
+        change = there.matrix - here.matrix
+        drift_a, drift_b = _sensitivity(here, change)[known], _sensitivity(there, change)[self.forward[known]]
+        gap_a, gap_b = a[p] - a[q], b[p] - b[q]
+        # In a window that stays open it is a gap that may hide: turn D over.
+        sign = np.where(here.partner[known[p]] < 0, 1.0, -1.0)
+        width, at = deepest_dip(
+            sign * (gap_a**2).real,
+            sign * (2 * gap_a * (drift_a[p] - drift_a[q])).real,
+            sign * (gap_b**2).real,
+            sign * (2 * gap_b * (drift_b[p] - drift_b[q])).real,
+        )
+        span = there.fx - here.fx
+        worst = int(np.argmax(width))
+        if width[worst] * span <= narrowest:
+            return None
+        margin = 0.25 * narrowest / span  # never return an end
+        return here.fx + span * float(np.clip(at[worst], margin, 1 - margin))
+
+
+def _sensitivity(modes: Modes, change: Floats) -> Complexes:
+    """First-order change of each eigenvalue, y^H dA x / y^H x."""
+    y = modes.left.conj()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sum(y * (change @ modes.right), axis=0) / np.sum(y * modes.right, axis=0)
+
+
+def deepest_dip(d0: Floats, s0: Floats, d1: Floats, s1: Floats) -> tuple[Floats, Floats]:
+    """The widest stretch of 0 < t < 1 on which functions known at both ends may be negative.
+
+    Parameters
+    ----------
+    d0, s0, d1, s1 : ndarray, shape (P,)
+        Values, positive, and slopes at t = 0 and at t = 1.
+
+    Returns
+    -------
+    width : ndarray, shape (P,)
+        Largest possible width in t, at most 1; zero where a function surely stays positive.
+    at : ndarray, shape (P,)
+        Where it is deepest.
+
+    Notes
+    -----
+    The disagreement of cubic and parabolas does not show what the secant A' hides, the curvature of A over
+    the interval: it enters as a twentieth of the smaller value, more than enough for loads between which
+    modes are recognised at all.
+    """
+    # Parabolas d0 + s0 t + f t^2 and d1 - s1 r + g r^2, r = 1 - t; cubic d0 + s0 t + h t^2 + k t^3.
+    f, g = d1 - d0 - s0, d0 - d1 + s1
+    h, k = 3 * (d1 - d0) - 2 * s0 - s1, 2 * (d0 - d1) + s0 + s1
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(np.maximum(h * h - 3 * k * s0, 0.0))
+        t = np.array([-s0 / (2 * f), 1 - s1 / (2 * g), (root - h) / (3 * k)])
+        t = np.clip(np.nan_to_num(t, nan=0.5), 0.0, 1.0)
+        r = 1 - t
+        cubic = d0 + t * (s0 + t * (h + t * k))
+        spread = np.maximum(np.abs(d0 + t * (s0 + t * f) - cubic), np.abs(d1 - r * (s1 - r * g) - cubic))
+        lowest = cubic - spread - 0.05 * np.minimum(d0, d1) * (4 * t * r)
+        deepest = np.argmin(lowest, axis=0), np.arange(len(d0))
+        depth = np.maximum(-lowest[deepest], 0.0)
+        width = np.where(depth > 0, 2 * np.sqrt(depth / np.maximum(np.abs(f), np.abs(g))), 0.0)
+    return np.minimum(width, 1.0), t[deepest]
+
+
+@dataclass(frozen=True)
+class _Edge:
+    """Where a pair enters or leaves the real axis."""
+
+    fx: float
+    error: float
+    eigenvalue: float
+    overlap: float
+    kind: Kind
+
+
+class _Windows:
+    """The windows that are open at the load reached so far, and those that are closed."""
+
+    def __init__(self, first: Modes) -> None:
+        self.open: dict[Pair, _Edge] = {}
+        self.closed: list[Window] = []
+        for pair in first.complex_pairs:
+            block = first.block(pair)
+            self.open[pair] = _Edge(first.fx, 0.0, block.mean, block.overlap, "start")
+
+    def advance(self, step: "_Step", edge: Callable[["_Step", Pair, Pair], _Edge], lost: Kind) -> None:
+        """Carry them over a step; pairs that are not recognised end and begin halfway."""
+        now = {image: self.open.pop(pair) for pair, image in step.staying}
+        for pair, image in step.closing:
+            self.closed.append(_window(self.open.pop(pair), edge(step, pair, image)))
+        for pair, image in step.opening:
+            now[image] = edge(step, pair, image)
+        for pair in step.lost:
+            self.closed.append(_window(self.open.pop(pair), step.halfway(step.here.block(pair), lost)))
+        for image in step.found:
+            now[image] = step.halfway(step.there.block(image), lost)
+        self.open = now
+
+    def all(self) -> tuple[Window, ...]:
+        still = [_window(edge, None) for edge in self.open.values()]
+        return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Walks along the loads, with as many loads in between as it takes to be sure."""
+
+    modes: Callable[[float], Modes]
+    narrowest: float
+    windows: _Windows
+
+    def walk(self, here: Modes, there: Modes) -> None:
+        """Go from one load to the next."""
+        step = _Step(here, there)
+        if there.fx - here.fx > self.narrowest:
+            middle = step.hidden_window(self.narrowest) if step.consistent else 0.5 * (here.fx + there.fx)
+            if middle is not None:
+                between = self.modes(middle)
+                self.walk(here, between)
+                self.walk(between, there)
+                return
+            edges = step.closing + step.opening
+            if edges:
+                edge, before, behind = self.solve(step, *edges[0])
+                if here.fx < before.fx < behind.fx < there.fx:
+                    # What lies on either side of this edge has yet to be looked at.
+                    self.walk(here, before)
+                    self.windows.advance(_Step(before, behind), lambda *_: edge, "contact change")
+                    self.walk(behind, there)
+                    return
+        self.windows.advance(step, lambda *edge: self.solve(*edge)[0], "contact change")
+
+    def solve(self, step: "_Step", pair: Pair, image: Pair) -> tuple[_Edge, Modes, Modes]:
+        """The root of D for a pair that is complex at one end only, and the modes close by on either side."""
+        here, there = step.here, step.there
+        before, after = here.block(pair), there.block(image)
+        if before.discriminant * after.discriminant >= 0:
+            # One end is within rounding of the coalescence: the edge is there, to within D over its slope.
+            end, fx = min((before, here.fx), (after, there.fx), key=lambda item: abs(item[0].discriminant))
+            slope = abs(after.discriminant - before.discriminant) / (there.fx - here.fx)
+            return _Edge(fx, abs(end.discriminant) / slope, end.mean, end.overlap, "coalescence"), here, there
+        known = {here.fx: (here, before), there.fx: (there, after)}
+
+        def block(fx: float) -> Block:
+            if fx not in known:
+                reference = before if fx - here.fx < there.fx - fx else after
+                modes = self.modes(fx)
+                known[fx] = modes, modes.block(modes.nearest(reference))
+            return known[fx][1]
+
+        # Ten digits and two to spare; the curve through five points takes over from there.
+        tolerance = 1e-12 * max(abs(here.fx), abs(there.fx))
+        root = float(brentq(lambda fx: block(fx).discriminant, here.fx, there.fx, xtol=tolerance))
+        room = min(root - here.fx, there.fx - root)
+        # As near as the noise allows: D should be straight, and yet stand out of the scatter.
+        distance = 1e-3 * min(room, 1e-3 * (there.fx - here.fx))
+        while 0 < distance < 0.1 * room:
+            points = [root + offset * distance for offset in (-2, -1, 0, 1, 2)]
+            edge = _coalescence(points, [block(fx) for fx in points])
+            if edge is not None:
+                return edge, known[points[0]][0], known[points[-1]][0]
+            distance *= 30
+        nearest = min((block(fx) for fx in known), key=lambda b: abs(b.discriminant))
+        jump = _Edge(root, tolerance, nearest.mean, nearest.overlap, "contact change")
+        below, above = (max(fx for fx in known if fx < root), min(fx for fx in known if fx > root))
+        return jump, known[below][0], known[above][0]
+
+
+def _coalescence(points: Sequence[float], blocks: Sequence[Block]) -> _Edge | None:
+    """Root and error of D from five equidistant points about it; None if D does not cross zero smoothly.
+
+    A parabola takes care of what curvature there is; two degrees of freedom are left for the scatter.
+    """
+    middle, distance = points[2], points[3] - points[2]
+    d = np.array([block.discriminant for block in blocks])
+    curve, residuals, *_ = np.polynomial.polynomial.polyfit(np.arange(-2, 3), d, 2, full=True)
+    scatter = float(np.sqrt(residuals[0].sum() / 2)) if residuals[0].size else 0.0
+    value, slope = float(curve[0]), float(curve[1])
+    # A step of height 1 has slope 0.3 and scatter 0.3 here.
+    if scatter > 0.1 * abs(slope) or abs(value) > abs(slope) or d[0] * d[-1] >= 0:
+        return None
+    shift = -value / slope * (1 + float(curve[2]) * value / slope**2)  # the parabola's root, to second order
+    return _Edge(
+        fx=middle + shift * distance,
+        error=2 * scatter / abs(slope) * distance + float(np.spacing(abs(middle))),
+        eigenvalue=float(np.mean([block.mean for block in blocks])),
+        overlap=min(block.overlap for block in blocks),
+        kind="coalescence",
+    )
+
+
+def _window(onset: _Edge, end: _Edge | None) -> Window:
+    return Window(
+        fx_onset=onset.fx,
+        fx_end=None if end is None else end.fx,
+        eigenvalue=onset.eigenvalue,
+        error=onset.error,
+        end_error=None if end is None else end.error,
+        overlap=onset.overlap,
+        kind=onset.kind,
+    )
+
+
+def _span(vectors: Complexes) -> Floats:
+    """Orthonormal real basis, shape (n, 2), of the plane of two real or two complex conjugate vectors."""
+    real_plane = np.hstack([vectors.real, vectors.imag])
+    return np.linalg.svd(real_plane, full_matrices=False)[0][:, :2]
+
+
+def _increasing(forces: ArrayLike) -> NDArray[np.float64]:
+    loads = np.array(forces, dtype=np.float64)
+    if loads.ndim != 1 or len(loads) < 2 or not np.all(np.isfinite(loads)) or np.any(np.diff(loads) <= 0):
+        raise ValueError("The loads of a ramp must be at least two finite, increasing numbers.")
+    return loads

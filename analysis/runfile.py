@@ -1,0 +1,366 @@
+"""run.h5: the equilibria of a run, to the bit, written as they come. The only place that knows the format.
+
+The file is H5MD 1.1, which MDAnalysis opens with
+``Universe.empty(N, trajectory=True).load_new("run.h5", format="H5MD", convert_units=False)``::
+
+    /h5md                          version, author, creator
+    /particles/disks/position      (T, N, 3)  centres, z = 0
+    /particles/disks/box           dimension 3, periodic along x or not
+    /particles/disks/box/edges     (T, 3)     period, height and largest diameter; only if periodic
+    /observables/angle             (T, N)     orientations
+    /observables/fx, fy            (T,)       force per top disk
+    /observables/residual          (T,)       the largest net force on a disk that has a contact
+    /observables/contacts          (T, C, 3)  rows (i, j, slip), j = -1 for the floor; unused rows are nan
+    /observables/<name>            (T,)       whatever scalars come with an equilibrium
+    /parameters/<name>             what never changes: radii, masses, top, law, inertia, box
+    /faultgouge/<name>/<column>    time series, such as D(t)
+
+Every element with a T is a group of ``value`` and of links to one common ``step`` (the number of the
+equilibrium) and ``time`` (the same number: equilibria have no time). A frame exists once ``step`` counts it,
+and ``step`` grows last, after everything else has been handed to the system: a run that is killed keeps every
+complete frame.
+
+Datasets depend on the scene alone. What belongs to the circumstances (resolved scene, versions, seed, ranks)
+is an attribute of the root. One file holds one set of disks and one law.
+"""
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .files import PackingFileError
+from .law import MindlinLaw
+from .packing import Contacts, Floats, Packing
+
+CREATOR = "faultgouge"
+
+
+class RunFile:
+    """A run.h5, open for reading or for appending; a context manager.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    mode : {"r", "a"}
+        Read, or read and append. :meth:`create` makes a new one.
+
+    Raises
+    ------
+    PackingFileError
+        If the file is missing, broken, or not written by this class.
+    """
+
+    def __init__(self, path: str | PathLike[str], mode: Literal["r", "a"] = "r") -> None:
+        self.path = Path(path)
+        if not self.path.is_file():
+            raise PackingFileError(f"{self.path} does not exist.")
+        try:
+            self._file = h5py.File(self.path, "r" if mode == "r" else "r+")
+        except OSError as error:
+            raise PackingFileError(f"{self.path} is not a readable HDF5 file: {error}.") from error
+        try:
+            foreign = self._file["h5md/creator"].attrs["name"] != CREATOR
+            self._step = self._file["particles/disks/position/step"]
+        except KeyError:
+            foreign = True
+        if foreign:
+            self._file.close()
+            raise PackingFileError(f"{self.path} is an HDF5 file, but not a run of {CREATOR}.")
+
+    @classmethod
+    def create(
+        cls,
+        path: str | PathLike[str],
+        packing: Packing,
+        attributes: Mapping[str, str | int | float] | None = None,
+    ) -> "RunFile":
+        """Start a new file for runs of the disks of a packing; an existing file is replaced.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        packing : Packing
+            Its radii, masses, upper layer, law, inertia factor and box are those of every frame. It is not
+            appended.
+        attributes : mapping, optional
+            Attributes of the root: the resolved scene as JSON, versions, seed, ranks.
+
+        Returns
+        -------
+        RunFile
+            Open for appending, without frames.
+
+        Raises
+        ------
+        PackingFileError
+            If the file cannot be written.
+        """
+        try:
+            file = h5py.File(path, "w")
+        except OSError as error:
+            raise PackingFileError(f"{path} cannot be written: {error}.") from error
+        with file:
+            _write_header(file, packing)
+            for name, value in (attributes or {}).items():
+                file.attrs[name] = value
+        return cls(path, "a")
+
+    def __enter__(self) -> "RunFile":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; what was appended is already in it."""
+        self._file.close()
+
+    def __len__(self) -> int:
+        """Number of complete frames."""
+        return int(self._step.shape[0])
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the root: scene, versions, seed, ranks."""
+        return {
+            name: getattr(value, "tolist", lambda value=value: value)()
+            for name, value in self._file.attrs.items()
+        }
+
+    @property
+    def fx(self) -> Floats:
+        """Force along +x on each top disk in every frame, shape (T,)."""
+        return self.observable("fx")
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """Names of everything that is stored with a frame."""
+        return tuple(self._file["observables"])
+
+    def observable(self, name: str) -> NDArray:
+        """An observable in every complete frame, shape (T, ...).
+
+        Raises
+        ------
+        KeyError
+            If it is not stored.
+        """
+        return self._file["observables"][name]["value"][: len(self)]
+
+    def append(self, packing: Packing, **scalars: float) -> None:
+        """Add a frame and see that it reaches the disk.
+
+        Parameters
+        ----------
+        packing : Packing
+            An equilibrium of the disks that the file was created for.
+        **scalars : float or int
+            Further observables, such as the force floor or the number of evaluations: the same names in every
+            frame.
+
+        Raises
+        ------
+        ValueError
+            If disks, law or box are not those of the file, or the names differ from those of earlier frames.
+        """
+        self._check_same(packing)
+        count = len(self)
+        contacts = np.column_stack([packing.contacts.i, packing.contacts.j, packing.contacts.slip])
+        frame: dict[str, ArrayLike] = {
+            "angle": packing.angle,
+            "fx": packing.fx,
+            "fy": packing.fy,
+            "residual": packing.residual,
+            "contacts": contacts,
+        }
+        taken = frame.keys() & scalars.keys()
+        if taken:
+            raise ValueError(f"The name {min(taken)} is taken: the packing itself says it.")
+        frame |= scalars
+        if count and set(frame) != set(self.observables):
+            raise ValueError(
+                f"Frames of {self.path} have the observables {', '.join(self.observables)}, not others."
+            )
+        for name, value in frame.items():
+            self._put(f"observables/{name}", np.asarray(value), count)
+        flat = np.column_stack([packing.position, np.zeros(len(packing))])
+        self._put("particles/disks/position", flat, count)
+        if packing.box_length is not None:
+            edges = [
+                packing.box_length,
+                (packing.position[:, 1] + packing.radius).max(),
+                2 * packing.radius.max(),
+            ]
+            self._put("particles/disks/box/edges", np.array(edges), count)
+        self._file.flush()
+        time = self._file["particles/disks/position/time"]
+        time.resize(count + 1, axis=0)
+        time[count] = count
+        self._step.resize(count + 1, axis=0)
+        self._step[count] = count
+        self._file.flush()
+
+    def packing(self, frame: int = -1) -> Packing:
+        """The packing of a frame, bit for bit.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame; negative ones count from the end.
+
+        Returns
+        -------
+        Packing
+
+        Raises
+        ------
+        PackingFileError
+            If there is no such frame.
+        """
+        count = len(self)
+        if not -count <= frame < count:
+            raise PackingFileError(f"{self.path} has {count} frames; there is no frame {frame}.")
+        frame %= count
+        rows = self._file["observables/contacts/value"][frame]
+        rows = rows[~np.isnan(rows[:, 0])]
+        parameters = self._file["parameters"]
+        return Packing(
+            position=self._file["particles/disks/position/value"][frame, :, :2],
+            radius=parameters["radius"][...],
+            angle=self._file["observables/angle/value"][frame],
+            mass=parameters["mass"][...],
+            inertia_factor=parameters["inertia_factor"][()],
+            box_length=parameters["box_length"][()] if "box_length" in parameters else None,
+            top=parameters["top"][...].astype(np.bool_),
+            contacts=Contacts(rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64), rows[:, 2]),
+            law=MindlinLaw(*(parameters[name][()] for name in ("kn", "kt", "mu"))),
+            fx=self._file["observables/fx/value"][frame],
+            fy=self._file["observables/fy/value"][frame],
+        )
+
+    def append_series(self, name: str, **columns: ArrayLike) -> None:
+        """Add rows to a time series, which begins with the first call.
+
+        Parameters
+        ----------
+        name : str
+            Name of the series.
+        **columns : array_like, shape (R, ...)
+            Columns by name, all of one length: always the same names.
+
+        Raises
+        ------
+        ValueError
+            If the columns differ in length, or in name from earlier calls.
+        """
+        group = self._file.require_group(f"faultgouge/{name}")
+        arrays = {column: np.asarray(value) for column, value in columns.items()}
+        lengths = {array.shape[0] if array.ndim else -1 for array in arrays.values()}
+        if len(lengths) != 1 or -1 in lengths:
+            raise ValueError(f"The columns of the series {name} must be lists of one length.")
+        if len(group) and set(group) != set(arrays):
+            raise ValueError(f"The series {name} has the columns {', '.join(group)}, not others.")
+        start, rows = _rows(group), lengths.pop()
+        for column, array in arrays.items():
+            if column not in group:
+                shape = array.shape[1:]
+                group.create_dataset(column, (0, *shape), array.dtype, maxshape=(None, *shape), chunks=True)
+            group[column].resize(start + rows, axis=0)
+            group[column][start:] = array
+        self._file.flush()
+
+    def series(self, name: str) -> dict[str, NDArray]:
+        """The columns of a time series by name.
+
+        Raises
+        ------
+        PackingFileError
+            If there is no such series.
+        """
+        group = self._file.get(f"faultgouge/{name}")
+        if group is None:
+            raise PackingFileError(f"{self.path} has no series {name}.")
+        return {column: group[column][: _rows(group)] for column in group}
+
+    def _put(self, name: str, value: NDArray, frame: int) -> None:
+        """Write one element of one frame; the contacts' second axis grows as it must, others stay."""
+        if name not in self._file:
+            group = self._file.create_group(name)
+            number = np.int64 if np.issubdtype(value.dtype, np.integer) else np.float64
+            group.create_dataset(
+                "value",
+                (0, *value.shape),
+                number,
+                maxshape=(None,) * (value.ndim + 1),
+                chunks=(1, *value.shape) if value.size > 1 else True,
+                fillvalue=np.nan if number is np.float64 else 0,
+            )
+            for clock in ("step", "time"):
+                group[clock] = self._file[f"particles/disks/position/{clock}"]
+        data = self._file[name]["value"]
+        size = [max(have, need) for have, need in zip(data.shape[1:], value.shape, strict=True)]
+        data.resize((frame + 1, *size))
+        row = np.full(size, data.fillvalue, data.dtype)
+        row[tuple(slice(extent) for extent in value.shape)] = value
+        data[frame] = row
+
+    def _check_same(self, packing: Packing) -> None:
+        parameters, values = self._file["parameters"], _parameters(packing)
+        for name in parameters.keys() | values.keys():
+            if not (
+                name in parameters and name in values and np.array_equal(parameters[name][()], values[name])
+            ):
+                raise ValueError(f"{self.path} was begun for a packing with another {name}.")
+
+
+def _parameters(packing: Packing) -> dict[str, Any]:
+    law = packing.law
+    values = {
+        "radius": packing.radius,
+        "mass": packing.mass,
+        "top": packing.top,
+        "kn": law.kn,
+        "kt": law.kt,
+        "mu": law.mu,
+    }
+    values["inertia_factor"] = packing.inertia_factor
+    if packing.box_length is not None:
+        values["box_length"] = packing.box_length
+    return values
+
+
+def _write_header(file: h5py.File, packing: Packing) -> None:
+    h5md = file.create_group("h5md")
+    h5md.attrs["version"] = np.array([1, 1])
+    h5md.create_group("author").attrs["name"] = CREATOR
+    creator = h5md.create_group("creator")
+    creator.attrs["name"], creator.attrs["version"] = CREATOR, "1"
+    disks = file.create_group("particles/disks")
+    box = disks.create_group("box")
+    box.attrs["dimension"] = 3
+    periodic = packing.box_length is not None
+    box.attrs["boundary"] = np.array(["periodic" if periodic else "none", "none", "none"], dtype="S8")
+    position = disks.create_group("position")
+    position.create_dataset("step", (0,), np.int64, maxshape=(None,))
+    position.create_dataset("time", (0,), np.float64, maxshape=(None,))
+    shape = (len(packing), 3)
+    position.create_dataset("value", (0, *shape), np.float64, maxshape=(None, *shape), chunks=(1, *shape))
+    file.create_group("observables")
+    parameters = file.create_group("parameters")
+    for name, value in _parameters(packing).items():
+        parameters[name] = value
+
+
+def _rows(group: h5py.Group) -> int:
+    """Rows that every column of a series has: a killed run may have left them uneven."""
+    return min((group[column].shape[0] for column in group), default=0)

@@ -1,0 +1,89 @@
+"""Packings for the tests of the analysis."""
+
+import bisect
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, touching
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import quasistatic
+
+
+@pytest.fixture(scope="session")
+def bed(reference: dict) -> Callable[[float], Packing]:
+    """The reference packing as it was settled, with zero slips, for a friction coefficient."""
+
+    def make(mu: float) -> Packing:
+        position = np.column_stack([reference["x"], reference["y"]])
+        return Packing(
+            position=position,
+            radius=reference["radius"],
+            contacts=touching(position, reference["radius"], reference["box_length"]),
+            law=MindlinLaw(reference["kn"], reference["kt"], mu),
+            box_length=reference["box_length"],
+            top=np.isin(np.arange(len(position)), reference["top"]),
+            fy=reference["fy_per_top_disk"],
+        )
+
+    return make
+
+
+class Ramp:
+    """Equilibria of a ramp by its grid of loads; between two of them, from the one below."""
+
+    def __init__(self, start: Packing, grid: np.ndarray) -> None:
+        self.grid = [start.fx, *grid]
+        self.states = [start, *quasistatic.ramp(start, grid)]
+
+    def __call__(self, fx: float) -> Packing:
+        below = self.states[bisect.bisect_right(self.grid, fx) - 1]
+        return below if below.fx == fx else quasistatic.equilibrium(below, fx)
+
+
+@pytest.fixture(scope="session")
+def ramp(bed: Callable[[float], Packing]) -> Callable[[float, float, int], Ramp]:
+    """Ramps of the reference packing by friction, increment and number of increments, computed once."""
+    known: dict[tuple[float, float, int], Ramp] = {}
+
+    def make(mu: float, increment: float, count: int) -> Ramp:
+        key = (mu, increment, count)
+        if key not in known:
+            known[key] = Ramp(bed(mu), increment * np.arange(1, count + 1))
+        return known[key]
+
+    return make
+
+
+@pytest.fixture
+def cluster() -> Packing:
+    """Six disks in every state of contact: sticking, near the bound, sliding either way, on the floor, across
+    the box.
+
+    Overlaps are a hundredth of a radius, so that finite differences have room; no balance is intended.
+    """
+    position = [[0.2, 0.49], [1.18, 0.493], [2.16, 0.488], [0.7, 1.34], [1.68, 1.345], [3.17, 0.492]]
+    radius = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5]
+    law = MindlinLaw(kn=2e5, kt=2e5 * 2 / 7, mu=0.7)
+    found = touching(position, radius, box_length=3.95)
+    bare = Packing(position=position, radius=radius, contacts=found, law=law, box_length=3.95)
+    share = np.resize([0.3, -0.99, 1.5, -0.2, 0.6, -1.5, 0.9], len(found))
+    slip = share * law.slip_limit(bare.geometry.overlap)
+    return Packing(
+        position=position,
+        radius=radius,
+        angle=[0.1, -0.2, 0.3, 0.0, 1.0, 2.0],
+        mass=[1.0, 2.0, 1.0, 0.5, 1.0, 1.0],
+        inertia_factor=0.5,
+        contacts=Contacts(found.i, found.j, slip),
+        law=law,
+        box_length=3.95,
+        top=[False, False, False, True, True, False],
+        fx=0.5,
+        fy=3.0,
+    )

@@ -1,0 +1,111 @@
+"""A slow, readable quasi-static solver: the reference that the analysis is tested on.
+
+An increment of the load is one unknown displacement q from the last equilibrium. Slips advance from their
+values there, never from an iterate, with the tangent at the midpoint (along r_old + r_new); then they are
+clamped. A new contact starts with s = 0 at the end of its first increment. Forces are summed contact by
+contact from the formulas; only Newton's matrix is borrowed from the package, and a wrong one would cost
+iterations, not digits.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse.linalg import splu
+
+from faultgouge.analysis import FLOOR, Contacts, Packing, stiffness_matrix, touching
+
+
+def moved(old: Packing, q: np.ndarray, fx: float) -> Packing:
+    """The packing after the displacement q = (dx.., dy.., R dtheta..) from the equilibrium `old`."""
+    dx, dy, du = q.reshape(3, -1)
+    position = old.position + np.column_stack([dx, dy])
+    now = touching(position, old.radius, old.box_length)
+    remembered = {
+        (i, j): s for i, j, s in zip(old.contacts.i, old.contacts.j, old.contacts.slip, strict=True)
+    }
+    slips = []
+    for i, j in zip(now.i, now.j, strict=True):
+        if j == FLOOR:
+            overlap = old.radius[i] - position[i, 1]
+            increment = -dx[i] - du[i]
+        else:
+            before, after = branch(old.position, old.box_length, i, j), branch(position, old.box_length, i, j)
+            middle = before + after
+            normal = middle / np.hypot(*middle)
+            tangent = np.array([-normal[1], normal[0]])
+            overlap = old.radius[i] + old.radius[j] - np.hypot(*after)
+            relative = np.array([dx[i] - dx[j], dy[i] - dy[j]])
+            increment = tangent @ relative - du[i] - du[j]
+        start = remembered.get((i, j))
+        slip = 0.0 if start is None else start + increment
+        limit = old.law.mu * old.law.kn / old.law.kt * overlap if old.law.frictional else 0.0
+        slips.append(min(max(slip, -limit), limit))
+    angle = old.angle + du / old.radius
+    return replace(
+        old, position=position, angle=angle, contacts=Contacts(now.i, now.j, np.array(slips)), fx=fx
+    )
+
+
+def branch(position: np.ndarray, box_length: float | None, i: int, j: int) -> np.ndarray:
+    """r_i - r_j, nearest image along x."""
+    difference = position[i] - position[j]
+    if box_length is not None:
+        difference[0] -= box_length * round(difference[0] / box_length)
+    return difference
+
+
+def forces(packing: Packing) -> np.ndarray:
+    """Net forces (Fx.., Fy.., T/R..), contact by contact."""
+    law, n = packing.law, len(packing)
+    total = np.zeros((3, n))
+    total[0, packing.top] += packing.fx
+    total[1, packing.top] -= packing.fy
+    for i, j, slip in zip(packing.contacts.i, packing.contacts.j, packing.contacts.slip, strict=True):
+        if j == FLOOR:
+            normal, overlap = np.array([0.0, 1.0]), packing.radius[i] - packing.position[i, 1]
+        else:
+            between = branch(packing.position, packing.box_length, i, j)
+            distance = np.hypot(*between)
+            normal, overlap = between / distance, packing.radius[i] + packing.radius[j] - distance
+        if overlap <= 0:
+            continue
+        fn, ft = law.kn * overlap**1.5, 0.0
+        if law.frictional:
+            limit = law.mu * law.kn / law.kt * overlap
+            slip = min(max(slip, -limit), limit)
+            x = abs(slip) / limit
+            ft = -law.kt * overlap**0.5 * (1 + x - x**2) * slip
+        force = fn * normal + ft * np.array([-normal[1], normal[0]])
+        total[:2, i] += force
+        total[2, i] -= ft
+        if j != FLOOR:
+            total[:2, j] -= force
+            total[2, j] -= ft
+    return total.ravel()
+
+
+def equilibrium(old: Packing, fx: float, good_enough: float = 1e-8) -> Packing:
+    """Newton's equilibrium at fx from the equilibrium `old`, converged until rounding stops it."""
+    q = np.zeros(3 * len(old))
+    best, best_residual = None, np.inf
+    for _ in range(60):
+        trial = moved(old, q, fx)
+        stiffness = stiffness_matrix(trial).tocsc()
+        active = np.flatnonzero(np.diff(stiffness.tocsr().indptr))
+        force = forces(trial)
+        residual = np.abs(force[active]).max()
+        if residual < good_enough and residual > 0.5 * best_residual:
+            return best
+        if residual < best_residual:
+            best, best_residual = trial, residual
+        q[active] += splu(stiffness[active][:, active]).solve(force[active])
+    raise RuntimeError(f"no equilibrium at fx = {fx}: residual {best_residual:.1e}")
+
+
+def ramp(packing: Packing, loads: np.ndarray) -> list[Packing]:
+    """Equilibria at the given loads, each from the one before."""
+    states = []
+    for fx in loads:
+        packing = equilibrium(packing, fx)
+        states.append(packing)
+    return states

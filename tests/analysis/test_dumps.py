@@ -1,0 +1,190 @@
+"""LAMMPS text dumps and JSON files, back to packings."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_runfile import assert_identical
+
+from faultgouge.analysis import Contacts, PackingFileError, read_dump, read_packing
+from faultgouge.analysis.dumps import dump_frames
+
+DISK_COLUMNS = "id type x y radius mass d_theta fx fy tqz floor_slip floor_overlap"
+CONTACT_COLUMNS = "id1 id2 f_n f_t slip"
+
+
+def block(step, what, columns, rows, x="pp", width=3.95):
+    """One snapshot as LAMMPS writes it, %.17g."""
+    return "\n".join(
+        [
+            f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF {what}\n{len(rows)}",
+            f"ITEM: BOX BOUNDS {x} ff pp\n{0.0:-1.16e} {width:-1.16e}\n-2 9\n-0.5 0.5",
+            f"ITEM: {'ATOMS' if what == 'ATOMS' else 'ENTRIES'} {columns}",
+            *(" ".join(f"{value:.17g}" for value in row) for row in rows),
+            "",
+        ]
+    )
+
+
+def written(packing, step=0):
+    """Both snapshots of a packing: rows shuffled, partners swapped, and a pair that does not touch."""
+    rng = np.random.default_rng(step)
+    c, n = packing.contacts, len(packing)
+    slips = dict(zip(c.i[c.floor], c.slip[c.floor], strict=True))
+    disks = [
+        (
+            k + 1,
+            1 + packing.top[k],
+            *packing.position[k],
+            packing.radius[k],
+            packing.mass[k],
+            packing.angle[k],
+            *packing.net_force[k::n],
+            slips.get(k, 0.0),
+            0.0,
+        )
+        for k in range(n)
+    ]
+    pairs = [(i + 1, j + 1, 0, 0, s) for i, j, s in zip(c.i, c.j, c.slip, strict=True) if j >= 0]
+    pairs = [(j, i, *rest) if rng.random() < 0.5 else (i, j, *rest) for i, j, *rest in pairs] + [
+        (1, 3, 0, 0, 0)
+    ]
+    x = "ff" if packing.box_length is None else "pp"
+    return (
+        block(step, "ATOMS", DISK_COLUMNS, [disks[k] for k in rng.permutation(n)], x),
+        block(step, "ENTRIES", CONTACT_COLUMNS, [pairs[k] for k in rng.permutation(len(pairs))], x),
+    )
+
+
+@pytest.fixture
+def dumped(tmp_path, cluster):
+    """The cluster's dumps, with its sidecar file; returns the path of the disks' dump."""
+    disks, contacts = written(cluster)
+    (tmp_path / "bed.disks").write_text(disks)
+    (tmp_path / "bed.contacts").write_text(contacts)
+    law = cluster.law
+    (tmp_path / "bed.params").write_text(
+        f"kn {law.kn:.17g}\nkt {law.kt:.17g}\nmu {law.mu:.17g}\nfx 0.5\nfy 3\ninertia_factor 0.5\n"
+    )
+    return tmp_path / "bed.disks"
+
+
+def test_roundtrip_to_the_bit(dumped, cluster):
+    assert_identical(read_dump(dumped), cluster)
+
+
+def test_the_caller_wins_over_the_sidecar(dumped, cluster):
+    packing = read_dump(dumped, fx=0.7, inertia_factor=1.0)
+    assert_identical(packing, replace(cluster, fx=0.7, inertia_factor=1.0))
+
+
+def test_open_box(tmp_path, cluster):
+    c = cluster.contacts
+    kept = np.arange(len(c)) != 2
+    state = replace(cluster, box_length=None, contacts=Contacts(c.i[kept], c.j[kept], c.slip[kept]))
+    disks, contacts = written(state)
+    (tmp_path / "a").write_text(disks)
+    (tmp_path / "b").write_text(contacts)
+    read = read_dump(tmp_path / "a", tmp_path / "b", law=state.law, fx=0.5, fy=3.0, inertia_factor=0.5)
+    assert_identical(read, state)
+
+
+def test_frames_are_matched_by_step(dumped, cluster):
+    states = [cluster, replace(cluster, angle=cluster.angle + 1), replace(cluster, angle=cluster.angle + 2)]
+    snapshots = [written(state, 10 * k) for k, state in enumerate(states)]
+    dumped.write_text("".join(disks for disks, _ in snapshots))
+    dumped.with_suffix(".contacts").write_text("".join(contacts for _, contacts in snapshots[::-1]))
+    for frame, state in ((0, 0), (1, 1), (2, 2), (-1, 2), (-3, 0)):
+        assert_identical(read_dump(dumped, frame=frame), states[state])
+    assert [frame.step for frame in dump_frames(dumped)] == [0, 10, 20]
+    for frame in (3, -4):
+        with pytest.raises(PackingFileError, match=f"no snapshot {frame}"):
+            read_dump(dumped, frame=frame)
+
+
+def test_names_as_lammps_has_them(dumped, cluster):
+    contacts = dumped.with_suffix(".contacts")
+    contacts.write_text(
+        contacts.read_text().replace(
+            CONTACT_COLUMNS, "c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]"
+        )
+    )
+    dumped.write_text(dumped.read_text().replace("floor_slip", "f_floor[3]"))
+    assert_identical(read_dump(dumped), cluster)
+
+
+def spoil(path, old, new):
+    path.write_text(path.read_text().replace(old, new))
+
+
+@pytest.mark.parametrize(
+    ("suffix", "old", "new", "says"),
+    [
+        (".disks", " radius", " diameter", "no column radius"),
+        (".contacts", " slip", " other", "no column slip"),
+        (".params", "mu 0", "nu 0", "does not name 'mu'"),
+        (".params", "fx 0.5", "fx half", "one number a line"),
+        (".disks", "ITEM: TIMESTEP", "hello", "not a complete LAMMPS text dump"),
+        (".disks", "OF ATOMS\n6", "OF ATOMS\n7", "7 rows are announced"),
+        (".contacts", "ITEM: TIMESTEP\n0", "ITEM: TIMESTEP\n5", "no snapshot of step 0"),
+        (".disks", "\n4 2 ", "\n9 2 ", "does not have"),
+        (".disks", "\n4 2 ", "\n4 2 nan ", "not a complete"),
+    ],
+)
+def test_spoiled_dumps(dumped, suffix, old, new, says):
+    spoil(dumped.with_suffix(suffix), old, new)
+    with pytest.raises(PackingFileError, match=says):
+        read_dump(dumped)
+
+
+@pytest.mark.parametrize("suffix", [".disks", ".contacts"])
+def test_missing_and_cut_off_dumps(dumped, suffix):
+    path = dumped.with_suffix(suffix)
+    text = path.read_text()
+    for size in (10, 60, 200, len(text) // 2):
+        path.write_text(text[:size])
+        with pytest.raises(PackingFileError, match=f"bed.{suffix[1:]}"):
+            read_dump(dumped)
+    path.unlink()
+    with pytest.raises(PackingFileError, match="cannot be read"):
+        read_dump(dumped)
+
+
+def test_packing_from_json(tmp_path, reference, bed, cluster):
+    path = tmp_path / "packing.json"
+    path.write_text(json.dumps(reference))
+    law = bed(0.8).law
+    assert_identical(read_packing(path, law, fy=3.0), bed(0.8))
+    plain = {"x": [0.0, 1.0], "y": [1.0, 1.5], "radius": [0.5, 0.7]}
+    path.write_text(json.dumps(plain))
+    packing = read_packing(path, law)
+    assert packing.box_length is None
+    assert not packing.top.any()
+    assert len(packing.contacts) == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ("", "not a packing file"),
+        ("[1, 2]", "not a packing file"),
+        ('{"x": [0], "y": [1]}', "lacks the key 'radius'"),
+        ('{"x": [0], "y": [1, 2], "radius": [1]}', "not a packing file"),
+        ('{"x": [0], "y": [1], "radius": [-1]}', "positive"),
+        ('{"x": ["a"], "y": [1], "radius": [1]}', "not a packing file"),
+        ('{"x": [0], "y": [1], "radius": [1], "top": [1]}', "top"),
+        ('{"x": [0], "y": [1], "radius": [1], "box_length": 1}', "two largest"),
+    ],
+)
+def test_json_that_is_no_packing(tmp_path, cluster, content, says):
+    path = tmp_path / "packing.json"
+    path.write_text(content)
+    with pytest.raises(PackingFileError, match=says) as error:
+        read_packing(path, cluster.law)
+    assert "packing.json" in str(error.value)
+
+
+def test_no_json_at_all(tmp_path, cluster):
+    with pytest.raises(PackingFileError, match="cannot be read"):
+        read_packing(tmp_path / "none.json", cluster.law)

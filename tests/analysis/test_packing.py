@@ -1,0 +1,150 @@
+"""Geometry, balance and validation of packings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import quasistatic
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, touching
+
+LAW = MindlinLaw(2e5, 6e4, 1.0)
+
+
+def test_contacts_have_one_order():
+    contacts = Contacts([3, 0, 2, 1, 4], [1, -1, 0, -1, 0], [0.1, 0.2, 0.3, 0.4, 0.5])
+    np.testing.assert_array_equal(contacts.i, [0, 0, 1, 0, 1])
+    np.testing.assert_array_equal(contacts.j, [2, 4, 3, -1, -1])
+    np.testing.assert_array_equal(contacts.slip, [0.3, 0.5, 0.1, 0.2, 0.4])
+    np.testing.assert_array_equal(contacts.floor, [False, False, False, True, True])
+
+
+@pytest.mark.parametrize(
+    ("i", "j", "slip", "says"),
+    [
+        ([0, 1], [1], [0, 0], "shape"),
+        ([0], [1], [np.nan], "finite"),
+        ([-1], [1], [0], "negative"),
+        ([0], [-2], [0], "negative"),
+        ([2], [2], [0], "itself"),
+        ([0, 1], [1, 0], [0, 0], "twice"),
+        ([0, 0], [-1, -1], [0, 0], "twice"),
+        ([0.5], [1], [0], "integers"),
+    ],
+)
+def test_impossible_contacts(i, j, slip, says):
+    with pytest.raises(ValueError, match=says):
+        Contacts(i, j, slip)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"position": [[0, 0]]}, "shape"),
+        ({"position": np.full((6, 2), np.nan)}, "finite"),
+        ({"radius": [1, 1, 1, 1, 1, -1]}, "positive"),
+        ({"mass": [1, 1, 1, 1, 1, 0]}, "positive"),
+        ({"angle": [0.0]}, "shape"),
+        ({"top": [0, 1, 2]}, "booleans"),
+        ({"top": [True]}, "booleans"),
+        ({"inertia_factor": 0.0}, "inertia_factor"),
+        ({"box_length": -1.0}, "box_length"),
+        ({"box_length": 1.99}, "two largest diameters"),
+        ({"fx": np.inf}, "fx"),
+        ({"contacts": Contacts([0], [6], [0.0])}, "beyond"),
+    ],
+)
+def test_impossible_packings(cluster, change, says):
+    with pytest.raises(ValueError, match=says):
+        replace(cluster, **change)
+
+
+def test_arrays_are_copies_and_read_only():
+    position = np.array([[0.0, 1.0]])
+    packing = Packing(position=position, radius=[0.5], contacts=Contacts([], [], []), law=LAW)
+    position[0, 0] = 7
+    assert packing.position[0, 0] == 0
+    with pytest.raises(ValueError, match="read-only"):
+        packing.position[0, 0] = 7
+    with pytest.raises(ValueError, match="read-only"):
+        packing.geometry.overlap[...] = 0
+
+
+def test_geometry_of_a_pair_across_the_box_and_of_the_floor():
+    packing = Packing(
+        position=[[0.1, 0.45], [3.9, 0.45]],
+        radius=[0.5, 0.4],
+        contacts=Contacts([0, 0], [1, -1], [0, 0]),
+        law=LAW,
+        box_length=4.0,
+    )
+    # Exact numbers up to the rounding of the inputs.
+    np.testing.assert_allclose(packing.geometry.normal, [[1, 0], [0, 1]], atol=1e-15)
+    np.testing.assert_allclose(packing.geometry.tangent, [[0, 1], [-1, 0]], atol=1e-15)
+    np.testing.assert_allclose(packing.geometry.overlap, [0.7, 0.05], rtol=1e-14)
+    np.testing.assert_allclose(packing.geometry.distance, [0.2, 0.45], rtol=1e-14)
+
+
+def test_coincident_centres_are_refused():
+    packing = Packing(position=[[0, 1], [0, 1]], radius=[1, 1], contacts=Contacts([0], [1], [0]), law=LAW)
+    with pytest.raises(ValueError, match="same centre"):
+        _ = packing.geometry
+
+
+def test_net_force_is_that_of_the_loop(cluster):
+    # Sums of six forces of order 100 in another order.
+    np.testing.assert_allclose(cluster.net_force, quasistatic.forces(cluster), rtol=0, atol=1e-12)
+
+
+def test_contacts_conserve_momentum_and_twist_by_their_overlap(cluster):
+    """Full radii as lever arms: each pair adds the couple r f_t - (R_i + R_j) f_t = -overlap f_t."""
+    pairs = ~cluster.contacts.floor
+    only = Contacts(*(a[pairs] for a in (cluster.contacts.i, cluster.contacts.j, cluster.contacts.slip)))
+    free = replace(cluster, contacts=only, fx=0.0, fy=0.0, box_length=None)
+    inside = free.geometry.overlap > 0  # without the box, the pair across it is far apart
+    fx, fy, t = free.net_force.reshape(3, -1)
+    couple = free.position[:, 0] @ fy - free.position[:, 1] @ fx + free.radius @ t
+    # Forces are of order 100, so their sums round at 1e-13.
+    assert abs(fx.sum()) < 1e-12
+    assert abs(fy.sum()) < 1e-12
+    twist = -(free.geometry.overlap * free.tangential_force)[inside].sum()
+    assert abs(twist) > 1e-3
+    assert couple == pytest.approx(twist, abs=1e-12)
+
+
+def test_residual_leaves_out_rattlers_of_the_upper_layer():
+    packing = Packing(
+        position=[[0, 0.5], [5, 3]],
+        radius=[0.5, 0.5],
+        top=[True, True],
+        fy=3.0,
+        contacts=Contacts([0], [-1], [0]),
+        law=LAW,
+    )
+    # An open contact is none: a disk that only touches at a point is a rattler too.
+    np.testing.assert_array_equal(packing.rattlers, [0, 1])
+    assert packing.residual == 0
+    pressed = replace(packing, position=[[0, 0.4], [5, 3]])
+    np.testing.assert_array_equal(pressed.rattlers, [1])
+    assert pressed.residual == pytest.approx(2e5 * 0.1**1.5 - 3, rel=1e-14)
+
+
+@given(seed=st.integers(0, 2**32 - 1), periodic=st.booleans())
+@settings(max_examples=50)
+def test_touching_finds_what_a_double_loop_finds(seed, periodic):
+    rng = np.random.default_rng(seed)
+    length, n = 6.0, 25
+    position = rng.uniform([-2 * length, 0.2], [2 * length, 4], (n, 2))
+    position[0, 0] = -1e-17  # wraps to the box length itself
+    radius = rng.uniform(0.2, 0.7, n)
+    box_length = length if periodic else None
+    expected = [(i, -1) for i in range(n) if position[i, 1] < radius[i]]
+    for i in range(n):
+        for j in range(i + 1, n):
+            if np.hypot(*quasistatic.branch(position, box_length, i, j)) < radius[i] + radius[j]:
+                expected.append((i, j))
+    contacts = touching(position, radius, box_length)
+    assert sorted(expected) == sorted(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True))
+    assert not contacts.slip.any()

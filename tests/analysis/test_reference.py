@@ -1,0 +1,70 @@
+"""The numbers of an independent code, for a packing of 100 disks: conventions and digits."""
+
+import numpy as np
+import pytest
+import quasistatic
+
+from faultgouge.analysis import find_onset, spectrum, stiffness_matrix
+
+ONSETS = {1.0: 0.0218330564080, 0.8: 0.0191432059561}
+
+
+@pytest.mark.parametrize("case", [0, 1])
+def test_loaded_packing(reference, ramp, case):
+    """Newton stops at 3e-11 of force; over stiffnesses of 1e3 and slips of 1e-6 these digits are left."""
+    expected = reference["cases"][case]
+    loaded = ramp(expected["mu"], expected["increment"], 88)(expected["fx"])
+    assert len(loaded.contacts) == expected["contacts"]
+    assert loaded.contacts.floor.sum() == expected["floor_contacts"]
+    assert len(loaded.rattlers) == expected["rattlers"]
+    assert loaded.residual < 1e-10
+    matrix = stiffness_matrix(loaded).toarray()
+    assert np.trace(matrix) == pytest.approx(expected["trace_K"], rel=1e-12)
+    assert np.linalg.norm(matrix) == pytest.approx(expected["fro_K"], rel=1e-12)
+    assert np.linalg.norm(matrix - matrix.T) == pytest.approx(expected["fro_asym"], rel=1e-9)
+    assert np.abs(loaded.contacts.slip).sum() == pytest.approx(expected["slip_sum_abs"], rel=1e-9)
+    result = spectrum(loaded)
+    assert not result.pairs
+    assert len(result.eigenvalues) == 3 * (100 - expected["rattlers"])
+    values = result.eigenvalues.real
+    np.testing.assert_allclose(values[::-1][:20], expected["eigenvalues_largest_20"], rtol=1e-11)
+    np.testing.assert_allclose(values[values > 0][:10], expected["smallest_positive_10"], rtol=1e-11)
+
+
+def test_newton_is_quadratic_to_the_rounding_floor(bed):
+    """4 or 5 iterations; the solver takes one more to see that nothing improves."""
+    start, calls = bed(1.0), []
+    forces = quasistatic.forces
+
+    def counted(packing):
+        calls.append(packing)
+        return forces(packing)
+
+    quasistatic.forces = counted
+    try:
+        quasistatic.equilibrium(start, 1e-3)
+    finally:
+        quasistatic.forces = forces
+    assert len(calls) <= 6
+
+
+@pytest.mark.parametrize(("increment", "count", "first"), [(1e-3, 22, 0), (2.5e-4, 88, 76)])
+@pytest.mark.parametrize("mu", [1.0, 0.8])
+def test_onset(reference, ramp, mu, increment, count, first):
+    """The increment does not matter: nine digits from either, and the stated error covers what is left."""
+    last = {1.0: count, 0.8: round(0.02 / increment)}[mu]
+    path = ramp(mu, increment, count)
+    onset = find_onset(path, path.grid[first : last + 1])
+    assert onset.fx_c == pytest.approx(ONSETS[mu], rel=1e-9)
+    assert abs(onset.fx_c - ONSETS[mu]) < onset.error < 1e-9 * onset.fx_c
+    (window,) = onset.windows
+    assert window.kind == "coalescence"
+    assert window.fx_end is None
+    # |y^H x| goes as the root of the distance: 1e-6 of a window of 1e-3 away it is 1e-3 at most.
+    assert window.overlap < 1e-3
+
+
+def test_eigenvalue_at_the_onset_is_that_of_the_pair_beside_it(reference, ramp):
+    """The reference gives the real part at the first grid point behind the onset, 0.022, not at the onset."""
+    (pair,) = spectrum(ramp(1.0, 2.5e-4, 88)(0.022)).pairs
+    assert pair.eigenvalue.real == pytest.approx(reference["cases"][0]["onset_lambda"], rel=1e-11)

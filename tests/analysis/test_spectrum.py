@@ -1,0 +1,202 @@
+"""Spectra: which pairs are real, what is left out, and the large-packing solver against the dense one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import (
+    Contacts,
+    MindlinLaw,
+    Packing,
+    discrete_frequency,
+    dynamical_matrix,
+    eigenpairs,
+    growth_rate,
+    spectrum,
+    stable_timestep,
+    stiffness_matrix,
+)
+
+
+def test_one_disk_on_the_floor():
+    """A disk that sticks: y decouples, x and R theta slide and roll together."""
+    law, overlap, inertia = MindlinLaw(2e5, 6e4, 1.0), 1e-3, 0.5
+    packing = Packing(
+        position=[[0, 0.5 - overlap]],
+        radius=[0.5],
+        mass=[2.0],
+        inertia_factor=inertia,
+        contacts=Contacts([0], [-1], [0]),
+        law=law,
+    )
+    result = spectrum(packing)
+    normal, tangential = 1.5 * law.kn * overlap**0.5, law.kt * overlap**0.5
+    # x: kt/m, u: kt/(I0 m), perfectly coupled: one rolls freely. The overlap 0.5 - 0.499 has lost digits.
+    expected = sorted([0.0, tangential * (1 + 1 / inertia) / 2, normal / 2])
+    np.testing.assert_allclose(result.eigenvalues.real, expected, rtol=1e-12, atol=1e-9)
+    assert not result.pairs
+    assert result.omega_max == pytest.approx(max(expected) ** 0.5, rel=1e-12)
+    assert result.growth_rate() == 0
+
+
+def test_rattlers_and_force_free_coordinates_are_left_out(bed):
+    packing = bed(1.0)
+    assert spectrum(packing).rattlers.tolist() == [58, 80, 85, 88, 89]
+    assert len(spectrum(packing).eigenvalues) == 285
+    smooth = replace(packing, law=MindlinLaw(2e5, 0, 1.0))
+    assert len(spectrum(smooth).eigenvalues) == 190
+    nothing = Packing(position=[[0, 9]], radius=[1], contacts=Contacts([], [], []), law=packing.law)
+    assert len(spectrum(nothing).eigenvalues) == 0
+    assert spectrum(nothing).omega_max == 0
+
+
+def test_masses_and_inertia_enter(cluster):
+    matrix, active = dynamical_matrix(cluster)
+    mass = np.concatenate([cluster.mass, cluster.mass, 0.5 * cluster.mass])[active]
+    plain = stiffness_matrix(cluster).toarray()[np.ix_(active, active)] / mass[:, None]
+    expected = np.sort_complex(np.linalg.eigvals(plain))
+    # Two orders of operations; condition numbers here are below a hundred.
+    np.testing.assert_allclose(spectrum(cluster).eigenvalues, expected, atol=1e-12 * np.abs(expected).max())
+    assert matrix.shape == (18, 18)
+
+
+def test_symmetric_operator_has_no_pairs_whatever_lapack_says(bed):
+    result = spectrum(bed(1.0))
+    assert result.pairs == ()
+    assert result.eigenvalues.real.min() > 0
+
+
+def test_pairs_behind_the_onset(ramp):
+    result = spectrum(ramp(1.0, 1e-3, 22)(0.022))
+    (pair,) = result.pairs
+    omega = np.sqrt(pair.eigenvalue)
+    assert pair.eigenvalue.imag > 0
+    assert pair.condition == 1 / pair.overlap > 1
+    assert pair.frequency == omega.real
+    assert pair.growth_rate == 2 * omega.imag == result.growth_rate()
+    assert pair.eigenvalue in result.unstable
+
+
+def test_imaginary_part_grows_as_the_root_of_the_distance(ramp):
+    path, onset = ramp(1.0, 1e-3, 22), 0.021833056408868
+    near, nearer = (spectrum(path(onset + distance)).pairs[0].eigenvalue.imag for distance in (1e-5, 1e-7))
+    # The next order is the distance over the width of the window, 1e-2.
+    assert near / nearer == pytest.approx(10, rel=1e-2)
+
+
+def test_copies_of_a_packing_have_its_pairs_each_and_no_others(cluster):
+    """Three copies out of reach of each other: threefold eigenvalues, which rounding splits at will."""
+    c = cluster.contacts
+    kept = np.arange(len(c)) != 2  # the contact across the box
+    shift = np.arange(3)
+    copies = Packing(
+        position=np.concatenate([cluster.position + np.array([100 * k, 0]) for k in shift]),
+        radius=np.tile(cluster.radius, 3),
+        law=cluster.law,
+        contacts=Contacts(
+            np.concatenate([c.i[kept] + 6 * k for k in shift]),
+            np.concatenate([np.where(c.floor, -1, c.j + 6 * k)[kept] for k in shift]),
+            np.tile(c.slip[kept], 3),
+        ),
+    )
+    single = replace(
+        cluster,
+        box_length=None,
+        mass=None,
+        inertia_factor=1.0,
+        contacts=Contacts(c.i[kept], c.j[kept], c.slip[kept]),
+    )
+    one, three = spectrum(single), spectrum(copies)
+    assert one.pairs
+    assert len(three.pairs) == 3 * len(one.pairs)
+    # A shift of 200 costs coordinates two digits, and the overlaps of 1e-2 two more.
+    expected = [pair.eigenvalue for pair in one.pairs for _ in shift]
+    np.testing.assert_allclose(
+        np.sort_complex([pair.eigenvalue for pair in three.pairs]), np.sort_complex(expected), rtol=1e-10
+    )
+
+
+def test_paper_form_has_another_spectrum(ramp):
+    packing = ramp(1.0, 1e-3, 22)(0.02)
+    difference = spectrum(packing).eigenvalues.real - spectrum(packing, "paper").eigenvalues.real
+    assert 1e-4 < np.abs(difference).max() < 1.0
+
+
+@pytest.mark.parametrize("near", [2058.4, 2058.4 + 3j, 40.0])
+def test_shift_invert_finds_what_lapack_finds(ramp, near):
+    packing = ramp(1.0, 1e-3, 22)(0.022)
+    dense = spectrum(packing)
+    some = eigenpairs(packing, near, 6)
+    nearest = dense.eigenvalues[np.argsort(np.abs(dense.eigenvalues - near))[:6]]
+    nearest = nearest[np.lexsort((nearest.imag, nearest.real))]
+    # Condition numbers up to 3 and the rounding of either solver, some 20 u |A|.
+    np.testing.assert_allclose(some.values, nearest, atol=100 * dense.rounding)
+    matrix = np.zeros((300, 300))
+    sparse, active = dynamical_matrix(packing)
+    matrix[np.ix_(active, active)] = sparse.toarray()
+    scale = np.linalg.norm(matrix, 2)
+    assert np.abs(matrix @ some.right - some.right * some.values).max() < 1e-13 * scale
+    assert (
+        np.abs(some.left.conj().T @ matrix - some.values[:, None] * some.left.conj().T).max() < 1e-13 * scale
+    )
+    np.testing.assert_allclose(np.linalg.norm(some.left, axis=0), 1, rtol=1e-12)
+    for pair in dense.pairs:
+        known = np.abs(some.values - pair.eigenvalue) < 1e-6
+        np.testing.assert_allclose(some.overlap[known], pair.overlap, rtol=1e-8)
+
+
+@pytest.mark.parametrize("count", [0, 284])
+def test_impossible_number_of_eigenpairs(bed, count):
+    with pytest.raises(ValueError, match="285"):
+        eigenpairs(bed(1.0), 100.0, count)
+
+
+@pytest.mark.parametrize("value", [1.0, 2.5e3, 2e3 + 1.5j, -30.0, 1e-8])
+@pytest.mark.parametrize("dt", [1e-3, 1e-2])
+def test_discrete_frequency_is_that_of_velocity_verlet(value, dt):
+    """One step is a 2 x 2 matrix, with eigenvalues exp(+-i Omega dt)."""
+
+    def step(x, v):
+        v = v - 0.5 * dt * value * x
+        x = x + dt * v
+        return x, v - 0.5 * dt * value * x
+
+    matrix = np.array([step(1.0 + 0j, 0j), step(0j, 1.0 + 0j)]).T
+    factors = np.linalg.eigvals(matrix)
+    omega = complex(discrete_frequency(value, dt))
+    assert np.cos(omega * dt) == pytest.approx(1 - value * dt**2 / 2, rel=1e-14)
+    # The two factors differ by 2 Omega dt, and their rounding is magnified by its inverse.
+    tolerance = 1e-15 / abs(omega * dt)
+    for factor in (np.exp(1j * omega * dt), np.exp(-1j * omega * dt)):
+        assert np.abs(factors - factor).min() < 4 * tolerance
+    assert omega == pytest.approx(np.sqrt(complex(value)), rel=abs(value) * dt**2 / 12)
+
+
+def test_dispersion_changes_no_stability_below_the_limit():
+    limit = stable_timestep(50.0)
+    assert limit == 0.04
+    assert discrete_frequency(2500.0, 0.999 * limit).imag == 0
+    assert abs(discrete_frequency(2500.0, 1.001 * limit).imag) > 0
+    assert growth_rate(2500.0) == 0
+    assert growth_rate(-4.0) == 4
+    assert growth_rate(1 + 2j) == growth_rate(1 - 2j) > 0
+
+
+def test_negative_eigenvalues_grow():
+    """Two disks one above the other, pressed together without friction, buckle."""
+    law = MindlinLaw(2e5, 0.0, 0.0)
+    column = Packing(
+        position=[[0, 0.49], [0, 1.47]],
+        radius=[0.5, 0.5],
+        contacts=Contacts([0, 0], [-1, 1], [0, 0]),
+        law=law,
+    )
+    result = spectrum(column)
+    # f_n/r on the relative motion of two equal masses.
+    slope = -2 * law.kn * 0.02**1.5 / 0.98
+    assert result.unstable == pytest.approx(np.array([slope]), rel=1e-12)
+    assert result.growth_rate() == pytest.approx(2 * np.sqrt(-slope), rel=1e-12)
+    assert result.growth_rate(dt=1e-3) == pytest.approx(
+        2 * abs(discrete_frequency(slope, 1e-3).imag), rel=1e-12
+    )

@@ -1,0 +1,214 @@
+"""The stability operator: the derivative of the forces, and the symmetries that it has and has not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import quasistatic
+
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, contact_stiffness, stiffness_matrix
+
+
+def differences(packing, step, columns):
+    """-dF/dq by central differences of the contact-by-contact forces, slips advanced by the midpoint rule."""
+    result = []
+    for column in columns:
+        q = np.zeros(3 * len(packing))
+        q[column] = step
+        ahead = quasistatic.forces(quasistatic.moved(packing, q, packing.fx))
+        behind = quasistatic.forces(quasistatic.moved(packing, -q, packing.fx))
+        result.append((behind - ahead) / (2 * step))
+    return np.array(result).T
+
+
+def test_derivative_of_forces(cluster):
+    """Sticking, near the bound, sliding, floor, across the box: all at once.
+
+    Step 1e-6 with overlaps of 1e-2: truncation (step/overlap)^2/6 = 2e-9, rounding 1e-16/1e-6 of a length.
+    """
+    matrix = stiffness_matrix(cluster).toarray()
+    expected = differences(cluster, 1e-6, range(18))
+    assert np.abs(matrix - expected).max() < 1e-8 * np.abs(matrix).max()
+    assert np.abs(stiffness_matrix(cluster, "paper").toarray() - expected).max() > 1e-4 * np.abs(matrix).max()
+
+
+@pytest.mark.parametrize("k", range(12))
+def test_derivative_of_one_contact(cluster, k):
+    c = cluster.contacts
+    alone = replace(cluster, contacts=Contacts(c.i[k : k + 1], c.j[k : k + 1], c.slip[k : k + 1]))
+    matrix = stiffness_matrix(alone).toarray()
+    assert np.abs(matrix).max() > 0
+
+    def force(q):
+        # The contact alone: moved() would find the others too, with zero slips.
+        there = quasistatic.moved(cluster, q, cluster.fx).contacts
+        place = np.flatnonzero((there.i == c.i[k]) & (there.j == c.j[k]))
+        one = Contacts(there.i[place], there.j[place], there.slip[place])
+        dx, dy, _ = q.reshape(3, -1)
+        return quasistatic.forces(
+            replace(alone, contacts=one, position=cluster.position + np.column_stack([dx, dy]))
+        )
+
+    expected = np.array([(force(-q) - force(q)) / 2e-6 for q in 1e-6 * np.eye(18)]).T
+    assert np.abs(matrix - expected).max() < 1e-8 * np.abs(matrix).max()
+
+
+def test_cluster_has_every_state(cluster):
+    x = cluster.contacts.slip / cluster.law.slip_limit(cluster.geometry.overlap)
+    assert len(cluster.contacts) == 12
+    assert cluster.contacts.floor.sum() == 4
+    assert (x > 1).any()
+    assert (x < -1).any()
+    assert (np.abs(x) < 0.5).any()
+    assert ((np.abs(x) > 0.95) & (np.abs(x) < 1)).any()
+    pairs = ~cluster.contacts.floor
+    bare = cluster.position[cluster.contacts.i[pairs], 0] - cluster.position[cluster.contacts.j[pairs], 0]
+    assert (np.abs(bare) > 2).any()
+
+
+def test_derivative_of_forces_in_a_loaded_packing(ramp):
+    """Overlaps of 6e-4 and a step of 1e-8.
+
+    Rounding of a coordinate, 1e-15, over the step is 1e-7 of a contact's stiffness at worst; truncation is
+    1e-10. No contact is at its bound at this load, where the second derivative jumps.
+    """
+    packing = ramp(1.0, 1e-3, 22)(0.02)
+    limit = packing.law.slip_limit(packing.geometry.overlap)
+    assert (np.abs(packing.contacts.slip) < limit).all()
+    columns = np.random.default_rng(0).choice(300, 40, replace=False)
+    matrix = stiffness_matrix(packing).toarray()
+    expected = differences(packing, 1e-8, columns)
+    assert np.abs(matrix[:, columns] - expected).max() < 1e-7 * np.abs(matrix).max()
+
+
+def test_single_valued_at_the_bound():
+    """From the bound, one way slides and the other sticks: either one-sided derivative is the operator."""
+    law = MindlinLaw(2e5, 6e4, 0.7)
+    overlap, step = 1e-2, 1e-7
+    limit = float(law.slip_limit(overlap))
+    packing = Packing(
+        position=[[0, 1], [1 - overlap, 1]], radius=[0.5, 0.5], contacts=Contacts([0], [1], [limit]), law=law
+    )
+    matrix = stiffness_matrix(packing).toarray()
+    for direction in (-1, 1):
+        for column in range(6):
+            q = np.zeros(6)
+            q[column] = direction * step
+            there = quasistatic.forces(quasistatic.moved(packing, q, 0.0))
+            slope = -(there - quasistatic.forces(packing)) / (direction * step)
+            # One-sided: half a second derivative, of relative size step/overlap and 4 step/t*, is left over.
+            assert np.abs(slope - matrix[:, column]).max() < 3 * (step / overlap) * np.abs(matrix).max()
+
+
+def test_paper_form_lacks_the_turning_of_the_tangent(cluster):
+    n = len(cluster)
+    missing = np.zeros((3 * n, 3 * n))
+    geometry = zip(
+        *cluster.geometry, cluster.contacts.i, cluster.contacts.j, cluster.tangential_force, strict=True
+    )
+    for normal, tangent, distance, _, i, j, ft in geometry:
+        if j < 0:
+            continue
+        big_n, big_p = np.zeros(3 * n), np.zeros(3 * n)
+        big_n[[i, i + n, j, j + n]] = *normal, *-normal
+        big_p[[i, i + n, j, j + n]] = *tangent, *-tangent
+        missing += ft / distance * np.outer(big_n, big_p)
+    difference = stiffness_matrix(cluster).toarray() - stiffness_matrix(cluster, "paper").toarray()
+    scale = np.abs(stiffness_matrix(cluster).toarray()).max()
+    assert np.abs(missing).max() > 1e-4 * scale
+    # Differences of entries of that scale, rounded.
+    np.testing.assert_allclose(difference, missing, rtol=0, atol=4e-16 * scale)
+
+
+def test_symmetric_without_slip_and_not_with(cluster, bed, ramp):
+    for packing in (
+        bed(1.0),
+        replace(cluster, contacts=Contacts(cluster.contacts.i, cluster.contacts.j, np.zeros(12))),
+    ):
+        matrix = stiffness_matrix(packing).toarray()
+        # c N N^T is rounded as N_i (c N_j), so mirror entries differ in their last bit.
+        assert np.abs(matrix - matrix.T).max() < 4e-16 * np.abs(matrix).max()
+    sheared = stiffness_matrix(ramp(1.0, 1e-3, 22)(0.01)).toarray()
+    assert np.abs(sheared - sheared.T).max() > 1e-4 * np.abs(sheared).max()
+
+
+def test_translations_are_null_modes(cluster):
+    n = len(cluster)
+    along_x, along_y = np.repeat(np.eye(3)[:2], n, axis=1)
+    pairs = ~cluster.contacts.floor
+    c = cluster.contacts
+    free = stiffness_matrix(replace(cluster, contacts=Contacts(c.i[pairs], c.j[pairs], c.slip[pairs])))
+    floored = stiffness_matrix(cluster)
+    scale = np.abs(free).max()
+    for form in (free, free.T):  # no net force on translation, and no net force by translation
+        for mode in (along_x, along_y):
+            assert np.abs(form @ mode)[: 2 * n].max() < 1e-14 * scale
+    assert np.abs(floored @ along_x).max() > 1e-3 * scale
+
+
+def test_order_of_disks_does_not_matter(cluster):
+    order = np.array([3, 5, 0, 4, 1, 2])
+    place = np.argsort(order)
+    c = cluster.contacts
+    shuffled = Packing(
+        position=cluster.position[order],
+        radius=cluster.radius[order],
+        contacts=Contacts(place[c.i], np.where(c.floor, -1, place[c.j]), c.slip),
+        law=cluster.law,
+        box_length=cluster.box_length,
+    )
+    rows = np.concatenate([order, order + 6, order + 12])
+    expected = stiffness_matrix(cluster).toarray()
+    # The same products; where i and j have changed places, sums in another order.
+    actual = stiffness_matrix(shuffled).toarray()
+    np.testing.assert_allclose(
+        actual, expected[np.ix_(rows, rows)], rtol=0, atol=1e-15 * np.abs(expected).max()
+    )
+
+
+def test_mirror(cluster):
+    """x -> -x, theta -> -theta: tau is an axial vector's companion, so slips change sign."""
+    c = cluster.contacts
+    mirrored = replace(
+        cluster,
+        position=cluster.position * [-1, 1],
+        angle=-cluster.angle,
+        contacts=Contacts(c.i, c.j, -c.slip),
+        fx=-cluster.fx,
+    )
+    sign = np.repeat([-1, 1, -1], len(cluster))
+    np.testing.assert_array_equal(mirrored.net_force, sign * cluster.net_force)
+    np.testing.assert_array_equal(
+        stiffness_matrix(mirrored).toarray(), sign[:, None] * stiffness_matrix(cluster).toarray() * sign
+    )
+
+
+def test_scales_with_the_stiffnesses(cluster):
+    law = cluster.law
+    stiffer = replace(cluster, law=MindlinLaw(4 * law.kn, 4 * law.kt, law.mu))
+    np.testing.assert_array_equal(
+        stiffness_matrix(stiffer).toarray(), 4 * stiffness_matrix(cluster).toarray()
+    )
+
+
+@pytest.mark.parametrize(("kt", "mu"), [(0.0, 1.0), (6e4, 0.0)])
+def test_no_friction_no_rotation(cluster, kt, mu):
+    smooth = replace(cluster, law=MindlinLaw(2e5, kt, mu))
+    matrix = stiffness_matrix(smooth).toarray()
+    assert not matrix[12:].any()
+    assert not matrix[:, 12:].any()
+    assert np.abs(matrix - matrix.T).max() < 4e-16 * np.abs(matrix).max()
+    assert not smooth.net_force[12:].any()
+
+
+def test_nothing_touches():
+    alone = Packing(position=[[0, 5]], radius=[1], contacts=Contacts([], [], []), law=MindlinLaw(1, 1, 1))
+    matrix = stiffness_matrix(alone)
+    assert matrix.shape == (3, 3)
+    assert matrix.nnz == 0
+    assert contact_stiffness(alone).shape == (0, 6, 6)
+
+
+def test_unknown_form(cluster):
+    with pytest.raises(ValueError, match="consistent"):
+        stiffness_matrix(cluster, "exact")

@@ -1,0 +1,93 @@
+"""A loose start touches nothing, keeps to its box and its shares, and is the same for one seed."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from faultgouge.pywrap.loose import Start, loose_start
+
+
+def smallest_gap(start: Start) -> float:
+    """Distance between the surfaces of the closest pair, or of the closest disk and the floor."""
+    position = start.position
+    if start.box_length is not None:
+        shift = np.array([start.box_length, 0.0])
+        position = np.concatenate([position - shift, position, position + shift])
+    radius = np.resize(start.radius, len(position))
+    i, j = cKDTree(position).query_pairs(2.01 * radius.max(), output_type="ndarray").T
+    pairs = np.hypot(*(position[i] - position[j]).T) - radius[i] - radius[j]
+    return min((start.position[:, 1] - start.radius).min(), pairs.min(initial=np.inf))
+
+
+@given(
+    disks=st.integers(1, 200),
+    radii=st.lists(st.floats(0.1, 2.0), min_size=1, max_size=4),
+    top=st.floats(0, 1),
+    width=st.floats(8.0, 30.0),
+    seed=st.integers(0, 2**32),
+    periodic=st.booleans(),
+)
+def test_nothing_overlaps_and_the_upper_layer_lies_above(disks, radii, top, width, seed, periodic):
+    top = int(top * disks)
+    start = loose_start(disks, tuple(radii), top, width, seed, periodic=periodic)
+    # Places are sums of a few numbers below 1000, each rounded once: 1e-12 is ten times that.
+    assert smallest_gap(start) > -1e-12
+    assert start.box_length == (width if periodic else None)
+    x = start.position[:, 0]
+    assert np.all((x >= 0) & (x < width))
+    assert np.array_equal(start.top, np.arange(disks) >= disks - top)
+    if 0 < top < disks:
+        highest = (start.position[:, 1] + start.radius)[~start.top].max()
+        assert (start.position[:, 1] - start.radius)[start.top].min() >= highest - 1e-12
+
+
+@pytest.mark.parametrize(
+    ("disks", "shares"), [(100, {0.5: 50, 0.7: 50}), (101, {0.5: 51, 0.7: 50}), (1, {0.5: 1})]
+)
+def test_radii_have_equal_shares(disks, shares):
+    start = loose_start(disks, (0.5, 0.7), 1, 11.9, 7)
+    assert Counter(start.radius.tolist()) == shares
+
+
+def test_radii_take_turns_in_the_upper_layer_which_is_evenly_spaced():
+    start = loose_start(100, (0.7, 0.5), 10, 11.9, 7)
+    assert start.radius[start.top].tolist() == 5 * [0.5, 0.7]
+    # Ten equal steps in a box of 11.9; differences of numbers of order 10 are rounded at 2e-15.
+    assert np.diff(start.position[start.top, 0]) == pytest.approx(np.full(9, 1.19), abs=1e-14)
+
+
+def test_a_seed_is_a_packing():
+    one, again, other = (loose_start(100, (0.5, 0.7), 10, 11.9, seed) for seed in (7, 7, 8))
+    assert np.array_equal(one.position, again.position)
+    assert np.array_equal(one.radius, again.radius)
+    assert not np.array_equal(one.radius, other.radius)
+
+
+def test_radii_are_shuffled():
+    radius = loose_start(100, (0.5, 0.7), 10, 11.9, 7).radius[:90]
+    changes = np.count_nonzero(np.diff(radius))
+    # 40 small and 50 large disks in random order have 44 +- 5 changes of size; in two blocks there is one.
+    assert 24 < changes < 64
+
+
+def test_many_disks():
+    start = loose_start(100_000, (0.5, 0.7), 300, 380.0, 1)
+    assert len(start) == 100_000
+    assert smallest_gap(start) > -1e-12
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ((10, (0.5,), 11, 20.0, 1), "an upper layer of 11 disks cannot be made from 10"),
+        ((0, (0.5,), 0, 20.0, 1), "an upper layer of 0 disks cannot be made from 0"),
+        ((20, (0.5, 0.7), 1, 1.3, 1), "a disk of radius 0.7 is wider than the box of width 1.3"),
+    ],
+)
+def test_what_cannot_be_laid_out_is_refused(arguments, says):
+    with pytest.raises(ValueError, match=says):
+        loose_start(*arguments)

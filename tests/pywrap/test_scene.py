@@ -1,0 +1,299 @@
+"""A scene says one thing, keeps it to the bit, and refuses what cannot be run in one sentence."""
+
+import json
+import math
+from copy import deepcopy
+from pathlib import Path
+
+import pytest
+
+from faultgouge.pywrap.scene import GeneratedPacking, Scene, SceneError, StoredPacking
+
+ROOT = Path(__file__).parents[2]
+REFERENCE = ROOT / "tests" / "reference" / "packing7.json"
+
+LEAST = {"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+FULL = {
+    "precision": "compensated",
+    "packing": {
+        "disks": 40,
+        "radii": [0.4, 0.5, 0.6],
+        "top": 5,
+        "width": 8,
+        "seed": 3,
+        "settle_friction": True,
+    },
+    "law": {"kn": 1e6, "kt": 0.5, "mu": [1, 0.8]},
+    "load": {"fy": 2},
+    "relax": {"damping": 3.0, "time_step": 0.01},
+    "ramp": {"step": 1e-3, "until": 0.02, "method": "overdamped", "force_tolerance": 1e-12},
+    "perturb": {
+        "fx": 0.01,
+        "time": 1e3,
+        "amplitude": 1e-12,
+        "omega": 0.01,
+        "target": [3, 4],
+        "time_step": 1e-3,
+        "inertia_factor": 0.5,
+    },
+    "friction": {"B": 0.1, "w": 1, "mu_ss": 0.9, "v0": 2e-11, "v_ss": "100 v0"},
+    "output": {"trajectory": True, "dumps": True},
+}
+
+
+def merged(changes: dict) -> dict:
+    """The least scene with keys of its sections added or replaced; None takes a section away."""
+    scene = deepcopy(LEAST)
+    for name, value in changes.items():
+        if value is None:
+            del scene[name]
+        elif isinstance(value, dict):
+            scene.setdefault(name, {}).update(value)
+        else:
+            scene[name] = value
+    return scene
+
+
+def test_absent_sections_are_absent_features():
+    scene = Scene.from_mapping(LEAST)
+    assert (scene.ramp, scene.perturb, scene.friction, scene.output) == (None, None, None, None)
+    assert isinstance(scene.packing, GeneratedPacking)
+    assert (scene.packing.disks, scene.packing.radii, scene.packing.periodic) == (100, (0.5, 0.7), True)
+    assert (scene.law.mus, scene.inertia_factor) == ((1.0,), 1.0)
+
+
+def test_every_key_reaches_the_scene():
+    scene = Scene.from_mapping(FULL)
+    resolved = scene.resolved()
+    assert resolved.pop("packing") == {**FULL["packing"], "periodic": True}
+    assert resolved == {name: value for name, value in FULL.items() if name != "packing"}
+    assert scene.law.mus == (1.0, 0.8)
+    assert scene.inertia_factor == 0.5
+
+
+@pytest.mark.parametrize("mapping", [LEAST, FULL])
+def test_resolved_scene_is_plain_and_gives_the_same_scene(mapping):
+    scene = Scene.from_mapping(mapping)
+    assert Scene.from_mapping(json.loads(json.dumps(scene.resolved()))) == scene
+
+
+def test_a_scene_cannot_be_changed():
+    scene = Scene.from_mapping(LEAST)
+    with pytest.raises(ValueError, match="frozen"):
+        scene.law.kn = 1.0
+
+
+@pytest.mark.parametrize(
+    ("kt", "number"),
+    [
+        ("2/7 kn", 57142.857142857145),  # the reference packing's k_t, to the bit
+        ("0.5 kn", 1e5),
+        ("kn", 2e5),
+        (0, 0.0),
+        (57000, 57000.0),
+    ],
+)
+def test_kt_is_a_number_or_a_share_of_kn(kt, number):
+    assert Scene.from_mapping(merged({"law": {"kt": kt}})).law.kt == number
+    assert Scene.from_mapping(LEAST).law.kt == 57142.857142857145
+
+
+@pytest.mark.parametrize(("v_ss", "scale"), [("10 v0", 2e-10), ("1e4 v0", 2e-7), ("v0", 2e-11), (3e-9, 3e-9)])
+def test_velocity_scale_is_a_number_or_a_multiple_of_the_threshold(v_ss, scale):
+    friction = Scene.from_mapping(merged({"friction": {"v_ss": v_ss}})).friction
+    assert friction is not None
+    assert friction.velocity_scale(2e-11) == pytest.approx(scale, rel=1e-15)  # one product: one rounding
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "scenes").glob("*.toml")), ids=lambda path: path.stem)
+def test_shipped_scenes_are_scenes(path):
+    scene = Scene.from_toml(path)
+    assert scene.law.kn == 2e5
+    assert scene.load.fy == 3.0
+
+
+def test_the_paper_scene_holds_the_papers_numbers():
+    scene = Scene.from_toml(ROOT / "scenes" / "paper.toml")
+    assert scene.law.mus == (1.0, 0.8)
+    assert scene.law.kt == 2 * 2e5 / 7
+    assert scene.ramp is not None
+    assert scene.ramp.step == 1e-4
+
+
+def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "packing.json").write_bytes(REFERENCE.read_bytes())
+    toml = tmp_path / "scene.toml"
+    toml.write_text('[packing]\nfile = "data/packing.json"\n[law]\nkn = 2e5\n[load]\nfy = 3\n')
+    scene = Scene.from_toml(toml)
+    assert isinstance(scene.packing, StoredPacking)
+    assert scene.packing.file == (tmp_path / "data" / "packing.json").resolve()
+    assert Scene.from_mapping(scene.resolved()) == scene
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        # names
+        ({"packing": {"dsks": 10}}, "packing.dsks is no key of [packing]: the nearest is packing.disks."),
+        ({"law": {"my": 1.0}}, "law.my is no key of [law]: the nearest is law.mu."),
+        ({"packing": {"kn": 1.0}}, "packing.kn is no key of [packing]: the nearest is law.kn."),
+        ({"kn": 2e5}, "kn stands outside of its section: move it below [law]."),
+        ({"precison": "double"}, "precison is no key of a scene: the nearest is precision."),
+        ({"law": None, "lwa": {"kn": 2e5}}, "lwa is no key of a scene: the nearest is law."),
+        ({"law": None}, "law is missing: add the section [law]."),
+        ({"ramp": {}}, "ramp.until is missing: add until to [ramp]."),
+        ({"load": 3.0}, "load is not a section: write [load] and its keys below."),
+        # numbers
+        ({"packing": {"disks": 0}}, "packing.disks = 0 is refused: give a number above 0."),
+        ({"packing": {"disks": 1.5}}, "packing.disks = 1.5 is refused: give a whole number."),
+        ({"packing": {"disks": True}}, "packing.disks = True is refused: give a whole number."),
+        (
+            {"packing": {"disks": 10**9}},
+            "packing.disks = 1000000000 is refused: give a number of at most 10000000.",
+        ),
+        ({"packing": {"seed": -1}}, "packing.seed = -1 is refused: give a number of at least 0."),
+        ({"packing": {"radii": []}}, "packing.radii = [] is refused: give at least one number."),
+        ({"packing": {"radii": [0.5, 0.0]}}, "packing.radii.1 = 0.0 is refused: give a number above 0."),
+        ({"packing": {"radii": 0.5}}, "packing.radii = 0.5 is refused: give a list of numbers."),
+        ({"packing": {"periodic": 1}}, "packing.periodic = 1 is refused: give true or false."),
+        ({"law": {"kn": math.nan}}, "law.kn = nan is refused: give a finite number."),
+        ({"law": {"kn": math.inf}}, "law.kn = inf is refused: give a finite number."),
+        ({"law": {"kn": -1.0}}, "law.kn = -1.0 is refused: give a number above 0."),
+        ({"law": {"kn": -1.0, "kt": "2/7 kn"}}, "law.kn = -1.0 is refused: give a number above 0."),
+        ({"law": {"kn": "2e5"}}, "law.kn = '2e5' is refused: give a number."),
+        ({"law": {"kt": -1.0}}, "law.kt = -1.0 is refused: give a number of at least 0."),
+        ({"law": {"mu": -0.1}}, "law.mu = -0.1 is refused: give a number of at least 0, or a list"),
+        ({"law": {"mu": [1.0, math.nan]}}, "law.mu = [1.0, nan] is refused"),
+        ({"law": {"mu": []}}, "law.mu = [] is refused"),
+        ({"law": {"mu": 10**400}}, "is refused: give a number of at least 0, or a list"),
+        ({"law": {"mu": [1.0, 1]}}, "law.mu = [1.0, 1] names one value twice: give each once."),
+        ({"load": {"fy": 0.0}}, "load.fy = 0.0 is refused: give a number above 0."),
+        ({"ramp": {"until": 0.0}}, "ramp.until = 0.0 is refused: give a number above 0."),
+        (
+            {"ramp": {"until": 1.0, "force_tolerance": 0}},
+            "ramp.force_tolerance = 0 is refused: give a number above 0.",
+        ),
+        ({"relax": {"damping": 0.0}}, "relax.damping = 0.0 is refused: give a number above 0."),
+        (
+            {"perturb": {"fx": 0.1, "time": 1.0, "omega": "slow"}},
+            "perturb.omega = 'slow' is refused: give a number.",
+        ),
+        ({"perturb": {"fx": 0.1, "time": 1.0, "amplitude": math.nan}}, "perturb.amplitude = nan is refused"),
+        # choices
+        ({"precision": "single"}, "precision = 'single' is refused: give 'double' or 'compensated'."),
+        (
+            {"ramp": {"until": 1.0, "method": "fire"}},
+            "ramp.method = 'fire' is refused: give 'newton' or 'overdamped'.",
+        ),
+        ({"perturb": {"fx": 0.0, "time": 1.0, "target": "floor"}}, "perturb.target = 'floor' is refused"),
+        ({"perturb": {"fx": 0.0, "time": 1.0, "target": [-1]}}, "perturb.target = [-1] is refused"),
+        ({"law": {"kt": "2/7 k"}}, 'law.kt = "2/7 k" is no share of kn'),
+        ({"law": {"kt": "2/0 kn"}}, 'law.kt = "2/0 kn" is no share of kn'),
+        ({"law": {"kt": "-1 kn"}}, 'law.kt = "-1 kn" is no share of kn'),
+        ({"friction": {"v_ss": "10 v"}}, "friction.v_ss = '10 v' is refused"),
+        ({"friction": {"v_ss": "0 v0"}}, "friction.v_ss = '0 v0' is refused"),
+        ({"friction": {"v_ss": 1.0, "v0": "measured"}}, "friction.v0 = 'measured' is refused"),
+        # what does not go together
+        ({"packing": {"top": 101}}, "packing.top = 101 is more than the 100 disks of the packing: lower it."),
+        (
+            {"packing": {"width": 2.7}},
+            "packing.width = 2.7 is under two cutoffs of one largest diameter, 2.8: widen",
+        ),
+        (
+            {"packing": {"width": 1.0, "periodic": False}},
+            "packing is refused because a disk of radius 0.7 is wider",
+        ),
+        (
+            {"ramp": {"step": 0.2, "until": 0.1}},
+            "ramp.step = 0.2 is larger than until = 0.1: take a smaller step.",
+        ),
+        (
+            {"perturb": {"fx": 0.1, "time": 1.0, "time_step": 2.0}},
+            "perturb.time = 1.0 is shorter than one step, 2.0",
+        ),
+        (
+            {"perturb": {"fx": 0.1, "time": 1.0, "amplitude": 1e-9}},
+            "perturb.omega is missing: an amplitude needs",
+        ),
+        (
+            {"perturb": {"fx": 0.1, "time": 1.0, "target": [100]}},
+            "perturb.target names disk 100: name disks from 0 to 99.",
+        ),
+        (
+            {"ramp": {"until": 0.05}, "perturb": {"fx": 0.1, "time": 1.0}},
+            "perturb.fx = 0.1 lies beyond the last equilibrium, ramp.until = 0.05",
+        ),
+        (
+            {"friction": {}},
+            "friction.v_ss is missing, and the paper gives no value: give a velocity, or a multiple",
+        ),
+        ({"friction": {"v0": 0.0, "v_ss": "10 v0"}}, 'friction.v_ss = "10 v0" is no velocity because v0 = 0'),
+        ({"law": {"mu": 0.0}, "friction": {"v_ss": 1.0}}, "friction has no mu to weaken"),
+    ],
+    ids=lambda value: str(value)[:60],
+)
+def test_what_cannot_be_run_is_refused_in_one_sentence(changes, says):
+    with pytest.raises(SceneError) as refusal:
+        Scene.from_mapping(merged(changes))
+    sentence = str(refusal.value)
+    assert f"scene: {says}" in sentence or says in sentence
+    assert sentence.endswith(".")
+    assert "\n" not in sentence
+    assert "pydantic" not in sentence
+
+
+def test_kt_without_kn():
+    with pytest.raises(SceneError, match=r"law\.kt stands without kn: give kn"):
+        Scene.from_mapping({**LEAST, "law": {"kt": 1.0}})
+
+
+def test_a_list_is_no_scene():
+    with pytest.raises(SceneError, match="this one is no mapping: give a dict"):
+        Scene.from_mapping([])
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("missing.json", None, "cannot be read at"),
+        ("broken.json", b"{", "is not a packing file"),
+        ("other.json", b'{"x": [1]}', "lacks the key .y."),
+        ("run.h5", b"no HDF5", "is neither HDF5 nor named .json"),
+    ],
+)
+def test_a_packing_file_is_looked_at_before_any_work(tmp_path, name, content, says):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(SceneError, match=rf'scene: packing.file = "{name}" .*{says}'):
+        Scene.from_mapping({**LEAST, "packing": {"file": name}}, folder=tmp_path)
+
+
+def test_an_hdf5_file_is_taken(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    h5py.File(tmp_path / "run.h5", "w").close()
+    scene = Scene.from_mapping({**LEAST, "packing": {"file": "run.h5"}}, folder=tmp_path)
+    assert isinstance(scene.packing, StoredPacking)
+
+
+def test_a_file_says_already_what_a_seed_would():
+    with pytest.raises(SceneError, match=r"packing\.seed cannot stand beside packing\.file"):
+        Scene.from_mapping({**LEAST, "packing": {"file": str(REFERENCE), "seed": 1}})
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (None, r"cannot be read \(No such file or directory\): correct its path"),
+        (b"[law]\nkn = 2e5\nkt =\n", "is not valid TOML: .*line 3"),
+        (b"\xff\xfe", "is not valid TOML: .*decode"),
+        (b"[law]\nkn = 2e5\n", "scene.toml: packing is missing: add the section .packing."),
+    ],
+)
+def test_a_refused_file_is_named(tmp_path, content, says):
+    path = tmp_path / "scene.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(SceneError, match=says) as refusal:
+        Scene.from_toml(path)
+    assert str(refusal.value).startswith(str(path))
