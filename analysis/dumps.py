@@ -184,9 +184,7 @@ def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
     except OSError as error:
         raise PackingFileError(f"{path} cannot be read: {error.strerror}.") from error
     except (ValueError, IndexError, StopIteration) as error:
-        raise PackingFileError(
-            f"{path} is not a complete LAMMPS text dump: {error or 'it breaks off'}."
-        ) from error
+        raise PackingFileError(f"{path} is not a complete LAMMPS text dump: {error or 'it breaks off'}.") from error
 
 
 def _next_frame(file: TextIO) -> DumpFrame | None:
@@ -206,9 +204,7 @@ def _next_frame(file: TextIO) -> DumpFrame | None:
         elif item[1] in ("ATOMS", "ENTRIES"):
             columns = tuple(item[2:])
             lines = list(islice(file, count))
-            rows = np.array([row.split() for row in lines], dtype=np.float64).reshape(
-                len(lines), len(columns)
-            )
+            rows = np.array([row.split() for row in lines], dtype=np.float64).reshape(len(lines), len(columns))
             if len(lines) < count:
                 raise ValueError(f"{count} rows are announced and {len(lines)} are there")
             return DumpFrame(step, boundary, bounds, columns, rows)
@@ -249,8 +245,7 @@ def _sidecar(path: Path) -> dict[str, float]:
         return {}
     try:
         return {
-            key: float(value)
-            for key, value in (line.split() for line in path.read_text().splitlines() if line.strip())
+            key: float(value) for key, value in (line.split() for line in path.read_text().splitlines() if line.strip())
         }
     except ValueError as error:
         raise PackingFileError(f"{path} must have one key and one number a line.") from error

@@ -52,9 +52,7 @@ class Growth:
     end: float
 
 
-def mean_square_displacement(
-    position: ArrayLike, reference: ArrayLike, box_length: float | None = None
-) -> Floats:
+def mean_square_displacement(position: ArrayLike, reference: ArrayLike, box_length: float | None = None) -> Floats:
     """D of one or more configurations.
 
     Parameters
@@ -71,9 +69,7 @@ def mean_square_displacement(
     ndarray, shape (...)
         Mean over disks of dx^2 + dy^2, length^2.
     """
-    moved = nearest_image(
-        np.asarray(position, dtype=np.float64) - np.asarray(reference, dtype=np.float64), box_length
-    )
+    moved = nearest_image(np.asarray(position, dtype=np.float64) - np.asarray(reference, dtype=np.float64), box_length)
     return np.mean(np.sum(moved**2, axis=-1), axis=-1)
 
 
@@ -102,9 +98,7 @@ def fit_growth(time: ArrayLike, msd: ArrayLike, lower: float, upper: float) -> G
     """
     t, d = np.asarray(time, dtype=np.float64), np.asarray(msd, dtype=np.float64)
     if t.ndim != 1 or t.shape != d.shape:
-        raise ValueError(
-            f"time and msd must be lists of one length; their shapes are {t.shape} and {d.shape}."
-        )
+        raise ValueError(f"time and msd must be lists of one length; their shapes are {t.shape} and {d.shape}.")
     step = np.diff(t)
     # Times of a run are multiples of dt, printed or summed: a part in a million is far above their rounding.
     if len(t) < 2 or step.min() <= 0 or np.ptp(step) > 1e-6 * step.mean():
@@ -126,9 +120,7 @@ def fit_growth(time: ArrayLike, msd: ArrayLike, lower: float, upper: float) -> G
     scatter = level - level.mean() - rate * x
     decades = float((level[-1] - level[0]) / np.log(10))
     if decades < 1:
-        raise ValueError(
-            f"D grows by {decades:.2g} decades between {lower:g} and {upper:g}; a rate needs one."
-        )
+        raise ValueError(f"D grows by {decades:.2g} decades between {lower:g} and {upper:g}; a rate needs one.")
     return Growth(
         rate=rate,
         error=float(np.sqrt(scatter @ scatter / (BLOCKS - 2) / (x @ x))),

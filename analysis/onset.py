@@ -42,7 +42,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig
 from scipy.optimize import brentq, linear_sum_assignment
 
-from .packing import Floats, Indices, Packing
+from .packing import Contacts, Floats, Indices, Packing
 from .spectrum import Complexes, believable, dynamical_matrix, unit_rounding
 from .stiffness import Form
 
@@ -188,9 +188,7 @@ def find_onset(
     )
     if not windows:
         largest = float(np.asarray(forces, dtype=np.float64)[-1])
-        raise OnsetError(
-            f"No pair of eigenvalues becomes complex up to fx = {largest:.17g}: raise the largest load."
-        )
+        raise OnsetError(f"No pair of eigenvalues becomes complex up to fx = {largest:.17g}: raise the largest load.")
     return Onset(windows)
 
 
@@ -293,10 +291,24 @@ def follow(packings: Iterable[Packing], form: Form = "consistent") -> Complexes:
 
 def full_operator(packing: Packing, form: Form = "consistent") -> Floats:
     """A = M^(-1/2) K M^(-1/2) as a dense array, shape (3N, 3N), with its zero rows; 1 / time^2."""
+    packing = loaded(packing)
     sparse, active = dynamical_matrix(packing, form)
     matrix = np.zeros((3 * len(packing),) * 2)
     matrix[np.ix_(active, active)] = sparse.toarray()
     return matrix
+
+
+def loaded(packing: Packing) -> Packing:
+    """The packing without the contacts whose force is no more than its own imbalance.
+
+    A disk that nothing holds but such contacts comes to rest just about touching, with an overlap, and so with
+    a stiffness, that is rounding noise: of order (residual / k_n)^(1/3), large enough to move eigenvalues.
+    """
+    contacts = packing.contacts
+    kept = packing.normal_force > packing.residual
+    if np.all(kept):
+        return packing
+    return replace(packing, contacts=Contacts(contacts.i[kept], contacts.j[kept], contacts.slip[kept]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -367,9 +379,7 @@ class Modes:
 
     def nearest(self, block: "Block") -> Pair:
         """The two modes that lie closest to the subspaces of a block at a neighbouring load."""
-        weight = np.linalg.norm(block.right.T @ self.right, axis=0) * np.linalg.norm(
-            block.left.T @ self.left, axis=0
-        )
+        weight = np.linalg.norm(block.right.T @ self.right, axis=0) * np.linalg.norm(block.left.T @ self.left, axis=0)
         first, second = np.argsort(weight)[-2:]
         return int(first), int(second)
 
@@ -405,11 +415,7 @@ def assign(here: Modes, there: Modes) -> Indices:
     partner[rows] = columns
     # Members of one pair have the same weights: let the one above the axis stay above.
     for up, down in here.complex_pairs:
-        if (
-            partner[up] >= 0
-            and there.partner[partner[up]] == partner[down]
-            and there.values[partner[up]].imag < 0
-        ):
+        if partner[up] >= 0 and there.partner[partner[up]] == partner[down] and there.values[partner[up]].imag < 0:
             partner[[up, down]] = partner[[down, up]]
     return partner
 

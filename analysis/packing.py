@@ -169,9 +169,7 @@ class Packing:
         }
         for name in ("radius", "mass"):
             if np.any(arrays[name] <= 0):
-                raise ValueError(
-                    f"Every {name} must be positive; disk {np.argmin(arrays[name])} has another."
-                )
+                raise ValueError(f"Every {name} must be positive; disk {np.argmin(arrays[name])} has another.")
         if arrays["top"].shape != (n,) or arrays["top"].dtype != np.bool_:
             raise ValueError(f"top must be {n} booleans, one for each disk.")
         for name, value in arrays.items():

@@ -132,10 +132,7 @@ class RunFile:
     @property
     def attributes(self) -> dict[str, Any]:
         """Attributes of the root: scene, versions, seed, ranks."""
-        return {
-            name: getattr(value, "tolist", lambda value=value: value)()
-            for name, value in self._file.attrs.items()
-        }
+        return {name: getattr(value, "tolist", lambda value=value: value)() for name, value in self._file.attrs.items()}
 
     @property
     def fx(self) -> Floats:
@@ -188,9 +185,7 @@ class RunFile:
             raise ValueError(f"The name {min(taken)} is taken: the packing itself says it.")
         frame |= scalars
         if count and set(frame) != set(self.observables):
-            raise ValueError(
-                f"Frames of {self.path} have the observables {', '.join(self.observables)}, not others."
-            )
+            raise ValueError(f"Frames of {self.path} have the observables {', '.join(self.observables)}, not others.")
         for name, value in frame.items():
             self._put(f"observables/{name}", np.asarray(value), count)
         flat = np.column_stack([packing.position, np.zeros(len(packing))])
@@ -317,9 +312,7 @@ class RunFile:
     def _check_same(self, packing: Packing) -> None:
         parameters, values = self._file["parameters"], _parameters(packing)
         for name in parameters.keys() | values.keys():
-            if not (
-                name in parameters and name in values and np.array_equal(parameters[name][()], values[name])
-            ):
+            if not (name in parameters and name in values and np.array_equal(parameters[name][()], values[name])):
                 raise ValueError(f"{self.path} was begun for a packing with another {name}.")
 
 

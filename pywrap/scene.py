@@ -96,9 +96,7 @@ class GeneratedPacking(_Section):
     @model_validator(mode="after")
     def _fits(self) -> "GeneratedPacking":
         if self.top > self.disks:
-            raise _refusal(
-                "top", f"= {self.top} is more than the {self.disks} disks of the packing: lower it"
-            )
+            raise _refusal("top", f"= {self.top} is more than the {self.disks} disks of the packing: lower it")
         cutoff = 2 * max(self.radii)
         if self.periodic and self.width < 2 * cutoff:
             says = f"= {self.width} is under two cutoffs of one largest diameter, {2 * cutoff}: widen the box"
@@ -443,9 +441,7 @@ class Scene(_Section):
         try:
             mapping = tomllib.loads(path.read_text(encoding="utf-8"))
         except OSError as error:
-            raise SceneError(
-                f"{path}: the scene cannot be read ({error.strerror}): correct its path."
-            ) from None
+            raise SceneError(f"{path}: the scene cannot be read ({error.strerror}): correct its path.") from None
         except ValueError as error:  # bytes that are not UTF-8, or text that is not TOML
             raise SceneError(f"{path}: the scene is not valid TOML: {error}.") from None
         return cls._checked(mapping, path.parent, str(path))

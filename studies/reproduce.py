@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -129,9 +130,7 @@ def _growth(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
     dt = time_step(start.packing)
     fastest = max(modes.pairs, key=lambda pair: pair.growth_rate)
     predicted = 2 * abs(discrete_frequency(fastest.eigenvalue, dt).imag)
-    settings = Perturb(
-        fx=start.fx, time=min(EFOLDS / predicted, LONGEST_RUN * dt), inertia_factor=scene.inertia_factor
-    )
+    settings = Perturb(fx=start.fx, time=min(EFOLDS / predicted, LONGEST_RUN * dt), inertia_factor=scene.inertia_factor)
     # D is linear in nothing any more once disks have moved by a tenth of the smallest overlap
     ceiling = (0.1 * start.packing.geometry.overlap.min()) ** 2
     samples: list[Sample] = []
@@ -140,9 +139,7 @@ def _growth(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
             samples.append(sample)
             if sample.msd > 1e6 * ceiling:
                 break
-        file.append_series(
-            "undamped", **{key: [getattr(s, key) for s in samples] for key in vars(samples[0])}
-        )
+        file.append_series("undamped", **{key: [getattr(s, key) for s in samples] for key in vars(samples[0])})
     time, msd = np.array([s.time for s in samples]), np.array([s.msd for s in samples])
     # the noise has no mode of its own: two decades above it the fastest pair is alone
     floor = np.median(msd[: len(msd) // 20])
@@ -279,7 +276,7 @@ def _onset_words(runs: list[OnsetRun]) -> list[str]:
                 f"For mu = {run.mu:g} no equilibrium was found beyond F_x = {run.flows_beyond:g}: the layer flows."
             )
     order = sorted(runs, key=lambda run: run.mu)
-    rising = all(a.onset.fx_c < b.onset.fx_c for a, b in zip(order, order[1:], strict=False))
+    rising = all(a.onset.fx_c < b.onset.fx_c for a, b in pairwise(order))
     if len(order) > 1:
         lines.append(
             "As in the paper, the onset comes earlier for smaller mu."
@@ -300,11 +297,12 @@ def _assumptions(scene: Scene, packing: Packing) -> list[str]:
         + (
             "with friction, so that the packing carries tangential load at F_x = 0"
             if getattr(scene.packing, "settle_friction", False)
-            else "without friction, which then begins with zero slips, so that K is symmetric at F_x = 0; every disk is "
-            "pulled down first, so that the upper layer comes to lie on the bed"
+            else "without friction, which then begins with zero slips, so that K is symmetric at F_x = 0; every disk "
+            "is pulled down first, so that the upper layer comes to lie on the bed"
         ),
         "time step of undamped runs: 0.05 of the stability limit 2/omega_max; damping in relaxation only",
-        "f_min: the force on a disk, with torque over radius, in the units of k_n and F_y; what was reached is said above",
+        "f_min: the force on a disk, with torque over radius, in the units of k_n and F_y; what was reached is said "
+        "above",
         "stability operator: the exact derivative of the forces, with the turning of the tangent that the paper's "
         "Eq. 14 leaves out",
         "units: mass of a disk 1, diameter of a small disk 1, k_n as given",

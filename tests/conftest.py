@@ -1,10 +1,15 @@
 """What tests share: LAMMPS as a user runs it, and the reference packing."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+
+# before NumPy is imported: the matrices are small, and workers share the cores
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest

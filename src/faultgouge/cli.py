@@ -19,7 +19,7 @@ import typer
 from rich.console import Console
 
 if TYPE_CHECKING:
-    from faultgouge.pywrap import Equilibrium, Scene
+    from faultgouge.pywrap import Scene
 
 T = TypeVar("T")
 
@@ -32,12 +32,8 @@ app = typer.Typer(
     epilog="Example: [bold]faultgouge reproduce -o results[/bold]",
 )
 
-ScenePath = Annotated[
-    Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)
-]
-Out = Annotated[
-    Path, typer.Option("-o", "--output", help="The file to write; an interrupted one is continued.")
-]
+ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)]
+Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted one is continued.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
@@ -70,9 +66,7 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     wanted = _scene(scene)
     with Record(output, wanted) as record:
         total = len(loads(wanted.ramp)) if wanted.ramp else None
-        done = (
-            0 if record.last is None or wanted.ramp is None else round(record.last.fx / wanted.ramp.step) + 1
-        )
+        done = 0 if record.last is None or wanted.ramp is None else round(record.last.fx / wanted.ramp.step) + 1
         for equilibrium in _progress(ramp_up(wanted, record.last), "equilibria", total, done):
             record.append(equilibrium)
     _say(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")  # type: ignore[union-attr]
@@ -90,14 +84,9 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     if wanted.perturb is None:
         raise SceneError(f"{scene}: the scene has no section [perturb]: add it, with fx and time")
     if output.exists():
-        raise SceneError(
-            f"{output} exists: an undamped run starts from rest, so give another name or delete it"
-        )
+        raise SceneError(f"{output} exists: an undamped run starts from rest, so give another name or delete it")
     with Record(output, wanted) as record:
-        start: Equilibrium | None = None
-        for start in _progress(reach(wanted, wanted.perturb.fx), "equilibria"):
-            pass
-        assert start is not None
+        *_, start = _progress(reach(wanted, wanted.perturb.fx), "equilibria")
         record.append(start)
         batch = []
         for sample in _progress(run_undamped(wanted, start), "samples"):
@@ -165,17 +154,13 @@ def spectrum(
     if not pairs:
         print("no complex pair: linearly stable")
     if result.noise_pairs:
-        print(
-            f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real"
-        )
+        print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
 
 
 @app.command(epilog="Example: [bold]faultgouge onset paper.toml --json[/bold]")
 def onset(
     scene: ScenePath,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Also write the JSON to this file.")
-    ] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Also write the JSON to this file.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """The onset F_x^c and the windows of complex eigenvalues, for each friction coefficient of the scene."""
@@ -200,9 +185,9 @@ def reproduce(
     scene: Annotated[
         Path | None, typer.Argument(metavar="[SCENE]", help="Another scene than the one that ships.")
     ] = None,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="The folder for figures, numbers and report.")
-    ] = Path("results"),
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for figures, numbers and report.")] = Path(
+        "results"
+    ),
 ) -> None:
     """The paper's protocol on one packing: figures 1, 3, 4, numbers and a report."""
     from importlib.resources import files

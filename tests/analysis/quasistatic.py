@@ -20,9 +20,7 @@ def moved(old: Packing, q: np.ndarray, fx: float) -> Packing:
     dx, dy, du = q.reshape(3, -1)
     position = old.position + np.column_stack([dx, dy])
     now = touching(position, old.radius, old.box_length)
-    remembered = {
-        (i, j): s for i, j, s in zip(old.contacts.i, old.contacts.j, old.contacts.slip, strict=True)
-    }
+    remembered = {(i, j): s for i, j, s in zip(old.contacts.i, old.contacts.j, old.contacts.slip, strict=True)}
     slips = []
     for i, j in zip(now.i, now.j, strict=True):
         if j == FLOOR:
@@ -41,9 +39,7 @@ def moved(old: Packing, q: np.ndarray, fx: float) -> Packing:
         limit = old.law.mu * old.law.kn / old.law.kt * overlap if old.law.frictional else 0.0
         slips.append(min(max(slip, -limit), limit))
     angle = old.angle + du / old.radius
-    return replace(
-        old, position=position, angle=angle, contacts=Contacts(now.i, now.j, np.array(slips)), fx=fx
-    )
+    return replace(old, position=position, angle=angle, contacts=Contacts(now.i, now.j, np.array(slips)), fx=fx)
 
 
 def branch(position: np.ndarray, box_length: float | None, i: int, j: int) -> np.ndarray:

@@ -47,9 +47,7 @@ def written(packing, step=0):
         for k in range(n)
     ]
     pairs = [(i + 1, j + 1, 0, 0, s) for i, j, s in zip(c.i, c.j, c.slip, strict=True) if j >= 0]
-    pairs = [(j, i, *rest) if rng.random() < 0.5 else (i, j, *rest) for i, j, *rest in pairs] + [
-        (1, 3, 0, 0, 0)
-    ]
+    pairs = [(j, i, *rest) if rng.random() < 0.5 else (i, j, *rest) for i, j, *rest in pairs] + [(1, 3, 0, 0, 0)]
     x = "ff" if packing.box_length is None else "pp"
     return (
         block(step, "ATOMS", DISK_COLUMNS, [disks[k] for k in rng.permutation(n)], x),
@@ -106,9 +104,7 @@ def test_frames_are_matched_by_step(dumped, cluster):
 def test_names_as_lammps_has_them(dumped, cluster):
     contacts = dumped.with_suffix(".contacts")
     contacts.write_text(
-        contacts.read_text().replace(
-            CONTACT_COLUMNS, "c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]"
-        )
+        contacts.read_text().replace(CONTACT_COLUMNS, "c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]")
     )
     dumped.write_text(dumped.read_text().replace("floor_slip", "f_floor[3]"))
     assert_identical(read_dump(dumped), cluster)

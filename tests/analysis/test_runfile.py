@@ -157,9 +157,7 @@ def test_datasets_depend_on_the_frames_alone(tmp_path, states):
     def datasets(name):
         found = {}
         with h5py.File(tmp_path / name) as file:
-            file.visititems(
-                lambda key, item: found.update({key: item[()]}) if isinstance(item, h5py.Dataset) else None
-            )
+            file.visititems(lambda key, item: found.update({key: item[()]}) if isinstance(item, h5py.Dataset) else None)
         return found
 
     first, second = datasets("a.h5"), datasets("b.h5")

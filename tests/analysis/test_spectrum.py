@@ -137,9 +137,7 @@ def test_shift_invert_finds_what_lapack_finds(ramp, near):
     matrix[np.ix_(active, active)] = sparse.toarray()
     scale = np.linalg.norm(matrix, 2)
     assert np.abs(matrix @ some.right - some.right * some.values).max() < 1e-13 * scale
-    assert (
-        np.abs(some.left.conj().T @ matrix - some.values[:, None] * some.left.conj().T).max() < 1e-13 * scale
-    )
+    assert np.abs(some.left.conj().T @ matrix - some.values[:, None] * some.left.conj().T).max() < 1e-13 * scale
     np.testing.assert_allclose(np.linalg.norm(some.left, axis=0), 1, rtol=1e-12)
     for pair in dense.pairs:
         known = np.abs(some.values - pair.eigenvalue) < 1e-6
@@ -197,6 +195,4 @@ def test_negative_eigenvalues_grow():
     slope = -2 * law.kn * 0.02**1.5 / 0.98
     assert result.unstable == pytest.approx(np.array([slope]), rel=1e-12)
     assert result.growth_rate() == pytest.approx(2 * np.sqrt(-slope), rel=1e-12)
-    assert result.growth_rate(dt=1e-3) == pytest.approx(
-        2 * abs(discrete_frequency(slope, 1e-3).imag), rel=1e-12
-    )
+    assert result.growth_rate(dt=1e-3) == pytest.approx(2 * abs(discrete_frequency(slope, 1e-3).imag), rel=1e-12)

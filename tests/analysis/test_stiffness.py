@@ -45,9 +45,7 @@ def test_derivative_of_one_contact(cluster, k):
         place = np.flatnonzero((there.i == c.i[k]) & (there.j == c.j[k]))
         one = Contacts(there.i[place], there.j[place], there.slip[place])
         dx, dy, _ = q.reshape(3, -1)
-        return quasistatic.forces(
-            replace(alone, contacts=one, position=cluster.position + np.column_stack([dx, dy]))
-        )
+        return quasistatic.forces(replace(alone, contacts=one, position=cluster.position + np.column_stack([dx, dy])))
 
     expected = np.array([(force(-q) - force(q)) / 2e-6 for q in 1e-6 * np.eye(18)]).T
     assert np.abs(matrix - expected).max() < 1e-8 * np.abs(matrix).max()
@@ -103,9 +101,7 @@ def test_single_valued_at_the_bound():
 def test_paper_form_lacks_the_turning_of_the_tangent(cluster):
     n = len(cluster)
     missing = np.zeros((3 * n, 3 * n))
-    geometry = zip(
-        *cluster.geometry, cluster.contacts.i, cluster.contacts.j, cluster.tangential_force, strict=True
-    )
+    geometry = zip(*cluster.geometry, cluster.contacts.i, cluster.contacts.j, cluster.tangential_force, strict=True)
     for normal, tangent, distance, _, i, j, ft in geometry:
         if j < 0:
             continue
@@ -161,9 +157,7 @@ def test_order_of_disks_does_not_matter(cluster):
     expected = stiffness_matrix(cluster).toarray()
     # The same products; where i and j have changed places, sums in another order.
     actual = stiffness_matrix(shuffled).toarray()
-    np.testing.assert_allclose(
-        actual, expected[np.ix_(rows, rows)], rtol=0, atol=1e-15 * np.abs(expected).max()
-    )
+    np.testing.assert_allclose(actual, expected[np.ix_(rows, rows)], rtol=0, atol=1e-15 * np.abs(expected).max())
 
 
 def test_mirror(cluster):
@@ -186,9 +180,7 @@ def test_mirror(cluster):
 def test_scales_with_the_stiffnesses(cluster):
     law = cluster.law
     stiffer = replace(cluster, law=MindlinLaw(4 * law.kn, 4 * law.kt, law.mu))
-    np.testing.assert_array_equal(
-        stiffness_matrix(stiffer).toarray(), 4 * stiffness_matrix(cluster).toarray()
-    )
+    np.testing.assert_array_equal(stiffness_matrix(stiffer).toarray(), 4 * stiffness_matrix(cluster).toarray())
 
 
 @pytest.mark.parametrize(("kt", "mu"), [(0.0, 1.0), (6e4, 0.0)])

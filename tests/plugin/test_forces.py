@@ -113,9 +113,7 @@ def test_slip_on_a_closed_path_is_second_order():
                 step = target - packing.position
                 packing = engine.displace(packing, np.concatenate([step[:, 0], step[:, 1], np.zeros(2)]))
         errors.append(abs(abs(packing.contacts.slip[0]) - 0.5 * reach))
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(
-        2.0, abs=0.05
-    )  # the next order is 1/steps^2 smaller
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.05)  # the next order is 1/steps^2 smaller
 
 
 def test_new_contact_starts_without_slip_and_lost_one_forgets():

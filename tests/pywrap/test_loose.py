@@ -45,9 +45,7 @@ def test_nothing_overlaps_and_the_upper_layer_lies_above(disks, radii, top, widt
         assert (start.position[:, 1] - start.radius)[start.top].min() >= highest - 1e-12
 
 
-@pytest.mark.parametrize(
-    ("disks", "shares"), [(100, {0.5: 50, 0.7: 50}), (101, {0.5: 51, 0.7: 50}), (1, {0.5: 1})]
-)
+@pytest.mark.parametrize(("disks", "shares"), [(100, {0.5: 50, 0.7: 50}), (101, {0.5: 51, 0.7: 50}), (1, {0.5: 1})])
 def test_radii_have_equal_shares(disks, shares):
     start = loose_start(disks, (0.5, 0.7), 1, 11.9, 7)
     assert Counter(start.radius.tolist()) == shares

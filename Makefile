@@ -1,0 +1,58 @@
+# make reproduce   sets everything up and runs the paper's protocol into results/
+# make test        sets everything up and runs all tests
+# make check       format, lint and types
+# make benchmark   time per step beside LAMMPS's own granular styles
+# make clean       removes what the others made
+
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+SOURCES := $(shell find pair_mindlin_smooth lammps_inputs analysis pywrap studies src scenes -type f -not -name '*.pyc') \
+           CMakeLists.txt pyproject.toml README.md
+
+# one thread a process: the matrices are small, and the ranks share the cores
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: reproduce test check format benchmark clean
+
+reproduce: $(VENV)/.installed
+	$(BIN)/faultgouge reproduce -o results
+
+test: $(VENV)/.test
+	$(BIN)/python -m pytest -q -n 2
+
+check: $(VENV)/.check
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/clang-format --dry-run --Werror pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp
+	$(BIN)/mypy -p faultgouge
+
+format: $(VENV)/.check
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+	$(BIN)/clang-format -i pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp
+
+benchmark: $(VENV)/.installed
+	$(BIN)/python benchmarks/time_per_step.py
+
+clean:
+	rm -rf $(VENV) build results report stability .pytest_cache .hypothesis .mypy_cache .ruff_cache
+
+# A bare Debian has python3 without ensurepip; virtualenv then comes from the system or from pip.
+$(VENV)/bin/python:
+	$(PYTHON) -m venv $(VENV) || $(PYTHON) -m virtualenv $(VENV) || \
+	  { echo "make: no virtual environment can be made: apt-get install python3-venv" >&2; rm -rf $(VENV); exit 1; }
+	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+
+$(VENV)/.installed: $(VENV)/bin/python $(SOURCES)
+	$(BIN)/python -m pip install --quiet .
+	touch $@
+
+$(VENV)/.test: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --group test
+	touch $@
+
+$(VENV)/.check: $(VENV)/.test
+	$(BIN)/python -m pip install --quiet --group check
+	touch $@

@@ -1,0 +1,427 @@
+r"""The normal form of two coalescing modes, and where a real packing's pair stands in it.
+
+In the paper's equations 12 to 23, in units of time in which the mean of the two eigenvalues is one,
+
+.. math::
+
+    \ddot{\mathbf x} = -\begin{pmatrix} 1 - \delta & \eta \\ -\eta & 1 + \delta \end{pmatrix} \mathbf x
+    - \frac1\tau \dot{\mathbf x} + \mathbf f \cos\omega t, \qquad \nu = \eta/\delta, \quad \epsilon = 1 - \nu .
+
+The matrix is 1 + N with tr N = 0 and :math:`N^2 = r^2`,
+
+.. math:: \lambda_{1,2} = 1 \mp r, \qquad r = \delta \sqrt{1 - \nu^2} = \delta \sqrt{\epsilon (2 - \epsilon)} ,
+
+complex for :math:`\nu > 1` (where the paper has :math:`\eta > 1`). With half the sum s and half the difference d
+= r/2s of :math:`\sqrt{1 \pm r}`, the start orthogonal to :math:`\mathbf v^* = (1, 1)/\sqrt2` has the exact solution
+
+.. math::
+
+    \mathbf x = \mathbf e_\perp \cos st \cos dt + g\, \mathbf v^* \sin st \sin dt, \qquad
+    \mathbf e_\perp = \frac{(1, -1)}{\sqrt2}, \quad g = \sqrt{\frac{1 + \nu}{1 - \nu}} = \sqrt{\frac{2 - \epsilon}
+    \epsilon} ,
+
+because :math:`N \mathbf e_\perp = -\delta (1 + \nu)\, \mathbf v^*`. It goes over into the paper's Eq. 18 for
+:math:`\epsilon \to 0`: the amplitude is :math:`\sqrt{2/\epsilon}`, reached after the time :math:`\pi/2d`.
+
+**Damping** takes :math:`\sqrt{1 - \gamma^2 \pm r}`, :math:`\gamma = 1/2\tau`, for the frequencies and multiplies by
+:math:`e^{-\gamma t} = e^{-t/2\tau}` (the paper has :math:`e^{-t/\tau}`), so that for small :math:`\epsilon` and
+:math:`\gamma`
+
+.. math::
+
+    A \approx g \max_t e^{-t/2\tau} \sin dt = g \sin\theta\, e^{-\theta / \tan\theta}, \qquad \tan\theta = 2 d \tau ,
+
+a function of :math:`\tau/\tau_d` alone with :math:`\tau_d = 1/\delta\sqrt\epsilon`: half of g at :math:`\tau =
+1.36\,\tau_d`, g far above and :math:`(2/e)\, g\, d\, \tau`, which does not depend on :math:`\epsilon`, far below.
+
+**A real pair.** On the right invariant subspace of two modes the operator A of a packing is a real 2 x 2 block. In an
+orthonormal basis of that plane its traceless part is a symmetric one, which a rotation makes diag(-p, p), and
+an antisymmetric one, q times the quarter turn, which a rotation leaves alone. With the mean m of the
+eigenvalues, :math:`\delta = p/m`, :math:`\eta = q/m` and :math:`t \to \sqrt m\, t`, it is the normal form without an
+approximation; a reflection takes care of the sign of q. What is oblique is only how the plane sees the other
+coordinates: a displacement z of the packing enters it by the left plane, :math:`W^T z`, with :math:`W^T V = 1`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq, minimize_scalar
+
+from .onset import Block, full_operator
+from .onset import Modes as PackingModes
+from .packing import Floats, Packing
+from .spectrum import Complexes
+from .stiffness import Form
+
+STAR = np.array([1.0, 1.0]) / np.sqrt(2)
+"""v*, the direction that both eigenvectors take at the coalescence."""
+
+ORTHOGONAL = np.array([1.0, -1.0]) / np.sqrt(2)
+"""The direction across it, in which the response starts."""
+
+PERIODS = 3
+"""Periods of the fast oscillation on either side of the envelope's maximum among which the largest is looked for: the
+neighbouring ones may win by their phase, those further out lie lower on the envelope."""
+
+
+@dataclass(frozen=True)
+class NormalForm:
+    """Two modes near their coalescence, in units of time in which the mean eigenvalue is one.
+
+    Parameters
+    ----------
+    delta : float
+        Half the distance of the uncoupled eigenvalues, 0 < delta < 1.
+    epsilon : float
+        1 - eta/delta, the distance from the coalescence; at most 1, negative where the pair is complex. It is
+        given rather than eta because eta loses the digits of a small one.
+
+    Raises
+    ------
+    ValueError
+        If delta or epsilon is out of range.
+    """
+
+    delta: float
+    epsilon: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.delta < 1:
+            raise ValueError(f"delta = {self.delta} must lie between 0 and 1.")
+        if not -np.inf < self.epsilon <= 1:
+            raise ValueError(f"epsilon = {self.epsilon} must be finite and at most 1.")
+
+    @property
+    def nu(self) -> float:
+        """eta / delta."""
+        return 1.0 - self.epsilon
+
+    @property
+    def eta(self) -> float:
+        """The antisymmetric coupling."""
+        return self.delta * self.nu
+
+    @property
+    def matrix(self) -> Floats:
+        """((1 - delta, eta), (-eta, 1 + delta))."""
+        return np.eye(2) + self._traceless
+
+    @property
+    def eigenvalues(self) -> Complexes:
+        """lambda_1 and lambda_2, 1 -+ delta (epsilon (2 - epsilon))^(1/2)."""
+        return np.array([1 - self._split, 1 + self._split])
+
+    @property
+    def gain(self) -> float:
+        """g, the least upper bound of the undamped response over all times; infinite where the pair is complex."""
+        return float(np.sqrt((2 - self.epsilon) / self.epsilon)) if self.epsilon > 0 else np.inf
+
+    @property
+    def asymptotic_amplitude(self) -> float:
+        """(2 / epsilon)^(1/2), the paper's Eq. 19 with its factor; infinite where the pair is complex."""
+        return float(np.sqrt(2 / self.epsilon)) if self.epsilon > 0 else np.inf
+
+    @property
+    def tau_d(self) -> float:
+        """1 / (delta epsilon^(1/2)), time that the response takes to build up; infinite where it never ends."""
+        return float(1 / (self.delta * np.sqrt(self.epsilon))) if self.epsilon > 0 else np.inf
+
+    def asymptotic_damped_amplitude(self, damping_time: float) -> float:
+        """The maximum of (2/epsilon)^(1/2) exp(-t/2 tau) sin(t/(2^(1/2) tau_d)), at least the 1 of the start."""
+        theta = np.arctan(np.sqrt(2) * damping_time / self.tau_d)
+        return float(max(1.0, self.asymptotic_amplitude * np.sin(theta) * np.exp(-theta / np.tan(theta))))
+
+    def solution(self, time: ArrayLike, start: ArrayLike = ORTHOGONAL, damping_time: float | None = None) -> Floats:
+        """The exact motion from rest without forcing.
+
+        Parameters
+        ----------
+        time : array_like, shape (T,)
+            Times.
+        start : array_like, shape (2,)
+            (x, y) at t = 0; across v* by default.
+        damping_time : float, optional
+            tau; none by default.
+
+        Returns
+        -------
+        ndarray, shape (T, 2)
+        """
+        cosine, sine = self._propagators(time, damping_time)
+        gamma = _gamma(damping_time)
+        return self._on(np.asarray(start, dtype=float), [c + gamma * s for c, s in zip(cosine, sine, strict=True)])
+
+    def driven(
+        self, time: ArrayLike, omega: float, force: ArrayLike = ORTHOGONAL, damping_time: float | None = None
+    ) -> Floats:
+        """The exact motion from rest at the origin under f cos(omega t), off resonance.
+
+        Parameters
+        ----------
+        time : array_like, shape (T,)
+            Times.
+        omega : float
+            Angular frequency; without damping its square is no eigenvalue.
+        force : array_like, shape (2,)
+            f; across v* by default.
+        damping_time : float, optional
+            tau; none by default.
+
+        Returns
+        -------
+        ndarray, shape (T, 2)
+        """
+        time, gamma = np.asarray(time, dtype=float), _gamma(damping_time)
+        # (c + N)^-1 = (c - N)/(c^2 - r^2)
+        c = 1 - omega**2 + 2j * gamma * omega
+        force = np.asarray(force, dtype=float)
+        stationary = (c * force - self._traceless @ force) / (c**2 - self._split**2)
+        cosine, sine = self._propagators(time, damping_time)
+        transient = self._on(stationary.real, cosine)
+        transient += self._on(gamma * stationary.real - omega * stationary.imag, sine)
+        return (np.exp(1j * omega * time)[:, None] * stationary).real - transient
+
+    def amplitude(self, damping_time: float | None = None) -> float:
+        """Largest |x(t)| of the response to a start across v*, over the first beat of the two modes.
+
+        Later beats are lower by the damping or, without, higher than the first by a share (pi d/2s)^2/2 at most:
+        `gain` bounds them all.
+
+        Parameters
+        ----------
+        damping_time : float, optional
+            tau; none by default.
+
+        Returns
+        -------
+        float
+            The exact maximum, at least the 1 of the start; infinite for a complex pair without damping, and for one
+            that grows faster than the damping.
+        """
+        gamma = _gamma(damping_time)
+        s, d = self._rates(gamma)
+        if not (s.imag == 0 and s.real > 0):
+            raise ValueError(f"damping_time = {damping_time} damps the oscillation itself away: there is no beat.")
+        if self.epsilon <= 0:
+            if abs(d) >= gamma:
+                return np.inf
+            peak = np.arctanh(abs(d) / gamma) / abs(d) if d else 1 / gamma
+        else:
+            peak = np.arctan2(d.real, gamma) / d.real
+        period = 2 * np.pi / s.real
+        # |x| has two maxima a period; 64 points see each of them.
+        time = peak + period * np.arange(-64 * PERIODS, 64 * PERIODS + 1) / 64
+        time = time[time >= 0]
+
+        def size(t: ArrayLike) -> Floats:
+            return np.linalg.norm(self.solution(np.atleast_1d(t), damping_time=damping_time), axis=1)
+
+        best = time[np.argmax(size(time))]
+        # Offsets from a late time keep their digits; at a flat maximum, half of them give all digits of the height.
+        near = (max(-best, -period / 64), period / 64)
+        found = minimize_scalar(lambda t: -size(best + t)[0], bounds=near, options={"xatol": 1e-8})
+        return float(max(1.0, -found.fun))
+
+    def half_gain_time(self) -> float:
+        """tau at which damping takes half of the undamped amplitude, the crossover; about 1.36 tau_d.
+
+        Raises
+        ------
+        ValueError
+            If the undamped amplitude is not at least 4: the start itself would be half of it.
+        """
+        full = self.amplitude()
+        if not 4 <= full < np.inf:
+            raise ValueError(f"An amplitude of {full:.3g} shows no crossover: take an epsilon between 0 and 0.1.")
+        bounds = 0.3 * self.tau_d, 10 * self.tau_d
+        return float(brentq(lambda tau: self.amplitude(tau) - 0.5 * full, *bounds, rtol=1e-9))
+
+    @property
+    def _split(self) -> complex | float:
+        """r, imaginary where the pair is complex."""
+        squared = self.epsilon * (2 - self.epsilon)
+        return self.delta * np.emath.sqrt(squared)
+
+    @property
+    def _traceless(self) -> Floats:
+        return np.array([[-self.delta, self.eta], [-self.eta, self.delta]])
+
+    def _rates(self, gamma: float) -> tuple[complex, complex]:
+        """s and d of the damped frequencies."""
+        r, c = self._split, 1 - gamma**2
+        s = complex(0.5 * (np.emath.sqrt(c + r) + np.emath.sqrt(c - r)))
+        return s, complex(0.5 * r / s)
+
+    def _propagators(self, time: ArrayLike, damping_time: float | None) -> tuple[list[Floats], list[Floats]]:
+        """exp(-gamma t) cos(St) and exp(-gamma t) sin(St)/S, each as its parts along 1 and along N."""
+        t, gamma = np.asarray(time, dtype=float), _gamma(damping_time)
+        s, d = self._rates(gamma)
+        # S = s + N/2s, and sin(N t/2s) = N q with q = sin(dt)/r, finite where r vanishes.
+        slow, q = np.cos(d * t), t / (2 * s) * np.sinc(d * t / np.pi)
+        fast, turn, decay = np.cos(s * t), np.sin(s * t), np.exp(-gamma * t)
+        # S^-1 = (s - N/2s)/(s^2 - d^2), and N^2 = r^2.
+        norm, r2 = s * s - d * d, self._split**2
+        sine = (turn * slow * s - fast * q * r2 / (2 * s)) / norm, (fast * q * s - turn * slow / (2 * s)) / norm
+        return (
+            [(decay * fast * slow).real, -(decay * turn * q).real],
+            [(decay * part).real for part in sine],
+        )
+
+    def _on(self, vector: Floats, parts: Sequence[Floats]) -> Floats:
+        even, odd = parts
+        return np.outer(even, vector) + np.outer(odd, self._traceless @ vector)
+
+
+@dataclass(frozen=True, eq=False)
+class PairForm:
+    """A packing's pair of modes in the normal form.
+
+    Attributes
+    ----------
+    fx : float
+        Load of the packing, force per top disk.
+    form : NormalForm
+        delta and epsilon of the pair.
+    frequency : float
+        Square root of the mean eigenvalue, radian / time: the unit of time of the normal form is its inverse.
+    right : ndarray, shape (3N, 2)
+        V, orthonormal directions of the two coordinates of the normal form, in mass-weighted coordinates.
+    left : ndarray, shape (3N, 2)
+        W, with W^T V = 1: coordinates of a displacement z are W^T z.
+    """
+
+    fx: float
+    form: NormalForm
+    frequency: float
+    right: Floats
+    left: Floats
+
+    @classmethod
+    def of(cls, modes: PackingModes, block: Block) -> "PairForm":
+        """The pair with the planes of a block, from the operator itself."""
+        v, u = block.right, block.left
+        dual = np.linalg.solve(u.T @ v, u.T).T
+        b = dual.T @ (modes.matrix @ v)
+        mean = 0.5 * (b[0, 0] + b[1, 1])
+        # Traceless part: ((-c, k), (k, c)) + q ((0, 1), (-1, 0)); c = p cos 2a, k = -p sin 2a.
+        c, k, q = 0.5 * (b[1, 1] - b[0, 0]), 0.5 * (b[0, 1] + b[1, 0]), 0.5 * (b[0, 1] - b[1, 0])
+        p, angle = np.hypot(c, k), 0.5 * np.arctan2(-k, c)
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        turn[:, 1] *= 1.0 if q >= 0 else -1.0
+        # (p - |q|)/p by way of the discriminant, the one number that is linear in the load.
+        epsilon = block.discriminant / (4 * p * (p + abs(q)))
+        return cls(modes.fx, NormalForm(float(p / mean), float(epsilon)), float(np.sqrt(mean)), v @ turn, dual @ turn)
+
+    @property
+    def start(self) -> Floats:
+        """The unit displacement across the coalescing eigenvectors, mass-weighted, shape (3N,)."""
+        return self.right @ ORTHOGONAL
+
+    @property
+    def obliquity(self) -> float:
+        """Largest angle between the right and the left plane, radian; 0 for a symmetric operator."""
+        # W has the singular values 1/cos of the principal angles
+        return float(np.arccos(min(1.0, 1 / np.linalg.norm(self.left, 2))))
+
+    def amplitude(self, damping_time: float | None = None) -> float:
+        """Response to `start`, as of `NormalForm.amplitude`, for a damping time in the packing's units of time."""
+        return self.form.amplitude(None if damping_time is None else damping_time * self.frequency)
+
+    @property
+    def tau_d(self) -> float:
+        """1 / (delta epsilon^(1/2)) in the packing's units of time."""
+        return self.form.tau_d / self.frequency
+
+    def half_gain_time(self) -> float:
+        """The crossover of `NormalForm.half_gain_time` in the packing's units of time."""
+        return self.form.half_gain_time() / self.frequency
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """A straight line through logarithms.
+
+    Attributes
+    ----------
+    exponent : float
+        Its slope.
+    error : float
+        Standard error of the slope from the scatter about the line.
+    factor : float
+        Value at 1.
+    """
+
+    exponent: float
+    error: float
+    factor: float
+
+
+def pair_forms(packings: Sequence[Packing], eigenvalue: float, form: Form = "consistent") -> list[PairForm]:
+    """The normal form of one pair, through equilibria on the way to its onset.
+
+    Parameters
+    ----------
+    packings : sequence of Packing
+        Equilibria in order of their distance from the onset, nearest first, close enough for the planes of the
+        pair to be recognised.
+    eigenvalue : float
+        The double eigenvalue at the onset, as of :class:`~faultgouge.analysis.Window`, 1 / time^2: the nearest two of
+        the first packing are the pair.
+    form : {"consistent", "paper"}
+        As in :func:`~faultgouge.analysis.stiffness_matrix`.
+
+    Returns
+    -------
+    list of PairForm
+        In the order of the packings.
+    """
+    pairs: list[PairForm] = []
+    block = None
+    for packing in packings:
+        modes = PackingModes.of(packing.fx, full_operator(packing, form))
+        if block is None:
+            first, second = np.argsort(np.abs(modes.values - eigenvalue))[:2]
+            pair = int(first), int(second)
+        else:
+            pair = modes.nearest(block)
+        block = modes.block(pair)
+        pairs.append(PairForm.of(modes, block))
+    return pairs
+
+
+def fit_power_law(x: ArrayLike, y: ArrayLike) -> PowerLaw:
+    """Exponent of y(x) by least squares in the logarithms.
+
+    Parameters
+    ----------
+    x, y : array_like, shape (n,)
+        Positive numbers, at least three.
+
+    Returns
+    -------
+    PowerLaw
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than three points, all at one x, or a number is not positive.
+    """
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    if x.ndim != 1 or x.shape != y.shape or len(x) < 3 or not (np.all(x > 0) and np.all(y > 0)) or np.ptp(x) == 0:
+        raise ValueError("A power law needs at least three points of positive numbers, not all at one x.")
+    log_x, log_y = np.log(x), np.log(y)
+    about = log_x - log_x.mean()
+    slope = float(about @ log_y / (about @ about))
+    scatter = log_y - log_y.mean() - slope * about
+    error = float(np.sqrt(scatter @ scatter / (len(x) - 2) / (about @ about)))
+    return PowerLaw(slope, error, float(np.exp(log_y.mean() - slope * log_x.mean())))
+
+
+def _gamma(damping_time: float | None) -> float:
+    if damping_time is None:
+        return 0.0
+    if not 0 < damping_time < np.inf:
+        raise ValueError(f"damping_time = {damping_time} must be positive and finite.")
+    return 0.5 / damping_time

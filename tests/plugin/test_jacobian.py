@@ -1,0 +1,66 @@
+"""The stiffness matrix against central differences of the forces that LAMMPS computes, slips advanced on the way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import Contacts, stiffness_matrix
+from faultgouge.pywrap.engine import Engine
+
+STEP = 2.0**-27
+"""About 1e-8, and a power of two, so that coordinates move by it exactly."""
+
+
+def central_differences(packing):
+    """-dF/dq by differences of width h and h/2, extrapolated.
+
+    f'' jumps at s = 0 and at the bound, so that a central difference there is off by h times the jump, which is large
+    for a contact that hardly touches. The extrapolation removes what is linear in h.
+    """
+    size = 3 * len(packing)
+    matrix = np.empty((size, size))
+    with Engine(packing) as engine:
+
+        def force(k, step):
+            displacement = np.zeros(size)
+            displacement[k] = step
+            engine.displace(packing, displacement)
+            return engine.net_force
+
+        for k in range(size):
+            wide, narrow = ((force(k, -h) - force(k, h)) / (2 * h) for h in (STEP, STEP / 2))
+            matrix[:, k] = 2 * narrow - wide
+    return matrix
+
+
+def with_slips(packing, fractions):
+    """The packing with slips that are the given fractions of the Coulomb limit in turn."""
+    contacts = packing.contacts
+    slip = np.resize(fractions, len(contacts)) * packing.law.slip_limit(packing.geometry.overlap)
+    return replace(packing, contacts=Contacts(contacts.i, contacts.j, slip))
+
+
+@pytest.mark.parametrize("mu", [1.0, 0.3])
+@pytest.mark.parametrize(
+    "fractions",
+    [[0.0], [0.1, -0.3, 0.02, 0.4], [0.999, -0.99, 0.9], [1.0, -1.0], [-1.0, 0.0, 0.5, 0.9999, 1.0, -0.2, 0.003]],
+    ids=["no slip", "sticking", "nearly sliding", "sliding", "all kinds"],
+)
+def test_consistent_form_is_the_derivative_of_the_forces(reference_packing, mu, fractions):
+    packing = with_slips(reference_packing(mu), fractions)
+    assert packing.contacts.floor.any()
+    matrix = stiffness_matrix(packing).toarray()
+    # A force is rounded at K * 1e-16, which a difference divides by STEP: 1e-8 of K; a disk has several contacts, and
+    # the extrapolation adds two differences.
+    assert np.abs(central_differences(packing) - matrix).max() < 1e-7 * np.abs(matrix).max()
+
+
+def test_papers_form_misses_the_turning_of_the_tangent(reference_packing):
+    packing = with_slips(reference_packing(1.0), [0.3, -0.7, 0.999])
+    measured = central_differences(packing)
+    paper, consistent = (stiffness_matrix(packing, form=form).toarray() for form in ("paper", "consistent"))
+    missing = consistent - paper
+    scale = np.abs(consistent).max()
+    assert np.abs(missing).max() > 1e-3 * scale
+    np.testing.assert_allclose(measured - paper, missing, atol=1e-7 * scale)
