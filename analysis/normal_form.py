@@ -199,6 +199,11 @@ class NormalForm:
         float
             The exact maximum, at least the 1 of the start; infinite for a complex pair without damping, and for one
             that grows faster than the damping.
+
+        Raises
+        ------
+        ValueError
+            If the damping time is not positive, or so short that nothing oscillates.
         """
         gamma = _gamma(damping_time)
         s, d = self._rates(gamma)

@@ -41,12 +41,23 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig
 from scipy.optimize import brentq, linear_sum_assignment
+from scipy.sparse import csr_array
 
 from .packing import Contacts, Floats, Indices, Packing
 from .spectrum import Complexes, believable, dynamical_matrix, unit_rounding
 from .stiffness import Form
+from .tracking import Block, continued
 
 Pair = tuple[int, int]
+Operator = Floats | csr_array
+ROOT = 1e-7
+"""Width to which the root of D is bracketed, in increments: a tenth of the distance at which the five points lie
+through which the parabola goes that gives the last digits."""
+
+JUMP = 1e-9
+"""Width to which a jump of the equilibrium is bracketed, in increments: the place depends on the path, and with it on
+the increment, by far more."""
+
 Kind = Literal["coalescence", "contact change", "start", "scan"]
 
 
@@ -170,7 +181,7 @@ def find_onset(
 
     unbalanced: dict[float, float] = {}
 
-    def operator(fx: float) -> Floats:
+    def operator(fx: float) -> csr_array:
         packing = equilibrium(fx)
         unbalanced[fx] = packing.residual / float(np.sqrt(max(1, packing.top.sum())))
         return full_operator(packing, form)
@@ -193,14 +204,15 @@ def find_onset(
 
 
 def complex_windows(
-    operator: Callable[[float], Floats], forces: ArrayLike, *, narrowest: float | None = None
+    operator: Callable[[float], Operator], forces: ArrayLike, *, narrowest: float | None = None
 ) -> tuple[Window, ...]:
     """Windows of complex eigenvalues of a one-parameter family of matrices.
 
     Parameters
     ----------
     operator : callable
-        fx -> ndarray, shape (n, n), in coordinates that do not depend on fx. Zero rows are left out.
+        fx -> ndarray or sparse array, shape (n, n), in coordinates that do not depend on fx. Zero rows are left
+        out.
     forces, narrowest
         As in :func:`find_onset`.
 
@@ -215,15 +227,11 @@ def complex_windows(
         If the loads are not at least two increasing numbers.
     """
     loads = _increasing(forces)
-
-    def modes(fx: float) -> Modes:
-        return Modes.of(fx, operator(fx))
-
-    here = modes(float(loads[0]))
+    here = Modes.of(float(loads[0]), operator(float(loads[0])))
     windows = _Windows(here)
-    search = _Search(modes, 1e-7 * np.abs(loads).max() if narrowest is None else narrowest, windows)
+    search = _Search(operator, 1e-7 * np.abs(loads).max() if narrowest is None else narrowest, windows)
     for load in loads[1:]:
-        there = modes(float(load))
+        there = Modes.of(float(load), operator(float(load)))
         search.walk(here, there)
         here = there
     return windows.all()
@@ -289,14 +297,12 @@ def follow(packings: Iterable[Packing], form: Form = "consistent") -> Complexes:
     return np.array(rows)
 
 
-def full_operator(packing: Packing, form: Form = "consistent") -> Floats:
-    """A = M^(-1/2) K M^(-1/2) as a dense array, shape (3N, 3N), with its zero rows; 1 / time^2."""
+def full_operator(packing: Packing, form: Form = "consistent") -> csr_array:
+    """A = M^(-1/2) K M^(-1/2) of the `loaded` packing, shape (3N, 3N), with its zero rows; 1 / time^2."""
     packing = loaded(packing)
-    sparse, active = dynamical_matrix(packing, form)
-    matrix = np.zeros((3 * len(packing),) * 2)
-    matrix[np.ix_(active, active)] = sparse.toarray()
-    return matrix
-
+    matrix, active = dynamical_matrix(packing, form)
+    place = csr_array((np.ones(len(active)), (active, np.arange(len(active)))), shape=(3 * len(packing), len(active)))
+    return csr_array(place @ matrix @ place.T)
 
 def loaded(packing: Packing) -> Packing:
     """The packing without the contacts whose force is no more than its own imbalance.
@@ -319,7 +325,7 @@ class Modes:
     ----------
     fx : float
         The load.
-    matrix : ndarray, shape (n, n)
+    matrix : scipy.sparse.csr_array, shape (n, n)
         The operator A, 1 / time^2.
     values : ndarray of complex, shape (E,)
         Eigenvalues by real part, then imaginary part. Complex pairs that are rounding noise have lost their
@@ -331,24 +337,26 @@ class Modes:
     """
 
     fx: float
-    matrix: Floats
+    matrix: csr_array
     values: Complexes
     right: Complexes
     left: Complexes
     partner: Indices
 
     @classmethod
-    def of(cls, fx: float, matrix: Floats) -> "Modes":
+    def of(cls, fx: float, matrix: Operator) -> "Modes":
         """Solve the dense eigenproblem, without the coordinates whose rows are zero."""
-        active = np.flatnonzero(np.any(matrix != 0, axis=1))
-        size, count = len(matrix), len(active)
+        sparse = csr_array(matrix)
+        active = np.flatnonzero(np.diff(sparse.indptr))
+        size, count = sparse.shape[0], len(active)
         right, left = np.zeros((2, size, count), dtype=np.complex128)
         if count == 0:
-            return cls(fx, matrix, np.zeros(0, complex), right, left, np.zeros(0, int))
-        values, left[active], right[active] = eig(matrix[np.ix_(active, active)], left=True, right=True)
+            return cls(fx, sparse, np.zeros(0, complex), right, left, np.zeros(0, int))
+        inner = sparse[active][:, active].toarray()
+        values, y, x = eig(inner, left=True, right=True, overwrite_a=True, check_finite=False)
         order = np.lexsort((values.imag, values.real))
-        values, right, left = values[order], right[:, order], left[:, order]
-        rounding = unit_rounding(matrix)
+        values, right[active], left[active] = values[order], x[:, order], y[:, order]
+        rounding = unit_rounding(sparse.data)
         partner = np.full(count, -1)
         for k in np.flatnonzero(values.imag > 0):
             conjugate = int(np.argmin(np.abs(values - values[k].conj())))
@@ -356,43 +364,23 @@ class Modes:
                 partner[k], partner[conjugate] = conjugate, k
             else:
                 values[[k, conjugate]] = values[k].real
-        return cls(fx, matrix, values, right, left, partner)
+        return cls(fx, sparse, values, right, left, partner)
 
     @property
     def complex_pairs(self) -> list[Pair]:
         """Indices of the members of each pair, the one with positive imaginary part first."""
         return [(int(k), int(self.partner[k])) for k in np.flatnonzero(self.values.imag > 0)]
 
-    def block(self, pair: Pair) -> "Block":
+    def block(self, pair: Pair) -> Block:
         """The 2 x 2 block on the invariant subspace of two modes."""
         modes = list(pair)
-        v, u = _span(self.right[:, modes]), _span(self.left[:, modes])
-        b = np.linalg.solve(u.T @ v, u.T @ (self.matrix @ v))
-        overlap = np.abs(np.sum(self.left[:, modes].conj() * self.right[:, modes], axis=0)).min()
-        return Block(
-            mean=float(0.5 * (b[0, 0] + b[1, 1])),
-            discriminant=float((b[0, 0] - b[1, 1]) ** 2 + 4 * b[0, 1] * b[1, 0]),
-            overlap=float(overlap),
-            right=v,
-            left=u,
-        )
+        return Block.of(self.matrix, _span(self.right[:, modes]), _span(self.left[:, modes]))
 
-    def nearest(self, block: "Block") -> Pair:
+    def nearest(self, block: Block) -> Pair:
         """The two modes that lie closest to the subspaces of a block at a neighbouring load."""
         weight = np.linalg.norm(block.right.T @ self.right, axis=0) * np.linalg.norm(block.left.T @ self.left, axis=0)
         first, second = np.argsort(weight)[-2:]
         return int(first), int(second)
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """The 2 x 2 block of a pair: half its trace, discriminant, smaller |y^H x|, bases of shape (n, 2)."""
-
-    mean: float
-    discriminant: float
-    overlap: float
-    right: Floats
-    left: Floats
 
 
 def assign(here: Modes, there: Modes) -> Indices:
@@ -409,15 +397,28 @@ def assign(here: Modes, there: Modes) -> Indices:
         Index there; -1 where there are fewer modes there. The assignment maximises the sum of |x^H x'| |y^H
         y'|.
     """
-    weight = np.abs(here.right.conj().T @ there.right) * np.abs(here.left.conj().T @ there.left)
-    rows, columns = linear_sum_assignment(weight, maximize=True)
+    weight = _products(here.right, there.right) * _products(here.left, there.left)
     partner = np.full(len(here.values), -1)
-    partner[rows] = columns
+    best = weight.argmax(axis=1) if weight.size else partner
+    if weight.size and len(np.unique(best)) == len(best):
+        partner = best  # every mode has its best match: no other assignment has a larger sum
+    else:
+        rows, columns = linear_sum_assignment(weight, maximize=True)
+        partner[rows] = columns
     # Members of one pair have the same weights: let the one above the axis stay above.
     for up, down in here.complex_pairs:
         if partner[up] >= 0 and there.partner[partner[up]] == partner[down] and there.values[partner[up]].imag < 0:
             partner[[up, down]] = partner[[down, up]]
     return partner
+
+
+def _products(a: Complexes, b: Complexes) -> Floats:
+    """|a_j^H b_k| over columns: in real arithmetic, but for the few columns that have imaginary parts."""
+    p, q = np.flatnonzero(np.any(a.imag, axis=0)), np.flatnonzero(np.any(b.imag, axis=0))
+    products = np.abs(np.ascontiguousarray(a.real).T @ np.ascontiguousarray(b.real))
+    products[p] = np.abs(a[:, p].conj().T @ b)
+    products[:, q] = np.abs(a.conj().T @ b[:, q])
+    return products
 
 
 class _Step:
@@ -436,7 +437,7 @@ class _Step:
         self.found: list[Pair] = []
         for pair in here.complex_pairs:
             image = (int(self.forward[pair[0]]), int(self.forward[pair[1]]))
-            if min(image) < 0 or not self._same_plane(pair, image):
+            if min(image) < 0 or not here.block(pair).same_plane(there.block(image)):
                 self.lost.append(pair)
             elif there.partner[image[0]] == image[1]:
                 self.staying.append((pair, image))
@@ -450,17 +451,10 @@ class _Step:
                 continue
             pair = (int(self.backward[image[0]]), int(self.backward[image[1]]))
             real = min(pair) >= 0 and here.partner[pair[0]] == here.partner[pair[1]] == -1
-            if real and self._same_plane(pair, image):
+            if real and here.block(pair).same_plane(there.block(image)):
                 self.opening.append((pair, image))
             else:
                 self.found.append(image)
-
-    def _same_plane(self, pair: Pair, image: Pair) -> bool:
-        """Whether both planes are the same rather than not: all principal angles below 60 degrees."""
-        before, after = self.here.block(pair), self.there.block(image)
-        right = np.linalg.svd(before.right.T @ after.right, compute_uv=False)
-        left = np.linalg.svd(before.left.T @ after.left, compute_uv=False)
-        return bool(min(right[-1], left[-1]) > 0.5)
 
     @property
     def consistent(self) -> bool:
@@ -510,7 +504,7 @@ class _Step:
         return here.fx + span * float(np.clip(at[worst], margin, 1 - margin))
 
 
-def _sensitivity(modes: Modes, change: Floats) -> Complexes:
+def _sensitivity(modes: Modes, change: csr_array) -> Complexes:
     """First-order change of each eigenvalue, y^H dA x / y^H x."""
     y = modes.left.conj()
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -598,7 +592,7 @@ class _Windows:
 class _Search:
     """Walks along the loads, with as many loads in between as it takes to be sure."""
 
-    modes: Callable[[float], Modes]
+    operator: Callable[[float], Operator]
     narrowest: float
     windows: _Windows
 
@@ -608,7 +602,7 @@ class _Search:
         if there.fx - here.fx > self.narrowest:
             middle = step.hidden_window(self.narrowest) if step.consistent else 0.5 * (here.fx + there.fx)
             if middle is not None:
-                between = self.modes(middle)
+                between = Modes.of(middle, self.operator(middle))
                 self.walk(here, between)
                 self.walk(between, there)
                 return
@@ -632,31 +626,68 @@ class _Search:
             end, fx = min((before, here.fx), (after, there.fx), key=lambda item: abs(item[0].discriminant))
             slope = abs(after.discriminant - before.discriminant) / (there.fx - here.fx)
             return _Edge(fx, abs(end.discriminant) / slope, end.mean, end.overlap, "coalescence"), here, there
-        known = {here.fx: (here, before), there.fx: (there, after)}
+        states = {here.fx: _State(here.matrix, before), there.fx: _State(there.matrix, after)}
 
         def block(fx: float) -> Block:
-            if fx not in known:
-                reference = before if fx - here.fx < there.fx - fx else after
-                modes = self.modes(fx)
-                known[fx] = modes, modes.block(modes.nearest(reference))
-            return known[fx][1]
+            if fx not in states:
+                states[fx] = _state(fx, csr_array(self.operator(fx)), states)
+            return states[fx].block
 
-        # Ten digits and two to spare; the curve through five points takes over from there.
-        tolerance = 1e-12 * max(abs(here.fx), abs(there.fx))
-        root = float(brentq(lambda fx: block(fx).discriminant, here.fx, there.fx, xtol=tolerance))
+        def modes(fx: float) -> Modes:
+            return Modes.of(fx, states[fx].matrix)
+
+        span = there.fx - here.fx
+        root = float(brentq(lambda fx: block(fx).discriminant, here.fx, there.fx, xtol=ROOT * span))
         room = min(root - here.fx, there.fx - root)
         # As near as the noise allows: D should be straight, and yet stand out of the scatter.
-        distance = 1e-3 * min(room, 1e-3 * (there.fx - here.fx))
+        distance = 1e-3 * min(room, 1e-3 * span)
         while 0 < distance < 0.1 * room:
             points = [root + offset * distance for offset in (-2, -1, 0, 1, 2)]
             edge = _coalescence(points, [block(fx) for fx in points])
             if edge is not None:
-                return edge, known[points[0]][0], known[points[-1]][0]
+                return edge, modes(points[0]), modes(points[-1])
             distance *= 30
-        nearest = min((block(fx) for fx in known), key=lambda b: abs(b.discriminant))
-        jump = _Edge(root, tolerance, nearest.mean, nearest.overlap, "contact change")
-        below, above = (max(fx for fx in known if fx < root), min(fx for fx in known if fx > root))
-        return jump, known[below][0], known[above][0]
+        below, above = self._jump(states, block)
+        jump = _Edge(
+            fx=0.5 * (below + above),
+            error=0.5 * (above - below),
+            eigenvalue=block(above).mean,
+            overlap=min(block(below).overlap, block(above).overlap),
+            kind="contact change",
+        )
+        return jump, modes(below), modes(above)
+
+    @staticmethod
+    def _jump(states: dict[float, "_State"], block: Callable[[float], Block]) -> tuple[float, float]:
+        """The loads on either side of a change of sign of D that is not smooth."""
+        loads = sorted(states)
+        width = JUMP * (loads[-1] - loads[0])
+        below, above = next(pair for pair in pairwise(loads) if block(pair[0]).discriminant * block(pair[1]).discriminant <= 0)
+        while above - below > max(width, 4 * np.spacing(abs(above))):
+            middle = 0.5 * (below + above)
+            if block(middle).discriminant * block(below).discriminant > 0:
+                below = middle
+            else:
+                above = middle
+        return below, above
+
+
+@dataclass(frozen=True)
+class _State:
+    """The operator at one load and the block of a pair in it."""
+
+    matrix: csr_array
+    block: Block
+
+
+def _state(fx: float, matrix: csr_array, known: dict[float, _State]) -> _State:
+    """Continue a pair from the nearest load where it is known, by all modes if need be."""
+    nearest = known[min(known, key=lambda each: abs(each - fx))].block
+    block = continued(matrix, nearest)
+    if block is None:
+        modes = Modes.of(fx, matrix)
+        block = modes.block(modes.nearest(nearest))
+    return _State(matrix, block)
 
 
 def _coalescence(points: Sequence[float], blocks: Sequence[Block]) -> _Edge | None:

@@ -17,7 +17,8 @@ In mass-weighted coordinates :math:`z = M^{1/2} q` it is a function of one matri
 whose last form cancels neither in resonance nor at small times; a start from x = 1 at rest gives
 :math:`\cos\Omega t`. With damping, :math:`\gamma = 1/2\tau` and :math:`S^2 = \lambda - \gamma^2`, the motion
 is the stationary one less :math:`e^{-\gamma t}` times a combination of :math:`\cos St` and
-:math:`\sin(St)/S`. All of these are entire functions of :math:`\lambda`, so that f(A) exists whatever A is.
+:math:`\sin(St)/S`; in the first moments the two cancel, to the rounding of the stationary motion. All of these
+are entire functions of :math:`\lambda`, so that f(A) exists whatever A is.
 
 **Time steps.** Velocity Verlet with step dt gives the same formulas with
 :math:`\sin\tfrac12\Omega\,dt = \tfrac12\sqrt\lambda\,dt` and with
@@ -157,8 +158,8 @@ class Oscillator:
         gamma = 0.5 / self.damping_time
         root = np.sqrt(value - gamma**2)
         root = np.where(root.imag < 0, -root, root)
-        slower = np.exp((-gamma - 1j * root) * t)
-        turn = np.expm1(2j * root * t)
+        slower: Complexes = np.exp((-gamma - 1j * root) * t)
+        turn: Complexes = np.expm1(2j * root * t)
         safe = np.where(root == 0, 1, root)
         return slower * (1 + 0.5 * turn), slower * np.where(root == 0, t, turn / (2j * safe))
 

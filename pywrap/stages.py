@@ -30,10 +30,10 @@ from ..analysis import (
 )
 from .engine import Engine
 from .quasistatic import Equilibrium, NoEquilibriumError, equilibrate, rounding_floor
-from .scene import GeneratedPacking, Ramp, Scene, SceneError
+from .scene import GeneratedPacking, Perturb, Ramp, Scene, SceneError
 
-SETTLING_TOLERANCE = 1e-10
-"""Force at which settling ends, in units of F_y/3: a few times the rounding floor of the paper's packing."""
+SETTLING_TOLERANCE = 1e-9
+"""Force at which dynamics leaves settling to Newton's method, in units of F_y: the contacts are what they will be."""
 
 ACCURATE_SHARE = 0.05
 """Time step of undamped runs in units of the stability limit 2/omega_max: the fastest mode is then resolved
@@ -248,14 +248,15 @@ def perturb(
     communicator : mpi4py.MPI.Comm, optional
         The ranks that share the packing; all by default.
 
-    Yields
-    ------
-    Sample
+    Returns
+    -------
+    iterator of Sample
+        The run proceeds as it is consumed.
 
     Raises
     ------
     SceneError
-        If the scene has no section [perturb], its time step is over the limit, or its time shorter than one
+        At once, if the scene has no section [perturb], its time step is over the limit, or its time shorter than one
         step.
     """
     settings = scene.perturb
@@ -266,6 +267,12 @@ def perturb(
     if settings.time < dt:
         raise SceneError(f"perturb.time = {settings.time:g} is shorter than one step, {dt:.4g}: run longer")
     every = max(1, int(settings.time / dt / samples))
+    return _undamped(settings, packing, dt, every, communicator)
+
+
+def _undamped(
+    settings: Perturb, packing: Packing, dt: float, every: int, communicator: MPI.Comm | None
+) -> Iterator[Sample]:
     inertia = packing.inertia_factor * packing.mass * packing.radius**2
     with (
         Engine(packing, communicator) as engine,
@@ -390,7 +397,7 @@ def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None) -> Pa
         fy=scene.load.fy,
     )
     with Engine(loose, communicator) as engine:
-        engine.settle(SETTLING_TOLERANCE * scene.load.fy / 3)
+        engine.settle(SETTLING_TOLERANCE * scene.load.fy)
         packing = engine.packing
         try:
             packing = equilibrate(

@@ -87,9 +87,10 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         raise SceneError(f"{output} exists: an undamped run starts from rest, so give another name or delete it")
     with Record(output, wanted) as record:
         *_, start = _progress(reach(wanted, wanted.perturb.fx), "equilibria")
+        run = run_undamped(wanted, start)
         record.append(start)
         batch = []
-        for sample in _progress(run_undamped(wanted, start), "samples"):
+        for sample in _progress(run, "samples"):
             batch.append(sample)
             if len(batch) == 100:
                 record.append_series(batch)

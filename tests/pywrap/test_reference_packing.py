@@ -66,7 +66,9 @@ def test_newton_and_overdamped_dynamics_agree_where_nothing_slides(reference_pac
     """Same increments, same slips at rest: the paths differ within an increment only, which enters at second order."""
     gaps = []
     for increment in (2e-3, 1e-3):
-        newton, overdamped = (ramped(reference_packing(1.0), method, increment)[-1] for method in ("newton", "overdamped"))
+        newton, overdamped = (
+            ramped(reference_packing(1.0), method, increment)[-1] for method in ("newton", "overdamped")
+        )
         gaps.append(np.abs(newton.packing.position - overdamped.packing.position).max())
     # The tolerance of 1e-10 on each of 100 disks is a residual vector of up to 1e-9, which displaces the softest mode,
     # lambda = 24, by 4e-11; the softest modes add up.

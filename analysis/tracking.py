@@ -1,0 +1,148 @@
+r"""One pair of eigenvalues, followed from operator to operator without the others.
+
+On the invariant subspace that two modes span the operator A is a 2 x 2 block
+:math:`B = (U^T V)^{-1} U^T A V`, with orthonormal bases V, U of the right and of the left subspace. Both are
+smooth where the two eigenvectors become parallel, and so are half the trace and the discriminant
+
+.. math:: D = (\lambda_1 - \lambda_2)^2 = (B_{11} - B_{22})^2 + 4 B_{12} B_{21} .
+
+**Continuation.** The bases of a neighbouring operator are improved by inverse iteration,
+:math:`V \leftarrow (A - \sigma)^{-1} V`, :math:`U \leftarrow (A - \sigma)^{-T} U`, with one factorisation for
+all steps. The error falls by :math:`|\lambda - \sigma| / |\lambda_3 - \sigma|` a step, :math:`\lambda_3` the
+closest of the others. The shift stands off the pair by the size of B - mean: nearer to a coalescence the
+inverse would be dominated by the one common eigenvector and the second direction would drown in rounding.
+The result counts only if the residuals :math:`A V - V (V^T A V)`, and those on the left, are at the level of
+rounding: then V and U belong to an operator that differs from A by no more, and as both are used D is in
+error by their product over the distance of the other modes. It must also be the same plane; an iteration that
+went to other modes is rejected.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+from scipy.sparse import csc_array, csr_array, eye_array
+from scipy.sparse.linalg import splu
+
+from .packing import Floats
+
+STEPS = 40
+"""Inverse iterations before a continuation is given up: a solve costs a hundredth of a decomposition."""
+
+RESIDUAL = 100.0
+"""Residuals of accepted bases, in units of u |A|_F; LAPACK's own are of some 10."""
+
+DENSE = 600
+"""Operators up to this size are factorised as dense matrices, which is faster there than a sparse factorisation."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """The 2 x 2 block of a pair.
+
+    Attributes
+    ----------
+    mean : float
+        Half the trace, 1 / time^2.
+    discriminant : float
+        D = (lambda_1 - lambda_2)^2, 1 / time^4.
+    overlap : float
+        The smaller |y^H x| of the unit left and right vectors.
+    spread : float
+        Frobenius norm of B - mean, 1 / time^2.
+    right, left : ndarray, shape (n, 2)
+        Orthonormal bases V and U.
+    """
+
+    mean: float
+    discriminant: float
+    overlap: float
+    spread: float
+    right: Floats
+    left: Floats
+
+    @classmethod
+    def of(cls, matrix: csr_array, right: Floats, left: Floats) -> "Block":
+        """The block of an operator on orthonormal bases of a right and a left invariant subspace."""
+        metric = left.T @ right
+        b = np.linalg.solve(metric, left.T @ (matrix @ right))
+        mean = 0.5 * (b[0, 0] + b[1, 1])
+        return cls(
+            mean=float(mean),
+            discriminant=float((b[0, 0] - b[1, 1]) ** 2 + 4 * b[0, 1] * b[1, 0]),
+            overlap=_overlap(b, metric),
+            spread=float(np.linalg.norm(b - mean * np.eye(2))),
+            right=right,
+            left=left,
+        )
+
+    def same_plane(self, other: "Block") -> bool:
+        """Whether both planes are the same rather than not: all principal angles below 60 degrees."""
+        right = np.linalg.svd(self.right.T @ other.right, compute_uv=False)
+        left = np.linalg.svd(self.left.T @ other.left, compute_uv=False)
+        return bool(min(right[-1], left[-1]) > 0.5)
+
+
+def _overlap(b: Floats, metric: Floats) -> float:
+    """The smaller |y^H x| from the eigenvectors z, w of the block: x = V z and y = U (U^T V)^-T w."""
+    values, z = np.linalg.eig(b)
+    if values[0] == values[1]:
+        return 0.0
+    w = np.linalg.inv(z).conj().T
+    y = np.linalg.solve(metric.T, w)
+    return float(np.min(1.0 / (np.linalg.norm(y, axis=0) * np.linalg.norm(z, axis=0))))
+
+
+def continued(matrix: csr_array, block: Block) -> Block | None:
+    """The block that a pair has become in a neighbouring operator.
+
+    Parameters
+    ----------
+    matrix : scipy.sparse.csr_array, shape (n, n)
+        The operator, 1 / time^2.
+    block : Block
+        The pair in the neighbouring operator.
+
+    Returns
+    -------
+    Block or None
+        None if the iteration does not converge to this plane: other modes are too close, or the neighbour is
+        too far.
+    """
+    v, u = block.right, block.left
+    shift = float(np.sum(u * (matrix @ v @ np.linalg.inv(u.T @ v)))) / 2 + max(
+        block.spread, 1e3 * np.finfo(np.float64).eps * abs(block.mean)
+    )
+    solve = _shifted_solver(matrix, shift)
+    if solve is None:
+        return None
+    level = RESIDUAL * 0.5 * np.finfo(np.float64).eps * float(np.linalg.norm(matrix.data))
+    transposed = matrix.T
+    for _ in range(STEPS):
+        v, u = np.linalg.qr(solve(v, False))[0], np.linalg.qr(solve(u, True))[0]
+        if max(_residual(matrix, v), _residual(transposed, u)) < level:
+            found = Block.of(matrix, v, u)
+            return found if found.same_plane(block) else None
+    return None
+
+
+def _residual(matrix: csr_array, basis: Floats) -> float:
+    image = matrix @ basis
+    return float(np.linalg.norm(image - basis @ (basis.T @ image)))
+
+
+def _shifted_solver(matrix: csr_array, shift: float) -> Callable[[Floats, bool], Floats] | None:
+    """(right-hand sides, transposed) -> solutions of A - shift; None if that is singular."""
+    size = matrix.shape[0]
+    shifted = csc_array(matrix - shift * eye_array(size))
+    if size <= DENSE:
+        factors = lu_factor(shifted.toarray(), check_finite=False)
+        if not np.all(np.diag(factors[0])):
+            return None
+        return lambda b, transposed: lu_solve(factors, b, trans=int(transposed), check_finite=False)
+    try:
+        sparse = splu(shifted)
+    except RuntimeError:
+        return None
+    return lambda b, transposed: sparse.solve(np.ascontiguousarray(b), trans="T" if transposed else "N")

