@@ -304,6 +304,7 @@ def full_operator(packing: Packing, form: Form = "consistent") -> csr_array:
     place = csr_array((np.ones(len(active)), (active, np.arange(len(active)))), shape=(3 * len(packing), len(active)))
     return csr_array(place @ matrix @ place.T)
 
+
 def loaded(packing: Packing) -> Packing:
     """The packing without the contacts whose force is no more than its own imbalance.
 
@@ -662,7 +663,9 @@ class _Search:
         """The loads on either side of a change of sign of D that is not smooth."""
         loads = sorted(states)
         width = JUMP * (loads[-1] - loads[0])
-        below, above = next(pair for pair in pairwise(loads) if block(pair[0]).discriminant * block(pair[1]).discriminant <= 0)
+        below, above = next(
+            pair for pair in pairwise(loads) if block(pair[0]).discriminant * block(pair[1]).discriminant <= 0
+        )
         while above - below > max(width, 4 * np.spacing(abs(above))):
             middle = 0.5 * (below + above)
             if block(middle).discriminant * block(below).discriminant > 0:

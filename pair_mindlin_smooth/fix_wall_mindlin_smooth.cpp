@@ -3,8 +3,11 @@
 #include "atom.h"
 #include "domain.h"
 #include "error.h"
+#include "input.h"
 #include "memory.h"
+#include "modify.h"
 #include "update.h"
+#include "variable.h"
 
 #include <algorithm>
 #include <cstring>
@@ -18,7 +21,7 @@ FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : 
   if (narg != 8) error->all(FLERR, "fix wall/mindlin/smooth takes KN KT MU ylo COORD, but got {} arguments", narg - 3);
   law.kn = utils::numeric(FLERR, arg[3], false, lmp);
   law.kt = utils::numeric(FLERR, arg[4], false, lmp);
-  law.mu = utils::numeric(FLERR, arg[5], false, lmp);
+  set_mu(arg[5]);
   if (!law.valid())
     error->all(FLERR, "fix wall/mindlin/smooth: KN must be positive, KT and MU not negative, all finite (got {} {} {})",
                arg[3], arg[4], arg[5]);
@@ -63,7 +66,14 @@ void FixWallMindlinSmooth::init()
   if (domain->dimension != 2) error->all(FLERR, "fix wall/mindlin/smooth is for disks in the plane: use dimension 2");
   if (domain->periodicity[1])
     error->all(FLERR, "fix wall/mindlin/smooth needs a box that is not periodic in y: use boundary p f p");
-  has_friction = law.frictional();
+  if (!mu_variable.empty()) {
+    mu_index = input->variable->find(mu_variable.c_str());
+    if (mu_index < 0 || !input->variable->equalstyle(mu_index))
+      error->all(FLERR, "fix wall/mindlin/smooth: MU is v_{}, but there is no equal-style variable of that name",
+                 mu_variable);
+  }
+  // a variable may be zero now and not later
+  has_friction = mu_variable.empty() ? law.frictional() : law.kt > 0.0;
   if (has_friction && update->whichflag == 2)
     error->all(FLERR, "fix wall/mindlin/smooth with friction cannot be minimized, since its forces depend on the path: "
                       "relax with fix overdamped/disc, or minimize with mu = 0");
@@ -84,8 +94,33 @@ void FixWallMindlinSmooth::min_post_force(int vflag)
   post_force(vflag);
 }
 
+void FixWallMindlinSmooth::set_mu(const char *text)
+{
+  mu_index = -1;
+  mu_variable = utils::strmatch(text, "^v_") ? text + 2 : "";
+  law.mu = mu_variable.empty() ? utils::numeric(FLERR, text, false, lmp) : 0.0;
+}
+
+int FixWallMindlinSmooth::modify_param(int narg, char **arg)
+{
+  if (strcmp(arg[0], "mu") != 0) return 0;
+  if (narg < 2) error->all(FLERR, "fix_modify {} mu takes a number or a variable v_NAME", id);
+  set_mu(arg[1]);
+  if (!law.valid()) error->all(FLERR, "fix_modify {} mu: must not be negative, but is {}", id, arg[1]);
+  return 2;
+}
+
+void FixWallMindlinSmooth::update_mu()
+{
+  modify->clearstep_compute();
+  law.mu = input->variable->compute_equal(mu_index);
+  modify->addstep_compute(update->ntimestep + 1);
+  if (!law.valid()) error->all(FLERR, "fix wall/mindlin/smooth: MU became {} in v_{}", law.mu, mu_variable);
+}
+
 void FixWallMindlinSmooth::post_force(int /*vflag*/)
 {
+  if (mu_index >= 0) update_mu();
   if (has_friction)
     contact_forces<true>();
   else
@@ -123,7 +158,7 @@ template <bool FRICTION> void FixWallMindlinSmooth::contact_forces()
       atom->torque[i][2] -= radius * tangential;
       contact[TANGENTIAL] = tangential;
       contact[SLIP] = slip;
-      contact[SLIP_RATIO] = slip / limit;
+      contact[SLIP_RATIO] = limit > 0.0 ? slip / limit : 0.0;
     }
     contact[NORMAL] = normal;
     contact[NX] = 0.0;

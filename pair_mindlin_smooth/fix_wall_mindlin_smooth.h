@@ -1,7 +1,8 @@
 // fix ID group wall/mindlin/smooth KN KT MU ylo COORD
 //
 // The flat floor at y = COORD below the disks: the law of mindlin_law.h with n = (0, 1), tau = (-1, 0).
-// Each disk has one slip. The per-atom array has the columns of pair mindlin/smooth's single():
+// MU may be v_NAME, an equal-style variable that is evaluated in every step; fix_modify ID mu MU changes it. Each
+// disk has one slip. The per-atom array has the columns of pair mindlin/smooth's single():
 // f_n, f_t, slip, slip/slip_limit, n_x, n_y, overlap, and zeros for a disk that does not touch.
 
 #ifndef LMP_FIX_WALL_MINDLIN_SMOOTH_H
@@ -24,6 +25,7 @@ public:
   void post_force(int) override;
   void min_post_force(int) override;
   double compute_scalar() override;
+  int modify_param(int, char **) override;
   void *extract(const char *, int &) override;
 
   void grow_arrays(int) override;
@@ -44,8 +46,12 @@ private:
   double height;
   double energy = 0.0;    // elastic energy of this rank's contacts
   bool has_friction = false;
+  std::string mu_variable;    // empty where mu is a number
+  int mu_index = -1;          // of that variable
   int nmax = 0;
 
+  void set_mu(const char *);
+  void update_mu();
   template <bool FRICTION> void contact_forces();
 };
 

@@ -37,6 +37,7 @@ struct MindlinLaw {
 
   double tangential_force(double normal, double slip, double slip_limit) const
   {
+    if (slip_limit == 0.0) return 0.0;    // friction may weaken to nothing
     const double x = std::min(std::fabs(slip) / slip_limit, 1.0);
     return -std::copysign(mu * normal * (x * (1.0 + x * (1.0 - x))), slip);
   }

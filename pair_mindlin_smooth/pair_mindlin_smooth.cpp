@@ -314,7 +314,7 @@ double PairMindlinSmooth::single(int i, int j, int, int, double rsq, double, dou
     const double slip = stored ? *stored : 0.0;
     svector[1] = law.tangential_force(normal, slip, limit);
     svector[2] = slip;
-    svector[3] = slip / limit;
+    svector[3] = limit > 0.0 ? slip / limit : 0.0;
   }
   svector[4] = (atom->x[i][0] - atom->x[j][0]) / r;
   svector[5] = (atom->x[i][1] - atom->x[j][1]) / r;

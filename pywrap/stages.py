@@ -28,9 +28,9 @@ from ..analysis import (
     stable_timestep,
     touching,
 )
-from .engine import Engine
+from .engine import Engine, Weakening
 from .quasistatic import Equilibrium, NoEquilibriumError, equilibrate, rounding_floor
-from .scene import GeneratedPacking, Perturb, Ramp, Scene, SceneError
+from .scene import Friction, GeneratedPacking, Perturb, Ramp, Scene, SceneError
 
 SETTLING_TOLERANCE = 1e-9
 """Force at which dynamics leaves settling to Newton's method, in units of F_y: the contacts are what they will be."""
@@ -195,12 +195,15 @@ class Sample:
         Of translation and rotation.
     layer_velocity : float
         Mean velocity of the upper layer along x.
+    friction : float
+        Friction coefficient at that moment.
     """
 
     time: float
     msd: float
     kinetic_energy: float
     layer_velocity: float
+    friction: float
 
 
 def time_step(packing: Packing, wanted: float | None = None) -> float:
@@ -234,6 +237,7 @@ def perturb(
     start: Equilibrium,
     samples: int = 2000,
     communicator: MPI.Comm | None = None,
+    weakening: Weakening | None = None,
 ) -> Iterator[Sample]:
     """An undamped run from rest at an equilibrium, with the scene's perturbation if it has one.
 
@@ -247,6 +251,8 @@ def perturb(
         Lines of the time series, equally spaced; fewer if there are fewer steps.
     communicator : mpi4py.MPI.Comm, optional
         The ranks that share the packing; all by default.
+    weakening : Weakening, optional
+        Friction that falls with the layer's velocity, see `weakening_of`; constant by default.
 
     Returns
     -------
@@ -267,16 +273,36 @@ def perturb(
     if settings.time < dt:
         raise SceneError(f"perturb.time = {settings.time:g} is shorter than one step, {dt:.4g}: run longer")
     every = max(1, int(settings.time / dt / samples))
-    return _undamped(settings, packing, dt, every, communicator)
+    return _undamped(settings, packing, dt, every, communicator, weakening)
+
+
+def calibrated(scene: Scene, start: Equilibrium, communicator: MPI.Comm | None = None) -> float:
+    """The threshold v_0: the largest |mean v_x| of the upper layer in an unforced undamped run of the scene's time."""
+    if scene.perturb is None:
+        raise SceneError("the scene has no section [perturb]: add it, with fx and time")
+    quiet = scene.model_copy(update={"perturb": scene.perturb.model_copy(update={"amplitude": 0.0})})
+    return max(abs(sample.layer_velocity) for sample in perturb(quiet, start, communicator=communicator))
+
+
+def weakening_of(friction: Friction, v0: float) -> Weakening:
+    """The scene's mu(v) for a threshold v_0, length / time."""
+    return Weakening(B=friction.B, w=friction.w, mu_ss=friction.mu_ss, v0=v0, v_ss=friction.velocity_scale(v0))
 
 
 def _undamped(
-    settings: Perturb, packing: Packing, dt: float, every: int, communicator: MPI.Comm | None
+    settings: Perturb,
+    packing: Packing,
+    dt: float,
+    every: int,
+    communicator: MPI.Comm | None,
+    weakening: Weakening | None,
 ) -> Iterator[Sample]:
+    everyone = range(len(packing)) if settings.target == "all" else settings.target
+    target = None if everyone == "top" else [int(disk) for disk in everyone]
     inertia = packing.inertia_factor * packing.mass * packing.radius**2
     with (
         Engine(packing, communicator) as engine,
-        engine.undamped(dt, settings.amplitude, settings.omega or 0.0),
+        engine.undamped(dt, settings.amplitude, settings.omega or 0.0, target, weakening),
     ):
         for k in range(1, int(settings.time / dt / every) + 1):
             motion = engine.advance(every)
@@ -287,6 +313,7 @@ def _undamped(
                     0.5 * (packing.mass @ np.sum(motion.velocity**2, axis=1) + inertia @ motion.spin**2)
                 ),
                 layer_velocity=float(motion.velocity[packing.top, 0].mean()),
+                friction=motion.friction,
             )
 
 

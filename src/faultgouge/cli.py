@@ -79,6 +79,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t)."""
     from faultgouge.pywrap import Record, SceneError, reach
     from faultgouge.pywrap import perturb as run_undamped
+    from faultgouge.pywrap.stages import calibrated, weakening_of
 
     wanted = _scene(scene)
     if wanted.perturb is None:
@@ -87,7 +88,14 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         raise SceneError(f"{output} exists: an undamped run starts from rest, so give another name or delete it")
     with Record(output, wanted) as record:
         *_, start = _progress(reach(wanted, wanted.perturb.fx), "equilibria")
-        run = run_undamped(wanted, start)
+        weakening = None
+        if wanted.friction is not None:
+            v0 = wanted.friction.v0
+            with _status("calibrating v0"):
+                threshold = calibrated(wanted, start) if isinstance(v0, str) else v0
+            weakening = weakening_of(wanted.friction, threshold)
+            _say(f"v0 = {threshold:.3g}, v_ss = {weakening.v_ss:.3g}")
+        run = run_undamped(wanted, start, weakening=weakening)
         record.append(start)
         batch = []
         for sample in _progress(run, "samples"):

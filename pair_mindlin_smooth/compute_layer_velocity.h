@@ -1,0 +1,22 @@
+// compute ID group layer/velocity
+//
+// Mean velocity along x of the disks of the group. They are added up in the order of their IDs, so that it is the
+// same to the bit for any number of ranks, and with it a friction that depends on it.
+
+#ifndef LMP_COMPUTE_LAYER_VELOCITY_H
+#define LMP_COMPUTE_LAYER_VELOCITY_H
+
+#include "compute.h"
+
+namespace LAMMPS_NS {
+
+class ComputeLayerVelocity : public Compute {
+public:
+  ComputeLayerVelocity(class LAMMPS *, int, char **);
+  void init() override {}
+  double compute_scalar() override;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif
