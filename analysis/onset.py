@@ -32,7 +32,7 @@ sign. If D jumps, the equilibrium itself does: a contact opened, closed or slid.
 bisection, and says so.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal
@@ -46,7 +46,7 @@ from scipy.sparse import csr_array
 from .packing import Contacts, Floats, Indices, Packing
 from .spectrum import Complexes, believable, dynamical_matrix, unit_rounding
 from .stiffness import Form
-from .tracking import Block, continued
+from .tracking import Block, Cluster, Projection, continued
 
 Pair = tuple[int, int]
 Operator = Floats | csr_array
@@ -158,7 +158,8 @@ def find_onset(
     equilibrium : callable
         fx -> Packing in equilibrium. It is called with the given loads in increasing order, and between calls
         for the loads a and b with loads between a and b, in any order; there it best starts from its
-        equilibrium at a.
+        equilibrium at a. Where there is none in between it may raise a RuntimeError: the search then tries beside
+        it, and failing that takes the step as a whole, with an edge in it known to half its width.
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
     form : {"consistent", "paper"}
@@ -237,6 +238,43 @@ def complex_windows(
     return windows.all()
 
 
+def first_window(
+    operator: Callable[[float], Operator], forces: ArrayLike, *, narrowest: float | None = None
+) -> Window | None:
+    """The first window of complex eigenvalues of a family of large matrices, without all their eigenvalues.
+
+    The clusters of a `Projection` are searched as `complex_windows` does, with the projected operators
+    interpolated linearly between two loads; what appears there is confirmed, in the order of its onset, with the
+    operator itself. So the window that is returned is as certain as those of `complex_windows`, and D of its pair
+    is followed to the same digits. That it is the first one is certain up to the accuracy of the clusters: an
+    earlier one may be missed if its pair is complex in the operator by less than the clusters' error in D, some
+    hundredths of the level spacing squared times the mixing to the fourth power, or for less than a thousandth of
+    an increment.
+
+    Parameters
+    ----------
+    operator, forces
+        As in :func:`complex_windows`. Loads beyond the one above the onset are not asked for.
+    narrowest
+        As in :func:`find_onset`; no less than a thousandth of an increment.
+
+    Returns
+    -------
+    Window or None
+        None if all eigenvalues are real. fx_end is None if the pair is complex at the load above the onset.
+    """
+    loads = _increasing(forces)
+    here = float(loads[0]), csr_array(operator(float(loads[0])))
+    search = _LargeSearch(operator, narrowest or 0.0)
+    for load in loads[1:]:
+        there = float(load), csr_array(operator(float(load)))
+        window = search.walk(here, there)
+        if window is not None:
+            return window
+        here = there
+    return None
+
+
 def scan_windows(packings: Sequence[Packing], form: Form = "consistent") -> tuple[Window, ...]:
     """Windows that stored equilibria show by themselves, each edge uncertain by half its increment.
 
@@ -305,14 +343,22 @@ def full_operator(packing: Packing, form: Form = "consistent") -> csr_array:
     return csr_array(place @ matrix @ place.T)
 
 
+UNKNOWN_FORCE = 10.0
+"""Forces of contacts mean something from this many times the packing's imbalance: ten, for a disk between two such
+contacts, whose forces cancel in part."""
+
+SMALL_FORCE = 1e-6
+"""And in any case from this share of the largest force: a packing that is out of balance keeps its contacts."""
+
+
 def loaded(packing: Packing) -> Packing:
     """The packing without the contacts whose force is no more than its own imbalance.
 
     A disk that nothing holds but such contacts comes to rest just about touching, with an overlap, and so with
     a stiffness, that is rounding noise: of order (residual / k_n)^(1/3), large enough to move eigenvalues.
     """
-    contacts = packing.contacts
-    kept = packing.normal_force > packing.residual
+    contacts, force = packing.contacts, packing.normal_force
+    kept = force > min(UNKNOWN_FORCE * packing.residual, SMALL_FORCE * force.max(initial=0.0))
     if np.all(kept):
         return packing
     return replace(packing, contacts=Contacts(contacts.i[kept], contacts.j[kept], contacts.slip[kept]))
@@ -602,8 +648,8 @@ class _Search:
         step = _Step(here, there)
         if there.fx - here.fx > self.narrowest:
             middle = step.hidden_window(self.narrowest) if step.consistent else 0.5 * (here.fx + there.fx)
-            if middle is not None:
-                between = Modes.of(middle, self.operator(middle))
+            between = None if middle is None else self.between(here.fx, middle, there.fx)
+            if between is not None:
                 self.walk(here, between)
                 self.walk(between, there)
                 return
@@ -618,88 +664,104 @@ class _Search:
                     return
         self.windows.advance(step, lambda *edge: self.solve(*edge)[0], "contact change")
 
+    def between(self, below: float, middle: float, above: float) -> Modes | None:
+        """The modes at a load in between, or at one beside it where that has no equilibrium."""
+        for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
+            try:
+                return Modes.of(fx, self.operator(fx))
+            except RuntimeError:
+                continue
+        return None
+
     def solve(self, step: "_Step", pair: Pair, image: Pair) -> tuple[_Edge, Modes, Modes]:
-        """The root of D for a pair that is complex at one end only, and the modes close by on either side."""
+        """The edge of a pair that is complex at one end only, and the modes close by on either side."""
         here, there = step.here, step.there
-        before, after = here.block(pair), there.block(image)
-        if before.discriminant * after.discriminant >= 0:
-            # One end is within rounding of the coalescence: the edge is there, to within D over its slope.
-            end, fx = min((before, here.fx), (after, there.fx), key=lambda item: abs(item[0].discriminant))
-            slope = abs(after.discriminant - before.discriminant) / (there.fx - here.fx)
-            return _Edge(fx, abs(end.discriminant) / slope, end.mean, end.overlap, "coalescence"), here, there
-        states = {here.fx: _State(here.matrix, before), there.fx: _State(there.matrix, after)}
-
-        def block(fx: float) -> Block:
-            if fx not in states:
-                states[fx] = _state(fx, csr_array(self.operator(fx)), states)
-            return states[fx].block
-
-        def modes(fx: float) -> Modes:
-            return Modes.of(fx, states[fx].matrix)
-
-        span = there.fx - here.fx
-        root = float(brentq(lambda fx: block(fx).discriminant, here.fx, there.fx, xtol=ROOT * span))
-        room = min(root - here.fx, there.fx - root)
-        # As near as the noise allows: D should be straight, and yet stand out of the scatter.
-        distance = 1e-3 * min(room, 1e-3 * span)
-        while 0 < distance < 0.1 * room:
-            points = [root + offset * distance for offset in (-2, -1, 0, 1, 2)]
-            edge = _coalescence(points, [block(fx) for fx in points])
-            if edge is not None:
-                return edge, modes(points[0]), modes(points[-1])
-            distance *= 30
-        below, above = self._jump(states, block)
-        jump = _Edge(
-            fx=0.5 * (below + above),
-            error=0.5 * (above - below),
-            eigenvalue=block(above).mean,
-            overlap=min(block(below).overlap, block(above).overlap),
-            kind="contact change",
+        ends = [_State(here.fx, here.matrix, here.block(pair)), _State(there.fx, there.matrix, there.block(image))]
+        try:
+            edge, below, above = _locate(self.operator, *ends)
+        except RuntimeError:
+            return step.halfway(ends[0].block, "contact change"), here, there
+        return (
+            edge,
+            here if below.fx == here.fx else Modes.of(below.fx, below.matrix),
+            there if above.fx == there.fx else Modes.of(above.fx, above.matrix),
         )
-        return jump, modes(below), modes(above)
-
-    @staticmethod
-    def _jump(states: dict[float, "_State"], block: Callable[[float], Block]) -> tuple[float, float]:
-        """The loads on either side of a change of sign of D that is not smooth."""
-        loads = sorted(states)
-        width = JUMP * (loads[-1] - loads[0])
-        below, above = next(
-            pair for pair in pairwise(loads) if block(pair[0]).discriminant * block(pair[1]).discriminant <= 0
-        )
-        while above - below > max(width, 4 * np.spacing(abs(above))):
-            middle = 0.5 * (below + above)
-            if block(middle).discriminant * block(below).discriminant > 0:
-                below = middle
-            else:
-                above = middle
-        return below, above
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _State:
     """The operator at one load and the block of a pair in it."""
 
+    fx: float
     matrix: csr_array
     block: Block
 
+    @property
+    def discriminant(self) -> float:
+        return self.block.discriminant
 
-def _state(fx: float, matrix: csr_array, known: dict[float, _State]) -> _State:
-    """Continue a pair from the nearest load where it is known, by all modes if need be."""
-    nearest = known[min(known, key=lambda each: abs(each - fx))].block
-    block = continued(matrix, nearest)
-    if block is None:
-        modes = Modes.of(fx, matrix)
-        block = modes.block(modes.nearest(nearest))
-    return _State(matrix, block)
+    def at(self, fx: float, operator: Operator) -> "_State":
+        """The same pair at another load: continued, or found among all modes if need be."""
+        matrix = csr_array(operator)
+        block = continued(matrix, self.block)
+        if block is None:
+            modes = Modes.of(fx, matrix)
+            block = modes.block(modes.nearest(self.block))
+        return _State(fx, matrix, block)
 
 
-def _coalescence(points: Sequence[float], blocks: Sequence[Block]) -> _Edge | None:
+def _locate(operator: Callable[[float], Operator], here: _State, there: _State) -> tuple[_Edge, _State, _State]:
+    """The root of D of a pair between two loads, and its states close by on either side."""
+    span = there.fx - here.fx
+    if here.discriminant * there.discriminant >= 0:
+        # One end is within rounding of the coalescence: the edge is there, to within D over its slope.
+        end = min(here, there, key=lambda state: abs(state.discriminant))
+        slope = abs(there.discriminant - here.discriminant) / span
+        error = abs(end.discriminant) / slope
+        return _Edge(end.fx, error, end.block.mean, end.block.overlap, "coalescence"), here, there
+    known = {here.fx: here, there.fx: there}
+
+    def state(fx: float) -> _State:
+        if fx not in known:
+            known[fx] = known[min(known, key=lambda each: abs(each - fx))].at(fx, operator(fx))
+        return known[fx]
+
+    root = float(brentq(lambda fx: state(fx).discriminant, here.fx, there.fx, xtol=ROOT * span))
+    room = min(root - here.fx, there.fx - root)
+    # As near as the noise allows: D should be straight, and yet stand out of the scatter.
+    distance = 1e-3 * min(room, 1e-3 * span)
+    while 0 < distance < 0.1 * room:
+        points = [state(root + offset * distance) for offset in (-2, -1, 0, 1, 2)]
+        edge = _coalescence(points)
+        if edge is not None:
+            return edge, points[0], points[-1]
+        distance *= 30
+    # D jumps: nothing but bisection will do.
+    order = sorted(known)
+    below, above = next((a, b) for a, b in pairwise(order) if known[a].discriminant * known[b].discriminant <= 0)
+    while above - below > max(JUMP * span, 4 * float(np.spacing(abs(above)))):
+        middle = 0.5 * (below + above)
+        if state(middle).discriminant * known[below].discriminant > 0:
+            below = middle
+        else:
+            above = middle
+    jump = _Edge(
+        fx=0.5 * (below + above),
+        error=0.5 * (above - below),
+        eigenvalue=known[above].block.mean,
+        overlap=min(known[below].block.overlap, known[above].block.overlap),
+        kind="contact change",
+    )
+    return jump, known[below], known[above]
+
+
+def _coalescence(points: Sequence[_State]) -> _Edge | None:
     """Root and error of D from five equidistant points about it; None if D does not cross zero smoothly.
 
     A parabola takes care of what curvature there is; two degrees of freedom are left for the scatter.
     """
-    middle, distance = points[2], points[3] - points[2]
-    d = np.array([block.discriminant for block in blocks])
+    middle, distance = points[2].fx, points[3].fx - points[2].fx
+    d = np.array([point.discriminant for point in points])
     curve, residuals, *_ = np.polynomial.polynomial.polyfit(np.arange(-2, 3), d, 2, full=True)
     scatter = float(np.sqrt(residuals[0].sum() / 2)) if residuals[0].size else 0.0
     value, slope = float(curve[0]), float(curve[1])
@@ -710,10 +772,125 @@ def _coalescence(points: Sequence[float], blocks: Sequence[Block]) -> _Edge | No
     return _Edge(
         fx=middle + shift * distance,
         error=2 * scatter / abs(slope) * distance + float(np.spacing(abs(middle))),
-        eigenvalue=float(np.mean([block.mean for block in blocks])),
-        overlap=min(block.overlap for block in blocks),
+        eigenvalue=float(np.mean([point.block.mean for point in points])),
+        overlap=min(point.block.overlap for point in points),
         kind="coalescence",
     )
+
+
+Place = tuple[float, csr_array]
+"""A load and the operator there."""
+
+REACH = 0.1
+"""Share of an increment by which the clusters are extrapolated: a pair that they have turn complex a little late is
+found in time."""
+
+FINEST = 1e-3
+"""Narrowest windows of clusters that are looked for, in increments: their own error is larger."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """A window of a cluster and the planes of its pair at a load inside it."""
+
+    fx_onset: float
+    inside: float
+    right: Floats
+    left: Floats
+
+
+class _LargeSearch:
+    """The first window of large operators, from load to load."""
+
+    def __init__(self, operator: Callable[[float], Operator], narrowest: float) -> None:
+        self.operator, self.narrowest = operator, narrowest
+        self.passed: list[Place] = []
+        self.projection: Projection | None = None
+        self.blocks: list[Floats] = []
+
+    def walk(self, here: Place, there: Place) -> Window | None:
+        """The first window that begins between two loads."""
+        self.passed.append(here)
+        if self.projection is None or not self.projection.fits(here[1], self.blocks):
+            self.projection = Projection.of(here[1])
+            self.blocks = self.projection.onto(here[1])
+        before, self.blocks = self.blocks, self.projection.onto(there[1])
+        candidates = [
+            candidate
+            for cluster, a, b in zip(self.projection.clusters, before, self.blocks, strict=True)
+            for candidate in self.candidates(cluster, (here[0], a), (there[0], b))
+        ]
+        first: Window | None = None
+        for candidate in candidates:
+            window = self.confirmed(candidate, there)
+            if window is not None and (first is None or window.fx_onset < first.fx_onset):
+                first = window
+        return first
+
+    def candidates(
+        self, cluster: Cluster, here: tuple[float, Floats], there: tuple[float, Floats]
+    ) -> Iterator[_Candidate]:
+        """The windows of one cluster, with its blocks interpolated between two loads."""
+        assert self.projection is not None
+        span = there[0] - here[0]
+
+        def block(fx: float) -> Floats:
+            share = (fx - here[0]) / span
+            return (1 - share) * here[1] + share * there[1]
+
+        reach = there[0] + REACH * span
+        for window in complex_windows(block, [here[0], reach], narrowest=max(self.narrowest, FINEST * span)):
+            end = reach if window.fx_end is None else window.fx_end
+            inside = there[0] if window.fx_onset < there[0] <= end else min(0.5 * (window.fx_onset + end), there[0])
+            modes = Modes.of(inside, block(inside))
+            pair = modes.complex_pairs
+            if not pair:
+                continue
+            nearest = min(pair, key=lambda each: abs(modes.values[each[0]].real - window.eigenvalue))
+            plane = modes.block(nearest)
+            if cluster.owns(plane.right):
+                right, left = (self.projection.lifted(cluster, basis) for basis in (plane.right, plane.left))
+                yield _Candidate(window.fx_onset, inside, right, left)
+
+    def confirmed(self, candidate: _Candidate, there: Place) -> Window | None:
+        """The window of the operator itself in place of that of a cluster; None if the pair stays real."""
+        inside = self.complex_state(candidate, there)
+        if inside is None:
+            return None
+        onset = _Edge(self.passed[0][0], 0.0, inside.block.mean, inside.block.overlap, "start")
+        for fx, matrix in reversed(self.passed):
+            below = inside.at(fx, matrix)
+            if below.discriminant > 0:
+                onset, *_ = _locate(self.operator, below, inside)
+                break
+            inside = below
+        last = inside
+        above = inside.at(*there) if inside.fx < there[0] else inside
+        end = _locate(self.operator, last, above)[0] if above.discriminant > 0 else None
+        return _window(onset, end)
+
+    def complex_state(self, candidate: _Candidate, there: Place) -> _State | None:
+        """The pair at a load where it is complex, if there is one near the candidate's window."""
+        fx = candidate.inside
+        matrix = there[1] if fx == there[0] else csr_array(self.operator(fx))
+        start = _State(fx, matrix, Block.of(matrix, candidate.right, candidate.left)).at(fx, matrix)
+        if start.discriminant < 0:
+            return start
+        # A parabola through D at the ends of the increment and here has its minimum where D is least.
+        places = [self.passed[-1], there] if fx < there[0] else [self.passed[-1]]
+        others = [start.at(*place) for place in places]
+        for other in others:
+            if other.discriminant < 0:
+                return other
+        if len(others) < 2:
+            return None
+        states = sorted([start, *others], key=lambda state: state.fx)
+        curve = np.polyfit([state.fx for state in states], [state.discriminant for state in states], 2)
+        lowest = float(-0.5 * curve[1] / curve[0])
+        if curve[0] <= 0 or not states[0].fx < lowest < states[-1].fx:
+            return None
+        state = start.at(lowest, self.operator(lowest))
+        return state if state.discriminant < 0 else None
 
 
 def _window(onset: _Edge, end: _Edge | None) -> Window:

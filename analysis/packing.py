@@ -15,7 +15,7 @@ carries :math:`(f_x, -f_y)` besides.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -247,6 +247,23 @@ class Packing:
             total[axis] += np.bincount(i, on_i[:, axis], n) - np.bincount(j[pair], on_i[pair, axis], n)
         total[2] = -np.bincount(i, ft, n) - np.bincount(j[pair], ft[pair], n)
         return _frozen(total.ravel())
+
+    def loaded(self, least: float) -> "Packing":
+        """The packing without the contacts that carry no more than a given force.
+
+        A disk that nothing holds comes to rest just about touching another, with an overlap, and so a stiffness, that
+        is rounding noise: of order (force / k_n)^(1/3), which is not small.
+
+        Parameters
+        ----------
+        least : float
+            Normal force that a contact has to exceed.
+        """
+        kept = self.normal_force > least
+        if np.all(kept):
+            return self
+        contacts = Contacts(self.contacts.i[kept], self.contacts.j[kept], self.contacts.slip[kept])
+        return replace(self, contacts=contacts)
 
     @property
     def residual(self) -> float:
