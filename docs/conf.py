@@ -1,13 +1,14 @@
 """Sphinx configuration. The package must be installed, or be on the path; LAMMPS and MPI need not be there."""
 
-from importlib.metadata import PackageNotFoundError, version
+import re
+from importlib import metadata
 
 project = "faultgouge"
 author = "The faultgouge developers"
 project_copyright = author
 try:
-    release = version("faultgouge")
-except PackageNotFoundError:
+    release = metadata.version("faultgouge")
+except metadata.PackageNotFoundError:
     release = ""
 
 extensions = [
@@ -19,7 +20,7 @@ extensions = [
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_build", "README.md"]
-myst_enable_extensions = ["amsmath", "dollarmath", "deflist"]
+myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 html_theme = "furo"
@@ -28,8 +29,22 @@ html_title = "faultgouge"
 autodoc_mock_imports = ["lammps", "mpi4py"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
-autoclass_content = "class"
-napoleon_numpy_docstring = True
 napoleon_google_docstring = False
 napoleon_use_ivar = True
 napoleon_use_rtype = False
+
+MATH_OR_LITERAL = re.compile(r":math:`[^`]*`|``[^`]*``|^( *)\.\. math::.*\n(?:(?:\1 +.*)?\n)*", re.MULTILINE)
+
+
+def keep_bars(app, what, name, obj, options, lines):
+    """Docstrings write |y^H x| for an absolute value, which reStructuredText takes for a substitution."""
+    text, done, end = "\n".join(lines) + "\n", "", 0
+    for match in MATH_OR_LITERAL.finditer(text):
+        done += text[end : match.start()].replace("|", r"\|") + match[0]
+        end = match.end()
+    done += text[end:].replace("|", r"\|")
+    lines[:] = done.split("\n")
+
+
+def setup(app):
+    app.connect("autodoc-process-docstring", keep_bars, priority=100)

@@ -1,8 +1,9 @@
-r"""The paper's protocol on one packing: figures 1, 3 and 4, numbers, and a report in plain words.
+r"""The paper's protocol on one packing: its figures, numbers, and a report in plain words.
 
 Settle, raise F_x from equilibrium to equilibrium for each friction coefficient, find the onset F_x^c where two real
 eigenvalues coalesce; then start undamped dynamics from an equilibrium above the onset and compare the growth of the
-mean square displacement D(t), which starts from rounding noise, with the rate 2 |Im omega| of the spectrum.
+mean square displacement D(t), which starts from rounding noise, with the rate 2 |Im omega| of the spectrum. Where the
+scene asks for it, a minute perturbation just below the onset follows (`triggering`).
 """
 
 from __future__ import annotations
@@ -27,10 +28,12 @@ from ..analysis import (
     follow,
     spectrum,
 )
-from ..pywrap import Equilibrium, Record, Sample, Scene, SceneError
-from ..pywrap.scene import Perturb
-from ..pywrap.stages import perturb, time_step
+from ..pywrap import Engine, Equilibrium, Record, Sample, Scene, SceneError
+from ..pywrap.scene import Friction, Perturb
+from ..pywrap.stages import next_equilibrium, perturb, time_step
 from .onsets import OnsetRun, onset_run
+from .triggering import figures, sensitivity, trigger, words
+from .triggering import summary as triggering_summary
 
 Floats = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -41,8 +44,9 @@ EFOLDS = 48.0
 LONGEST_RUN = 3_000_000
 """Steps of the undamped run, at the most: about 20 s for 100 disks."""
 
-NEAR_ONSET = np.concatenate([-np.geomspace(1e-3, 1e-6, 7), [0.0], np.geomspace(1e-6, 1e-3, 7)])
-"""Distances from the onset at which figure 3 has further points, in units of the ramp's last F_x."""
+NEAR_ONSET = np.concatenate([-np.geomspace(1e-3, 1e-7, 13), [0.0], np.geomspace(1e-6, 1e-3, 7)])
+"""Distances from the onset at which there are further equilibria, in units of the ramp's last F_x: for figure 3, and
+below the onset for the response over the distance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +107,29 @@ def reproduce(scene: Scene, output: Path, say: Say = print) -> dict[str, Any]:
     say(f"growth rate of D: {growth.measured.rate:.6g} measured, {growth.predicted:.6g} predicted")
     _figures(runs, growth, output)
     summary = _summary(scene, runs, growth)
+    more: list[str] = []
+    if scene.perturb is not None and scene.friction is not None:
+        say(f"triggering at F_x = {scene.perturb.fx:g}")
+        more, summary["triggering"] = _triggering(scene, scene.perturb, scene.friction, runs[0], output)
     (output / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
-    (output / "report.md").write_text(_report(scene, runs, growth))
+    (output / "report.md").write_text(_report(scene, runs, growth, more))
     return summary
+
+
+def _triggering(
+    scene: Scene, settings: Perturb, friction: Friction, run: OnsetRun, output: Path
+) -> tuple[list[str], dict[str, Any]]:
+    """Lines of the report and numbers; figures and series are written."""
+    if settings.fx >= run.onset.fx_c:
+        says = f"F_x = {settings.fx:g} is above the onset {run.onset.fx_c:g}: nothing is stable there to be triggered."
+        return ["## Triggering", "", says, ""], {"says": says}
+    below = max((each for each in run.equilibria if each.fx <= settings.fx), key=lambda each: each.fx)
+    with Engine(below.packing) as engine:
+        start = next_equilibrium(engine, below, settings.fx, scene)
+    triggering = trigger(scene, start, settings, friction, output / "run.h5")
+    sensitive = sensitivity(run)
+    figures(triggering, sensitive, run.mu, output)
+    return words(triggering, sensitive, settings, run.mu), triggering_summary(triggering, sensitive)
 
 
 def _recorded(scene: Scene, mu: float, path: Path) -> OnsetRun:
@@ -131,7 +155,7 @@ def _growth(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
     fastest = max(modes.pairs, key=lambda pair: pair.growth_rate)
     predicted = 2 * abs(discrete_frequency(fastest.eigenvalue, dt).imag)
     settings = Perturb(fx=start.fx, time=min(EFOLDS / predicted, LONGEST_RUN * dt), inertia_factor=scene.inertia_factor)
-    # D is linear in nothing any more once disks have moved by a tenth of the smallest overlap
+    # disks that have moved by a tenth of the smallest overlap certainly move otherwise than the spectrum says
     ceiling = (0.1 * start.packing.geometry.overlap.min()) ** 2
     samples: list[Sample] = []
     with RunFile(path, "a") as file:
@@ -141,9 +165,19 @@ def _growth(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
                 break
         file.append_series("undamped", **{key: [getattr(s, key) for s in samples] for key in vars(samples[0])})
     time, msd = np.array([s.time for s in samples]), np.array([s.msd for s in samples])
-    # the noise has no mode of its own: two decades above it the fastest pair is alone
-    floor = np.median(msd[: len(msd) // 20])
-    return GrowthRun(start, time, msd, modes, dt, predicted, fit_growth(time, msd, 1e2 * floor, ceiling))
+    lower, upper = _growing(msd, ceiling)
+    return GrowthRun(start, time, msd, modes, dt, predicted, fit_growth(time, msd, lower, upper))
+
+
+def _growing(msd: Floats, ceiling: float) -> tuple[float, float]:
+    """Bounds of D between which one pair grows alone: above the noise of all modes, below where D levels off.
+
+    The noise is what D shows in the first quarter of its way to the ceiling; three decades above it, the fastest pair
+    has left the others behind. Three decades below its largest value D has not levelled off.
+    """
+    upper = min(ceiling, 1e-3 * float(msd.max()))
+    way = int(np.argmax(msd >= upper))
+    return 1e3 * float(np.median(msd[: max(way // 4, 1)])), upper
 
 
 def _dominance(modes: Spectrum) -> float:
@@ -210,7 +244,7 @@ def _summary(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> dict[str,
     }
 
 
-def _report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> str:
+def _report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, more: list[str]) -> str:
     packing = runs[0].equilibria[0].packing
     lines = [
         "# The paper's protocol on one packing",
@@ -250,6 +284,7 @@ def _report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> str:
         "",
         "![D(t)](figure4.png)",
         "",
+        *more,
         "## What the paper leaves open, and what was taken",
         "",
         *(f"- {line}" for line in _assumptions(scene, packing)),

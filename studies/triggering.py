@@ -1,0 +1,228 @@
+r"""Remote triggering: a linearly stable packing just below its onset that erupts once friction weakens with velocity.
+
+Between the onsets of two friction coefficients, mu mu_ss and mu, a packing is stable with the larger and unstable with
+the smaller one. Three undamped runs from the same equilibrium show what a minute perturbation a cos(omega t) does
+there: nothing without it; a small bounded response with it; and an eruption where it sets the upper layer into motion
+that is fast enough to weaken the friction, mu(v), of all contacts.
+
+Closer and closer to the onset, the response of the pair that is about to coalesce grows as
+:math:`\epsilon^{-1/2}`, and damping cuts it off where its time tau falls below :math:`\tau_d`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analysis import RunFile
+from ..analysis.normal_form import PairForm, PowerLaw, fit_power_law, pair_forms
+from ..pywrap import Equilibrium, Sample, Scene
+from ..pywrap.engine import Weakening
+from ..pywrap.scene import Friction, Perturb
+from ..pywrap.stages import perturb, weakening_of
+from .onsets import OnsetRun
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Triggering:
+    """Three undamped runs from one equilibrium.
+
+    Attributes
+    ----------
+    start : Equilibrium
+        Linearly stable.
+    weakening : Weakening
+        mu(v), with v_0 the largest velocity of the unperturbed run.
+    unperturbed, perturbed, erupting : tuple of Sample
+        Without perturbation, with it, and with it and mu(v).
+    """
+
+    start: Equilibrium
+    weakening: Weakening
+    unperturbed: tuple[Sample, ...]
+    perturbed: tuple[Sample, ...]
+    erupting: tuple[Sample, ...]
+
+    @property
+    def rise(self) -> float:
+        """Decades between the largest D of the perturbed run and of the one with mu(v)."""
+        return float(np.log10(column(self.erupting, "msd").max() / column(self.perturbed, "msd").max()))
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Response of the pair that is about to coalesce, over the distance from the onset.
+
+    Attributes
+    ----------
+    distance : ndarray, shape (n,)
+        1 - F_x/F_x^c.
+    pairs : tuple of PairForm
+        The pair at these distances.
+    fit : PowerLaw
+        Of the undamped amplitude over the distance.
+    """
+
+    distance: Floats
+    pairs: tuple[PairForm, ...]
+    fit: PowerLaw
+
+    @property
+    def amplitude(self) -> Floats:
+        """Undamped amplitudes in units of the start, shape (n,)."""
+        return np.array([pair.amplitude() for pair in self.pairs])
+
+
+def column(samples: tuple[Sample, ...], name: str) -> Floats:
+    """One quantity of a time series, shape (T,)."""
+    return np.array([getattr(sample, name) for sample in samples])
+
+
+def trigger(scene: Scene, start: Equilibrium, settings: Perturb, friction: Friction, path: Path) -> Triggering:
+    """The three runs, written to run.h5 as they end.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    start : Equilibrium
+        At settings.fx.
+    settings : Perturb
+        The perturbation and the length of the runs.
+    friction : Friction
+        mu(v).
+    path : Path
+        run.h5 of the ramp; gets the series unperturbed, perturbed and erupting.
+    """
+
+    def run(name: str, amplitude: float, weakening: Weakening | None = None) -> tuple[Sample, ...]:
+        one = settings.model_copy(update={"amplitude": amplitude})
+        samples = tuple(perturb(scene.model_copy(update={"perturb": one}), start, weakening=weakening))
+        with RunFile(path, "a") as file:
+            file.append_series(name, **{key: column(samples, key) for key in vars(samples[0])})
+        return samples
+
+    unperturbed = run("unperturbed", 0.0)
+    v0 = np.abs(column(unperturbed, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
+    weakening = weakening_of(friction, float(v0))
+    perturbed = run("perturbed", settings.amplitude)
+    return Triggering(start, weakening, unperturbed, perturbed, run("erupting", settings.amplitude, weakening))
+
+
+def sensitivity(run: OnsetRun) -> Sensitivity:
+    """The pair of the first onset, at the equilibria that the run has just below it."""
+    first = run.onset.windows[0]
+    below = sorted((fx for fx in run.between if fx < first.fx_onset), reverse=True)
+    # nearer than a hundred times the onset's own error, the distance is not known
+    below = [fx for fx in below if first.fx_onset - fx > 100 * first.error]
+    pairs = tuple(pair_forms([run.between[fx] for fx in below], first.eigenvalue))
+    distance = 1 - np.array(below) / first.fx_onset
+    return Sensitivity(distance, pairs, fit_power_law(distance, [pair.amplitude() for pair in pairs]))
+
+
+def figures(triggering: Triggering, sensitive: Sensitivity, mu: float, output: Path) -> None:
+    """The paper's figures 2, 5 and 6, and two of the response: over the distance from the onset, and over damping."""
+    from . import triggering_figures as draw
+    from .figures import save
+
+    weak = triggering.weakening
+    law = draw.FrictionLaw(mu_0=mu, B=weak.B, w=weak.w, mu_ss=weak.mu_ss, v_0=weak.v0, v_ss=weak.v_ss)
+    curves = {
+        name: draw.Displacements(column(getattr(triggering, name), "time"), column(getattr(triggering, name), "msd"))
+        for name in ("unperturbed", "perturbed", "erupting")
+    }
+    save(draw.friction_law_figure(draw.FrictionLaw(mu_0=mu, B=weak.B, w=weak.w, mu_ss=weak.mu_ss)), output / "figure2")
+    save(
+        draw.eruption_figure(curves["unperturbed"], curves["perturbed"], curves["erupting"]),
+        output / "figure5a",
+    )
+    speed, friction = (column(triggering.erupting, name) for name in ("layer_velocity", "friction"))
+    save(draw.weakening_figure(np.abs(speed), friction, law), output / "figure5b")
+    save(draw.measured_friction_figure(), output / "figure6")
+
+    reach = (float(sensitive.distance.min()), float(sensitive.distance.max()))
+    curve = draw.AmplitudeCurve("$1 - F_x/F_x^c$", sensitive.distance, sensitive.amplitude, sensitive.fit, reach)
+    save(draw.amplitude_figure([curve]), output / "amplitude")
+    chosen = [sensitive.pairs[k] for k in np.linspace(0, len(sensitive.pairs) - 1, 4).astype(int)]
+    save(draw.damping_figure([_damping_curve(pair) for pair in chosen]), output / "damping")
+
+
+def _damping_curve(pair: PairForm) -> Any:
+    from .triggering_figures import DampingCurve
+
+    damping_time = pair.tau_d * np.geomspace(1e-2, 1e2, 33)
+    return DampingCurve(
+        epsilon=pair.form.epsilon,
+        damping_time=damping_time,
+        amplitude=np.array([pair.amplitude(tau) for tau in damping_time]),
+        undamped=pair.amplitude(),
+        tau_d=pair.tau_d,
+        half_time=pair.half_gain_time(),
+    )
+
+
+def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
+    """Numbers for summary.json."""
+    largest = {
+        name: float(column(getattr(triggering, name), "msd").max())
+        for name in ("unperturbed", "perturbed", "erupting")
+    }
+    return {
+        "fx": triggering.start.fx,
+        "v0": triggering.weakening.v0,
+        "v_ss": triggering.weakening.v_ss,
+        "largest_D": largest,
+        "rise_in_decades": triggering.rise,
+        "smallest_mu": float(column(triggering.erupting, "friction").min()),
+        "amplitude_exponent": sensitive.fit.exponent,
+        "amplitude_exponent_error": sensitive.fit.error,
+        "distances": [float(sensitive.distance.min()), float(sensitive.distance.max())],
+        "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in sensitive.pairs],
+    }
+
+
+def words(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, mu: float) -> list[str]:
+    """Lines of the report."""
+    largest = summary(triggering, sensitive)["largest_D"]
+    weak = triggering.weakening
+    speed = np.abs(column(triggering.erupting, "layer_velocity"))
+    erupted = triggering.rise >= 1
+    return [
+        "## Triggering",
+        "",
+        f"At F_x = {triggering.start.fx:g} the packing is linearly stable with mu = {mu:g}. Three undamped runs of "
+        f"t = {settings.time:g} from there:",
+        "",
+        "| run | largest D |",
+        "|---|---|",
+        f"| unperturbed | {largest['unperturbed']:.1e} |",
+        f"| perturbed by {settings.amplitude:g} cos({settings.omega:g} t) on the upper layer | "
+        f"{largest['perturbed']:.1e} |",
+        f"| perturbed, with mu(v) | {largest['erupting']:.1e} |",
+        "",
+        f"mu(v) falls from {mu:g} towards {mu * weak.mu_ss:g} once |v| > v_0 = {weak.v0:.2g} (the largest velocity of "
+        f"the unperturbed run), over v_ss = {weak.v_ss:.2g}; the lowest mu in the run is "
+        f"{column(triggering.erupting, 'friction').min():.4g}, the velocity reaches {speed.max():.1e}.",
+        f"With mu(v), D rises {triggering.rise:.1f} decades above the perturbed run."
+        if erupted
+        else "The packing does not erupt: weakened friction leaves it stable at this force.",
+        "",
+        "![D(t) of the three runs](figure5a.png) ![mu over v](figure5b.png) ![the law](figure2.png)",
+        "",
+        "Below the onset, the response of the pair that is about to coalesce grows as a power of the distance "
+        f"1 - F_x/F_x^c: the exponent is {sensitive.fit.exponent:.4f} +- {sensitive.fit.error:.1g} over distances from "
+        f"{sensitive.distance.min():.1e} to {sensitive.distance.max():.1e}; theory has -1/2.",
+        "Damping leaves half of it where tau = "
+        f"{np.mean([pair.half_gain_time() / pair.tau_d for pair in sensitive.pairs]):.3f} tau_d.",
+        "",
+        "![amplitude over distance](amplitude.png) ![amplitude over damping](damping.png)",
+        "",
+        "The paper's figure 6 compares mu(v) with data that are not public; figure6.png has its fitted law alone.",
+        "",
+    ]
