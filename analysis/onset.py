@@ -30,12 +30,21 @@ inconsistent.
 far below the increment, and there :math:`|y^H x| \to 0`; a mere crossing touches D = 0 without a change of
 sign. If D jumps, the equilibrium itself does: a contact opened, closed or slid. The edge is then located by
 bisection, and says so.
+
+**Contacts without force.** A disk that nothing presses comes to rest touching its neighbours with an overlap that
+is rounding, and a Hertzian contact has the stiffness :math:`\tfrac32 k_n \delta^{1/2}`: a force of 1e-11, the
+balance that an equilibrium can have, goes with a stiffness of order 1, which differs from one equilibrium to the
+next and would open and shut windows at random. Such contacts are left out, see `loaded`.
+
+**What it costs.** An equilibrium and a dense decomposition at every load that is examined. While an edge is
+solved for only its pair is continued (:mod:`~faultgouge.analysis.tracking`). In packings of more than
+`ALL_WINDOWS` disks no load is decomposed: `first_window` finds the first pair from clusters of neighbouring modes.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,8 +57,9 @@ from .spectrum import Complexes, believable, dynamical_matrix, unit_rounding
 from .stiffness import Form
 from .tracking import Block, Cluster, Projection, continued
 
-Pair = tuple[int, int]
-Operator = Floats | csr_array
+ALL_WINDOWS = 300
+"""Disks up to which all eigenvalues are computed at every load, which takes a second there and grows with the cube."""
+
 ROOT = 1e-7
 """Width to which the root of D is bracketed, in increments: a tenth of the distance at which the five points lie
 through which the parabola goes that gives the last digits."""
@@ -58,6 +68,8 @@ JUMP = 1e-9
 """Width to which a jump of the equilibrium is bracketed, in increments: the place depends on the path, and with it on
 the increment, by far more."""
 
+Pair = tuple[int, int]
+Operator: TypeAlias = Floats | csr_array
 Kind = Literal["coalescence", "contact change", "start", "scan"]
 
 
@@ -74,7 +86,7 @@ class Window:
     fx_onset : float
         Load at which the pair becomes complex, force per top disk.
     fx_end : float or None
-        Load at which it is real again; None if it is complex at the largest load.
+        Load at which it is real again; None if it is complex at the largest load that was looked at.
     eigenvalue : float
         The double eigenvalue at the onset (the real part of the pair if it does not coalesce there), 1 /
         time^2.
@@ -121,9 +133,12 @@ class Onset:
     ----------
     windows : tuple of Window
         By increasing onset; at least one.
+    complete : bool
+        Whether these are all up to the largest load. Of a large packing only the first is sought.
     """
 
     windows: tuple[Window, ...]
+    complete: bool = True
 
     @property
     def fx_c(self) -> float:
@@ -151,7 +166,10 @@ def find_onset(
     form: Form = "consistent",
     narrowest: float | None = None,
 ) -> Onset:
-    """Every window of complex eigenvalues between the smallest and the largest load.
+    """The windows of complex eigenvalues between the smallest and the largest load.
+
+    Of a packing of up to `ALL_WINDOWS` disks these are all, from all eigenvalues at every load. Of a larger one it
+    is the first, see :func:`first_window`, and loads beyond it are not asked for.
 
     Parameters
     ----------
@@ -180,28 +198,35 @@ def find_onset(
         If the loads are not at least two increasing numbers.
     """
 
+    loads = _increasing(forces)
+    start = equilibrium(float(loads[0]))
     unbalanced: dict[float, float] = {}
 
     def operator(fx: float) -> csr_array:
-        packing = equilibrium(fx)
+        packing = start if fx == loads[0] else equilibrium(fx)
         unbalanced[fx] = packing.residual / float(np.sqrt(max(1, packing.top.sum())))
         return full_operator(packing, form)
 
     def balance(fx: float) -> float:
         return unbalanced[min(unbalanced, key=lambda known: abs(known - fx))]
 
+    complete = len(start) <= ALL_WINDOWS
+    if complete:
+        found = complex_windows(operator, loads, narrowest=narrowest)
+    else:
+        first = first_window(operator, loads, narrowest=narrowest)
+        found = () if first is None else (first,)
+    if not found:
+        raise OnsetError(f"No pair of eigenvalues becomes complex up to fx = {loads[-1]:.17g}: raise the largest load.")
     windows = tuple(
         replace(
             window,
             error=window.error + balance(window.fx_onset),
             end_error=None if window.fx_end is None else (window.end_error or 0.0) + balance(window.fx_end),
         )
-        for window in complex_windows(operator, forces, narrowest=narrowest)
+        for window in found
     )
-    if not windows:
-        largest = float(np.asarray(forces, dtype=np.float64)[-1])
-        raise OnsetError(f"No pair of eigenvalues becomes complex up to fx = {largest:.17g}: raise the largest load.")
-    return Onset(windows)
+    return Onset(windows, complete)
 
 
 def complex_windows(
@@ -243,13 +268,12 @@ def first_window(
 ) -> Window | None:
     """The first window of complex eigenvalues of a family of large matrices, without all their eigenvalues.
 
-    The clusters of a `Projection` are searched as `complex_windows` does, with the projected operators
-    interpolated linearly between two loads; what appears there is confirmed, in the order of its onset, with the
-    operator itself. So the window that is returned is as certain as those of `complex_windows`, and D of its pair
-    is followed to the same digits. That it is the first one is certain up to the accuracy of the clusters: an
-    earlier one may be missed if its pair is complex in the operator by less than the clusters' error in D, some
-    hundredths of the level spacing squared times the mixing to the fourth power, or for less than a thousandth of
-    an increment.
+    The clusters of a :class:`~faultgouge.analysis.tracking.Projection` are searched as `complex_windows` does, with
+    the projected operators interpolated linearly between two loads; what appears there is confirmed with the operator
+    itself, whose pair is continued to the edges. So the window that is returned is as certain, and its edges have the
+    same digits, as those of `complex_windows`. That it is the first rests on the clusters, whose onsets were within a
+    tenth of an increment of the confirmed ones (packings of 1,000 disks, increments of 1e-3): a pair that is
+    complex by less than their error, or for less than `FINEST` of an increment, may be missed before it.
 
     Parameters
     ----------

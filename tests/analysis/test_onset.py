@@ -1,10 +1,13 @@
 """Windows of complex eigenvalues, on families of matrices whose windows are known, and along a ramp."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from faultgouge.analysis import OnsetError, complex_windows, find_onset, follow, scan_windows, spectrum
-from faultgouge.analysis.onset import Modes, assign, deepest_dip
+from faultgouge.analysis import Contacts, OnsetError, complex_windows, find_onset, follow, scan_windows, spectrum
+from faultgouge.analysis import onset as onset_module
+from faultgouge.analysis.onset import Modes, assign, deepest_dip, first_window, full_operator, loaded
 
 RNG = np.random.default_rng(5)
 BASIS = np.eye(12) + 0.3 * RNG.normal(size=(12, 12))
@@ -236,3 +239,75 @@ def test_error_follows_the_noise_of_the_equilibria(noise):
     assert noise < window.error < 1e4 * noise
     # Two degrees of freedom make the error itself uncertain by a factor of two or three.
     assert abs(window.fx_onset - d) < 4 * window.error
+
+
+def test_contacts_without_force_are_left_out(bed):
+    """A rattler brought to touch by 1e-12 of a length: a stiffness of 0.3 that no force stands for."""
+    packing = bed(1.0)
+    rattler = packing.rattlers[0]
+    gap = np.hypot(*(packing.position - packing.position[rattler]).T) - packing.radius - packing.radius[rattler]
+    gap[packing.rattlers] = np.inf
+    neighbour = int(np.argmin(gap))
+    direction = packing.position[rattler] - packing.position[neighbour]
+    direction /= np.hypot(*direction)
+    position = packing.position.copy()
+    reach = packing.radius[rattler] + packing.radius[neighbour]
+    position[rattler] = position[neighbour] + (reach - 1e-12) * direction
+    contacts = packing.contacts
+    touching = replace(
+        packing,
+        position=position,
+        contacts=Contacts(
+            np.append(contacts.i, rattler), np.append(contacts.j, neighbour), np.append(contacts.slip, 0.0)
+        ),
+    )
+    assert len(touching.rattlers) == len(packing.rattlers) - 1
+    assert touching.residual == packing.residual
+    assert len(loaded(touching).contacts) == len(contacts)
+    assert abs(full_operator(touching) - full_operator(packing)).max() == 0
+    # Not so where the balance is bad because the packing is none.
+    assert loaded(replace(touching, fx=1.0)).residual > 0.1
+    assert len(loaded(replace(touching, fx=1.0)).contacts) >= len(contacts)
+
+
+@pytest.mark.parametrize(("hole", "error"), [((0.49, 0.51), DIGITS), ((0.299, 0.301), 0.25)])
+def test_loads_without_equilibrium_are_gone_around(hole, error):
+    """Where no edge lies nothing is lost; where one does it is known to half of the step that has it inside."""
+
+    def operator(f):
+        if hole[0] < f < hole[1]:
+            raise RuntimeError("no equilibrium")
+        return crossing(0.5, -0.04)(f)
+
+    (window,) = complex_windows(operator, [0.0, 1.0])
+    assert abs(window.fx_onset - 0.3) <= window.error + DIGITS
+    assert window.error <= error
+    assert window.fx_end == pytest.approx(0.7, abs=DIGITS)
+
+
+def test_large_packings_are_searched_for_the_first_window(ramp, monkeypatch):
+    path = ramp(1.0, 1e-3, 22)
+    every = find_onset(path, path.grid[12:])
+    assert every.complete
+    monkeypatch.setattr(onset_module, "ALL_WINDOWS", 50)
+    first = find_onset(path, path.grid[12:])
+    assert not first.complete
+    assert len(first.windows) == 1
+    # Two ways to the same root, each with its error.
+    assert abs(first.fx_c - every.fx_c) < first.error + every.error
+    with pytest.raises(OnsetError, match="raise the largest load"):
+        find_onset(path, path.grid[:4])
+
+
+@pytest.mark.parametrize("half_width", [0.2, 0.03])
+def test_first_window_that_ends_within_its_increment(half_width):
+    window = first_window(crossing(0.47, -(half_width**2)), [0.0, 1.0, 2.0])
+    assert window.kind == "coalescence"
+    assert window.fx_onset == pytest.approx(0.47 - half_width, abs=DIGITS)
+    assert window.fx_end == pytest.approx(0.47 + half_width, abs=DIGITS)
+
+
+def test_first_window_of_real_eigenvalues_or_from_the_start():
+    assert first_window(crossing(0.37, 1e-3), np.linspace(0, 1, 4)) is None
+    window = first_window(normal_form(0.1), [0.2, 0.3])
+    assert (window.kind, window.fx_onset, window.fx_end) == ("start", 0.2, None)

@@ -1,0 +1,155 @@
+"""Pairs that are continued, and found, without the other eigenvalues: against dense LAPACK."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eig, eigvals
+from scipy.sparse import csr_array
+
+from faultgouge.analysis import Contacts, Packing
+from faultgouge.analysis.onset import Modes, first_window, full_operator
+from faultgouge.analysis.tracking import Block, Projection, continued
+
+
+def dense_block(matrix, reference):
+    """The block of the two modes that lie closest to the planes of another one, from all eigenvectors."""
+    modes = Modes.of(0.0, matrix)
+    return modes.block(modes.nearest(reference))
+
+
+def pair_of(packing):
+    (pair,) = (modes := Modes.of(packing.fx, full_operator(packing))).complex_pairs
+    return modes.block(pair)
+
+
+@pytest.mark.parametrize("fx", [0.0218, 0.0218330564, 0.021833056408868, 0.0219, 0.022])
+def test_continued_pair_is_that_of_lapack(ramp, fx):
+    """From real through double to complex, from a load at which the pair is complex."""
+    path = ramp(1.0, 1e-3, 22)
+    matrix = full_operator(path(fx))
+    start = pair_of(path(0.022))
+    found, expected = continued(matrix, start), dense_block(matrix, start)
+    rounding = 0.5 * np.finfo(float).eps * np.linalg.norm(matrix.data)
+    # D is in error by its coefficients, the entries of B - mean, times some ten of the operator's rounding.
+    assert found.mean == pytest.approx(expected.mean, abs=50 * rounding)
+    assert found.discriminant == pytest.approx(expected.discriminant, abs=200 * rounding * expected.spread)
+    if abs(expected.discriminant) > 1e-8:
+        assert found.overlap == pytest.approx(expected.overlap, rel=1e-4)
+    assert found.same_plane(expected)
+
+
+def test_continuation_is_refused_rather_than_wrong(ramp):
+    """Planes of two unrelated modes belong to no pair that inverse iteration can reach."""
+    path = ramp(1.0, 1e-3, 22)
+    matrix = full_operator(path(0.022))
+    modes = Modes.of(0.022, matrix)
+    apart = modes.block((30, 200))
+    found = continued(matrix, replace(apart, right=np.eye(300)[:, [7, 107]], left=np.eye(300)[:, [7, 107]]))
+    assert found is None
+
+
+def test_overlap_of_a_block_is_that_of_the_eigenvectors(ramp):
+    packing = ramp(1.0, 1e-3, 22)(0.022)
+    modes = Modes.of(0.022, full_operator(packing))
+    (pair,) = modes.complex_pairs
+    expected = abs(np.vdot(modes.left[:, pair[0]], modes.right[:, pair[0]]))
+    assert modes.block(pair).overlap == pytest.approx(expected, rel=1e-8)
+
+
+def test_block_without_coupling_of_unit_overlap():
+    matrix = csr_array(np.diag([1.0, 2.0, 5.0]))
+    block = Block.of(matrix, np.eye(3)[:, :2], np.eye(3)[:, :2])
+    assert (block.mean, block.discriminant, block.overlap) == (1.5, 1.0, 1.0)
+
+
+def test_clusters_have_the_eigenvalues_of_the_operator(ramp):
+    """Projected on the modes of another load; what is left out is of third order in the coupling."""
+    path = ramp(1.0, 1e-3, 22)
+    projection = Projection.of(full_operator(path(0.0)))
+    owned = [cluster.modes.start + np.arange(cluster.core[0], cluster.core[1] + 1) for cluster in projection.clusters]
+    np.testing.assert_array_equal(np.concatenate(owned), np.arange(285))
+    for fx, accuracy in ((0.001, 1e-4), (0.01, 2e-2)):
+        matrix = full_operator(path(fx))
+        expected = np.sort(eigvals(matrix.toarray()).real)[15:]  # five rattlers
+        blocks = projection.onto(matrix)
+        assert projection.fits(matrix, blocks)
+        for cluster, block in zip(projection.clusters, blocks, strict=True):
+            core = slice(cluster.core[0], cluster.core[1] + 1)
+            values = np.sort(eigvals(block).real)[core]
+            np.testing.assert_allclose(values, expected[cluster.modes][core], atol=accuracy * np.diff(expected).mean())
+
+
+def test_projection_is_given_up_where_modes_mix_or_disks_move_in(ramp):
+    path = ramp(1.0, 1e-3, 22)
+    matrix = full_operator(path(0.0))
+    projection = Projection.of(matrix)
+    noise = np.random.default_rng(1).normal(size=(300, 300)) * 20.0
+    other = matrix + csr_array(
+        noise * (matrix.toarray() != 0).any(axis=1)[:, None] * (matrix.toarray() != 0).any(axis=0)
+    )
+    assert not projection.fits(csr_array(other), projection.onto(csr_array(other)))
+    more = csr_array(matrix + csr_array(([1.0], ([58], [58])), shape=matrix.shape))
+    assert not projection.fits(more, projection.onto(more))
+
+
+@pytest.mark.parametrize("mu", [1.0, 0.8])
+def test_first_window_of_the_reference(ramp, mu):
+    path = ramp(mu, 1e-3, 22)
+    window = first_window(lambda fx: full_operator(path(fx)), path.grid[12:21] if mu == 0.8 else path.grid[12:])
+    assert window.kind == "coalescence"
+    assert window.fx_onset == pytest.approx({1.0: 0.0218330564080, 0.8: 0.0191432059561}[mu], rel=1e-9)
+
+
+def tiled(cell: Packing, copies: int) -> Packing:
+    """Copies of a periodic packing side by side, in balance as it is, with masses that make them differ."""
+    n, contacts = len(cell), cell.contacts
+    index = np.arange(copies)[:, None]
+    image = np.where(
+        contacts.floor,
+        0,
+        np.round((cell.position[contacts.i, 0] - cell.position[contacts.j, 0]) / cell.box_length).astype(int),
+    )
+    j = np.where(contacts.floor, -1, contacts.j + n * ((index + image) % copies))
+    shift = np.column_stack([cell.box_length * np.arange(copies), np.zeros(copies)])
+    return replace(
+        cell,
+        position=(cell.position + shift[:, None]).reshape(-1, 2),
+        radius=np.tile(cell.radius, copies),
+        angle=np.tile(cell.angle, copies),
+        mass=np.random.default_rng(3).uniform(0.7, 1.3, n * copies),
+        top=np.tile(cell.top, copies),
+        box_length=copies * cell.box_length,
+        contacts=Contacts((contacts.i + n * index).ravel(), j.ravel(), np.tile(contacts.slip, copies)),
+    )
+
+
+@pytest.mark.slow
+def test_first_window_of_a_thousand_disks(ramp):
+    """Against all eigenvalues by LAPACK, at the loads before it, just below and just above it."""
+    path = ramp(1.0, 1e-3, 22)
+
+    def operator(fx):
+        return full_operator(tiled(path(fx), 10))
+
+    window = first_window(operator, path.grid)
+    assert window.kind == "coalescence"
+    assert window.error < 1e-9
+    distance = 1e-6
+    before = [fx for fx in path.grid if fx < window.fx_onset][-2:]
+    for fx in [*before, window.fx_onset - distance]:
+        matrix = operator(fx)
+        values = eigvals(matrix.toarray(), check_finite=False)
+        # A double eigenvalue is uncertain by the root of u |A| times its coupling.
+        assert np.abs(values.imag).max() < 1e-4
+    matrix = operator(window.fx_onset + distance)
+    values, left, right = eig(matrix.toarray(), left=True, right=True, check_finite=False)
+    (k,) = np.flatnonzero(values.imag > 1e-4)
+    assert values[k].real == pytest.approx(window.eigenvalue, abs=1e-2)
+    bases = (np.linalg.qr(np.column_stack([each[:, k].real, each[:, k].imag]))[0] for each in (right, left))
+    block = continued(matrix, Block.of(matrix, *bases))
+    # The imaginary part has condition 1/|y^H x|.
+    condition = 1 / abs(np.vdot(left[:, k], right[:, k]))
+    rounding = 0.5 * np.finfo(float).eps * np.linalg.norm(matrix.data)
+    assert np.sqrt(-block.discriminant) / 2 == pytest.approx(values[k].imag, abs=50 * condition * rounding)
+    assert block.mean == pytest.approx(values[k].real, abs=50 * condition * rounding)
