@@ -176,8 +176,8 @@ def find_onset(
     equilibrium : callable
         fx -> Packing in equilibrium. It is called with the given loads in increasing order, and between calls
         for the loads a and b with loads between a and b, in any order; there it best starts from its
-        equilibrium at a. Where there is none in between it may raise a RuntimeError: the search then tries beside
-        it, and failing that takes the step as a whole, with an edge in it known to half its width.
+        equilibrium at a. Where there is none in between it may raise a RuntimeError: the search then closes
+        in on it from either side, and an edge in what is left is known to half its width.
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
     form : {"consistent", "paper"}
@@ -671,22 +671,31 @@ class _Search:
         """Go from one load to the next."""
         step = _Step(here, there)
         if there.fx - here.fx > self.narrowest:
-            middle = step.hidden_window(self.narrowest) if step.consistent else 0.5 * (here.fx + there.fx)
+            halfway = 0.5 * (here.fx + there.fx)
+            middle = step.hidden_window(self.narrowest) if step.consistent else halfway
+            edges = step.closing + step.opening
+            if middle is None and edges:
+                solution = self.solve(step, *edges[0])
+                if solution is None:
+                    middle = halfway
+                elif here.fx < solution[1].fx < solution[2].fx < there.fx:
+                    # What lies on either side of this edge has yet to be looked at.
+                    edge, before, behind = solution
+                    self.walk(here, before)
+                    self.windows.advance(_Step(before, behind), lambda *_: edge, "contact change")
+                    self.walk(behind, there)
+                    return
             between = None if middle is None else self.between(here.fx, middle, there.fx)
             if between is not None:
                 self.walk(here, between)
                 self.walk(between, there)
                 return
-            edges = step.closing + step.opening
-            if edges:
-                edge, before, behind = self.solve(step, *edges[0])
-                if here.fx < before.fx < behind.fx < there.fx:
-                    # What lies on either side of this edge has yet to be looked at.
-                    self.walk(here, before)
-                    self.windows.advance(_Step(before, behind), lambda *_: edge, "contact change")
-                    self.walk(behind, there)
-                    return
-        self.windows.advance(step, lambda *edge: self.solve(*edge)[0], "contact change")
+        self.windows.advance(step, self.edge, "contact change")
+
+    def edge(self, step: "_Step", pair: Pair, image: Pair) -> _Edge:
+        """The edge of a pair, half the step wide if it cannot be solved for."""
+        solution = self.solve(step, pair, image)
+        return step.halfway(step.there.block(image), "contact change") if solution is None else solution[0]
 
     def between(self, below: float, middle: float, above: float) -> Modes | None:
         """The modes at a load in between, or at one beside it where that has no equilibrium."""
@@ -697,14 +706,17 @@ class _Search:
                 continue
         return None
 
-    def solve(self, step: "_Step", pair: Pair, image: Pair) -> tuple[_Edge, Modes, Modes]:
-        """The edge of a pair that is complex at one end only, and the modes close by on either side."""
+    def solve(self, step: "_Step", pair: Pair, image: Pair) -> tuple[_Edge, Modes, Modes] | None:
+        """The edge of a pair that is complex at one end only, and the modes close by on either side.
+
+        None if the search for it comes upon a load without equilibrium.
+        """
         here, there = step.here, step.there
         ends = [_State(here.fx, here.matrix, here.block(pair)), _State(there.fx, there.matrix, there.block(image))]
         try:
             edge, below, above = _locate(self.operator, *ends)
         except RuntimeError:
-            return step.halfway(ends[0].block, "contact change"), here, there
+            return None
         return (
             edge,
             here if below.fx == here.fx else Modes.of(below.fx, below.matrix),
@@ -815,12 +827,18 @@ FINEST = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A window of a cluster and the planes of its pair at a load inside it."""
+    """The planes of a pair that turns complex in its cluster, and a load at which it may be so in the operator."""
 
-    fx_onset: float
     inside: float
     right: Floats
     left: Floats
+
+
+def _nearest_pair(modes: Modes, eigenvalue: float) -> Pair:
+    """The complex pair, or failing that the two modes, closest to a real eigenvalue."""
+    first, second = np.argsort(np.abs(modes.values.real - eigenvalue))[:2]
+    pairs = modes.complex_pairs or [(int(first), int(second))]
+    return min(pairs, key=lambda pair: abs(modes.values[pair[0]].real - eigenvalue))
 
 
 class _LargeSearch:
@@ -842,7 +860,7 @@ class _LargeSearch:
         candidates = [
             candidate
             for cluster, a, b in zip(self.projection.clusters, before, self.blocks, strict=True)
-            for candidate in self.candidates(cluster, (here[0], a), (there[0], b))
+            for candidate in self.candidates(self.projection, cluster, (here[0], a), (there[0], b))
         ]
         first: Window | None = None
         for candidate in candidates:
@@ -852,10 +870,9 @@ class _LargeSearch:
         return first
 
     def candidates(
-        self, cluster: Cluster, here: tuple[float, Floats], there: tuple[float, Floats]
+        self, projection: Projection, cluster: Cluster, here: tuple[float, Floats], there: tuple[float, Floats]
     ) -> Iterator[_Candidate]:
         """The windows of one cluster, with its blocks interpolated between two loads."""
-        assert self.projection is not None
         span = there[0] - here[0]
 
         def block(fx: float) -> Floats:
@@ -865,33 +882,26 @@ class _LargeSearch:
         reach = there[0] + REACH * span
         for window in complex_windows(block, [here[0], reach], narrowest=max(self.narrowest, FINEST * span)):
             end = reach if window.fx_end is None else window.fx_end
-            inside = there[0] if window.fx_onset < there[0] <= end else min(0.5 * (window.fx_onset + end), there[0])
+            inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
             modes = Modes.of(inside, block(inside))
-            pair = modes.complex_pairs
-            if not pair:
-                continue
-            nearest = min(pair, key=lambda each: abs(modes.values[each[0]].real - window.eigenvalue))
-            plane = modes.block(nearest)
+            plane = modes.block(_nearest_pair(modes, window.eigenvalue))
             if cluster.owns(plane.right):
-                right, left = (self.projection.lifted(cluster, basis) for basis in (plane.right, plane.left))
-                yield _Candidate(window.fx_onset, inside, right, left)
+                right, left = projection.lifted(cluster, plane.right), projection.lifted(cluster, plane.left)
+                yield _Candidate(min(inside, there[0]), right, left)
 
     def confirmed(self, candidate: _Candidate, there: Place) -> Window | None:
         """The window of the operator itself in place of that of a cluster; None if the pair stays real."""
         inside = self.complex_state(candidate, there)
         if inside is None:
             return None
-        onset = _Edge(self.passed[0][0], 0.0, inside.block.mean, inside.block.overlap, "start")
-        for fx, matrix in reversed(self.passed):
-            below = inside.at(fx, matrix)
+        above = inside if inside.fx == there[0] else inside.at(*there)
+        end = _locate(self.operator, inside, above)[0] if above.discriminant > 0 else None
+        for place in reversed(self.passed):
+            below = inside if inside.fx == place[0] else inside.at(*place)
             if below.discriminant > 0:
-                onset, *_ = _locate(self.operator, below, inside)
-                break
+                return _window(_locate(self.operator, below, inside)[0], end)
             inside = below
-        last = inside
-        above = inside.at(*there) if inside.fx < there[0] else inside
-        end = _locate(self.operator, last, above)[0] if above.discriminant > 0 else None
-        return _window(onset, end)
+        return _window(_Edge(inside.fx, 0.0, inside.block.mean, inside.block.overlap, "start"), end)
 
     def complex_state(self, candidate: _Candidate, there: Place) -> _State | None:
         """The pair at a load where it is complex, if there is one near the candidate's window."""

@@ -192,7 +192,7 @@ class Cluster:
         """Whether the plane of orthonormal vectors, in cluster coordinates, has its weight in the core."""
         weight = np.sum(vectors**2, axis=1)
         centre = float(weight @ np.arange(len(weight)) / weight.sum())
-        # Half a mode more: the clusters' planes differ a little, and a pair may be owned twice but never not at all.
+        # One mode more: planes differ a little from cluster to cluster, and twice is better than not at all.
         return self.core[0] - 1.0 <= centre <= self.core[1] + 1.0
 
 
@@ -283,6 +283,7 @@ class Projection:
         for cluster, block in zip(self.clusters, blocks, strict=True):
             levels = self.values[cluster.modes]
             off_diagonal = block - np.diag(np.diag(block))
-            mixing.append(np.linalg.norm(off_diagonal) / max(1, levels[-1] - levels[0]))
+            width = max(levels[-1] - levels[0], np.finfo(np.float64).tiny)
+            mixing.append(np.linalg.norm(off_diagonal) / width)
         # |off-diagonal|_F over the width of the cluster is the typical coupling over the spacing.
         return bool(np.median(mixing) < MIXING)

@@ -83,7 +83,7 @@ def main() -> None:
     options = parser.parse_args()
 
     print(
-        f"{platform.processor() or platform.machine()}; microseconds per step, median of {options.turns} [lowest, highest]"
+        f"{platform.processor() or platform.machine()}; microseconds per step, median of {options.turns} turns [extremes]"
     )
     rows = []
     for disks in options.disks:

@@ -78,6 +78,7 @@ void PairMindlinSmooth::coeff(int narg, char **arg)
 void PairMindlinSmooth::init_style()
 {
   if (domain->dimension != 2) error->all(FLERR, "pair mindlin/smooth is for disks in the plane: use dimension 2");
+  if (domain->triclinic) error->all(FLERR, "pair mindlin/smooth needs an orthogonal box, not a triclinic one");
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->torque_flag)
     error->all(FLERR, "pair mindlin/smooth needs disks with radius and spin: use atom_style sphere");
   if (atom->molecular != Atom::ATOMIC)

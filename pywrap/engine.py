@@ -9,7 +9,7 @@ every rank sees the whole packing.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from ctypes import POINTER, c_double
 from dataclasses import asdict, dataclass, replace
@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..analysis import Contacts, Packing
 from ..analysis.packing import FLOOR, touching
@@ -222,13 +222,18 @@ class Engine:
         self._scatter("d_theta", base.angle + du / base.radius)
         return self.packing
 
+    def dump(self, stem: Path) -> None:
+        """Write the configuration as LAMMPS dumps in full precision (deck part write.in): STEM.disks and others."""
+        self._variables(name=stem)
+        self._include("write.in")
+
     @contextmanager
     def undamped(
         self,
         time_step: float,
         amplitude: float = 0.0,
         omega: float = 0.0,
-        target: Sequence[int] | None = None,
+        target: ArrayLike | None = None,
         weakening: Weakening | None = None,
     ) -> Iterator[None]:
         """Undamped dynamics from rest (deck part undamped.in), for `advance`.
@@ -241,7 +246,7 @@ class Engine:
             Of the force a cos(omega t) along x on each disk of the target; 0 for none.
         omega : float
             Its angular frequency, 1 / time.
-        target : sequence of int, optional
+        target : array_like of int, optional
             The disks that feel it; the upper layer by default.
         weakening : Weakening, optional
             Friction that falls with the velocity of the upper layer; constant by default.
@@ -375,7 +380,7 @@ class Engine:
             self._command(f'variable {name} index "{text}"')
 
     @contextmanager
-    def _group(self, name: str, disks: Sequence[int]) -> Iterator[str]:
+    def _group(self, name: str, disks: ArrayLike) -> Iterator[str]:
         members = np.asarray(disks) + 1
         self._command(f"group {name} id {int(members[0])}")
         for part in np.array_split(members, len(members) // 100 + 1):  # an input line has a limit

@@ -158,7 +158,7 @@ def _largest(force: Floats, packing: Packing) -> float:
 
 
 def _solve(packing: Packing, force: Floats) -> Floats | None:
-    """K^-1 F on the coordinates that K knows, without contacts that carry less than the floor; None if K is singular."""
+    """K^-1 F on the coordinates that K knows, contacts below the floor left out; None if K is singular."""
     matrix = csc_array(stiffness_matrix(packing.loaded(rounding_floor(packing))))
     active = np.flatnonzero(matrix.diagonal() != 0)
     block = matrix[active][:, active]

@@ -1,6 +1,6 @@
 """A scene: what is wanted, in TOML, checked in full before any work is done.
 
-    precision = "double"          # or "compensated": coordinates as a high and a low part
+    precision = "double"          # of the coordinates
     [packing]   the disks and the box: generated from a seed, or read from a file
     [law]       k_n, k_t and the friction coefficient mu
     [load]      the force F_y that presses each disk of the upper layer down
@@ -156,8 +156,8 @@ class Law(_Section):
         Tangential stiffness, force / length^(3/2). A scene may also say "A/B kn", "A kn" or "kn". The
         default, "2/7 kn", is the paper's.
     mu : float or tuple of float
-        Static friction coefficient; 0 means no tangential force at all. Of a list, `onset` takes every one
-        and all else the first.
+        Static friction coefficient; 0 means no tangential force at all. Of a list, `onset` and
+        `reproduce` take every one and all else the first.
     """
 
     kn: Positive
@@ -213,7 +213,7 @@ class Load(_Section):
 
 
 class Relax(_Section):
-    """[relax] damped dynamics, v = F / damping, of settling and of the ramp's method "overdamped".
+    """[relax] damped dynamics, v = F / damping, of the ramp's method "overdamped".
 
     Attributes
     ----------
@@ -221,7 +221,7 @@ class Relax(_Section):
         Friction against the medium, mass / time. It sets the unit of the relaxation's time and leaves the
         equilibria as they are; the paper gives none.
     time_step : float or None
-        Step, time. None: from the largest eigenvalue of K, below which the steps are stable.
+        Step, time. None: a third of the stable step of a disk whose contacts carry ten times F_y.
     """
 
     damping: Positive = 1.0
@@ -383,7 +383,7 @@ class Scene(_Section):
 
     Attributes
     ----------
-    precision : {"double", "compensated"}
+    precision : {"double"}
         Arithmetic of the coordinates.
     packing, law, load, relax
         Sections that every scene has; relax may be left out in TOML.
@@ -391,7 +391,7 @@ class Scene(_Section):
         Sections or None, which means that the feature is not in the run.
     """
 
-    precision: Literal["double", "compensated"] = "double"
+    precision: Literal["double"] = "double"
     packing: Annotated[
         Annotated[GeneratedPacking, Tag("generated")] | Annotated[StoredPacking, Tag("stored")],
         Discriminator(_kind_of_packing),

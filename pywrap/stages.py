@@ -7,7 +7,7 @@ cut off. All functions are collective over the ranks of the communicator; rank 0
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -28,7 +28,7 @@ from ..analysis import (
     stable_timestep,
     touching,
 )
-from .engine import Engine, Weakening
+from .engine import Engine, Motion, Weakening
 from .quasistatic import Equilibrium, NoEquilibriumError, equilibrate, rounding_floor
 from .scene import Friction, GeneratedPacking, Perturb, Ramp, Scene, SceneError
 
@@ -76,7 +76,12 @@ def settle(scene: Scene, mu: float | None = None, communicator: MPI.Comm | None 
         return equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), packing.fx)
 
 
-def ramp(scene: Scene, start: Equilibrium | None = None, communicator: MPI.Comm | None = None) -> Iterator[Equilibrium]:
+def ramp(
+    scene: Scene,
+    start: Equilibrium | None = None,
+    communicator: MPI.Comm | None = None,
+    dumps: Path | None = None,
+) -> Iterator[Equilibrium]:
     """Equilibria at F_x = step, 2 step, ... up to the scene's ramp.until.
 
     Parameters
@@ -88,6 +93,9 @@ def ramp(scene: Scene, start: Equilibrium | None = None, communicator: MPI.Comm 
         is the first to be yielded.
     communicator : mpi4py.MPI.Comm, optional
         The ranks that share the packing; all by default.
+    dumps : Path, optional
+        Stem of LAMMPS dumps of each equilibrium k, the first of the ramp being 1: STEM.k.disks and the others of
+        write.in. None by default.
 
     Yields
     ------
@@ -105,16 +113,20 @@ def ramp(scene: Scene, start: Equilibrium | None = None, communicator: MPI.Comm 
         start = settle(scene, communicator=communicator)
         yield start
     with Engine(start.packing, communicator) as engine:
-        for fx in loads(settings):
+        for k, fx in enumerate(loads(settings)):
             if fx > start.fx:
                 start = next_equilibrium(engine, start, fx, scene)
+                if dumps is not None:
+                    engine.restore(start.packing)
+                    engine.dump(Path(f"{dumps}.{k}"))
                 yield start
 
 
 def loads(settings: Ramp) -> NDArray[np.float64]:
     """F_x of the equilibria of a ramp, force, from 0: multiples of the step, to the bit."""
     # half a step in a million is far above the rounding of until/step, and far below a step
-    return np.arange(int(settings.until / settings.step * (1 + 5e-7)) + 1) * settings.step
+    multiples = np.arange(int(settings.until / settings.step * (1 + 5e-7)) + 1, dtype=np.float64)
+    return multiples * settings.step
 
 
 def next_equilibrium(engine: Engine, last: Equilibrium, fx: float, scene: Scene) -> Equilibrium:
@@ -238,6 +250,7 @@ def perturb(
     samples: int = 2000,
     communicator: MPI.Comm | None = None,
     weakening: Weakening | None = None,
+    watch: Callable[[float, Motion], None] | None = None,
 ) -> Iterator[Sample]:
     """An undamped run from rest at an equilibrium, with the scene's perturbation if it has one.
 
@@ -253,6 +266,8 @@ def perturb(
         The ranks that share the packing; all by default.
     weakening : Weakening, optional
         Friction that falls with the layer's velocity, see `weakening_of`; constant by default.
+    watch : callable, optional
+        Called with the time, and the positions and velocities, of each sample.
 
     Returns
     -------
@@ -273,7 +288,7 @@ def perturb(
     if settings.time < dt:
         raise SceneError(f"perturb.time = {settings.time:g} is shorter than one step, {dt:.4g}: run longer")
     every = max(1, int(settings.time / dt / samples))
-    return _undamped(settings, packing, dt, every, communicator, weakening)
+    return _undamped(settings, packing, dt, every, communicator, weakening, watch)
 
 
 def calibrated(scene: Scene, start: Equilibrium, communicator: MPI.Comm | None = None) -> float:
@@ -296,6 +311,7 @@ def _undamped(
     every: int,
     communicator: MPI.Comm | None,
     weakening: Weakening | None,
+    watch: Callable[[float, Motion], None] | None,
 ) -> Iterator[Sample]:
     everyone = range(len(packing)) if settings.target == "all" else settings.target
     target = None if everyone == "top" else [int(disk) for disk in everyone]
@@ -306,6 +322,8 @@ def _undamped(
     ):
         for k in range(1, int(settings.time / dt / every) + 1):
             motion = engine.advance(every)
+            if watch is not None:
+                watch(k * every * dt, motion)
             yield Sample(
                 time=k * every * dt,
                 msd=float(mean_square_displacement(motion.position, packing.position, packing.box_length)),
@@ -386,6 +404,11 @@ class Record:
         if self.communicator.rank == 0 and self._file is not None and samples:
             columns = {key: [getattr(sample, key) for sample in samples] for key in vars(samples[0])}
             self._file.append_series(name, **columns)
+
+    def append_motion(self, time: float, motion: Motion) -> None:
+        """Write positions of an undamped run, series trajectory."""
+        if self.communicator.rank == 0 and self._file is not None:
+            self._file.append_series("trajectory", time=[time], position=[motion.position])
 
     def _open(self, packing: Packing) -> RunFile:
         if self._file is None:

@@ -9,8 +9,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ..analysis import Onset, Packing, find_onset
-from ..pywrap import Engine, Equilibrium, Scene, SceneError
+from ..analysis import Onset, OnsetError, Packing, find_onset
+from ..pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, SceneError
 from ..pywrap.stages import EquilibriumPath, loads, settle
 
 
@@ -68,7 +68,7 @@ def onset_run(
     OnsetError
         If no pair becomes complex up to the ramp's end.
     NoEquilibriumError
-        If the packing flows from the first increment on.
+        If the packing flows from the first increment on, or before an onset.
     """
     if scene.ramp is None:
         raise SceneError("the scene has no section [ramp]: add it, with step and until")
@@ -80,7 +80,15 @@ def onset_run(
         for equilibrium in path.climb(wanted[1:]):
             reached(equilibrium)
         forces = np.array([each.fx for each in path.kept])
-        onset = find_onset(path, forces)
+        try:
+            onset = find_onset(path, forces)
+        except OnsetError as error:
+            if len(forces) == len(wanted):
+                raise
+            raise NoEquilibriumError(
+                f"no pair of eigenvalues becomes complex up to F_x = {forces[-1]:.10g}, and no equilibrium was found "
+                f"beyond: the packing flows before an onset"
+            ) from error
         extra = [] if near_onset is None else [fx for fx in onset.fx_c + near_onset if 0 <= fx <= forces[-1]]
         between = {float(fx): path(float(fx)) for fx in extra}
     return OnsetRun(mu, tuple(path.kept), onset, float(forces[-1]) if len(forces) < len(wanted) else None, between)

@@ -65,8 +65,8 @@ class GrowthRun:
         Of the run.
     predicted : float
         Growth rate of D from the spectrum and the time step's dispersion, 1/time.
-    measured : Growth
-        Fitted to D(t).
+    measured : Growth or None
+        Fitted to D(t); None where D does not grow far enough between its noise and where it levels off.
     """
 
     start: Equilibrium
@@ -75,7 +75,7 @@ class GrowthRun:
     spectrum: Spectrum
     time_step: float
     predicted: float
-    measured: Growth
+    measured: Growth | None
 
 
 def reproduce(scene: Scene, output: Path, say: Say = print) -> dict[str, Any]:
@@ -104,7 +104,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print) -> dict[str, Any]:
         say(f"mu = {mu:g}: F_x^c = {runs[-1].onset.fx_c:.10g} +- {runs[-1].onset.error:.1g}")
     say("undamped run above the onset")
     growth = _growth(scene, runs[0], output / "run.h5")
-    say(f"growth rate of D: {growth.measured.rate:.6g} measured, {growth.predicted:.6g} predicted")
+    say(f"growth rate of D: {_rate(growth)} measured, {growth.predicted:.6g} predicted")
     _figures(runs, growth, output)
     summary = _summary(scene, runs, growth)
     more: list[str] = []
@@ -153,10 +153,10 @@ def _growth(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
     start, modes = candidates[best], spectra[best]
     dt = time_step(start.packing)
     fastest = max(modes.pairs, key=lambda pair: pair.growth_rate)
-    predicted = 2 * abs(discrete_frequency(fastest.eigenvalue, dt).imag)
+    predicted = float(2 * np.abs(discrete_frequency(fastest.eigenvalue, dt).imag))
     settings = Perturb(fx=start.fx, time=min(EFOLDS / predicted, LONGEST_RUN * dt), inertia_factor=scene.inertia_factor)
     # disks that have moved by a tenth of the smallest overlap certainly move otherwise than the spectrum says
-    ceiling = (0.1 * start.packing.geometry.overlap.min()) ** 2
+    ceiling = (0.1 * start.packing.loaded(start.residual).geometry.overlap.min()) ** 2
     samples: list[Sample] = []
     with RunFile(path, "a") as file:
         for sample in perturb(scene.model_copy(update={"perturb": settings}), start, samples=4000):
@@ -165,8 +165,15 @@ def _growth(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
                 break
         file.append_series("undamped", **{key: [getattr(s, key) for s in samples] for key in vars(samples[0])})
     time, msd = np.array([s.time for s in samples]), np.array([s.msd for s in samples])
-    lower, upper = _growing(msd, ceiling)
-    return GrowthRun(start, time, msd, modes, dt, predicted, fit_growth(time, msd, lower, upper))
+    try:
+        measured = fit_growth(time, msd, *_growing(msd, ceiling))
+    except ValueError:
+        measured = None
+    return GrowthRun(start, time, msd, modes, dt, predicted, measured)
+
+
+def _rate(growth: GrowthRun) -> str:
+    return "none" if growth.measured is None else f"{growth.measured.rate:.6g}"
 
 
 def _growing(msd: Floats, ceiling: float) -> tuple[float, float]:
@@ -207,12 +214,15 @@ def _figures(runs: list[OnsetRun], growth: GrowthRun, output: Path) -> None:
 
     save(packing_figure(growth.start.packing), output / "figure1")
     save(coalescence_figure([_pair_curve(run) for run in runs]), output / "figure3")
+    measured = growth.measured
+    if measured is None:
+        return
     figure = growth_figure(
         growth.time,
         growth.msd,
-        window=(growth.measured.start, growth.measured.end),
+        window=(measured.start, measured.end),
         predicted_rate=growth.predicted,
-        measured_rate=growth.measured.rate,
+        measured_rate=measured.rate,
     )
     save(figure, output / "figure4")
 
@@ -238,8 +248,8 @@ def _summary(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> dict[str,
             "fx": growth.start.fx,
             "time_step": growth.time_step,
             "predicted_rate": growth.predicted,
-            "measured": asdict(growth.measured),
-            "deviation": growth.measured.rate / growth.predicted - 1,
+            "measured": asdict(growth.measured) if growth.measured else None,
+            "deviation": growth.measured.rate / growth.predicted - 1 if growth.measured else None,
         },
     }
 
@@ -276,13 +286,9 @@ def _report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, more: list[st
         "",
         "![real parts coalesce, imaginary parts bifurcate](figure3.png)",
         "",
-        f"At F_x = {growth.start.fx:g}, above the onset, undamped dynamics from rest (time step {growth.time_step:.3g}) "
+        f"At F_x = {growth.start.fx:g}, above the onset, undamped dynamics from rest (step {growth.time_step:.3g}) "
         "multiplies its own rounding noise:",
-        f"D(t) grows by {growth.measured.decades:.1f} decades at the rate {growth.measured.rate:.6g} +- "
-        f"{growth.measured.error:.1g}; the spectrum predicts 2 |Im omega| = {growth.predicted:.6g}, a difference of "
-        f"{100 * (growth.measured.rate / growth.predicted - 1):+.2f} %.",
-        "",
-        "![D(t)](figure4.png)",
+        *_growth_words(growth),
         "",
         *more,
         "## What the paper leaves open, and what was taken",
@@ -301,6 +307,19 @@ def _onset_row(run: OnsetRun) -> str:
         f"| {run.mu:g} | {first.fx_onset:.12g} | {first.error:.1g} | {first.eigenvalue:.8g} | {first.kind} | "
         f"{len(run.onset.windows)} |"
     )
+
+
+def _growth_words(growth: GrowthRun) -> list[str]:
+    predicted = f"the spectrum predicts 2 |Im omega| = {growth.predicted:.6g}"
+    measured = growth.measured
+    if measured is None:
+        return [f"D(t) reaches {growth.msd.max():.1e}, not far enough above its noise for a rate; {predicted}."]
+    return [
+        f"D(t) grows by {measured.decades:.1f} decades at the rate {measured.rate:.6g} +- {measured.error:.1g}; "
+        f"{predicted}, a difference of {100 * (measured.rate / growth.predicted - 1):+.2f} %.",
+        "",
+        "![D(t)](figure4.png)",
+    ]
 
 
 def _onset_words(runs: list[OnsetRun]) -> list[str]:

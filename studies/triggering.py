@@ -170,8 +170,7 @@ def _damping_curve(pair: PairForm) -> Any:
 def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
     """Numbers for summary.json."""
     largest = {
-        name: float(column(getattr(triggering, name), "msd").max())
-        for name in ("unperturbed", "perturbed", "erupting")
+        name: float(column(getattr(triggering, name), "msd").max()) for name in ("unperturbed", "perturbed", "erupting")
     }
     return {
         "fx": triggering.start.fx,

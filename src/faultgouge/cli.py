@@ -67,9 +67,11 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     with Record(output, wanted) as record:
         total = len(loads(wanted.ramp)) if wanted.ramp else None
         done = 0 if record.last is None or wanted.ramp is None else round(record.last.fx / wanted.ramp.step) + 1
-        for equilibrium in _progress(ramp_up(wanted, record.last), "equilibria", total, done):
+        dumps = output.with_suffix("") if wanted.output is not None and wanted.output.dumps else None
+        for equilibrium in _progress(ramp_up(wanted, record.last, dumps=dumps), "equilibria", total, done):
             record.append(equilibrium)
-    _say(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")  # type: ignore[union-attr]
+    assert record.last is not None
+    _say(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")
     if as_json:
         _print_json({"equilibria": _equilibria(output)})
 
@@ -95,7 +97,8 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
                 threshold = calibrated(wanted, start) if isinstance(v0, str) else v0
             weakening = weakening_of(wanted.friction, threshold)
             _say(f"v0 = {threshold:.3g}, v_ss = {weakening.v_ss:.3g}")
-        run = run_undamped(wanted, start, weakening=weakening)
+        watch = record.append_motion if wanted.output is not None and wanted.output.trajectory else None
+        run = run_undamped(wanted, start, weakening=weakening, watch=watch)
         record.append(start)
         batch = []
         for sample in _progress(run, "samples"):
@@ -128,7 +131,7 @@ def spectrum(
         with RunFile(file) as run:
             packing = run.packing(frame)
     result = eigenvalues_of(packing)
-    pairs = [
+    pairs: list[dict[str, Any]] = [
         {
             "eigenvalue": [pair.eigenvalue.real, pair.eigenvalue.imag],
             "condition": pair.condition,

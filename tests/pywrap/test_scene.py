@@ -117,7 +117,8 @@ def test_the_paper_scene_holds_the_papers_numbers():
     assert scene.law.mus == (1.0, 0.8)
     assert scene.law.kt == 2 * 2e5 / 7
     assert scene.ramp is not None
-    assert scene.ramp.step == 1e-4
+    assert scene.load.fy == 3.0
+    assert (scene.friction.B, scene.friction.w, scene.friction.mu_ss) == (0.2, 0.4, 0.8)
 
 
 def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
