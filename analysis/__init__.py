@@ -8,7 +8,7 @@ eigenvalues), `onset` (where they become complex), `growth` (what a run shows of
 
 from .dumps import read_dump
 from .files import PackingFileError, read_packing
-from .growth import Growth, fit_growth, mean_square_displacement
+from .growth import Growth, fit_growth, fit_oscillation, mean_square_displacement
 from .law import MindlinLaw
 from .onset import Onset, OnsetError, Window, complex_windows, find_onset, follow, scan_windows
 from .packing import FLOOR, ContactGeometry, Contacts, Packing, nearest_image, touching
@@ -48,6 +48,7 @@ __all__ = [
     "eigenpairs",
     "find_onset",
     "fit_growth",
+    "fit_oscillation",
     "follow",
     "growth_rate",
     "mean_square_displacement",

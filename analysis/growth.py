@@ -16,6 +16,10 @@ Close to an exceptional point v is nearly real, the motion a standing wave, and 
 twice a period and a straight line through log D is at the mercy of those dips. The mean of D over stretches
 of several periods keeps the exponential and loses the modulation, whatever its frequency: the rate is the
 slope of the logarithm of these means.
+
+A signal that is one growing oscillation, such as the velocity of the upper layer once the pair has taken over, obeys
+at equal steps h a recursion of two terms, :math:`s_{n+1} = a s_n + b s_{n-1}`, whose roots are
+:math:`e^{\pm i \mathrm{Re}\,\omega h + |\mathrm{Im}\,\omega| h}`: `fit_oscillation` solves for a and b.
 """
 
 from dataclasses import dataclass
@@ -128,3 +132,39 @@ def fit_growth(time: ArrayLike, msd: ArrayLike, lower: float, upper: float) -> G
         start=float(t[first]),
         end=float(t[last - 1]),
     )
+
+
+def fit_oscillation(time: ArrayLike, signal: ArrayLike) -> complex:
+    """Frequency and growth of one oscillation, from equally spaced samples.
+
+    Parameters
+    ----------
+    time : array_like, shape (T,)
+        Equally spaced times, more than two a period.
+    signal : array_like, shape (T,)
+        Samples of Re c exp((i omega_r + sigma) t), on which the growth over the stretch may be large: equations are
+        weighted by the signal's own size.
+
+    Returns
+    -------
+    complex
+        omega_r - i sigma: the frequency, and the growth rate of the amplitude (half of that of D) with a minus sign.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than eight samples, times are not equally spaced, or the signal does not oscillate.
+    """
+    t, s = np.asarray(time, dtype=np.float64), np.asarray(signal, dtype=np.float64)
+    step = np.diff(t)
+    # as in fit_growth
+    if t.ndim != 1 or t.shape != s.shape or len(t) < 8 or step.min() <= 0 or np.ptp(step) > 1e-6 * step.mean():
+        raise ValueError("An oscillation is fitted to at least eight equally spaced samples.")
+    size = np.abs(s[:-2]) + np.abs(s[1:-1]) + np.abs(s[2:])
+    rows = np.column_stack([s[1:-1], s[:-2]]) / size[:, None]
+    a, b = np.linalg.lstsq(rows, s[2:] / size, rcond=None)[0]
+    root = 0.5 * (a + np.sqrt(complex(a * a + 4 * b)))
+    if root.imag == 0:
+        raise ValueError("The signal does not oscillate at these samples: take more of them a period.")
+    exponent = np.log(root) / step.mean()
+    return complex(abs(exponent.imag), -exponent.real)

@@ -82,9 +82,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, help="also write the numbers to this file")
     options = parser.parse_args()
 
-    print(
-        f"{platform.processor() or platform.machine()}; microseconds per step, median of {options.turns} turns [extremes]"
-    )
+    print(f"{platform.processor() or platform.machine()}; microseconds per step, median of {options.turns} [extremes]")
     rows = []
     for disks in options.disks:
         for ranks in options.ranks:

@@ -1,19 +1,20 @@
 r"""How generic is it? Onsets and eruptions over an ensemble of packings.
 
-The members are the packings of one scene from the seeds s, s + 1, ...; nothing else differs. Each is settled and ramped
-for every friction coefficient of the scene, and for :math:`\mu \mu_{ss}`, what friction weakens to. Up to the first
-window of complex eigenvalues a ramp ends in one of three ways: with an *onset*; *until* the scene's last F_x without
-one; or with a packing that *flows*, because no equilibrium follows the last. The two latter say that the onset, if there
-is one, lies beyond the last equilibrium: they are right-censored observations, and distributions of F_x^c are those of
-Kaplan and Meier, in which such a packing counts up to where it was seen. (That a packing that begins to flow is like the
-others is an assumption; the count is given with the result.)
+The members are the packings of one scene from the seeds s, s + 1, ...; nothing else differs. Each is settled and
+ramped for every friction coefficient of the scene, and for :math:`\mu \mu_{ss}`, what friction weakens to (without
+[friction] in the scene the last coefficient takes its place). Up to the first window of complex eigenvalues a ramp ends
+in one of three ways: with an *onset*; *until* the scene's last F_x without one; or with a packing that *flows*, because
+no equilibrium follows the last. The two latter say that the onset, if there is one, lies beyond the last equilibrium:
+they are right-censored observations, and distributions of F_x^c are those of Kaplan and Meier, in which such a packing
+counts up to where it was seen. (That a packing that begins to flow is like the others is an assumption; how many there
+are is given with the result.)
 
-Weakening lowers the onset where :math:`F_x^c(\mu \mu_{ss}) < F_x^c(\mu)`, and that can be known although one of the two
-is censored. Where both are known and leave a window between them, three undamped runs from its middle tell whether the
-packing erupts (:mod:`~faultgouge.studies.triggering`): unperturbed, perturbed, perturbed with mu(v). The *rise* is the
-distance in decades between the largest D of the last two. It need not be large: the pair of the weakened packing may be
-real again at the middle of the window, or grow too slowly for the length of the run. So the growth rate that the spectrum
-has there with the weakened friction is kept beside it.
+Weakening lowers the onset where :math:`F_x^c(\mu \mu_{ss}) < F_x^c(\mu)`, and that can be known although one of the
+two is censored. Where both are known and leave a window between them, three undamped runs from its middle tell whether
+the packing erupts (:mod:`~faultgouge.studies.triggering`): unperturbed, perturbed, perturbed with mu(v). The *rise* is
+the distance in decades between the largest D of the last two. It need not be large: the pair of the weakened packing
+may be real again at the middle of the window, or grow too slowly for the length of the run. So the growth rate that the
+spectrum has there with the weakened friction is kept beside it.
 
 Shares are given with Wilson's 95 % interval.
 """
@@ -24,7 +25,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import version
@@ -34,9 +35,10 @@ from typing import Any, Literal
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mpi4py import MPI
-from mpi4py.futures import MPICommExecutor
+from mpi4py.futures import MPICommExecutor, MPIPoolExecutor
 from numpy.typing import NDArray
 from scipy.stats import CensoredData, binomtest, ecdf
 from threadpoolctl import threadpool_limits
@@ -123,7 +125,7 @@ class Member:
     seed : int
         Of its loose start.
     ramps : tuple of RampEnd
-        One for each friction coefficient, the scene's first one first.
+        One for each friction coefficient: the scene's first one first, what it weakens to last.
     lowered : bool or None
         Whether weakening friction lowers the onset; None if that cannot be known.
     eruption : Eruption or None
@@ -154,7 +156,7 @@ def ensemble(
     members: int,
     output: Path,
     say: Say = print,
-    progress: Callable[[Iterator[Member]], Iterable[Member]] = iter,
+    progress: Callable[[Iterator[Member], int], Iterable[Member]] = lambda results, _: results,
 ) -> dict[str, Any]:
     """Examine packings and leave ensemble.jsonl, ensemble.json and a figure in a folder.
 
@@ -173,7 +175,7 @@ def ensemble(
     say : callable
         Takes a line of progress.
     progress : callable
-        Wrapped around the members as they end.
+        Takes the members that end and their number, and hands the members on.
 
     Returns
     -------
@@ -186,26 +188,41 @@ def ensemble(
         If the scene has no generated packing or no section [ramp].
     """
     seeds = _seeds(scene, members)
-    root = MPI.COMM_WORLD.rank == 0
-    known: dict[int, Member] = {}
-    if root:
+    with nullcontext() if MPI.COMM_WORLD.size == 1 else MPICommExecutor(MPI.COMM_WORLD) as pool:
+        if MPI.COMM_WORLD.rank != 0:
+            return {}
         output.mkdir(parents=True, exist_ok=True)
-        known = stored(output / "ensemble.jsonl", scene)
-    ended = [known[seed] for seed in seeds if seed in known]
-    if ended:
-        say(f"{len(ended)} of {members} packings are in {output}/ensemble.jsonl already")
-    for member in progress(_examined(scene, [seed for seed in seeds if seed not in known])):
-        append(output / "ensemble.jsonl", scene, member)
-        say(sentence(member))
-        ended.append(member)
-    if not root:
-        return {}
+        lines = output / "ensemble.jsonl"
+        known = stored(lines, scene)
+        ended = [known[seed] for seed in seeds if seed in known]
+        if ended:
+            say(f"{len(ended)} of {members} packings are in {lines} already")
+        missing = [seed for seed in seeds if seed not in known]
+        with closing(_examined(pool, scene, missing)) as results:
+            for member in progress(results, len(missing)):
+                append(lines, scene, member)
+                say(sentence(member))
+                ended.append(member)
     result = summary(scene, ended)
     (output / "ensemble.json").write_text(json.dumps(result, indent=1) + "\n")
     save(ensemble_figure(ended), output / "ensemble")
     for line in words(result):
         say(line)
     return result
+
+
+def _seeds(scene: Scene, members: int) -> range:
+    if not isinstance(scene.packing, GeneratedPacking):
+        raise SceneError("an ensemble needs packings of several seeds, and the scene has a stored one: give a seed")
+    if scene.ramp is None:
+        raise SceneError("the scene has no section [ramp]: add it, with step and until")
+    return range(scene.packing.seed, scene.packing.seed + members)
+
+
+def _examined(pool: MPIPoolExecutor | None, scene: Scene, seeds: list[int]) -> Iterator[Member]:
+    """Members as they end; closing the iterator takes back those that no worker has begun."""
+    one = partial(examine, scene)
+    yield from map(one, seeds) if pool is None else pool.map(one, seeds, unordered=True)
 
 
 def economical(scene: Scene) -> Scene:
@@ -228,8 +245,8 @@ def examine(scene: Scene, seed: int) -> Member:
     member = Member(seed)
     with threadpool_limits(1):
         try:
-            for member in _examination(scene, member):
-                pass
+            for found in _examination(scene, member):
+                member = found
         except (RuntimeError, ValueError) as error:  # of the engine, the solver, LAPACK, or a scene without room
             member = replace(member, says=str(error))
     return replace(member, seconds=round(time.perf_counter() - begin, 3))
@@ -239,16 +256,15 @@ def _examination(scene: Scene, member: Member) -> Iterator[Member]:
     """The member after each stage, so that a stage that fails takes nothing along."""
     resolved = scene.resolved()
     one = Scene.from_mapping(resolved | {"packing": resolved["packing"] | {"seed": member.seed}})
-    strong = weak = None
     paths: list[tuple[Equilibrium, ...]] = []
     for mu in _frictions(scene):
         end, path = first_onset(one, mu)
         paths.append(path)
         member = replace(member, ramps=(*member.ramps, end))
         yield member
-    strong, weak = member.ramps[0], _weakened(scene, member.ramps)
-    if weak is None:
+    if len(member.ramps) < 2:
         return
+    strong, weak = member.ramps[0], member.ramps[-1]
     member = replace(member, lowered=lowers(strong, weak))
     yield member
     if member.lowered and strong.fx_c is not None and one.perturb is not None and one.friction is not None:
@@ -257,6 +273,15 @@ def _examination(scene: Scene, member: Member) -> Iterator[Member]:
         with Engine(below.packing, MPI.COMM_SELF) as engine:
             start = next_equilibrium(engine, below, middle, one)
         yield replace(member, eruption=_eruption(one, start, one.perturb, one.friction))
+
+
+def _frictions(scene: Scene) -> tuple[float, ...]:
+    """The scene's friction coefficients, the one that weakens first and what it weakens to last."""
+    if scene.friction is None:
+        return scene.law.mus
+    weak = scene.friction.mu_ss * scene.law.mus[0]
+    # 0.8 * 0.7 is not 0.56 to the last bit
+    return (*(mu for mu in scene.law.mus if not np.isclose(mu, weak, rtol=1e-12, atol=0.0)), weak)
 
 
 def first_onset(scene: Scene, mu: float) -> tuple[RampEnd, tuple[Equilibrium, ...]]:
@@ -361,7 +386,7 @@ def share(count: int, of: int) -> dict[str, Any]:
 
 
 def distribution(ends: Iterable[RampEnd]) -> tuple[Floats, Floats]:
-    """Kaplan and Meier's distribution of F_x^c: onsets, shape (n,), and the share of packings up to each, shape (n,)."""
+    """Kaplan and Meier's distribution of F_x^c: onsets, and the share of packings up to each; both of shape (n,)."""
     ends = list(ends)
     if not any(end.ends == "onset" for end in ends):
         return np.empty(0), np.empty(0)
@@ -472,10 +497,10 @@ def ensemble_figure(members: Iterable[Member]) -> Figure:
     Returns
     -------
     Figure
-        Panel (a) the share of packings with an onset up to F_x, for each friction coefficient, with ticks where packings
-        are lost from sight without one; (b) the onset with the last coefficient over that with the first, filled
-        where D rose by the paper's decades, open where it did not, crosses where no eruption was tried; (c)
-        how many packings rose by how many decades.
+        Panel (a) the share of packings with an onset up to F_x, for each friction coefficient, with ticks where
+        packings are lost from sight without one; (b) the onset with the weakened friction over that with the
+        first, filled where D rose by the paper's decades, triangles where one of the two is only known to lie
+        beyond; (c) how many packings rose by how many decades.
     """
     members = [member for member in members if member.ramps]
     figure = Figure(figsize=(3.4, 6.0), layout="constrained")
@@ -503,3 +528,22 @@ def ensemble_figure(members: Iterable[Member]) -> Figure:
     for axes, name in ((onsets, "(a)"), (pairs, "(b)"), (rises, "(c)")):
         axes.set_title(name, loc="left", fontsize=8.5)
     return figure
+
+
+def _draw_pairs(axes: Axes, members: list[Member]) -> None:
+    """Onsets with the weakened friction over those with the first; triangles where one is known to lie beyond."""
+    most = 0.0
+    for member in members:
+        strong, weak = member.ramps[0], member.ramps[-1]
+        if strong.fx_c is None and weak.fx_c is None:
+            continue
+        most = max(most, strong.reach, weak.reach)
+        marker = ">" if strong.fx_c is None else "^" if weak.fx_c is None else "o"
+        erupts = member.eruption is not None and member.eruption.rise >= max(ERUPTIONS)
+        face = "C0" if erupts else "none"
+        axes.plot(strong.reach, weak.reach, marker, color="C0", markerfacecolor=face, markeredgewidth=0.7)
+    axes.axline((0, 0), slope=1, color=INK, linewidth=0.6, linestyle=":")
+    axes.set(xlim=(0, 1.05 * most or 1), ylim=(0, 1.05 * most or 1), aspect="equal")
+    if members:
+        strong, weak = members[0].ramps[0], members[0].ramps[-1]
+        axes.set(xlabel=rf"$F_x^c(\mu = {strong.mu:g})$", ylabel=rf"$F_x^c(\mu = {weak.mu:g})$")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from faultgouge.analysis import fit_growth, growth_rate, mean_square_displacement
+from faultgouge.analysis import fit_growth, fit_oscillation, growth_rate, mean_square_displacement
 
 
 def motion(eigenvalue, vector, time):
@@ -80,3 +80,18 @@ def test_mean_square_displacement_of_wrapped_positions():
     d = mean_square_displacement(np.array([reference, moved]), reference, box_length=10.0)
     np.testing.assert_allclose(d, [0, (0.04 + 0.25) / 2], rtol=1e-12, atol=0)
     assert mean_square_displacement(moved, reference) > 50
+
+
+@pytest.mark.parametrize(("frequency", "sigma"), [(45.0, 0.02), (3.0, 0.5), (45.0, -0.1), (1.0, 0.0)])
+def test_oscillation_has_its_frequency_and_growth(frequency, sigma):
+    time = 0.013 * np.arange(3000) / frequency * 45
+    signal = 1e-12 * np.exp(sigma * time) * np.cos(frequency * time + 0.4)
+    omega = fit_oscillation(time, signal)
+    # exact but for roundings of the samples
+    assert omega.real == pytest.approx(frequency, rel=1e-10)
+    assert -omega.imag == pytest.approx(sigma, abs=1e-9 * frequency)
+
+
+def test_what_does_not_oscillate_is_refused():
+    with pytest.raises(ValueError, match="does not oscillate"):
+        fit_oscillation(np.arange(20), np.exp(np.arange(20) / 3))

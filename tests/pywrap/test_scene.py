@@ -14,7 +14,7 @@ REFERENCE = ROOT / "tests" / "reference" / "packing7.json"
 
 LEAST = {"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
 FULL = {
-    "precision": "compensated",
+    "precision": "double",
     "packing": {
         "disks": 40,
         "radii": [0.4, 0.5, 0.6],
@@ -182,7 +182,7 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ),
         ({"perturb": {"fx": 0.1, "time": 1.0, "amplitude": math.nan}}, "perturb.amplitude = nan is refused"),
         # choices
-        ({"precision": "single"}, "precision = 'single' is refused: give 'double' or 'compensated'."),
+        ({"precision": "single"}, "precision = 'single' is refused: give 'double'."),
         (
             {"ramp": {"until": 1.0, "method": "fire"}},
             "ramp.method = 'fire' is refused: give 'newton' or 'overdamped'.",

@@ -1,0 +1,148 @@
+"""The onset by Newton's method and a root of the discriminant, beside the scan by overdamped dynamics, in one run.
+
+Both start from the reference packing of 100 disks at F_x = 0 and end with F_x^c for mu = 1:
+
+    solved    F_x raised by 1e-3 with Newton's method, all windows of complex eigenvalues up to 0.0225 solved for
+    scanned   F_x raised by 1e-4 with overdamped dynamics down to the rounding of the coordinates, as in the paper; the
+              spectrum at every equilibrium; the onset in the middle between the last real and the first complex one
+
+An independent code gives the onset to 18 digits for equilibria by Newton's method from increments of 1e-3. What is
+timed is everything from the packing's file on, on one core with one thread. The scan takes minutes.
+
+    python benchmarks/onset_against_scan.py [--output onset_against_scan.json]
+"""
+
+import os
+
+# before NumPy is imported: one thread each, for a fair comparison
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+import argparse
+import json
+import platform
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+from faultgouge.analysis import scan_windows
+from faultgouge.pywrap import Equilibrium, Scene, ramp
+from faultgouge.studies.onsets import onset_run
+
+PACKING = Path(__file__).parents[1] / "tests" / "reference" / "packing7.json"
+EXACT = 0.021833056408038582
+UNTIL = 0.0225
+
+
+@dataclass(frozen=True)
+class Result:
+    """An onset and what it took.
+
+    Attributes
+    ----------
+    method : str
+        How it was found.
+    increment : float
+        Of F_x.
+    seconds : float
+        Wall time.
+    evaluations : int
+        Force evaluations of the ramp's equilibria, those of the root-finding not counted.
+    fx_c : float
+        The onset.
+    stated_error : float
+        The uncertainty that the method states.
+    difference : float
+        |fx_c - EXACT|.
+    """
+
+    method: str
+    increment: float
+    seconds: float
+    evaluations: int
+    fx_c: float
+    stated_error: float
+    difference: float
+
+
+def scene(method: Literal["newton", "overdamped"], increment: float) -> Scene:
+    """The ramp of the reference packing."""
+    return Scene.from_mapping(
+        {
+            "packing": {"file": str(PACKING)},
+            "law": {"kn": 2e5, "mu": 1.0},
+            "load": {"fy": 3.0},
+            "ramp": {"step": increment, "until": UNTIL, "method": method},
+        }
+    )
+
+
+def solved(progress: Callable[[Equilibrium], None]) -> Result:
+    """Newton's method and the root of the discriminant."""
+    increment = 1e-3
+    begin = time.perf_counter()
+    run = onset_run(scene("newton", increment), 1.0, reached=progress)
+    seconds = time.perf_counter() - begin
+    evaluations = sum(each.evaluations for each in run.equilibria)
+    fx_c = run.onset.fx_c
+    return Result("solved", increment, seconds, evaluations, fx_c, run.onset.error, abs(fx_c - EXACT))
+
+
+def scanned(progress: Callable[[Equilibrium], None]) -> Result:
+    """Overdamped dynamics and the spectrum at every increment."""
+    increment = 1e-4
+    begin = time.perf_counter()
+    equilibria = []
+    for equilibrium in ramp(scene("overdamped", increment)):
+        equilibria.append(equilibrium)
+        progress(equilibrium)
+    windows = scan_windows([each.packing for each in equilibria])
+    seconds = time.perf_counter() - begin
+    if not windows:
+        sys.exit(f"The scan shows no complex pair up to F_x = {UNTIL}.")
+    evaluations = sum(each.evaluations for each in equilibria)
+    first = windows[0]
+    difference = abs(first.fx_onset - EXACT)
+    return Result("scanned", increment, seconds, evaluations, first.fx_onset, first.error, difference)
+
+
+def announce(equilibrium: Equilibrium) -> None:
+    """Say on standard error how far a ramp is."""
+    end = "\n" if equilibrium.fx > UNTIL - 1e-4 else "\r"
+    print(f"F_x = {equilibrium.fx:.4f} of {UNTIL}", end=end, file=sys.stderr, flush=True)
+
+
+def main() -> None:
+    """Print the table, and write it as JSON if asked to."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--output", type=Path, help="also write the numbers to this file")
+    options = parser.parse_args()
+
+    fast, slow = solved(announce), scanned(announce)
+    print(f"{platform.processor() or platform.machine()}; F_x^c of the reference packing, mu = 1, exact {EXACT:.15g}\n")
+    print(f"{'':10s}{'increment':>10s}{'seconds':>10s}{'evaluations':>13s}{'F_x^c':>20s}{'stated':>10s}{'error':>10s}")
+    for row in (fast, slow):
+        print(
+            f"{row.method:10s}{row.increment:10.0e}{row.seconds:10.2f}{row.evaluations:13d}{row.fx_c:20.15f}"
+            f"{row.stated_error:10.1e}{row.difference:10.1e}"
+        )
+    # the smaller of a difference and the spacing of doubles says nothing
+    ratios = {
+        "seconds": slow.seconds / fast.seconds,
+        "evaluations": slow.evaluations / fast.evaluations,
+        "stated_error": slow.stated_error / fast.stated_error,
+        "difference": slow.difference / max(fast.difference, sys.float_info.epsilon * EXACT),
+    }
+    print(
+        f"{'ratio':20s}{ratios['seconds']:10.1f}{ratios['evaluations']:13.1f}{'':20s}"
+        f"{ratios['stated_error']:10.1e}{ratios['difference']:10.1e}"
+    )
+    if options.output:
+        result = {"exact": EXACT, "solved": asdict(fast), "scanned": asdict(slow), "ratios": ratios}
+        options.output.write_text(json.dumps(result, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

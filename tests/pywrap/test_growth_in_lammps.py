@@ -1,0 +1,80 @@
+"""Undamped dynamics in LAMMPS against the spectrum: growth above the onset, none below it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import discrete_frequency, fit_growth, fit_oscillation, mean_square_displacement, spectrum
+from faultgouge.analysis.onset import Modes, full_operator
+from faultgouge.pywrap import Engine, Equilibrium, equilibrate
+from faultgouge.pywrap.quasistatic import rounding_floor
+from faultgouge.pywrap.stages import time_step
+
+
+def equilibrium(packing, fx, increment=1e-3):
+    here = Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
+    with Engine(packing) as engine:
+        here = equilibrate(engine, here, 0.0)
+        for k in range(1, round(fx / increment) + 1):
+            here = equilibrate(engine, here, k * increment)
+    return here.packing
+
+
+def pushed_along(packing, eigenvalue, size):
+    """The packing displaced along the mode of an eigenvalue, slips advanced, by `size` in the norm of all coordinates."""
+    modes = Modes.of(packing.fx, full_operator(packing))
+    mode = modes.right[:, np.argmin(np.abs(modes.values - eigenvalue))].real
+    with Engine(packing) as engine:
+        return engine.displace(packing, size * mode / np.linalg.norm(mode))
+
+
+def run(packing, reference, time, samples):
+    """Times, D from the reference, and mean velocity of the upper layer."""
+    dt = time_step(reference)
+    every = max(1, round(time / dt / samples))
+    rows = []
+    with Engine(packing) as engine, engine.undamped(dt):
+        for k in range(1, samples + 1):
+            motion = engine.advance(every)
+            msd = mean_square_displacement(motion.position, reference.position, reference.box_length)
+            rows.append((k * every * dt, msd, motion.velocity[reference.top, 0].mean()))
+    return np.array(rows).T
+
+
+@pytest.mark.slow
+def test_growth_rate_and_frequency_are_those_of_the_spectrum(reference_packing):
+    """Over six decades of D, from a small start along the pair that coalesces first."""
+    packing = equilibrium(reference_packing(1.0), 0.024)
+    pair = max(spectrum(packing).pairs, key=lambda each: each.growth_rate)
+    omega = complex(discrete_frequency(pair.eigenvalue, time_step(packing)))
+    # from far above the noise of 1e-25 to far below the square of the slip limits
+    time, msd, velocity = run(pushed_along(packing, pair.eigenvalue, 1e-8), packing, 540.0, 12000)
+    growth = fit_growth(time, msd, lower=3e-18, upper=3e-12)
+    assert growth.decades > 5.8  # of 6: the ends are means over stretches
+    assert growth.rate == pytest.approx(2 * abs(omega.imag), rel=5e-3)
+    measured = fit_oscillation(time, velocity)
+    assert measured.real == pytest.approx(omega.real, rel=1e-3)
+    assert 2 * abs(measured.imag) == pytest.approx(2 * abs(omega.imag), rel=5e-3)
+
+
+@pytest.mark.slow
+def test_nothing_grows_below_the_onset(reference_packing):
+    """A million steps at F_x = 0.0205, F_x^c = 0.0218: the rounding of each step adds to D, which grows as the time."""
+    packing = equilibrium(reference_packing(1.0), 0.0205, increment=5e-4)
+    assert spectrum(packing).pairs == ()
+    _, msd, _ = run(packing, packing, 456.0, 500)
+    early, late = (np.median(part) for part in (msd[50:100], msd[-50:]))
+    # a random walk of seven times the length; the beat of the pair near its coalescence is allowed as much again
+    assert late < 14 * early
+    assert msd.max() < 1e-23
+
+
+def test_rattlers_are_held_still(reference_packing):
+    packing = equilibrium(reference_packing(1.0), 1e-3)
+    falling = replace(packing, top=packing.top | np.isin(np.arange(len(packing)), packing.rattlers[:1]))
+    dt = time_step(packing)
+    with Engine(falling) as engine, engine.undamped(dt):
+        motion = engine.advance(1000)
+    assert np.array_equal(motion.position[packing.rattlers], packing.position[packing.rattlers])
+    assert not np.array_equal(motion.position, packing.position)
