@@ -110,8 +110,7 @@ def scanned(progress: Callable[[Equilibrium], None]) -> Result:
 
 def announce(equilibrium: Equilibrium) -> None:
     """Say on standard error how far a ramp is."""
-    end = "\n" if equilibrium.fx > UNTIL - 1e-4 else "\r"
-    print(f"F_x = {equilibrium.fx:.4f} of {UNTIL}", end=end, file=sys.stderr, flush=True)
+    print(f"\rF_x = {equilibrium.fx:.4f} of {UNTIL}", end="", file=sys.stderr, flush=True)
 
 
 def main() -> None:
@@ -121,6 +120,7 @@ def main() -> None:
     options = parser.parse_args()
 
     fast, slow = solved(announce), scanned(announce)
+    print(file=sys.stderr)
     print(f"{platform.processor() or platform.machine()}; F_x^c of the reference packing, mu = 1, exact {EXACT:.15g}\n")
     print(f"{'':10s}{'increment':>10s}{'seconds':>10s}{'evaluations':>13s}{'F_x^c':>20s}{'stated':>10s}{'error':>10s}")
     for row in (fast, slow):
@@ -128,7 +128,7 @@ def main() -> None:
             f"{row.method:10s}{row.increment:10.0e}{row.seconds:10.2f}{row.evaluations:13d}{row.fx_c:20.15f}"
             f"{row.stated_error:10.1e}{row.difference:10.1e}"
         )
-    # the smaller of a difference and the spacing of doubles says nothing
+    # a difference below the spacing of doubles says nothing
     ratios = {
         "seconds": slow.seconds / fast.seconds,
         "evaluations": slow.evaluations / fast.evaluations,

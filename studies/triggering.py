@@ -20,13 +20,20 @@ from numpy.typing import NDArray
 
 from ..analysis import RunFile
 from ..analysis.normal_form import PairForm, PowerLaw, fit_power_law, pair_forms
+from ..analysis.response import Response, layer_force, linear_response
 from ..pywrap import Equilibrium, Sample, Scene
 from ..pywrap.engine import Weakening
 from ..pywrap.scene import Friction, Perturb
-from ..pywrap.stages import perturb, weakening_of
+from ..pywrap.stages import perturb, time_step, weakening_of
 from .onsets import OnsetRun
 
 Floats = NDArray[np.float64]
+
+ABOVE_NOISE = 1e3
+"""How much stronger the perturbation is that is compared with the linear response: a million times in D."""
+
+COMPARED_TIME = 50.0
+"""Length of that run, time: a few hundred periods of the pair."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +48,11 @@ class Triggering:
         mu(v), with v_0 the largest velocity of the unperturbed run.
     unperturbed, perturbed, erupting : tuple of Sample
         Without perturbation, with it, and with it and mu(v).
+    strong : tuple of Sample
+        With a perturbation `ABOVE_NOISE` as strong, for a shorter time: its D stands out of the noise of doubles and is
+        compared with the linear response.
+    response : Response
+        Of the linearised packing to that perturbation, time step included.
     """
 
     start: Equilibrium
@@ -48,6 +60,14 @@ class Triggering:
     unperturbed: tuple[Sample, ...]
     perturbed: tuple[Sample, ...]
     erupting: tuple[Sample, ...]
+    strong: tuple[Sample, ...]
+    response: Response
+
+    @property
+    def deviation(self) -> float:
+        """Largest difference between D of the strong run and of the linear response, in units of the largest D."""
+        msd = column(self.strong, "msd")
+        return float(np.abs(msd - self.response.msd).max() / msd.max())
 
     @property
     def rise(self) -> float:
@@ -85,7 +105,7 @@ def column(samples: tuple[Sample, ...], name: str) -> Floats:
 
 
 def trigger(scene: Scene, start: Equilibrium, settings: Perturb, friction: Friction, path: Path) -> Triggering:
-    """The three runs, written to run.h5 as they end.
+    """The runs, written to run.h5 as they end, and the linear response beside the last.
 
     Parameters
     ----------
@@ -98,11 +118,13 @@ def trigger(scene: Scene, start: Equilibrium, settings: Perturb, friction: Frict
     friction : Friction
         mu(v).
     path : Path
-        run.h5 of the ramp; gets the series unperturbed, perturbed and erupting.
+        run.h5 of the ramp; gets the series unperturbed, perturbed, erupting and strong.
     """
 
-    def run(name: str, amplitude: float, weakening: Weakening | None = None) -> tuple[Sample, ...]:
-        one = settings.model_copy(update={"amplitude": amplitude})
+    def run(
+        name: str, amplitude: float, weakening: Weakening | None = None, time: float = settings.time
+    ) -> tuple[Sample, ...]:
+        one = settings.model_copy(update={"amplitude": amplitude, "time": time})
         samples = tuple(perturb(scene.model_copy(update={"perturb": one}), start, weakening=weakening))
         with RunFile(path, "a") as file:
             file.append_series(name, **{key: column(samples, key) for key in vars(samples[0])})
@@ -112,7 +134,18 @@ def trigger(scene: Scene, start: Equilibrium, settings: Perturb, friction: Frict
     v0 = np.abs(column(unperturbed, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
     weakening = weakening_of(friction, float(v0))
     perturbed = run("perturbed", settings.amplitude)
-    return Triggering(start, weakening, unperturbed, perturbed, run("erupting", settings.amplitude, weakening))
+    erupting = run("erupting", settings.amplitude, weakening)
+    amplitude = ABOVE_NOISE * settings.amplitude
+    strong = run("strong", amplitude, time=min(settings.time, COMPARED_TIME))
+    packing = start.packing
+    response = linear_response(
+        packing,
+        column(strong, "time"),
+        force=layer_force(packing, amplitude),
+        omega=settings.omega or 0.0,
+        dt=time_step(packing, settings.time_step),
+    )
+    return Triggering(start, weakening, unperturbed, perturbed, erupting, strong, response)
 
 
 def sensitivity(run: OnsetRun) -> Sensitivity:
@@ -146,6 +179,10 @@ def figures(triggering: Triggering, sensitive: Sensitivity, mu: float, output: P
     save(draw.weakening_figure(np.abs(speed), friction, law), output / "figure5b")
     save(draw.measured_friction_figure(), output / "figure6")
 
+    strong = draw.Displacements(column(triggering.strong, "time"), column(triggering.strong, "msd"))
+    linear = draw.Displacements(triggering.response.time, triggering.response.msd)
+    save(draw.response_figure(strong, linear), output / "response")
+
     reach = (float(sensitive.distance.min()), float(sensitive.distance.max()))
     curve = draw.AmplitudeCurve("$1 - F_x/F_x^c$", sensitive.distance, sensitive.amplitude, sensitive.fit, reach)
     save(draw.amplitude_figure([curve]), output / "amplitude")
@@ -178,6 +215,7 @@ def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
         "v_ss": triggering.weakening.v_ss,
         "largest_D": largest,
         "rise_in_decades": triggering.rise,
+        "linear_response_deviation": triggering.deviation,
         "smallest_mu": float(column(triggering.erupting, "friction").min()),
         "amplitude_exponent": sensitive.fit.exponent,
         "amplitude_exponent_error": sensitive.fit.error,
@@ -213,6 +251,11 @@ def words(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, mu:
         else "The packing does not erupt: weakened friction leaves it stable at this force.",
         "",
         "![D(t) of the three runs](figure5a.png) ![mu over v](figure5b.png) ![the law](figure2.png)",
+        "",
+        f"The linear response of the packing, from its K alone, meets LAMMPS within {triggering.deviation:.1e} of the "
+        f"largest D under a perturbation {ABOVE_NOISE:g} times as strong (figure `response`).",
+        "",
+        "![linear response and LAMMPS](response.png)",
         "",
         "Below the onset, the response of the pair that is about to coalesce grows as a power of the distance "
         f"1 - F_x/F_x^c: the exponent is {sensitive.fit.exponent:.4f} +- {sensitive.fit.error:.1g} over distances from "
