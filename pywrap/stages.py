@@ -248,6 +248,7 @@ def perturb(
     scene: Scene,
     start: Equilibrium,
     samples: int = 2000,
+    early: int = 200,
     communicator: MPI.Comm | None = None,
     weakening: Weakening | None = None,
     watch: Callable[[float, Motion], None] | None = None,
@@ -262,6 +263,8 @@ def perturb(
         The equilibrium at the scene's perturb.fx.
     samples : int
         Lines of the time series, equally spaced; fewer if there are fewer steps.
+    early : int
+        Further lines, at times that grow geometrically from the first step on; 0 for none.
     communicator : mpi4py.MPI.Comm, optional
         The ranks that share the packing; all by default.
     weakening : Weakening, optional
@@ -288,7 +291,10 @@ def perturb(
     if settings.time < dt:
         raise SceneError(f"perturb.time = {settings.time:g} is shorter than one step, {dt:.4g}: run longer")
     every = max(1, int(settings.time / dt / samples))
-    return _undamped(settings, packing, dt, every, communicator, weakening, watch)
+    steps = every * np.arange(1, int(settings.time / dt / every) + 1)
+    if early:
+        steps = np.union1d(steps, np.geomspace(1, steps[-1], early).astype(np.int64))
+    return _undamped(settings, packing, dt, steps, communicator, weakening, watch)
 
 
 def calibrated(scene: Scene, start: Equilibrium, communicator: MPI.Comm | None = None) -> float:
@@ -308,7 +314,7 @@ def _undamped(
     settings: Perturb,
     packing: Packing,
     dt: float,
-    every: int,
+    steps: NDArray[np.int64],
     communicator: MPI.Comm | None,
     weakening: Weakening | None,
     watch: Callable[[float, Motion], None] | None,
@@ -320,12 +326,12 @@ def _undamped(
         Engine(packing, communicator) as engine,
         engine.undamped(dt, settings.amplitude, settings.omega or 0.0, target, weakening),
     ):
-        for k in range(1, int(settings.time / dt / every) + 1):
-            motion = engine.advance(every)
+        for step, forward in zip(steps.tolist(), np.diff(steps, prepend=0).tolist(), strict=True):
+            motion = engine.advance(forward)
             if watch is not None:
-                watch(k * every * dt, motion)
+                watch(step * dt, motion)
             yield Sample(
-                time=k * every * dt,
+                time=step * dt,
                 msd=float(mean_square_displacement(motion.position, packing.position, packing.box_length)),
                 kinetic_energy=float(
                     0.5 * (packing.mass @ np.sum(motion.velocity**2, axis=1) + inertia @ motion.spin**2)

@@ -159,7 +159,7 @@ def _growth(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
     ceiling = (0.1 * start.packing.loaded(start.residual).geometry.overlap.min()) ** 2
     samples: list[Sample] = []
     with RunFile(path, "a") as file:
-        for sample in perturb(scene.model_copy(update={"perturb": settings}), start, samples=4000):
+        for sample in perturb(scene.model_copy(update={"perturb": settings}), start, samples=4000, early=0):
             samples.append(sample)
             if sample.msd > 1e6 * ceiling:
                 break
