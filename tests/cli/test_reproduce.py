@@ -1,0 +1,85 @@
+"""The main job, on the reference packing: what it leaves behind, and that its numbers are those of physics."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+BIN = Path(sys.executable).parent
+REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
+
+SCENE = f"""
+[packing]
+file = "{REFERENCE}"
+[law]
+kn = 2e5
+mu = [1.0, 0.8]
+[load]
+fy = 3.0
+[ramp]
+step = 1e-3
+until = 0.024
+[perturb]
+fx = 0.0205
+time = 40.0
+amplitude = 1e-9
+omega = 0.01
+[friction]
+v_ss = "10 v0"
+"""
+
+FIGURES = ("figure1", "figure2", "figure3", "figure4", "figure5a", "figure5b", "figure6", "amplitude", "damping")
+
+
+@pytest.mark.slow
+def test_reproduce(tmp_path):
+    (tmp_path / "scene.toml").write_text(SCENE)
+    command = [BIN / "faultgouge", "reproduce", "scene.toml", "-o", "results"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    results = tmp_path / "results"
+    for name in (*FIGURES, "response"):
+        for suffix in (".png", ".svg"):
+            assert (results / (name + suffix)).stat().st_size > 5_000
+    report = (results / "report.md").read_text()
+    for assumption in ("side boundaries", "upper layer", "inertia", "time step", "f_min", "settling"):
+        assert assumption in report
+
+    summary = json.loads((results / "summary.json").read_text())
+    first, second = summary["ramps"]
+    assert first["onset"]["fx_c"] == pytest.approx(0.0218330564080, rel=1e-9)
+    assert second["onset"]["fx_c"] == pytest.approx(0.0191432059561, rel=1e-9)
+    # the rate over at least six decades, within 1 % of the spectrum's
+    assert summary["growth"]["measured"]["decades"] > 6
+    assert abs(summary["growth"]["deviation"]) < 0.01
+    triggering = summary["triggering"]
+    assert triggering["linear_response_deviation"] < 0.01
+    assert triggering["amplitude_exponent"] == pytest.approx(-0.5, abs=0.02)
+    assert triggering["distances"][1] / triggering["distances"][0] > 1e3
+    # 40 time units are enough for friction to weaken; the eruption goes on from there
+    assert triggering["rise_in_decades"] > 7
+    assert triggering["smallest_mu"] == pytest.approx(0.8, abs=1e-6)
+
+
+def test_a_ramp_that_is_killed_goes_on(tmp_path):
+    (tmp_path / "scene.toml").write_text(SCENE)
+    command = [BIN / "faultgouge", "ramp", "scene.toml", "-o"]
+    running = subprocess.Popen([*command, "killed.h5"], cwd=tmp_path, stderr=subprocess.PIPE)
+    killed = tmp_path / "killed.h5"
+    while running.poll() is None and (not killed.exists() or killed.stat().st_size < 60_000):
+        time.sleep(0.01)
+    running.send_signal(signal.SIGKILL)
+    running.wait()
+    for name in ("killed.h5", "whole.h5"):
+        done = subprocess.run([*command, name], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
+    with h5py.File(killed) as one, h5py.File(tmp_path / "whole.h5") as other:
+        for name in ("particles/disks/position/value", "observables/contacts/value", "observables/evaluations/value"):
+            assert np.array_equal(one[name][...], other[name][...], equal_nan="evaluations" not in name)
+        assert len(one["observables/fx/value"]) == 25
