@@ -2,6 +2,7 @@
 # make test        sets everything up and runs all tests
 # make check       format, lint and types
 # make benchmark   time per step beside LAMMPS's own granular styles
+# make docs        the documentation, in docs/_build/html (Python >= 3.11)
 # make clean       removes what the others made
 
 PYTHON ?= python3
@@ -14,7 +15,7 @@ SOURCES := $(shell find pair_mindlin_smooth lammps_inputs analysis pywrap studie
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: reproduce test check format benchmark clean
+.PHONY: reproduce test check format benchmark docs clean
 
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
@@ -35,6 +36,10 @@ format: $(VENV)/.check
 
 benchmark: $(VENV)/.installed
 	$(BIN)/python benchmarks/time_per_step.py
+
+docs: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet -r docs/requirements.txt
+	$(BIN)/python -m sphinx -q -W -b html docs docs/_build/html
 
 clean:
 	rm -rf $(VENV) build results report stability .pytest_cache .hypothesis .mypy_cache .ruff_cache

@@ -244,20 +244,25 @@ def main() -> None:
 
 
 def _exit_code(error: Exception) -> int:
-    """2 for bad input, 1 for a computation that failed; anything else is a bug and keeps its traceback."""
+    """2 for bad input, 1 for a computation that failed."""
     if hasattr(error, "exit_code"):  # typer's own: usage errors and exits
         return int(error.exit_code)
     names = {base.__name__ for base in type(error).__mro__}
-    if names & {"SceneError", "PackingFileError"}:
-        return 2
-    if names & {"NoEquilibriumError", "EngineError", "OnsetError", "OSError"}:
-        return 1
-    raise error
+    return 2 if names & {"SceneError", "PackingFileError"} else 1
 
 
 def _sentence(error: Exception) -> str:
     show = getattr(error, "format_message", None)
-    return (show() if show else str(error)).strip()
+    if show:
+        return str(show()).strip()
+    expected = {"SceneError", "PackingFileError", "NoEquilibriumError", "EngineError", "OnsetError", "OSError"}
+    if {base.__name__ for base in type(error).__mro__} & expected:
+        return str(error).strip()
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    where = f"{Path(place.tb_frame.f_code.co_filename).name}:{place.tb_lineno}" if place else "unknown place"
+    return f"this should not have happened ({type(error).__name__} at {where}: {error}): please report it"
 
 
 def _stop(sentence: str, code: int) -> None:
