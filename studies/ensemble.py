@@ -12,9 +12,14 @@ are is given with the result.)
 Weakening lowers the onset where :math:`F_x^c(\mu \mu_{ss}) < F_x^c(\mu)`, and that can be known although one of the
 two is censored. Where both are known and leave a window between them, three undamped runs from its middle tell whether
 the packing erupts (:mod:`~faultgouge.studies.triggering`): unperturbed, perturbed, perturbed with mu(v). The *rise* is
-the distance in decades between the largest D of the last two. It need not be large: the pair of the weakened packing
-may be real again at the middle of the window, or grow too slowly for the length of the run. So the growth rate that the
-spectrum has there with the weakened friction is kept beside it.
+the distance in decades between the largest D of the last two.
+
+A rise alone is no instability. As soon as mu(v) has fallen, every contact that carries tangential load carries less of
+it, and the equilibrium is elsewhere: D *jumps* to the square of that distance, in a packing that is stable with the
+weakened friction as well. How far, a *control* shows: mu(v) at a force as far below the lower onset as the middle of
+the window is above it. What tells an instability from the jump is that D goes on to *grow* after it, at the rate that
+the spectrum has there with the weakened friction, to the level where contacts open. The pair may also be real again at
+the middle of the window, or grow too slowly for the length of the run; so the rate is kept beside all this.
 
 Shares are given with Wilson's 95 % interval.
 """
@@ -24,8 +29,8 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing, nullcontext
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import version
@@ -41,7 +46,7 @@ from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor, MPIPoolExecutor
 from numpy.typing import NDArray
 from scipy.stats import CensoredData, binomtest, ecdf
-from threadpoolctl import threadpool_limits
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from ..analysis import OnsetError, Packing, find_onset, spectrum
 from ..pywrap import Engine, Equilibrium, Sample, Scene, SceneError
@@ -50,7 +55,7 @@ from ..pywrap.quasistatic import NoEquilibriumError
 from ..pywrap.scene import Friction, GeneratedPacking, Perturb
 from ..pywrap.stages import EquilibriumPath, loads, next_equilibrium, perturb, settle, weakening_of
 from .figures import INK, STYLE, save
-from .triggering import Triggering, column
+from .triggering import column
 
 Floats = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -58,11 +63,19 @@ Say = Callable[[str], None]
 FINEST_STEP = 1e-3
 """Increment of F_x below which a ramp only costs: onsets are solved for, and come out the same."""
 
-LONGEST_TIME = 200.0
-"""Length of the undamped runs, time, at the most: with 100 disks, three of them take about 20 s."""
+LONGEST_TIME = 100.0
+"""Length of the undamped runs, time, at the most: with 100 disks, four of them take about 20 s."""
 
-ERUPTIONS = (5, 10)
-"""Rises in decades from which on a packing counts as erupting; the larger is that of the paper's figure 5."""
+RISES = (5, 10)
+"""Rises in decades whose shares are given; the paper's figure 5 has 12."""
+
+JUMP_SHARE = 0.1
+"""Share of the run with mu(v) that shows the jump: 10 of 100 time units, where the slowest modes of 100 disks have
+periods of 6, and the fastest pairs have just begun to stand out."""
+
+GROWTH_FACTOR = 2.0
+"""Factor from the jump to the largest D from which on D has grown. Without an instability, the phases in which many
+modes happen to meet change the maximum by some ten percent."""
 
 
 @dataclass(frozen=True)
@@ -94,26 +107,43 @@ class RampEnd:
 
 @dataclass(frozen=True)
 class Eruption:
-    """The three runs from the middle of the window, in numbers.
+    """The runs from the middle of the window and the control, in numbers.
 
     Attributes
     ----------
-    fx : float
-        The middle of the window, force per disk of the upper layer.
+    fx, fx_control : float
+        The middle of the window, and the control below it, force per disk of the upper layer.
     rate : float
-        Growth rate of D with the weakened friction, from the spectrum, 1 / time; 0 if it is stable.
-    unperturbed, perturbed, erupting : float
-        Largest D, length^2.
-    rise : float
-        Decades between the last two.
+        Growth rate of D with the weakened friction at fx, from the spectrum, 1 / time; 0 if it is stable.
+    unperturbed, perturbed, weakening, control : float
+        Largest D, length^2: of the three runs at fx, and with mu(v) at fx_control.
+    jump : float
+        Largest D of the run with mu(v) in its first part, `JUMP_SHARE`.
     """
 
     fx: float
+    fx_control: float
     rate: float
     unperturbed: float
     perturbed: float
-    erupting: float
-    rise: float
+    weakening: float
+    control: float
+    jump: float
+
+    @property
+    def rise(self) -> float:
+        """Decades between the largest D of the perturbed run and of the one with mu(v)."""
+        return float(np.log10(self.weakening / self.perturbed))
+
+    @property
+    def control_rise(self) -> float:
+        """The same with the control in place of the run with mu(v)."""
+        return float(np.log10(self.control / self.perturbed))
+
+    @property
+    def grows(self) -> bool:
+        """Whether D goes on to grow after the jump."""
+        return self.weakening >= GROWTH_FACTOR * self.jump
 
 
 @dataclass(frozen=True)
@@ -188,7 +218,10 @@ def ensemble(
         If the scene has no generated packing or no section [ramp].
     """
     seeds = _seeds(scene, members)
-    with nullcontext() if MPI.COMM_WORLD.size == 1 else MPICommExecutor(MPI.COMM_WORLD) as pool:
+    workers: AbstractContextManager[Any] = (
+        nullcontext() if MPI.COMM_WORLD.size == 1 else MPICommExecutor(MPI.COMM_WORLD)
+    )
+    with workers as pool:
         if MPI.COMM_WORLD.rank != 0:
             return {}
         output.mkdir(parents=True, exist_ok=True)
@@ -219,7 +252,7 @@ def _seeds(scene: Scene, members: int) -> range:
     return range(scene.packing.seed, scene.packing.seed + members)
 
 
-def _examined(pool: MPIPoolExecutor | None, scene: Scene, seeds: list[int]) -> Iterator[Member]:
+def _examined(pool: MPIPoolExecutor | None, scene: Scene, seeds: list[int]) -> Generator[Member, None, None]:
     """Members as they end; closing the iterator takes back those that no worker has begun."""
     one = partial(examine, scene)
     yield from map(one, seeds) if pool is None else pool.map(one, seeds, unordered=True)
@@ -268,11 +301,7 @@ def _examination(scene: Scene, member: Member) -> Iterator[Member]:
     member = replace(member, lowered=lowers(strong, weak))
     yield member
     if member.lowered and strong.fx_c is not None and one.perturb is not None and one.friction is not None:
-        middle = 0.5 * (weak.reach + strong.reach)
-        below = max((each for each in paths[0] if each.fx <= middle), key=lambda each: each.fx)
-        with Engine(below.packing, MPI.COMM_SELF) as engine:
-            start = next_equilibrium(engine, below, middle, one)
-        yield replace(member, eruption=_eruption(one, start, one.perturb, one.friction))
+        yield replace(member, eruption=_eruption(one, paths[0], (weak.reach, strong.fx_c), one.perturb, one.friction))
 
 
 def _frictions(scene: Scene) -> tuple[float, ...]:
@@ -325,17 +354,47 @@ def lowers(strong: RampEnd, weak: RampEnd) -> bool | None:
     return False if strong.fx_c is not None and strong.reach <= weak.reach else None
 
 
-def _eruption(scene: Scene, start: Equilibrium, settings: Perturb, friction: Friction) -> Eruption:
-    def run(amplitude: float, weakening: Weakening | None = None) -> tuple[Sample, ...]:
-        one = scene.model_copy(update={"perturb": settings.model_copy(update={"fx": start.fx, "amplitude": amplitude})})
-        return tuple(perturb(one, start, communicator=MPI.COMM_SELF, weakening=weakening))
+def _eruption(
+    scene: Scene,
+    path: tuple[Equilibrium, ...],
+    window: tuple[float, float],
+    settings: Perturb,
+    friction: Friction,
+) -> Eruption:
+    """The runs in a window between two onsets, and the control; path leads up to the upper one."""
+    middle = 0.5 * (window[0] + window[1])
+    start, below = (_equilibrium_at(scene, path, fx) for fx in (middle, max(0.0, 2 * window[0] - middle)))
 
-    quiet = run(0.0)
+    def msd(start: Equilibrium, weakening: Weakening | None) -> Floats:
+        return column(_undamped(scene, settings, start, settings.amplitude, weakening), "msd")
+
+    quiet = _undamped(scene, settings, start, 0.0)
     v0 = np.abs(column(quiet, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
     weakening = weakening_of(friction, float(v0))
-    runs = Triggering(start, weakening, quiet, run(settings.amplitude), run(settings.amplitude, weakening))
-    largest = [float(column(samples, "msd").max()) for samples in (runs.unperturbed, runs.perturbed, runs.erupting)]
-    return Eruption(start.fx, weakened_rate(start.packing, friction.mu_ss), *largest, runs.rise)
+    weakened = msd(start, weakening)
+    return Eruption(
+        fx=start.fx,
+        fx_control=below.fx,
+        rate=weakened_rate(start.packing, friction.mu_ss),
+        unperturbed=float(column(quiet, "msd").max()),
+        perturbed=float(msd(start, None).max()),
+        weakening=float(weakened.max()),
+        control=float(msd(below, weakening).max()),
+        jump=float(weakened[: max(1, round(JUMP_SHARE * len(weakened)))].max()),
+    )
+
+
+def _equilibrium_at(scene: Scene, path: tuple[Equilibrium, ...], fx: float) -> Equilibrium:
+    below = max((each for each in path if each.fx <= fx), key=lambda each: each.fx)
+    with Engine(below.packing, MPI.COMM_SELF) as engine:
+        return below if below.fx == fx else next_equilibrium(engine, below, fx, scene)
+
+
+def _undamped(
+    scene: Scene, settings: Perturb, start: Equilibrium, amplitude: float, weakening: Weakening | None = None
+) -> tuple[Sample, ...]:
+    one = scene.model_copy(update={"perturb": settings.model_copy(update={"fx": start.fx, "amplitude": amplitude})})
+    return tuple(perturb(one, start, communicator=MPI.COMM_SELF, weakening=weakening))
 
 
 def weakened_rate(packing: Packing, mu_ss: float) -> float:
@@ -407,7 +466,8 @@ def quartiles(ends: Iterable[RampEnd]) -> list[float | None]:
 def summary(scene: Scene, members: list[Member]) -> dict[str, Any]:
     """Numbers for ensemble.json."""
     ramped = [member for member in members if len(member.ramps) == len(_frictions(scene))]
-    rises = np.sort([member.eruption.rise for member in ramped if member.eruption is not None])
+    eruptions = [member.eruption for member in ramped if member.eruption is not None]
+    rises, controls = [each.rise for each in eruptions], [each.control_rise for each in eruptions]
     decided = [member.lowered for member in ramped if member.lowered is not None]
     return {
         "scene": scene.resolved(),
@@ -418,14 +478,20 @@ def summary(scene: Scene, members: list[Member]) -> dict[str, Any]:
         else [],
         "lowered": share(sum(decided), len(decided)),
         "lowered_unknown": len(ramped) - len(decided),
-        "unstable_when_weakened": share(
-            sum(each.eruption.rate > 0 for each in ramped if each.eruption is not None), len(rises)
-        ),
-        "erupts": {str(decades): share(int(np.sum(rises >= decades)), len(rises)) for decades in ERUPTIONS},
-        "rise_quartiles": np.quantile(rises, [0.25, 0.5, 0.75]).tolist() if len(rises) else None,
-        "rises": rises.tolist(),
+        "rises": {str(decades): share(sum(rise >= decades for rise in rises), len(rises)) for decades in RISES},
+        "control_rises": {
+            str(decades): share(sum(rise >= decades for rise in controls), len(controls)) for decades in RISES
+        },
+        "rise_quartiles": _quartiles(rises),
+        "control_rise_quartiles": _quartiles(controls),
+        "unstable_when_weakened": share(sum(each.rate > 0 for each in eruptions), len(eruptions)),
+        "grows": share(sum(each.grows for each in eruptions), len(eruptions)),
         "seconds_per_packing": float(np.median([member.seconds for member in members])) if members else None,
     }
+
+
+def _quartiles(values: list[float]) -> list[float] | None:
+    return np.quantile(values, [0.25, 0.5, 0.75]).tolist() if values else None
 
 
 def _onset_summary(ends: list[RampEnd]) -> dict[str, Any]:
@@ -450,7 +516,11 @@ def sentence(member: Member) -> str:
         for end in member.ramps
     ]
     if member.eruption is not None:
-        parts.append(f"D rises {member.eruption.rise:.1f} decades at {member.eruption.fx:.6g}")
+        found = member.eruption
+        parts.append(
+            f"D rises {found.rise:.1f} decades at {found.fx:.6g} (control: {found.control_rise:.1f}) and "
+            f"{'grows' if found.grows else 'does not grow'} after its jump"
+        )
     if member.says is not None:
         parts.append(f"failed: {member.says}")
     return f"seed {member.seed}: {'; '.join(parts)} ({member.seconds:.0f} s)"
@@ -469,10 +539,17 @@ def words(result: dict[str, Any]) -> list[str]:
         f"weakening friction lowers the onset in {_percent(result['lowered'])}; not known for "
         f"{result['lowered_unknown']} more"
     )
+    if result["grows"]["of"] == 0:
+        return lines
     lines += [
-        f"of those with a window between the onsets, {_percent(found)} rise by {decades} decades or more"
-        for decades, found in result["erupts"].items()
+        f"rise of D by {decades} decades or more: {_percent(found)} of the packings with a window between the onsets, "
+        f"and {_percent(result['control_rises'][decades])} of their controls below both onsets"
+        for decades, found in result["rises"].items()
     ]
+    lines.append(
+        f"unstable with the weakened friction, by the spectrum: {_percent(result['unstable_when_weakened'])}; "
+        f"D goes on to grow after its jump: {_percent(result['grows'])}"
+    )
     return lines
 
 
@@ -499,8 +576,8 @@ def ensemble_figure(members: Iterable[Member]) -> Figure:
     Figure
         Panel (a) the share of packings with an onset up to F_x, for each friction coefficient, with ticks where
         packings are lost from sight without one; (b) the onset with the weakened friction over that with the
-        first, filled where D rose by the paper's decades, triangles where one of the two is only known to lie
-        beyond; (c) how many packings rose by how many decades.
+        first, filled where D went on to grow after its jump, triangles where one of the two is only known to lie
+        beyond; (c) how many packings rose by how many decades, and how many controls.
     """
     members = [member for member in members if member.ramps]
     figure = Figure(figsize=(3.4, 6.0), layout="constrained")
@@ -509,21 +586,22 @@ def ensemble_figure(members: Iterable[Member]) -> Figure:
     for number, mu in enumerate(mus):
         ends = [end for member in members for end in member.ramps if end.mu == mu]
         fx, probability = distribution(ends)
-        last = max(end.reach for end in ends)
-        curve = np.append(np.insert(probability, 0, 0.0), probability[-1:])
-        if len(fx):
-            places = np.concatenate([[0.0], fx, [last]])
-            onsets.step(places, curve, where="post", color=f"C{number}", label=rf"$\mu = {mu:g}$")
-            lost = np.array([end.reach for end in ends if end.ends != "onset"])
-            onsets.plot(lost, curve[np.searchsorted(fx, lost, side="right")], "|", color=f"C{number}")
+        levels = np.concatenate([[0.0], probability])
+        places = np.concatenate([[0.0], fx, [max(end.reach for end in ends)]])
+        curve = np.append(levels, levels[-1])
+        onsets.step(places, curve, where="post", color=f"C{number}", label=rf"$\mu = {mu:g}$")
+        lost = np.array([end.reach for end in ends if end.ends != "onset"])
+        onsets.plot(lost, levels[np.searchsorted(fx, lost, side="right")], "|", color=f"C{number}")
     onsets.set(xlabel="$F_x^c$", ylabel="share of packings", ylim=(0, 1))
     if mus:
         onsets.legend()
     _draw_pairs(pairs, [member for member in members if len(member.ramps) > 1])
-    decades = [member.eruption.rise for member in members if member.eruption is not None]
-    if decades:
-        rises.hist(decades, bins=np.arange(np.floor(min(decades)), max(decades) + 1.5), color="C0", alpha=0.8)
-    rises.axvline(max(ERUPTIONS), color=INK, linewidth=0.6, linestyle=":")
+    eruptions = [member.eruption for member in members if member.eruption is not None]
+    if eruptions:
+        decades = [[each.rise for each in eruptions], [each.control_rise for each in eruptions]]
+        edges = np.arange(np.floor(np.min(decades)), np.max(decades) + 0.5, 0.5)
+        rises.hist(decades, bins=edges, label=["in the window", "control"], color=["C0", "C1"])
+        rises.legend()
     rises.set(xlabel="rise of $D$ in decades", ylabel="packings")
     for axes, name in ((onsets, "(a)"), (pairs, "(b)"), (rises, "(c)")):
         axes.set_title(name, loc="left", fontsize=8.5)
@@ -539,8 +617,7 @@ def _draw_pairs(axes: Axes, members: list[Member]) -> None:
             continue
         most = max(most, strong.reach, weak.reach)
         marker = ">" if strong.fx_c is None else "^" if weak.fx_c is None else "o"
-        erupts = member.eruption is not None and member.eruption.rise >= max(ERUPTIONS)
-        face = "C0" if erupts else "none"
+        face = "C0" if member.eruption is not None and member.eruption.grows else "none"
         axes.plot(strong.reach, weak.reach, marker, color="C0", markerfacecolor=face, markeredgewidth=0.7)
     axes.axline((0, 0), slope=1, color=INK, linewidth=0.6, linestyle=":")
     axes.set(xlim=(0, 1.05 * most or 1), ylim=(0, 1.05 * most or 1), aspect="equal")

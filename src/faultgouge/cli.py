@@ -206,9 +206,11 @@ def reproduce(
 ) -> None:
     """The paper's protocol on one packing: figures 1, 3, 4, numbers and a report.
 
-    With --ensemble M: how generic that is, from M packings that differ in their seeds. An interrupted ensemble goes on,
-    and grows with a larger M. It takes a minute a packing at the most, and as many cores as it gets, one of K ranks
-    handing out the work: mpiexec -n 5 faultgouge reproduce --ensemble 100 keeps 4 cores busy.
+    With --ensemble M: how generic that is, from M packings that differ in their
+    seeds. An interrupted ensemble goes on, and grows with a larger M. A packing
+    takes a minute at the most on one core; of several ranks one hands out the
+    work, so that mpiexec -n 5 faultgouge reproduce --ensemble 100 keeps 4 cores
+    busy.
     """
     from importlib.resources import files
 

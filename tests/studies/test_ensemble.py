@@ -17,11 +17,11 @@ from faultgouge.studies.onsets import onset_run
 BIN = Path(sys.executable).parent
 
 SCENE = {
-    "packing": {"disks": 30, "top": 5, "width": 6.0, "seed": 3},
+    "packing": {"disks": 30, "top": 5, "width": 6.0, "seed": 2},
     "law": {"kn": 2e5, "mu": [1.0, 0.8]},
     "load": {"fy": 3.0},
-    "ramp": {"step": 5e-3, "until": 0.02},
-    "perturb": {"fx": 0.0, "time": 2.0, "amplitude": 5e-10, "omega": 0.01},
+    "ramp": {"step": 5e-3, "until": 0.025},
+    "perturb": {"fx": 0.0, "time": 0.5, "amplitude": 5e-10, "omega": 0.01},
     "friction": {"v_ss": "10 v0"},
 }
 
@@ -37,6 +37,20 @@ def silent(_):
 
 def ramps(strong, weak):
     return RampEnd(1.0, *strong), RampEnd(0.8, *weak)
+
+
+def eruption(rise):
+    """A rise over 1e-23, after a jump to 1e-14 that the control shows as well."""
+    return Eruption(
+        fx=0.015,
+        fx_control=0.005,
+        rate=1.0,
+        unperturbed=1e-25,
+        perturbed=1e-23,
+        weakening=1e-23 * 10**rise,
+        control=1e-14,
+        jump=1e-14,
+    )
 
 
 @pytest.mark.parametrize(
@@ -110,27 +124,27 @@ def test_an_ensemble_goes_on_where_it_was_cut_off(scene, tmp_path, monkeypatch):
     monkeypatch.setattr(study, "examine", examine)
     said = []
     second = study.ensemble(scene, 2, tmp_path, said.append)
-    assert examined == [4]
+    assert examined == [3]
     assert said[0].startswith("1 of 2 packings are in")
     assert lines.read_text().startswith(whole)
-    assert [json.loads(line)["seed"] for line in lines.read_text().splitlines()] == [3, 4]
-    assert (first["seeds"], second["seeds"]) == ([3], [3, 4])
+    assert [json.loads(line)["seed"] for line in lines.read_text().splitlines()] == [2, 3]
+    assert (first["seeds"], second["seeds"]) == ([2], [2, 3])
     assert first["onsets"] == second["onsets"]  # what failed adds nothing to them
     assert json.loads((tmp_path / "ensemble.json").read_text()) == second
 
     study.ensemble(scene.model_copy(update={"load": scene.load.model_copy(update={"fy": 2.0})}), 1, tmp_path, silent)
-    assert examined == [4, 3], "another scene's lines are none of this one"
+    assert examined == [3, 2], "another scene's lines are none of this one"
 
 
 def test_a_member_that_fails_is_counted(scene, tmp_path):
     full = scene.model_copy(update={"packing": scene.packing.model_copy(update={"width": 1.0})})
     said = []
     result = study.ensemble(full, 2, tmp_path, said.append)
-    assert [each["seed"] for each in result["failed"]] == [3, 4]
+    assert [each["seed"] for each in result["failed"]] == [2, 3]
     assert "width" in result["failed"][0]["says"]
     assert result["onsets"] == []
     assert "2 packings, of which 2 failed" in said
-    assert any(line.startswith("seed 3: failed: ") for line in said)
+    assert any(line.startswith("seed 2: failed: ") for line in said)
 
 
 def test_what_was_found_before_a_failure_is_kept(scene, monkeypatch):
@@ -142,26 +156,28 @@ def test_what_was_found_before_a_failure_is_kept(scene, monkeypatch):
     member = study.examine(scene, 3)
     assert member.ramps == ramps(("onset", 0.01), ("onset", 0.008))
     assert member.lowered is True
-    assert member.says
+    assert member.says == "no eruption today"
     assert "failed: " in study.sentence(member)
 
 
 def test_eruptions_are_counted(scene):
-    eruptions = [Eruption(0.01, 1.0, 1e-25, 1e-23, 1e-23 * 10**rise, rise) for rise in (0.0, 6.0, 11.0, 12.0)]
+    eruptions = [eruption(rise) for rise in (0.0, 6.0, 11.0, 12.0)]
     ends = ramps(("onset", 0.02), ("onset", 0.01))
     members = [Member(seed, ends, True, each) for seed, each in enumerate(eruptions)]
     members += [Member(8, ramps(("onset", 0.01), ("onset", 0.02)), False), Member(9, says="did not settle")]
     result = study.summary(scene, members)
-    assert {name: (each["count"], each["of"]) for name, each in result["erupts"].items()} == {"5": (3, 4), "10": (2, 4)}
+    assert {name: (each["count"], each["of"]) for name, each in result["rises"].items()} == {"5": (3, 4), "10": (2, 4)}
+    assert [each["count"] for each in result["control_rises"].values()] == [4, 0]
+    assert (result["grows"]["count"], result["grows"]["of"]) == (2, 4)
     assert (result["lowered"]["count"], result["lowered"]["of"]) == (4, 5)
-    assert result["rise_quartiles"] == [4.5, 8.5, 11.25]
+    assert result["rise_quartiles"] == pytest.approx([4.5, 8.5, 11.25])
     assert [each["seed"] for each in result["failed"]] == [9]
     assert Member.from_dict(json.loads(json.dumps(study.asdict(members[0])))) == members[0]
 
 
 def test_figure_shows_pairs_and_rises():
     members = [
-        Member(1, ramps(("onset", 0.02), ("onset", 0.01)), True, Eruption(0.015, 1.0, 1e-25, 1e-23, 1e-12, 11.0)),
+        Member(1, ramps(("onset", 0.02), ("onset", 0.01)), True, eruption(11.0)),
         Member(2, ramps(("onset", 0.01), ("onset", 0.02)), False),
         Member(3, ramps(("until", 0.03), ("onset", 0.02)), True),
         Member(4, ramps(("until", 0.03), ("until", 0.03))),
@@ -171,7 +187,8 @@ def test_figure_shows_pairs_and_rises():
     drawn = [(*line.get_xydata()[0], line.get_marker()) for line in pairs.lines[:3]]
     assert drawn == [(0.02, 0.01, "o"), (0.01, 0.02, "o"), (0.03, 0.02, ">")]
     assert pairs.get_xlabel() == r"$F_x^c(\mu = 1)$"
-    assert sum(bar.get_height() for bar in rises.patches) == 1
+    assert sum(bar.get_height() for bar in rises.patches) == 2  # the packing and its control
+    assert [line.get_markerfacecolor() for line in pairs.lines[:3]] == ["C0", "none", "none"]
     assert len(study.ensemble_figure([]).axes) == 3
 
 
