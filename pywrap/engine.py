@@ -224,7 +224,7 @@ class Engine:
 
     def dump(self, stem: Path) -> None:
         """Write the configuration as LAMMPS dumps in full precision (deck part write.in): STEM.disks and others."""
-        self._variables(name=stem)
+        self._variables(name=stem, fx=self._static.fx)
         self._include("write.in")
 
     @contextmanager

@@ -63,14 +63,14 @@ Say = Callable[[str], None]
 FINEST_STEP = 1e-3
 """Increment of F_x below which a ramp only costs: onsets are solved for, and come out the same."""
 
-LONGEST_TIME = 100.0
-"""Length of the undamped runs, time, at the most: with 100 disks, four of them take about 20 s."""
+LONGEST_TIME = 200.0
+"""Length of the undamped runs, time, at the most: with 100 disks, four of them take some 30 s."""
 
 RISES = (5, 10)
 """Rises in decades whose shares are given; the paper's figure 5 has 12."""
 
-JUMP_SHARE = 0.1
-"""Share of the run with mu(v) that shows the jump: 10 of 100 time units, where the slowest modes of 100 disks have
+JUMP_SHARE = 0.05
+"""Share of the run with mu(v) that shows the jump: 10 of 200 time units, where the slowest modes of 100 disks have
 periods of 6, and the fastest pairs have just begun to stand out."""
 
 GROWTH_FACTOR = 2.0
@@ -236,6 +236,7 @@ def ensemble(
                 append(lines, scene, member)
                 say(sentence(member))
                 ended.append(member)
+    ended.sort(key=lambda member: member.seed)
     result = summary(scene, ended)
     (output / "ensemble.json").write_text(json.dumps(result, indent=1) + "\n")
     save(ensemble_figure(ended), output / "ensemble")

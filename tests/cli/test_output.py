@@ -1,0 +1,65 @@
+"""Section [output]: what is written only when it is asked for."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import RunFile, mean_square_displacement, read_dump
+
+BIN = Path(sys.executable).parent
+REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
+
+SCENE = f"""
+[packing]
+file = "{REFERENCE}"
+[law]
+kn = 2e5
+[load]
+fy = 3.0
+[ramp]
+step = 1e-3
+until = 2e-3
+[perturb]
+fx = 1e-3
+time = 0.2
+amplitude = 1e-6
+omega = 1.0
+"""
+
+
+def faultgouge(folder, command, output):
+    (folder / "scene.toml").write_text(SCENE + output)
+    done = subprocess.run(
+        [BIN / "faultgouge", command, "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_nothing_but_the_result_without_output(tmp_path):
+    assert faultgouge(tmp_path, "ramp", "") == ["run.h5", "scene.toml"]
+    assert faultgouge(tmp_path, "perturb", "") == ["perturb.h5", "run.h5", "scene.toml"]
+    with RunFile(tmp_path / "perturb.h5") as file, pytest.raises(ValueError, match="no series trajectory"):
+        file.series("trajectory")
+
+
+def test_dumps_hold_the_equilibria(tmp_path):
+    written = faultgouge(tmp_path, "ramp", "[output]\ndumps = true\n")
+    assert {f"run.{k}.{kind}" for k in (1, 2) for kind in ("disks", "contacts", "params")} <= set(written)
+    with RunFile(tmp_path / "run.h5") as file:
+        for k in (1, 2):
+            stored, dumped = file.packing(k), read_dump(tmp_path / f"run.{k}.disks")
+            assert np.array_equal(dumped.position, stored.position)
+            assert np.array_equal(dumped.contacts.slip, stored.contacts.slip)
+            assert dumped.fx == stored.fx
+
+
+def test_trajectory_is_that_of_the_displacements(tmp_path):
+    faultgouge(tmp_path, "perturb", "[output]\ntrajectory = true\n")
+    with RunFile(tmp_path / "perturb.h5") as file:
+        path, series, start = file.series("trajectory"), file.series("undamped"), file.packing()
+    assert np.array_equal(path["time"], series["time"])
+    assert np.array_equal(mean_square_displacement(path["position"], start.position, start.box_length), series["msd"])
