@@ -135,7 +135,8 @@ def main() -> None:
     print(file=sys.stderr)
     print(f"{platform.processor() or platform.machine()}; F_x^c of the reference packing, mu = 1, exact {EXACT:.15g}\n")
     print(
-        f"{'':10s}{'increment':>10s}{'wall s':>9s}{'CPU s':>9s}{'evaluations':>13s}{'F_x^c':>20s}{'stated':>10s}{'error':>10s}"
+        f"{'':10s}{'increment':>10s}{'wall s':>9s}{'CPU s':>9s}{'evaluations':>13s}"
+        f"{'F_x^c':>20s}{'stated':>10s}{'error':>10s}"
     )
     for row in (fast, slow):
         print(

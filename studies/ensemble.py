@@ -42,6 +42,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor, MPIPoolExecutor
 from numpy.typing import NDArray
@@ -602,7 +603,8 @@ def ensemble_figure(members: Iterable[Member]) -> Figure:
         decades = [[each.rise for each in eruptions], [each.control_rise for each in eruptions]]
         edges = np.arange(np.floor(np.min(decades)), np.max(decades) + 0.5, 0.5)
         rises.hist(decades, bins=edges, label=["in the window", "control"], color=["C0", "C1"])
-        rises.legend()
+        rises.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=2)
+        rises.yaxis.set_major_locator(MaxNLocator(integer=True))
     rises.set(xlabel="rise of $D$ in decades", ylabel="packings")
     for axes, name in ((onsets, "(a)"), (pairs, "(b)"), (rises, "(c)")):
         axes.set_title(name, loc="left", fontsize=8.5)

@@ -59,6 +59,19 @@ def test_growth_rate_and_frequency_are_those_of_the_spectrum(reference_packing):
 
 
 @pytest.mark.slow
+def test_rounding_noise_grows_by_fifteen_decades(reference_packing):
+    """Nothing but noise to begin with: D rises from 1e-25 by fifteen decades, most of them at the spectrum's rate."""
+    packing = equilibrium(reference_packing(1.0), 0.024)
+    time, msd, _ = run(packing, packing, 1400.0, 7000)
+    noise = np.median(msd[time < 100])
+    assert msd.max() / noise > 1e15
+    # three decades above the noise one pair is alone; at 1e-11 D begins to level off
+    growth = fit_growth(time, msd, lower=1e3 * noise, upper=1e-11)
+    assert growth.decades > 9
+    assert growth.rate == pytest.approx(spectrum(packing).growth_rate(time_step(packing)), rel=5e-3)
+
+
+@pytest.mark.slow
 def test_nothing_grows_below_the_onset(reference_packing):
     """A million steps at F_x = 0.0205, F_x^c = 0.0218: the rounding of each step adds to D, which grows as the time."""
     packing = equilibrium(reference_packing(1.0), 0.0205, increment=5e-4)
