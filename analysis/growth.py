@@ -148,7 +148,8 @@ def fit_oscillation(time: ArrayLike, signal: ArrayLike) -> complex:
     Returns
     -------
     complex
-        omega_r - i sigma: the frequency, and the growth rate of the amplitude (half of that of D) with a minus sign.
+        omega_r - i sigma: the frequency, and the growth rate of the amplitude (half of that of D) with a minus sign. A
+        second oscillation or noise of relative size r changes omega_r by a share of r and biases sigma by r omega_r.
 
     Raises
     ------

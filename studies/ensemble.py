@@ -56,7 +56,7 @@ from ..pywrap.quasistatic import NoEquilibriumError
 from ..pywrap.scene import Friction, GeneratedPacking, Perturb
 from ..pywrap.stages import EquilibriumPath, loads, next_equilibrium, perturb, settle, weakening_of
 from .figures import INK, STYLE, save
-from .triggering import column
+from .triggering import GROWTH_FACTOR, column, jump
 
 Floats = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -69,14 +69,6 @@ LONGEST_TIME = 200.0
 
 RISES = (5, 10)
 """Rises in decades whose shares are given; the paper's figure 5 has 12."""
-
-JUMP_SHARE = 0.05
-"""Share of the run with mu(v) that shows the jump: 10 of 200 time units, where the slowest modes of 100 disks have
-periods of 6, and the fastest pairs have just begun to stand out."""
-
-GROWTH_FACTOR = 2.0
-"""Factor from the jump to the largest D from which on D has grown. Without an instability, the phases in which many
-modes happen to meet change the maximum by some ten percent."""
 
 
 @dataclass(frozen=True)
@@ -373,16 +365,16 @@ def _eruption(
     quiet = _undamped(scene, settings, start, 0.0)
     v0 = np.abs(column(quiet, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
     weakening = weakening_of(friction, float(v0))
-    weakened = msd(start, weakening)
+    weakened = _undamped(scene, settings, start, settings.amplitude, weakening)
     return Eruption(
         fx=start.fx,
         fx_control=below.fx,
         rate=weakened_rate(start.packing, friction.mu_ss),
         unperturbed=float(column(quiet, "msd").max()),
         perturbed=float(msd(start, None).max()),
-        weakening=float(weakened.max()),
+        weakening=float(column(weakened, "msd").max()),
         control=float(msd(below, weakening).max()),
-        jump=float(weakened[: max(1, round(JUMP_SHARE * len(weakened)))].max()),
+        jump=jump(weakened),
     )
 
 

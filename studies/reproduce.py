@@ -110,23 +110,31 @@ def reproduce(scene: Scene, output: Path, say: Say = print) -> dict[str, Any]:
     more: list[str] = []
     if scene.perturb is not None and scene.friction is not None:
         say(f"triggering at F_x = {scene.perturb.fx:g}")
-        more, summary["triggering"] = _triggering(scene, scene.perturb, scene.friction, runs[0], output)
+        more, summary["triggering"] = _triggering(scene, scene.perturb, scene.friction, runs, output)
     (output / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
     (output / "report.md").write_text(_report(scene, runs, growth, more))
     return summary
 
 
 def _triggering(
-    scene: Scene, settings: Perturb, friction: Friction, run: OnsetRun, output: Path
+    scene: Scene, settings: Perturb, friction: Friction, runs: list[OnsetRun], output: Path
 ) -> tuple[list[str], dict[str, Any]]:
     """Lines of the report and numbers; figures and series are written."""
+    run = runs[0]
+    # exact but for the product's rounding
+    weakened = [each for each in runs if np.isclose(each.mu, run.mu * friction.mu_ss, rtol=1e-12)]
+    if weakened and settings.fx <= weakened[0].onset.fx_c:
+        says = (
+            f"F_x = {settings.fx:g} is below the onset {weakened[0].onset.fx_c:g} of the weakened friction, too: no "
+            "window between the two, and nothing to erupt."
+        )
+        return ["## Triggering", "", says, ""], {"says": says}
     if settings.fx >= run.onset.fx_c:
         says = f"F_x = {settings.fx:g} is above the onset {run.onset.fx_c:g}: nothing is stable there to be triggered."
         return ["## Triggering", "", says, ""], {"says": says}
-    below = max((each for each in run.equilibria if each.fx <= settings.fx), key=lambda each: each.fx)
-    with Engine(below.packing) as engine:
-        start = next_equilibrium(engine, below, settings.fx, scene)
-    triggering = trigger(scene, start, settings, friction, output / "run.h5")
+    start = _equilibrium_at(scene, run, settings.fx)
+    control = _equilibrium_at(scene, run, max(0.0, 2 * weakened[0].onset.fx_c - settings.fx)) if weakened else None
+    triggering = trigger(scene, start, control, settings, friction, output / "run.h5")
     sensitive = sensitivity(run)
     figures(triggering, sensitive, run.mu, output)
     return words(triggering, sensitive, settings, run.mu), triggering_summary(triggering, sensitive)
@@ -252,6 +260,12 @@ def _summary(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> dict[str,
             "deviation": growth.measured.rate / growth.predicted - 1 if growth.measured else None,
         },
     }
+
+
+def _equilibrium_at(scene: Scene, run: OnsetRun, fx: float) -> Equilibrium:
+    below = max((each for each in run.equilibria if each.fx <= fx), key=lambda each: each.fx)
+    with Engine(below.packing) as engine:
+        return below if below.fx == fx else next_equilibrium(engine, below, fx, scene)
 
 
 def _report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, more: list[str]) -> str:

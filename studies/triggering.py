@@ -5,6 +5,11 @@ the smaller one. Three undamped runs from the same equilibrium show what a minut
 there: nothing without it; a small bounded response with it; and an eruption where it sets the upper layer into motion
 that is fast enough to weaken the friction, mu(v), of all contacts.
 
+A rise of D alone is no instability. As soon as mu(v) has fallen, every contact that carries tangential load carries
+less of it, and the equilibrium is elsewhere: D *jumps* to the square of that distance, in a packing that is stable with
+the weakened friction as well. A control run says how far: mu(v) at a force as far below the onset of the weakened
+friction as the run is above it. What tells an instability from the jump is that D *grows* on after it.
+
 Closer and closer to the onset, the response of the pair that is about to coalesce grows as
 :math:`\epsilon^{-1/2}`, and damping cuts it off where its time tau falls below :math:`\tau_d`.
 """
@@ -29,6 +34,14 @@ from .onsets import OnsetRun
 
 Floats = NDArray[np.float64]
 
+JUMP_SHARE = 0.05
+"""Share of the run with mu(v) that shows the jump: 10 of 200 time units, where the slowest modes of 100 disks have
+periods of 6, and the fastest pairs have just begun to stand out."""
+
+GROWTH_FACTOR = 2.0
+"""Factor from the jump to the largest D from which on D has grown. Without an instability, the phases in which many
+modes happen to meet change the maximum by some ten percent."""
+
 ABOVE_NOISE = 1e3
 """How much stronger the perturbation is that is compared with the linear response: a million times in D."""
 
@@ -48,6 +61,8 @@ class Triggering:
         mu(v), with v_0 the largest velocity of the unperturbed run.
     unperturbed, perturbed, erupting : tuple of Sample
         Without perturbation, with it, and with it and mu(v).
+    control : tuple of Sample or None
+        As the last, at a force where the packing is stable with the weakened friction, too; None if none is known.
     strong : tuple of Sample
         With a perturbation `ABOVE_NOISE` as strong, for a shorter time: its D stands out of the noise of doubles and is
         compared with the linear response.
@@ -60,6 +75,7 @@ class Triggering:
     unperturbed: tuple[Sample, ...]
     perturbed: tuple[Sample, ...]
     erupting: tuple[Sample, ...]
+    control: tuple[Sample, ...] | None
     strong: tuple[Sample, ...]
     response: Response
 
@@ -73,6 +89,11 @@ class Triggering:
     def rise(self) -> float:
         """Decades between the largest D of the perturbed run and of the one with mu(v)."""
         return float(np.log10(column(self.erupting, "msd").max() / column(self.perturbed, "msd").max()))
+
+    @property
+    def grows(self) -> bool:
+        """Whether D goes on to grow after its jump."""
+        return bool(column(self.erupting, "msd").max() >= GROWTH_FACTOR * jump(self.erupting))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +125,20 @@ def column(samples: tuple[Sample, ...], name: str) -> Floats:
     return np.array([getattr(sample, name) for sample in samples])
 
 
-def trigger(scene: Scene, start: Equilibrium, settings: Perturb, friction: Friction, path: Path) -> Triggering:
+def jump(samples: tuple[Sample, ...]) -> float:
+    """The largest D in the first `JUMP_SHARE` of a run, length^2."""
+    time, msd = column(samples, "time"), column(samples, "msd")
+    return float(msd[time <= JUMP_SHARE * time[-1]].max())
+
+
+def trigger(
+    scene: Scene,
+    start: Equilibrium,
+    below: Equilibrium | None,
+    settings: Perturb,
+    friction: Friction,
+    path: Path,
+) -> Triggering:
     """The runs, written to run.h5 as they end, and the linear response beside the last.
 
     Parameters
@@ -113,16 +147,22 @@ def trigger(scene: Scene, start: Equilibrium, settings: Perturb, friction: Frict
         The scene.
     start : Equilibrium
         At settings.fx.
+    below : Equilibrium or None
+        Where the control starts.
     settings : Perturb
         The perturbation and the length of the runs.
     friction : Friction
         mu(v).
     path : Path
-        run.h5 of the ramp; gets the series unperturbed, perturbed, erupting and strong.
+        run.h5 of the ramp; gets the series unperturbed, perturbed, erupting, control and strong.
     """
 
     def run(
-        name: str, amplitude: float, weakening: Weakening | None = None, time: float = settings.time
+        name: str,
+        amplitude: float,
+        weakening: Weakening | None = None,
+        time: float = settings.time,
+        start: Equilibrium = start,
     ) -> tuple[Sample, ...]:
         one = settings.model_copy(update={"amplitude": amplitude, "time": time})
         samples = tuple(perturb(scene.model_copy(update={"perturb": one}), start, weakening=weakening))
@@ -135,6 +175,7 @@ def trigger(scene: Scene, start: Equilibrium, settings: Perturb, friction: Frict
     weakening = weakening_of(friction, float(v0))
     perturbed = run("perturbed", settings.amplitude)
     erupting = run("erupting", settings.amplitude, weakening)
+    control = None if below is None else run("control", settings.amplitude, weakening, start=below)
     amplitude = ABOVE_NOISE * settings.amplitude
     strong = run("strong", amplitude, time=min(settings.time, COMPARED_TIME))
     packing = start.packing
@@ -145,7 +186,7 @@ def trigger(scene: Scene, start: Equilibrium, settings: Perturb, friction: Frict
         omega=settings.omega or 0.0,
         dt=time_step(packing, settings.time_step),
     )
-    return Triggering(start, weakening, unperturbed, perturbed, erupting, strong, response)
+    return Triggering(start, weakening, unperturbed, perturbed, erupting, control, strong, response)
 
 
 def sensitivity(run: OnsetRun) -> Sensitivity:
@@ -215,6 +256,11 @@ def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
         "v_ss": triggering.weakening.v_ss,
         "largest_D": largest,
         "rise_in_decades": triggering.rise,
+        "jump": jump(triggering.erupting),
+        "grows_after_the_jump": triggering.grows,
+        "largest_D_of_the_control": None
+        if triggering.control is None
+        else float(column(triggering.control, "msd").max()),
         "linear_response_deviation": triggering.deviation,
         "smallest_mu": float(column(triggering.erupting, "friction").min()),
         "amplitude_exponent": sensitive.fit.exponent,
@@ -224,12 +270,29 @@ def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
     }
 
 
+def _jump_words(triggering: Triggering) -> list[str]:
+    first, largest = jump(triggering.erupting), column(triggering.erupting, "msd").max()
+    lines = [
+        f"Most of that is a jump, to {first:.1e} in the first twentieth of the run: weakened contacts carry less, and "
+        "the equilibrium is elsewhere."
+    ]
+    if triggering.control is not None:
+        control = column(triggering.control, "msd").max()
+        lines.append(
+            f"In the control run, below both onsets and so stable with weakened friction, too, D reaches {control:.1e}."
+        )
+    grown = (
+        f"It then grows {largest / first:.1f}-fold, to the level where its smallest contacts open: the packing erupts."
+    )
+    still = "It does not grow after the jump: with weakened friction the packing is stable, or grows too slowly to see."
+    return [*lines, grown if triggering.grows else still]
+
+
 def words(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, mu: float) -> list[str]:
     """Lines of the report."""
     largest = summary(triggering, sensitive)["largest_D"]
     weak = triggering.weakening
     speed = np.abs(column(triggering.erupting, "layer_velocity"))
-    erupted = triggering.rise >= 1
     return [
         "## Triggering",
         "",
@@ -246,9 +309,8 @@ def words(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, mu:
         f"mu(v) falls from {mu:g} towards {mu * weak.mu_ss:g} once |v| > v_0 = {weak.v0:.2g} (the largest velocity of "
         f"the unperturbed run), over v_ss = {weak.v_ss:.2g}; the lowest mu in the run is "
         f"{column(triggering.erupting, 'friction').min():.4g}, the velocity reaches {speed.max():.1e}.",
-        f"With mu(v), D rises {triggering.rise:.1f} decades above the perturbed run."
-        if erupted
-        else "The packing does not erupt: weakened friction leaves it stable at this force.",
+        f"With mu(v), D rises {triggering.rise:.1f} decades above the perturbed run.",
+        *_jump_words(triggering),
         "",
         "![D(t) of the three runs](figure5a.png) ![mu over v](figure5b.png) ![the law](figure2.png)",
         "",

@@ -62,8 +62,10 @@ def test_reproduce(tmp_path):
     assert triggering["linear_response_deviation"] < 0.01
     assert triggering["amplitude_exponent"] == pytest.approx(-0.5, abs=0.02)
     assert triggering["distances"][1] / triggering["distances"][0] > 1e3
-    # 40 time units are enough for friction to weaken; the eruption goes on from there
+    # 40 time units are enough for friction to weaken and the equilibrium to jump; growth takes longer
     assert triggering["rise_in_decades"] > 7
+    assert triggering["jump"] > 1e6 * triggering["largest_D"]["perturbed"]
+    assert triggering["largest_D_of_the_control"] > 0
     assert triggering["smallest_mu"] == pytest.approx(0.8, abs=1e-6)
 
 

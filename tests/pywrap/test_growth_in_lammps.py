@@ -53,9 +53,9 @@ def test_growth_rate_and_frequency_are_those_of_the_spectrum(reference_packing):
     growth = fit_growth(time, msd, lower=1e-18, upper=3e-12)
     assert growth.decades > 5.8  # of 6: the ends are means over stretches
     assert growth.rate == pytest.approx(2 * abs(omega.imag), rel=5e-3)
-    measured = fit_oscillation(time, velocity)
-    assert measured.real == pytest.approx(omega.real, rel=1e-3)
-    assert 2 * abs(measured.imag) == pytest.approx(2 * abs(omega.imag), rel=5e-3)
+    linear = slice(0, int(np.argmax(msd > 3e-12)))
+    # of the velocity the frequency alone: the second unstable pair moves the layer, too
+    assert fit_oscillation(time[linear], velocity[linear]).real == pytest.approx(omega.real, rel=1e-3)
 
 
 @pytest.mark.slow
