@@ -30,6 +30,7 @@ from ..analysis import (
 )
 from .engine import Engine, Motion, Weakening
 from .quasistatic import Equilibrium, NoEquilibriumError, equilibrate, rounding_floor
+from .rattlers import clear_rattlers
 from .scene import Friction, GeneratedPacking, Perturb, Ramp, Scene, SceneError
 
 SETTLING_TOLERANCE = 1e-9
@@ -464,10 +465,17 @@ def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None) -> Pa
                 f"the packing did not settle (a disk feels {packing.residual:.2g}): try another seed, or more disks in "
                 "the upper layer"
             ) from error
+    idle = len(packing.loaded(rounding_floor(packing)).rattlers)
+    if idle > 0.5 * len(packing):
+        raise NoEquilibriumError(
+            f"the upper layer sank through the bed, and {idle} of {len(packing)} disks carry nothing: without friction "
+            "only a layer that closes the box stays on top, so put more disks into it (packing.top), their diameters "
+            "adding up to a tenth more than the width, or try another seed"
+        )
     if scene.packing.settle_friction:
         return packing
-    contacts = touching(packing.position, packing.radius, packing.box_length)
-    return replace(packing, law=law, contacts=contacts, angle=np.zeros(len(packing)))
+    packing = clear_rattlers(packing, rounding_floor(packing))
+    return replace(packing, law=law, angle=np.zeros(len(packing)))
 
 
 def _stored(scene: Scene, law: MindlinLaw) -> Packing:
