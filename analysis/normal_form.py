@@ -49,11 +49,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 
-from .onset import Block, full_operator
-from .onset import Modes as PackingModes
+from .modes import Modes as PackingModes
+from .modes import full_operator
 from .packing import Floats, Packing
 from .spectrum import Complexes
 from .stiffness import Form
+from .tracking import Block
 
 STAR = np.array([1.0, 1.0]) / np.sqrt(2)
 """v*, the direction that both eigenvectors take at the coalescence."""

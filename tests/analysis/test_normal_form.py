@@ -6,8 +6,8 @@ import pytest
 import quasistatic
 from scipy.integrate import solve_ivp
 
+from faultgouge.analysis.modes import full_operator
 from faultgouge.analysis.normal_form import ORTHOGONAL, STAR, NormalForm, fit_power_law, pair_forms
-from faultgouge.analysis.onset import full_operator
 from faultgouge.analysis.response import linear_response
 
 ONSET, DOUBLE_EIGENVALUE = 0.0218330564080, 2058.269

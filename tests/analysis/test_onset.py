@@ -7,7 +7,8 @@ import pytest
 
 from faultgouge.analysis import Contacts, OnsetError, complex_windows, find_onset, follow, scan_windows, spectrum
 from faultgouge.analysis import onset as onset_module
-from faultgouge.analysis.onset import Modes, assign, deepest_dip, first_window, full_operator, loaded
+from faultgouge.analysis.modes import Modes, assign, full_operator, loaded
+from faultgouge.analysis.onset import deepest_dip, first_window
 
 RNG = np.random.default_rng(5)
 BASIS = np.eye(12) + 0.3 * RNG.normal(size=(12, 12))

@@ -8,7 +8,8 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import Contacts, Packing
-from faultgouge.analysis.onset import Modes, first_window, full_operator
+from faultgouge.analysis.modes import Modes, full_operator
+from faultgouge.analysis.onset import first_window
 from faultgouge.analysis.tracking import Block, Projection, continued
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import discrete_frequency, fit_growth, fit_oscillation, mean_square_displacement, spectrum
-from faultgouge.analysis.onset import Modes, full_operator
+from faultgouge.analysis.modes import Modes, full_operator
 from faultgouge.pywrap import Engine, Equilibrium, equilibrate
 from faultgouge.pywrap.quasistatic import rounding_floor
 from faultgouge.pywrap.stages import time_step

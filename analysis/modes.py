@@ -1,0 +1,158 @@
+"""The modes of a packing at one load, and which of them is which at the next.
+
+Modes are those of the symmetric form A = M^(-1/2) K M^(-1/2) of the operator, with right vectors x and left vectors y.
+Contacts whose force is unknown are left out of it, see `loaded`. Modes at neighbouring loads a, b are assigned by
+|x_a^H x_b| |y_a^H y_b| over unit vectors, so that modes that cross do not swap names; |y_a^H x_b|, the obvious weight,
+vanishes at an exceptional point.
+"""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from scipy.linalg import eig
+from scipy.optimize import linear_sum_assignment
+from scipy.sparse import csr_array
+
+from .packing import Floats, Indices, Packing
+from .spectrum import Complexes, believable, dynamical_matrix, unit_rounding
+from .stiffness import Form
+from .tracking import Block
+
+Pair = tuple[int, int]
+Operator: TypeAlias = Floats | csr_array
+
+UNKNOWN_FORCE = 10.0
+"""Forces of contacts mean something from this many times the packing's imbalance: ten, for a disk between two such
+contacts, whose forces cancel in part."""
+
+SMALL_FORCE = 1e-6
+"""And in any case from this share of the largest force: a packing that is out of balance keeps its contacts."""
+
+
+def full_operator(packing: Packing, form: Form = "consistent") -> csr_array:
+    """A = M^(-1/2) K M^(-1/2) of the `loaded` packing, shape (3N, 3N), with its zero rows; 1 / time^2."""
+    packing = loaded(packing)
+    matrix, active = dynamical_matrix(packing, form)
+    place = csr_array((np.ones(len(active)), (active, np.arange(len(active)))), shape=(3 * len(packing), len(active)))
+    return csr_array(place @ matrix @ place.T)
+
+
+def loaded(packing: Packing) -> Packing:
+    """The packing without the contacts whose force is no more than its own imbalance.
+
+    A disk that nothing holds but such contacts comes to rest just about touching, with an overlap, and so with
+    a stiffness, that is rounding noise: of order (residual / k_n)^(1/3), large enough to move eigenvalues.
+    """
+    largest = packing.normal_force.max(initial=0.0)
+    return packing.loaded(min(UNKNOWN_FORCE * packing.residual, SMALL_FORCE * largest))
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The modes of the operator at one load.
+
+    Attributes
+    ----------
+    fx : float
+        The load.
+    matrix : scipy.sparse.csr_array, shape (n, n)
+        The operator A, 1 / time^2.
+    values : ndarray of complex, shape (E,)
+        Eigenvalues by real part, then imaginary part. Complex pairs that are rounding noise have lost their
+        imaginary parts.
+    right, left : ndarray of complex, shape (n, E)
+        Unit vectors in columns.
+    partner : ndarray of int, shape (E,)
+        Index of the complex conjugate; -1 for a real eigenvalue.
+    """
+
+    fx: float
+    matrix: csr_array
+    values: Complexes
+    right: Complexes
+    left: Complexes
+    partner: Indices
+
+    @classmethod
+    def of(cls, fx: float, matrix: Operator) -> "Modes":
+        """Solve the dense eigenproblem, without the coordinates whose rows are zero."""
+        sparse = csr_array(matrix)
+        active = np.flatnonzero(np.diff(sparse.indptr))
+        size, count = sparse.shape[0], len(active)
+        right, left = np.zeros((2, size, count), dtype=np.complex128)
+        if count == 0:
+            return cls(fx, sparse, np.zeros(0, complex), right, left, np.zeros(0, int))
+        inner = sparse[active][:, active].toarray()
+        values, y, x = eig(inner, left=True, right=True, overwrite_a=True, check_finite=False)
+        order = np.lexsort((values.imag, values.real))
+        values, right[active], left[active] = values[order], x[:, order], y[:, order]
+        rounding = unit_rounding(sparse.data)
+        partner = np.full(count, -1)
+        for k in np.flatnonzero(values.imag > 0):
+            conjugate = int(np.argmin(np.abs(values - values[k].conj())))
+            if believable(values[k], abs(np.vdot(left[:, k], right[:, k])), rounding):
+                partner[k], partner[conjugate] = conjugate, k
+            else:
+                values[[k, conjugate]] = values[k].real
+        return cls(fx, sparse, values, right, left, partner)
+
+    @property
+    def complex_pairs(self) -> list[Pair]:
+        """Indices of the members of each pair, the one with positive imaginary part first."""
+        return [(int(k), int(self.partner[k])) for k in np.flatnonzero(self.values.imag > 0)]
+
+    def block(self, pair: Pair) -> Block:
+        """The 2 x 2 block on the invariant subspace of two modes."""
+        modes = list(pair)
+        return Block.of(self.matrix, span(self.right[:, modes]), span(self.left[:, modes]))
+
+    def nearest(self, block: Block) -> Pair:
+        """The two modes that lie closest to the subspaces of a block at a neighbouring load."""
+        weight = np.linalg.norm(block.right.T @ self.right, axis=0) * np.linalg.norm(block.left.T @ self.left, axis=0)
+        first, second = np.argsort(weight)[-2:]
+        return int(first), int(second)
+
+
+def assign(here: Modes, there: Modes) -> Indices:
+    """Which mode there each mode here has become.
+
+    Parameters
+    ----------
+    here, there : Modes
+        Modes at two neighbouring loads.
+
+    Returns
+    -------
+    ndarray of int, shape (E,)
+        Index there; -1 where there are fewer modes there. The assignment maximises the sum of |x^H x'| |y^H
+        y'|.
+    """
+    weight = products(here.right, there.right) * products(here.left, there.left)
+    partner = np.full(len(here.values), -1)
+    best = weight.argmax(axis=1) if weight.size else partner
+    if weight.size and len(np.unique(best)) == len(best):
+        partner = best  # every mode has its best match: no other assignment has a larger sum
+    else:
+        rows, columns = linear_sum_assignment(weight, maximize=True)
+        partner[rows] = columns
+    # Members of one pair have the same weights: let the one above the axis stay above.
+    for up, down in here.complex_pairs:
+        if partner[up] >= 0 and there.partner[partner[up]] == partner[down] and there.values[partner[up]].imag < 0:
+            partner[[up, down]] = partner[[down, up]]
+    return partner
+
+
+def products(a: Complexes, b: Complexes) -> Floats:
+    """|a_j^H b_k| over columns: in real arithmetic, but for the few columns that have imaginary parts."""
+    p, q = np.flatnonzero(np.any(a.imag, axis=0)), np.flatnonzero(np.any(b.imag, axis=0))
+    products = np.abs(np.ascontiguousarray(a.real).T @ np.ascontiguousarray(b.real))
+    products[p] = np.abs(a[:, p].conj().T @ b)
+    products[:, q] = np.abs(a.conj().T @ b[:, q])
+    return products
+
+
+def span(vectors: Complexes) -> Floats:
+    """Orthonormal real basis, shape (n, 2), of the plane of two real or two complex conjugate vectors."""
+    real_plane = np.hstack([vectors.real, vectors.imag])
+    return np.linalg.svd(real_plane, full_matrices=False)[0][:, :2]
