@@ -18,7 +18,7 @@ A rise alone is no instability. As soon as mu(v) has fallen, every contact that 
 it, and the equilibrium is elsewhere: D *jumps* to the square of that distance, in a packing that is stable with the
 weakened friction as well. How far, a *control* shows: mu(v) at a force as far below the lower onset as the middle of
 the window is above it. What tells an instability from the jump is that D goes on to *grow* after it, at the rate that
-the spectrum has there with the weakened friction, to the level where contacts open. The pair may also be real again at
+the spectrum has there with the weakened friction, until it levels off. The pair may also be real again at
 the middle of the window, or grow too slowly for the length of the run; so the rate is kept beside all this.
 
 Shares are given with Wilson's 95 % interval.

@@ -269,7 +269,8 @@ def _equilibrium_at(scene: Scene, run: OnsetRun, fx: float) -> Equilibrium:
 
 
 def _report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, more: list[str]) -> str:
-    packing = runs[0].equilibria[0].packing
+    packing, ramp = runs[0].equilibria[0].packing, scene.ramp
+    assert ramp is not None  # there are runs
     lines = [
         "# The paper's protocol on one packing",
         "",
@@ -282,8 +283,8 @@ def _report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, more: list[st
         f"A layer of {len(packing)} disks, {packing.top.sum()} of them in the upper layer, settled under",
         f"F_y = {packing.fy:g} on each disk of the upper layer: {len(packing.contacts)} contacts, "
         f"{len(packing.rattlers)} rattlers (disks that touch nothing, left out of the spectrum).",
-        f"Then F_x was raised to {runs[0].equilibria[-1].fx:g} in steps of {scene.ramp.step:g}, from equilibrium to "  # type: ignore[union-attr]
-        f"equilibrium ({scene.ramp.method}).",  # type: ignore[union-attr]
+        f"Then F_x was raised to {runs[0].equilibria[-1].fx:g} in steps of {ramp.step:g}, from equilibrium to "
+        f"equilibrium ({ramp.method}).",
         f"The largest force left on a disk is {max(e.residual for run in runs for e in run.equilibria):.1e}; the "
         f"rounding of the coordinates alone leaves about {runs[0].equilibria[-1].floor:.1e}, so that the paper's 1e-15",
         "cannot be reached in double precision in these units.",

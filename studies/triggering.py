@@ -272,18 +272,17 @@ def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
 
 def _jump_words(triggering: Triggering) -> list[str]:
     first, largest = jump(triggering.erupting), column(triggering.erupting, "msd").max()
+    jumped = np.log10(first / column(triggering.perturbed, "msd").max())
     lines = [
-        f"Most of that is a jump, to {first:.1e} in the first twentieth of the run: weakened contacts carry less, and "
-        "the equilibrium is elsewhere."
+        f"Of that, {jumped:.1f} decades are a jump, to {first:.1e} in the first twentieth of the run: weakened contacts "
+        "carry less, and the equilibrium is elsewhere."
     ]
     if triggering.control is not None:
         control = column(triggering.control, "msd").max()
         lines.append(
             f"In the control run, below both onsets and so stable with weakened friction, too, D reaches {control:.1e}."
         )
-    grown = (
-        f"It then grows {largest / first:.1f}-fold, to the level where its smallest contacts open: the packing erupts."
-    )
+    grown = f"It then grows {largest / first:.1f}-fold: an instability, and not the jump alone."
     still = "It does not grow after the jump: with weakened friction the packing is stable, or grows too slowly to see."
     return [*lines, grown if triggering.grows else still]
 
