@@ -274,7 +274,7 @@ def _jump_words(triggering: Triggering) -> list[str]:
     first, largest = jump(triggering.erupting), column(triggering.erupting, "msd").max()
     jumped = np.log10(first / column(triggering.perturbed, "msd").max())
     lines = [
-        f"Of that, {jumped:.1f} decades are a jump, to {first:.1e} in the first twentieth of the run: weakened contacts "
+        f"Of that, {jumped:.1f} decades are a jump, to {first:.1e} in the first twentieth of the run: weak contacts "
         "carry less, and the equilibrium is elsewhere."
     ]
     if triggering.control is not None:
