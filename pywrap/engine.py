@@ -265,12 +265,7 @@ class Engine:
         """
         still = self.packing.rattlers
         with ExitStack() as groups:
-            mobile = "all"
-            if len(still):
-                groups.enter_context(self._group("still", still))
-                mobile = "mobile"
-                self._command("group mobile subtract all still")
-                groups.callback(self._command, "group mobile delete")
+            mobile = groups.enter_context(self._all_but(still)) if len(still) else "all"
             self._variables(dt=time_step, mobile=mobile)
             self._include("undamped.in")
             if amplitude != 0:
@@ -406,6 +401,13 @@ class Engine:
             self._command(f"group {name} id {' '.join(map(str, part))}")
         yield name
         self._command(f"group {name} delete")
+
+    @contextmanager
+    def _all_but(self, disks: ArrayLike) -> Iterator[str]:
+        with self._group("still", disks):
+            self._command("group mobile subtract all still")
+            yield "mobile"
+            self._command("group mobile delete")
 
     @contextmanager
     def _fix(self, name: str, arguments: str) -> Iterator[None]:

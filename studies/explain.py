@@ -63,8 +63,8 @@ class Part:
         Times without and with it; None where it cannot be measured here.
     same : str
         What both compute.
-    identical : bool
-        Whether that agrees to the bit.
+    identical : bool or None
+        Whether that agrees to the bit; None where it cannot be measured here.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Part:
     adds: tuple[str, ...]
     cost: Cost | None
     same: str
-    identical: bool
+    identical: bool | None
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -144,6 +144,7 @@ def explain(scene: Scene) -> Explanation:
     SceneError, NoEquilibriumError, EngineError
         If the packing cannot be settled.
     """
+    defaults = _defaults(scene)
     scene, remark = _affordable(scene)
     start = settle(scene, communicator=MPI.COMM_SELF)
     run = _run_of(scene, start.packing)
@@ -166,7 +167,7 @@ def explain(scene: Scene) -> Explanation:
         imported=imported,
         left_out=tuple(package for package in HEAVY if package not in imported),
         parts=tuple(parts),
-        defaults=_defaults(scene),
+        defaults=defaults,
         load_average=os.getloadavg()[0],
     )
 
@@ -188,7 +189,7 @@ def _switched(feature: Feature, scene: Loaded, steps: int, folder: Path) -> Part
         if not feature.moves:
             same = f"positions and velocities after {steps * (TURNS + 1) + 1} steps"
             identical &= _same_motion(without.advance(1), with_it.advance(1))
-    included = set(adds) <= set(scene.everything)
+    included = bool(adds) and set(adds) <= set(scene.everything)
     if feature.name == "tangential history":
         adds += (f"{_rotations(feature.with_it.packing) - _rotations(feature.without.packing)} rotations in K",)
     return Part(feature.name, included, feature.reason, adds, cost, same, bool(identical))
@@ -264,14 +265,14 @@ def _ranks(run: Run, steps: int, folder: Path) -> Part:
     same = "positions and velocities"
     program = Path(sys.executable).parent / "mpiexec"
     if size > 1 or not program.exists():
-        return Part("MPI", size > 1, f"{reason}: not measured here", adds, None, same, True)
+        return Part("MPI", size > 1, f"{reason}: not measured here", adds, None, same, None)
     job = folder / "run.pickle"
     job.write_bytes(pickle.dumps((run, steps)))
     code = "import sys; from faultgouge.studies.explain import time_ranks; time_ranks(sys.argv[1])"
     command = [str(program), "-n", "2", sys.executable, "-c", code, str(job)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        return Part("MPI", False, f"{reason}: two ranks did not run here", adds, None, same, True)
+        return Part("MPI", False, f"{reason}: two ranks did not run here", adds, None, same, None)
     cost, identical = pickle.loads((folder / "run.pickle.times").read_bytes())
     return Part("MPI", False, f"{reason}: nothing is sent", adds, cost, same, identical)
 

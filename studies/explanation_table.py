@@ -32,7 +32,7 @@ def explanation_table(explanation: Explanation) -> Group:
             Text(part.reason),
             Text(", ".join(part.adds)),
             Text(_cost(part.cost)),
-            Text(part.same) if part.identical else Text(f"no: {part.same}", style="bold"),
+            Text(f"no: {part.same}", style="bold") if part.identical is False else Text(part.same),
         )
     loaded = explanation.loaded
     lines = {
