@@ -305,7 +305,7 @@ def time_ranks(job: str) -> None:
 
 def _threads(packing: Packing) -> Part:
     """A dense solve of Newton's method, with one thread and with two."""
-    from threadpoolctl import threadpool_info, threadpool_limits
+    from threadpoolctl import threadpool_info, threadpool_limits  # type: ignore[import-untyped]
 
     here = max((pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"), default=1)
     matrix = dynamical_matrix(packing)[0][:DENSE, :DENSE].toarray()
@@ -347,8 +347,8 @@ def _run_of(scene: Scene, packing: Packing) -> Run:
     """The scene's undamped run; friction that weakens does so beyond a threshold that is never reached."""
     perturb, push, weakening = scene.perturb, None, None
     if perturb and perturb.amplitude > 0:
-        target = {"top": None, "all": tuple(range(len(packing)))}.get(perturb.target, perturb.target)  # type: ignore[arg-type]
-        push = Push(perturb.amplitude, perturb.omega or 0.0, target)
+        target = tuple(range(len(packing))) if perturb.target == "all" else perturb.target
+        push = Push(perturb.amplitude, perturb.omega or 0.0, None if target == "top" else target)
     if scene.friction:
         law = scene.friction
         weakening = Weakening(B=law.B, w=law.w, mu_ss=law.mu_ss, v0=UNREACHED, v_ss=1.0)
@@ -383,4 +383,4 @@ def _rotations(packing: Packing) -> int:
 
 
 def _same_motion(one: Motion, other: Motion) -> bool:
-    return all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in one._fields)

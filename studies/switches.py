@@ -123,9 +123,9 @@ class Run:
     @contextmanager
     def started(self, communicator: MPI.Comm, log: Path | None = None) -> Iterator[Engine]:
         """LAMMPS ready for `Engine.advance`."""
-        law, fy = self.packing.law, max(self.packing.fy, np.finfo(float).tiny)
-        # two fifths of the limit of a disk whose contacts carry ten times F_y, as in undamped.in
-        step = QUIET_SHARE * 0.2 / np.sqrt(12 * law.kn ** (2 / 3) * (10 * fy) ** (1 / 3))
+        # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
+        stiffness = self.packing.law.kn ** (2 / 3) * (10 * self.packing.fy) ** (1 / 3)
+        step = QUIET_SHARE * 0.2 / np.sqrt(12 * stiffness)
         push = self.push or Push(0.0, 0.0, None)
         with (
             Engine(self.packing, communicator, log) as engine,

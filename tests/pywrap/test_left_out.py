@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from faultgouge.analysis import MindlinLaw, spectrum, stiffness_matrix, touching
+from faultgouge.analysis import MindlinLaw, PackingFileError, read_dump, spectrum, stiffness_matrix, touching
+from faultgouge.analysis.dumps import dump_frames
 from faultgouge.analysis.spectrum import dynamical_matrix
 from faultgouge.pywrap import Engine, EngineError, Equilibrium, Scene, equilibrate, settle
 from faultgouge.pywrap.engine import DECKS, Weakening
@@ -209,6 +210,23 @@ def test_without_friction_the_matrix_has_no_rotations(reference_packing):
     # what is left is the x, y block of a matrix with friction whose tangential terms vanish
     faint = stiffness_matrix(with_law(packing, mu=1.0, kt=1e-300)).toarray()
     np.testing.assert_array_equal(matrix.toarray()[: 2 * n, : 2 * n], faint[: 2 * n, : 2 * n])
+
+
+def test_dumps_without_friction_have_no_slips_and_no_angles(reference_packing, tmp_path):
+    packing = with_law(reference_packing(1.0), mu=0.0)
+    with Engine(packing) as engine:
+        engine.dump(tmp_path / "smooth")
+        packing = engine.packing  # disks in the periodic box
+    disks, contacts = (next(dump_frames(tmp_path / f"smooth.{kind}")).columns for kind in ("disks", "contacts"))
+    assert disks == ("id", "type", "x", "y", "radius", "mass", "fx", "fy", "floor_overlap")
+    assert contacts == ("id1", "id2", "f_n")
+    again = read_dump(tmp_path / "smooth.disks")
+    assert np.array_equal(again.position, packing.position)
+    assert np.array_equal(again.contacts.i, packing.contacts.i)
+    assert np.array_equal(again.contacts.j, packing.contacts.j)
+    assert again.law == packing.law
+    with pytest.raises(PackingFileError, match="no column theta or d_theta"):
+        read_dump(tmp_path / "smooth.disks", law=MindlinLaw(2e5, 1e5, 1.0))
 
 
 def test_newton_without_friction_leaves_the_angles(reference_packing):

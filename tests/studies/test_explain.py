@@ -49,7 +49,6 @@ def paper():
 @pytest.fixture(scope="module")
 def frictionless():
     mapping = Scene.from_toml(SCENES / "frictionless.toml").resolved()
-    mapping["packing"]["periodic"] = True
     return explain(Scene.from_mapping(mapping | {"output": {"dumps": True, "trajectory": True}}))
 
 
