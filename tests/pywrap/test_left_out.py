@@ -168,7 +168,16 @@ def assert_same_motion(one, other):
             },
         ),
         ({}, {"weakening": UNREACHED}),
-        ({}, {"commands": ("variable amplitude index 0.0", f'include "{DECKS / "push.in"}"')}),
+        (
+            {},
+            {
+                "commands": (
+                    "variable amplitude index 0.0",
+                    "variable omega index 1.0",
+                    f'include "{DECKS / "push.in"}"',
+                )
+            },
+        ),
         (
             {},
             {
