@@ -3,6 +3,8 @@
 #include "atom.h"
 #include "domain.h"
 #include "error.h"
+#include "fix_low_parts.h"
+#include "modify.h"
 #include "update.h"
 
 #include <cmath>
@@ -11,8 +13,24 @@
 using namespace LAMMPS_NS;
 using namespace FixConst;
 
-FixDiscIntegrator::FixDiscIntegrator(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg)
+FixDiscIntegrator::FixDiscIntegrator(LAMMPS *lmp, int narg, char **arg, int numbers) :
+    Fix(lmp, narg, arg),
+    numbers(numbers)
 {
+  static const char *const needs[] = {"no number", "one number, I0 = I/(m R^2)",
+                                      "two numbers, GAMMA and I0 = I/(m R^2)"};
+  if (narg < 3 + numbers) error->all(FLERR, "fix {} takes {}, but got {} arguments", style, needs[numbers], narg - 3);
+  for (int k = 3 + numbers; k < narg; k++) {
+    if (strcmp(arg[k], "compensated") == 0) {
+      carries_low_parts = true;
+    } else if (strcmp(arg[k], "rotation") == 0) {
+      if (++k == narg) error->all(FLERR, "fix {}: rotation takes yes or no", style);
+      rotation = utils::logical(FLERR, arg[k], false, lmp) == 1;
+    } else {
+      error->all(FLERR, "fix {} takes {} and the keywords rotation yes|no and compensated, but got {}", style,
+                 needs[numbers], arg[k]);
+    }
+  }
   time_integrate = 1;
   dynamic_group_allow = 1;
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->torque_flag)
@@ -27,19 +45,9 @@ double FixDiscIntegrator::positive_argument(const char *name, const char *text)
   return value;
 }
 
-void FixDiscIntegrator::keywords(int narg, char **arg)
-{
-  for (int k = 0; k < narg; k += 2) {
-    if (strcmp(arg[k], "rotation") != 0)
-      error->all(FLERR, "fix {}: unknown keyword {}, use rotation yes or rotation no", style, arg[k]);
-    if (k + 1 == narg) error->all(FLERR, "fix {}: rotation takes yes or no", style);
-    rotation = utils::logical(FLERR, arg[k + 1], false, lmp) == 1;
-  }
-}
-
 int FixDiscIntegrator::setmask()
 {
-  return INITIAL_INTEGRATE;
+  return INITIAL_INTEGRATE | (carries_low_parts ? FINAL_INTEGRATE : 0);
 }
 
 void FixDiscIntegrator::init()
@@ -52,7 +60,30 @@ void FixDiscIntegrator::init()
   int is_double, columns;
   angle = atom->find_custom("theta", is_double, columns);
   if (!is_double || columns > 0) angle = -1;
+  low_parts = nullptr;
+  if (carries_low_parts) {
+    low_parts = dynamic_cast<FixLowParts *>(modify->get_fix_by_id(FixLowParts::ID));
+    if (!low_parts)
+      error->all(FLERR, "fix {} with the keyword compensated needs pair_style mindlin/smooth KN KT MU compensated",
+                 style);
+  }
   reset_dt();
+}
+
+// after all that act on the disks: this fix comes last
+void FixDiscIntegrator::setup(int /*vflag*/)
+{
+  complete_forces();
+}
+
+void FixDiscIntegrator::final_integrate()
+{
+  complete_forces();
+}
+
+void FixDiscIntegrator::complete_forces()
+{
+  if (low_parts) low_parts->complete_forces();
 }
 
 void FixDiscIntegrator::reset_dt()
@@ -60,19 +91,22 @@ void FixDiscIntegrator::reset_dt()
   dt = update->dt;
 }
 
-template <bool ROTATION> void FixDiscIntegrator::move(int i)
+template <bool ROTATION, bool COMPENSATED> void FixDiscIntegrator::move(int i)
 {
-  atom->x[i][0] += dt * atom->v[i][0];
-  atom->x[i][1] += dt * atom->v[i][1];
+  const double dx = dt * atom->v[i][0], dy = dt * atom->v[i][1];
+  if constexpr (COMPENSATED) {
+    low_parts->move(i, dx, dy);
+  } else {
+    atom->x[i][0] += dx;
+    atom->x[i][1] += dy;
+  }
   if constexpr (ROTATION)
     if (angle >= 0) atom->dvector[angle][i] += dt * atom->omega[i][2];
 }
 
-FixNVEDisc::FixNVEDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg)
+FixNVEDisc::FixNVEDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg, 1)
 {
-  if (narg < 4) error->all(FLERR, "fix nve/disc takes one number, I0 = I/(m R^2), but got none");
   inertia_factor = positive_argument("I0", arg[3]);
-  keywords(narg - 4, arg + 4);
 }
 
 int FixNVEDisc::setmask()
@@ -91,65 +125,56 @@ template <bool ROTATION> void FixNVEDisc::kick(int i)
   }
 }
 
-template <bool ROTATION> void FixNVEDisc::kick_and_move()
-{
-  for (int i = 0; i < atom->nlocal; i++)
-    if (atom->mask[i] & groupbit) {
-      kick<ROTATION>(i);
-      move<ROTATION>(i);
-    }
-}
-
-template <bool ROTATION> void FixNVEDisc::kick_all()
-{
-  for (int i = 0; i < atom->nlocal; i++)
-    if (atom->mask[i] & groupbit) kick<ROTATION>(i);
-}
-
 void FixNVEDisc::initial_integrate(int /*vflag*/)
 {
-  if (rotation)
-    kick_and_move<true>();
-  else
-    kick_and_move<false>();
+  choose([this](auto rotates, auto compensates) {
+    for (int i = 0; i < atom->nlocal; i++)
+      if (atom->mask[i] & groupbit) {
+        kick<decltype(rotates)::value>(i);
+        move<decltype(rotates)::value, decltype(compensates)::value>(i);
+      }
+  });
 }
 
 void FixNVEDisc::final_integrate()
 {
-  if (rotation)
-    kick_all<true>();
-  else
-    kick_all<false>();
+  complete_forces();
+  choose([this](auto rotates, auto) {
+    for (int i = 0; i < atom->nlocal; i++)
+      if (atom->mask[i] & groupbit) kick<decltype(rotates)::value>(i);
+  });
 }
 
-FixOverdampedDisc::FixOverdampedDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg)
+FixDisplaceDisc::FixDisplaceDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg, 0)
 {
-  if (narg < 5)
-    error->all(FLERR, "fix overdamped/disc takes two numbers, GAMMA and I0 = I/(m R^2), but got {} arguments",
-               narg - 3);
+}
+
+void FixDisplaceDisc::initial_integrate(int /*vflag*/)
+{
+  choose([this](auto rotates, auto compensates) {
+    for (int i = 0; i < atom->nlocal; i++)
+      if (atom->mask[i] & groupbit) move<decltype(rotates)::value, decltype(compensates)::value>(i);
+  });
+}
+
+FixOverdampedDisc::FixOverdampedDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg, 2)
+{
   damping = positive_argument("GAMMA", arg[3]);
   inertia_factor = positive_argument("I0", arg[4]);
-  keywords(narg - 5, arg + 5);
 }
 
 void FixOverdampedDisc::initial_integrate(int /*vflag*/)
 {
-  if (rotation)
-    relax<true>();
-  else
-    relax<false>();
-}
-
-template <bool ROTATION> void FixOverdampedDisc::relax()
-{
-  for (int i = 0; i < atom->nlocal; i++)
-    if (atom->mask[i] & groupbit) {
+  choose([this](auto rotates, auto compensates) {
+    for (int i = 0; i < atom->nlocal; i++) {
+      if (!(atom->mask[i] & groupbit)) continue;
       atom->v[i][0] = atom->f[i][0] / damping;
       atom->v[i][1] = atom->f[i][1] / damping;
-      if constexpr (ROTATION) {
+      if constexpr (decltype(rotates)::value) {
         const double radius = atom->radius[i];
         atom->omega[i][2] = atom->torque[i][2] / (damping * inertia_factor * radius * radius);
       }
-      move<ROTATION>(i);
+      move<decltype(rotates)::value, decltype(compensates)::value>(i);
     }
+  });
 }

@@ -1,10 +1,12 @@
 // Integrators of disks in the plane, with moment of inertia I = I0 m R^2.
 //
-//   fix ID group nve/disc I0 [rotation no]                 velocity Verlet, undamped
-//   fix ID group overdamped/disc GAMMA I0 [rotation no]    v = F/GAMMA, R omega = (T/R)/(GAMMA I0): the relaxation
-//                                                          of the coordinates (x, y, R theta) by their forces
+//   fix ID group nve/disc I0                 velocity Verlet, undamped
+//   fix ID group overdamped/disc GAMMA I0    v = F/GAMMA, R omega = (T/R)/(GAMMA I0): the relaxation
+//                                            of the coordinates (x, y, R theta) by their forces
+//   fix ID group displace/disc               moves by v dt and omega dt, whatever the forces
 //
-// Without friction nothing turns a disk: rotation no leaves spins and angles out.
+// Keywords: with rotation no they leave spins and angles out, since without friction nothing turns a disk; with
+// compensated they carry the low parts of coordinates, see pair mindlin/smooth.
 // Where the input has a per-atom property d_theta (fix property/atom), it takes up the rotation angle.
 
 #ifndef LMP_FIX_DISC_INTEGRATORS_H
@@ -12,26 +14,50 @@
 
 #include "fix.h"
 
+#include <type_traits>
+
 namespace LAMMPS_NS {
 
 class FixDiscIntegrator : public Fix {
 public:
-  FixDiscIntegrator(class LAMMPS *, int, char **);
+  FixDiscIntegrator(class LAMMPS *, int, char **, int numbers);
   int setmask() override;
   void init() override;
+  void setup(int) override;
+  void final_integrate() override;
   void reset_dt() override;
+
+  bool compensated() const { return carries_low_parts; }
 
 protected:
   double dt = 0.0;
   double inertia_factor = 1.0;
-  bool rotation = true;
+  const int numbers;    // arguments before the keywords
 
   double positive_argument(const char *name, const char *text);
-  void keywords(int narg, char **arg);
-  template <bool ROTATION> void move(int i);    // by v dt and omega dt
+  template <bool ROTATION, bool COMPENSATED> void move(int i);    // by v dt and omega dt
+  void complete_forces();
+
+  // work(rotates, compensates) with both known at compile time
+  template <class Work> void choose(Work work) const
+  {
+    using Yes = std::true_type;
+    using No = std::false_type;
+    if (rotation && low_parts)
+      work(Yes(), Yes());
+    else if (rotation)
+      work(Yes(), No());
+    else if (low_parts)
+      work(No(), Yes());
+    else
+      work(No(), No());
+  }
 
 private:
-  int angle = -1;    // index of d_theta among the custom per-atom vectors, -1: there is none
+  bool rotation = true;
+  bool carries_low_parts = false;
+  class FixLowParts *low_parts = nullptr;    // null: plain doubles
+  int angle = -1;                            // index of d_theta among the custom per-atom vectors, -1: there is none
 };
 
 class FixNVEDisc : public FixDiscIntegrator {
@@ -43,8 +69,12 @@ public:
 
 private:
   template <bool ROTATION> void kick(int i);    // by half a step
-  template <bool ROTATION> void kick_and_move();
-  template <bool ROTATION> void kick_all();
+};
+
+class FixDisplaceDisc : public FixDiscIntegrator {
+public:
+  FixDisplaceDisc(class LAMMPS *, int, char **);
+  void initial_integrate(int) override;
 };
 
 class FixOverdampedDisc : public FixDiscIntegrator {
@@ -54,8 +84,6 @@ public:
 
 private:
   double damping;
-
-  template <bool ROTATION> void relax();
 };
 
 }    // namespace LAMMPS_NS

@@ -1,12 +1,14 @@
-"""What one way of doing a thing costs beside another: wall times of the two, taken in turns.
+"""What one way of doing a thing costs beside another: times of the two, taken in turns.
 
-What else the machine does falls on both alike, and the ratio is taken within a turn. Of the turns, medians and
-quartiles are kept: a mean would tell of the slowest.
+The ratio is taken within a turn, and every other turn begins with the other of the two, so that what else the machine
+does falls on both alike. Work of one thread is timed by the processor time of this process, which goes on without the
+pauses that others make it take; work of several by the clock on the wall. Of the turns, medians and quartiles are kept: a
+mean would tell of the slowest.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 
@@ -19,7 +21,7 @@ SHARE = 10e-3
 
 @dataclass(frozen=True)
 class Cost:
-    """Wall times of a thing without and with a feature.
+    """Times of a thing without and with a feature.
 
     Attributes
     ----------
@@ -52,7 +54,12 @@ class Cost:
 
 
 def in_turns(
-    per: str, without: Callable[[], object], with_it: Callable[[], object], count: int = 1, turns: int = TURNS
+    per: str,
+    without: Callable[[], object],
+    with_it: Callable[[], object],
+    count: int = 1,
+    turns: int = TURNS,
+    parallel: bool = False,
 ) -> Cost:
     """Time two callables in turns.
 
@@ -66,12 +73,16 @@ def in_turns(
         Times are divided by it.
     turns : int
         How often both are called, after one call that is not timed.
+    parallel : bool
+        Whether the work is that of several threads or processes.
     """
-    seconds: tuple[list[float], list[float]] = [], []
+    clock = perf_counter if parallel else process_time
+    times: tuple[list[float], list[float]] = [], []
     for turn in range(turns + 1):
-        for work, times in zip((without, with_it), seconds, strict=True):
-            start = perf_counter()
+        both = list(zip((without, with_it), times, strict=True))
+        for work, record in both if turn % 2 else both[::-1]:
+            start = clock()
             work()
             if turn:
-                times.append((perf_counter() - start) / count)
-    return Cost(per, tuple(seconds[0]), tuple(seconds[1]))
+                record.append((clock() - start) / count)
+    return Cost(per, tuple(times[0]), tuple(times[1]))

@@ -160,6 +160,7 @@ def explain(scene: Scene) -> Explanation:
         with bare.started(MPI.COMM_SELF) as engine:
             steps = _steps(engine)
         parts = [_switched(feature, loaded, steps, folder) for feature in features(run)]
+        parts += [_compensated(bare, loaded, steps, folder)]
         parts += [_dumps(scene, start, folder), _contact_output(scene, bare, loaded, steps, folder)]
         parts += [_trajectory(scene, start, bare, steps, folder)]
         parts += [_ranks(bare, steps, folder), _threads(start.packing)]
@@ -196,6 +197,25 @@ def _switched(feature: Feature, scene: Loaded, steps: int, folder: Path) -> Part
     if feature.name == "tangential history":
         adds += (f"{_rotations(feature.with_it.packing) - _rotations(feature.without.packing)} rotations in K",)
     return Part(feature.name, included, feature.reason, adds, cost, same, bool(identical))
+
+
+def _compensated(run: Run, loaded: Loaded, steps: int, folder: Path) -> Part:
+    """Coordinates, slips and forces with low parts, and without."""
+    packing, contacts = run.packing, run.packing.contacts
+    plain = replace(packing, position_low=None, contacts=replace(contacts, slip_low=None))
+    low = packing if packing.compensated else replace(packing, position_low=np.zeros_like(packing.position))
+    without, with_it = (replace(run, packing=each) for each in (plain, low))
+    reason = f'precision = "{"compensated" if packing.compensated else "double"}"'
+    feature = Feature("compensated coordinates", reason, without, with_it, where(packing, []), moves=True)
+    part = _switched(feature, loaded, steps, folder)
+    if part.identical:
+        return part
+    forces = []
+    for each in (without, with_it):
+        with each.started(MPI.COMM_SELF) as engine:
+            forces.append(engine.net_force)
+    same = f"forces at the start differ by {np.abs(forces[1] - forces[0]).max():.1g}, which doubles round away"
+    return replace(part, same=same)
 
 
 def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
@@ -299,7 +319,7 @@ def time_ranks(job: str) -> None:
                 alone.advance(steps)
             world.Barrier()
 
-        cost = in_turns("step", on_one, lambda: together.advance(steps), steps)
+        cost = in_turns("step", on_one, lambda: together.advance(steps), steps, parallel=True)
         motion = together.advance(1)
         if alone is not None:
             result = cost, _same_motion(alone.advance(1), motion)
@@ -320,7 +340,8 @@ def _threads(packing: Packing) -> Part:
             solutions[threads] = np.linalg.solve(matrix, force)
 
     # two threads that wait for one core take a third of a second
-    cost = in_turns(f"dense solve of {len(matrix)} equations", lambda: solve(1), lambda: solve(2), turns=FEW)
+    per = f"dense solve of {len(matrix)} equations"
+    cost = in_turns(per, lambda: solve(1), lambda: solve(2), turns=FEW, parallel=True)
     reason = f"{here} thread{'s' * (here > 1)} in BLAS, by OPENBLAS_NUM_THREADS; the plugin has none"
     identical = np.array_equal(solutions[1], solutions[2])
     same = "the solution" if identical else "the solution differs in its last digits"

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
-from ..analysis import Contacts, MindlinLaw, Packing
+from ..analysis import Contacts, MindlinLaw, Packing, touching
 from ..pywrap import Engine
 from ..pywrap.engine import Weakening
 
@@ -189,7 +189,7 @@ def features(run: Run) -> Iterator[Feature]:
         moves=True,
     )
 
-    contacts = replace(packing.contacts, slip=np.zeros(len(packing.contacts)))
+    contacts = touching(packing.position, packing.radius, packing.box_length)  # with zero slips
     rough_law = law if law.frictional else MindlinLaw(law.kn, 2 / 7 * law.kn, 1.0)
     yield Feature(
         "tangential history",
@@ -259,7 +259,8 @@ def _opened_and_closed(packing: Packing) -> tuple[Packing, Packing, NDArray[np.b
         length = packing.box_length
         position[:, 0] %= length
     beyond = ~floor & (np.abs(position[i, 0] - position[j, 0]) > 0.5 * length)
-    contacts = Contacts(i[~beyond], j[~beyond], packing.contacts.slip[~beyond])
+    slip, low = packing.contacts.slip, packing.contacts.slip_low
+    contacts = Contacts(i[~beyond], j[~beyond], slip[~beyond], None if low is None else low[~beyond])
     return (
         replace(packing, position=position, box_length=None, contacts=contacts),
         replace(packing, position=position, box_length=length),

@@ -23,7 +23,8 @@ from faultgouge.studies.switches import Loaded
 BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
-MODEL = {"decks", "data", "sides", "kn", "kt", "mu", "fx", "fy", "inertia", "rotation", "dt", "mobile"}
+MODEL = {"decks", "data", "sides", "kn", "kt", "mu", "fx", "fy", "inertia", "precision", "compensated", "rotation"}
+MODEL |= {"dt", "mobile"}
 PUSH = {"amplitude", "omega", "target", "push"}
 WEAKEN = {"B", "w", "mu_ss", "v0", "v_ss", "friction"}
 
