@@ -1,9 +1,9 @@
 """What one way of doing a thing costs beside another: times of the two, taken in turns.
 
 The ratio is taken within a turn, and every other turn begins with the other of the two, so that what else the machine
-does falls on both alike. Work of one thread is timed by the processor time of this process, which goes on without the
-pauses that others make it take; work of several by the clock on the wall. Of the turns, medians and quartiles are kept: a
-mean would tell of the slowest.
+does falls on both alike. Work of one thread is timed by the processor time of this process, which leaves out the pauses
+that others make it take; work of several by the clock on the wall. Of the turns, medians and quartiles are kept: a mean
+would tell of the slowest.
 """
 
 from collections.abc import Callable
