@@ -301,15 +301,19 @@ def test_a_spectrum_needs_no_lammps(tmp_path):
     assert run_command(tmp_path, "spectrum", "run.h5") == ["numpy", "scipy", "h5py"]
 
 
-def test_help_answers_at_once():
-    def seconds():
+def test_help_costs_little_more_than_the_libraries_that_print_it():
+    """0.12 s on an idle machine; here a ratio of processor times, which a busy one leaves as it is."""
+
+    def seconds(*command):
         before = getrusage(RUSAGE_CHILDREN)
-        subprocess.run([BIN / "faultgouge", "--help"], capture_output=True, check=True)
+        subprocess.run(command, capture_output=True, check=True)
         after = getrusage(RUSAGE_CHILDREN)
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
-    # processor time, and the least of several: what else the machine does only adds
-    assert min(seconds() for _ in range(7)) < 0.3
+    libraries = (sys.executable, "-c", "import typer, typer.rich_utils, rich.console, rich.markdown")
+    turns = [(seconds(BIN / "faultgouge", "--help"), seconds(*libraries)) for _ in range(5)]
+    # NumPy alone would double it
+    assert min(help_time for help_time, _ in turns) < 1.7 * min(bare for _, bare in turns)
 
 
 def datasets(path):
