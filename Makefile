@@ -1,7 +1,7 @@
 # make reproduce   sets everything up and runs the paper's protocol into results/
 # make test        sets everything up and runs all tests
 # make check       format, lint and types
-# make benchmark   time per step beside LAMMPS's own granular styles; the onset, solved and scanned
+# make benchmark   time per step beside LAMMPS's own granular styles; the onset, solved and scanned; growth with size
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
 # make clean       removes what the others made
 
@@ -37,6 +37,7 @@ format: $(VENV)/.check
 benchmark: $(VENV)/.installed
 	$(BIN)/python benchmarks/time_per_step.py
 	$(BIN)/python benchmarks/onset_against_scan.py
+	$(BIN)/python benchmarks/scale.py
 
 docs: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet -r docs/requirements.txt

@@ -44,9 +44,8 @@ TOLERANCES = tuple(10.0**-k for k in range(4, 10))
 """Forces at which dynamics hands over to Newton's method, in units of F_y, one after the other as that fails. At the
 first, a packing of 3000 disks needs about 20 iterations; at the last the contacts are what they will be."""
 
-STEPS = 100_000
-"""Time steps of one stage of dynamics, at the most, for more than SMALL disks: a rearrangement that takes longer is
-handed to Newton's method as it is."""
+STEPS = 1_000_000
+"""Time steps of one stage of dynamics, at the most, for more than SMALL disks. A layer that sinks is stopped by this."""
 
 ITERATIONS = 60
 """Iterations before dynamics takes over again; where no rearrangement is under way, 15 to 40 do."""
@@ -107,7 +106,7 @@ def minimized(packing: Packing, iterations: int = ITERATIONS) -> tuple[Packing, 
     Returns
     -------
     Packing
-        The one with the least force on a disk; the given one if none has less.
+        The minimum; or, where it is not reached, as far downhill as the iteration came.
     bool
         Whether the force is down at the rounding floor.
     """
@@ -128,7 +127,8 @@ def minimized(packing: Packing, iterations: int = ITERATIONS) -> tuple[Packing, 
             return best, True
         if residual < least:
             best, least = here, residual
-    return best, least < 10 * rounding_floor(best)
+    found = least < 10 * rounding_floor(best)
+    return best if found else here, found
 
 
 def _downhill(packing: Packing, step: Floats) -> tuple[Packing, float]:
