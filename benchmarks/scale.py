@@ -1,7 +1,7 @@
 """Settle, ramp and tracked onset of packings of growing size: time, memory, and how they grow.
 
-Square packings of disks of two radii, width 1.192 sqrt(N), an upper layer whose diameters add up to 1.3 times the width, as
-in a scene. Each size runs in a process of its own, with one thread, so that its peak of memory is its own.
+Square packings of disks of two radii, width 1.192 sqrt(N), with an upper layer whose diameters add up to 1.3 times the
+width. Each size runs in a process of its own, with one thread, so that its peak of memory is its own.
 
     settle     from the loose start to the rounding floor, at F_x = 0
     newton     one increment of F_x by 1e-3 from there, median of three

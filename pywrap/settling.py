@@ -9,8 +9,8 @@ the other: damped dynamics takes them in their stride, at a thousandth of the pr
 gather.in, bed.in, damp.in). The end is slow for dynamics and quick for Newton's method, if that is taught to live with
 what floats: a packing without friction has modes without stiffness (all of it may slide along the floor, a chain is
 about to buckle, a disk is held by nothing), on which K is singular or has a negative eigenvalue. So the flow
-:math:`\dot q = F` is integrated with implicit steps of length :math:`1/\sigma` (pseudo-transient continuation; Kelley and
-Keyes, SIAM J. Numer. Anal. 35, 508 (1998)),
+:math:`\dot q = F` is integrated with implicit steps of length :math:`1/\sigma` (pseudo-transient continuation; Kelley
+and Keyes, SIAM J. Numer. Anal. 35, 508 (1998)),
 
 .. math:: (K + \sigma)\, \Delta q = F(q), \qquad q \leftarrow q + \alpha\, \Delta q .
 
@@ -45,7 +45,7 @@ TOLERANCES = tuple(10.0**-k for k in range(4, 10))
 first, a packing of 3000 disks needs about 20 iterations; at the last the contacts are what they will be."""
 
 STEPS = 1_000_000
-"""Time steps of one stage of dynamics, at the most, for more than SMALL disks. A layer that sinks is stopped by this."""
+"""Time steps of one stage of dynamics, at the most, for more than SMALL disks: a layer may sink for ever."""
 
 ITERATIONS = 60
 """Iterations before dynamics takes over again; where no rearrangement is under way, 15 to 40 do."""

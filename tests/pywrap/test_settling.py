@@ -14,7 +14,6 @@ from faultgouge.pywrap import Scene, settle
 from faultgouge.pywrap.quasistatic import rounding_floor
 from faultgouge.pywrap.settling import minimized
 
-
 BIN = Path(sys.executable).parent
 SCENE = {"packing": {"disks": 400, "top": 26, "width": 24.0, "seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
 
