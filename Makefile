@@ -2,7 +2,7 @@
 # make test        sets everything up and runs all tests
 # make check       format, lint and types
 # make benchmark   time per step beside LAMMPS's own granular styles; what each part of a scene costs; the onset, solved and
-#                  scanned
+#                  scanned; growth with size
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
 # make clean       removes what the others made
 
@@ -40,6 +40,7 @@ benchmark: $(VENV)/.installed
 	$(BIN)/faultgouge explain scenes/paper.toml
 	$(BIN)/faultgouge explain scenes/frictionless.toml
 	$(BIN)/python benchmarks/onset_against_scan.py
+	$(BIN)/python benchmarks/scale.py
 
 docs: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet -r docs/requirements.txt

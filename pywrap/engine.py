@@ -29,6 +29,9 @@ from ..analysis.packing import FLOOR, touching
 Floats = NDArray[np.float64]
 
 DECKS = Path(str(files("faultgouge.lammps_inputs")))
+LOOK = 1000
+"""Time steps between two looks at the forces."""
+
 FLOOR_SLIP, FLOOR_OVERLAP, FLOOR_SLIP_LOW = 2, 6, 7
 LOW_COLUMNS = 5
 
@@ -174,10 +177,29 @@ class Engine:
         self._write(packing)
         self.set_fx(packing.fx)
 
-    def settle(self, force_tolerance: float) -> None:
-        """Let a loose start settle under the load (deck part bed.in)."""
-        self._variables(force_tolerance=force_tolerance)
+    def settle(self, force_tolerance: float, gather: float = 1.0, steps: int = 10_000_000) -> None:
+        """Let a loose start settle under the load (deck parts gather.in, bed.in).
+
+        Parameters
+        ----------
+        force_tolerance : float
+            Largest force on a disk.
+        gather : float
+            Share of its height to which the start is brought down evenly at first; 1 for not at all.
+        steps : int
+            Time steps of each stage, at the most.
+        """
+        self._variables(force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
+        if gather < 1:
+            self._variables(gather=gather)
+            self._include("gather.in")
         self._include("bed.in")
+
+    def damp(self, packing: Packing, force_tolerance: float, steps: int) -> None:
+        """Viscously damped dynamics from a packing at rest (deck part damp.in), for so many steps at the most."""
+        self.restore(packing)
+        self._variables(force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
+        self._include("damp.in")
 
     def relax(
         self, force_tolerance: float, damping: float = 1.0, time_step: float | None = None, chunk: int = 1000

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -33,9 +32,7 @@ from .engine import Engine, Motion, Weakening
 from .quasistatic import Equilibrium, NoEquilibriumError, equilibrate, rounding_floor
 from .rattlers import clear_rattlers
 from .scene import Friction, GeneratedPacking, Perturb, Ramp, Scene, SceneError
-
-SETTLING_TOLERANCE = 1e-9
-"""Force at which dynamics leaves settling to Newton's method, in units of F_y: the contacts are what they will be."""
+from .settling import settled
 
 ACCURATE_SHARE = 0.05
 """Time step of undamped runs in units of the stability limit 2/omega_max: the fastest mode is then resolved
@@ -467,12 +464,7 @@ def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None) -> Pa
         position_low=np.zeros_like(start.position) if scene.precision == "compensated" else None,
     )
     with Engine(loose, communicator) as engine:
-        engine.settle(SETTLING_TOLERANCE * scene.load.fy)
-        packing = engine.packing
-        # where parts float without friction this fails; the packing is then at rest to the tolerance above, and the
-        # rest is done with friction
-        with suppress(NoEquilibriumError):
-            packing = equilibrate(engine, _unpolished(packing), 0.0).packing
+        packing = settled(engine, loose)
     idle = len(packing.loaded(rounding_floor(packing)).rattlers)
     if idle > 0.5 * len(packing):
         raise NoEquilibriumError(
