@@ -8,9 +8,10 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import Contacts, Packing
+from faultgouge.analysis.large import first_window
 from faultgouge.analysis.modes import Modes, full_operator
-from faultgouge.analysis.onset import first_window
-from faultgouge.analysis.tracking import Block, Projection, continued
+from faultgouge.analysis.projection import Projection
+from faultgouge.analysis.tracking import Block, continued
 
 
 def dense_block(matrix, reference):
