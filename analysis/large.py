@@ -19,10 +19,7 @@ from .modes import Modes, Operator, Pair
 from .packing import Floats
 from .projection import Cluster, Projection
 from .tracking import Block
-from .windows import Window, complex_windows, increasing, window_between
-
-Place = tuple[float, csr_array]
-"""A load and the operator there."""
+from .windows import Place, Window, complex_windows, increasing, window_between
 
 REACH = 0.1
 """Share of an increment by which the clusters are extrapolated: a pair that they have turn complex a little late is
@@ -57,10 +54,10 @@ def first_window(
         None if all eigenvalues are real. fx_end is None if the pair is complex at the load above the onset.
     """
     loads = increasing(forces)
-    here = float(loads[0]), csr_array(operator(float(loads[0])))
+    here = Place(float(loads[0]), csr_array(operator(float(loads[0]))))
     search = _Search(operator, narrowest or 0.0)
     for load in loads[1:]:
-        there = float(load), csr_array(operator(float(load)))
+        there = Place(float(load), csr_array(operator(float(load))))
         window = search.walk(here, there)
         if window is not None:
             return window

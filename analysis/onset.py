@@ -19,9 +19,10 @@ is rounding, and a Hertzian contact has the stiffness :math:`\tfrac32 k_n \delta
 balance that an equilibrium can have, goes with a stiffness of order 1, which differs from one equilibrium to the
 next and would open and shut windows at random. Such contacts are left out, see `loaded`.
 
-**What it costs.** An equilibrium and a dense decomposition at every load that is examined. While an edge is
-solved for only its pair is continued (:mod:`~faultgouge.analysis.tracking`). In packings of more than
-`ALL_WINDOWS` disks no load is decomposed: :func:`~faultgouge.analysis.large.first_window` finds the first pair from
+**What it costs.** An equilibrium at every load that is examined, and two dense decompositions for an increment on which
+something happens; on the others two products of matrices tell that nothing does. While an edge is solved for only its
+pair is continued (:mod:`~faultgouge.analysis.tracking`). In packings of more than `ALL_WINDOWS` disks no load is
+decomposed: :func:`~faultgouge.analysis.large.first_window` finds the first pair from
 clusters of neighbouring modes.
 """
 
@@ -176,7 +177,8 @@ def scan_windows(packings: Sequence[Packing], form: Form = "consistent") -> tupl
     """
     increasing([packing.fx for packing in packings])
     states = [Modes.of(packing.fx, full_operator(packing, form)) for packing in packings]
-    windows = OpenWindows(states[0])
+    windows = OpenWindows()
+    windows.start(states[0])
     for here, there in pairwise(states):
         windows.advance(Step(here, there), lambda step, _, image: step.halfway(step.there.block(image), "scan"), "scan")
     return windows.all()

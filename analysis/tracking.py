@@ -51,6 +51,8 @@ class Block:
         The smaller |y^H x| of the unit left and right vectors.
     spread : float
         Frobenius norm of B - mean, 1 / time^2.
+    entries : ndarray, shape (2, 2)
+        B itself, 1 / time^2.
     right, left : ndarray, shape (n, 2)
         Orthonormal bases V and U.
     """
@@ -59,6 +61,7 @@ class Block:
     discriminant: float
     overlap: float
     spread: float
+    entries: Floats
     right: Floats
     left: Floats
 
@@ -73,9 +76,17 @@ class Block:
             discriminant=float((b[0, 0] - b[1, 1]) ** 2 + 4 * b[0, 1] * b[1, 0]),
             overlap=_overlap(b, metric),
             spread=float(np.linalg.norm(b - mean * np.eye(2))),
+            entries=b,
             right=right,
             left=left,
         )
+
+    def slope(self, change: csr_array) -> float:
+        """First-order change of the discriminant with a change of the operator, 1 / time^4."""
+        b = self.entries
+        db = np.linalg.solve(self.left.T @ self.right, self.left.T @ (change @ self.right))
+        # The subspaces turn in first order, which changes invariants of the block in second order only.
+        return float(2 * (b[0, 0] - b[1, 1]) * (db[0, 0] - db[1, 1]) + 4 * (db[0, 1] * b[1, 0] + b[0, 1] * db[1, 0]))
 
     def same_plane(self, other: "Block") -> bool:
         """Whether both planes are the same rather than not: all principal angles below 60 degrees."""

@@ -13,12 +13,18 @@ disagreement, is negative, an operator is computed at the predicted minimum and 
 again, until no window wider than a stated width can hide. The same is done where the assignment is
 inconsistent.
 
+**Increments on which nothing happens** are most of them, and need no decomposition. A projection names the few pairs
+that may meet (:mod:`~faultgouge.analysis.projection`), and each of these is followed by itself
+(:mod:`~faultgouge.analysis.tracking`): if its D, known to all digits at both loads with its slopes, surely keeps its
+sign in between, by the same curves, then so do all. Where one pair alone may change, what lies on either side of its
+edge is told from its own D as well. In every other case all modes of both loads are computed.
+
 The edges themselves are solved for, see :mod:`~faultgouge.analysis.edges`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,8 +33,9 @@ from scipy.sparse import csr_array
 from .edges import Edge, Kind, State, locate
 from .modes import Modes, Operator, Pair, assign
 from .packing import Floats
+from .projection import Outlook
 from .spectrum import Complexes
-from .tracking import Block
+from .tracking import Block, continued
 
 
 @dataclass(frozen=True)
@@ -103,14 +110,10 @@ def complex_windows(
         If the loads are not at least two increasing numbers.
     """
     loads = increasing(forces)
-    here = Modes.of(float(loads[0]), operator(float(loads[0])))
-    windows = OpenWindows(here)
-    search = _Search(operator, 1e-7 * np.abs(loads).max() if narrowest is None else narrowest, windows)
-    for load in loads[1:]:
-        there = Modes.of(float(load), operator(float(load)))
-        search.walk(here, there)
-        here = there
-    return windows.all()
+    search = _Search(operator, 1e-7 * np.abs(loads).max() if narrowest is None else narrowest)
+    for load in loads:
+        search.go_on(Place(float(load), csr_array(operator(float(load)))))
+    return search.windows.all()
 
 
 class Step:
@@ -152,6 +155,11 @@ class Step:
     def consistent(self) -> bool:
         """Whether every complex pair at one end is recognised at the other."""
         return not self.lost and not self.found
+
+    def states(self, pair: Pair, image: Pair) -> tuple[State, State]:
+        """A pair at both ends."""
+        here, there = self.here, self.there
+        return State(here.fx, here.matrix, here.block(pair)), State(there.fx, there.matrix, there.block(image))
 
     def halfway(self, block: Block, kind: Kind) -> "Edge":
         """An edge somewhere in this step."""
@@ -244,9 +252,12 @@ def deepest_dip(d0: Floats, s0: Floats, d1: Floats, s1: Floats) -> tuple[Floats,
 class OpenWindows:
     """The windows that are open at the load reached so far, and those that are closed."""
 
-    def __init__(self, first: Modes) -> None:
+    def __init__(self) -> None:
         self.open: dict[Pair, Edge] = {}
         self.closed: list[Window] = []
+
+    def start(self, first: Modes) -> None:
+        """Begin with the pairs that are complex at the smallest load."""
         for pair in first.complex_pairs:
             block = first.block(pair)
             self.open[pair] = Edge(first.fx, 0.0, block.mean, block.overlap, "start")
@@ -269,28 +280,112 @@ class OpenWindows:
         return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
 
 
-@dataclass(frozen=True)
+class Place(NamedTuple):
+    """A load and the operator there."""
+
+    fx: float
+    matrix: csr_array
+
+
+class Prospect(NamedTuple):
+    """What a projection and the pairs that it names say of an increment."""
+
+    changing: int  # pairs that may become complex or real in it
+    staying: int  # pairs that are complex all through it
+
+
 class _Search:
     """Walks along the loads, with as many loads in between as it takes to be sure."""
 
-    operator: Callable[[float], Operator]
-    narrowest: float
-    windows: OpenWindows
+    def __init__(self, operator: Callable[[float], Operator], narrowest: float) -> None:
+        self.operator, self.narrowest = operator, narrowest
+        self.windows = OpenWindows()
+        self.outlook = Outlook()
+        self.modes: Modes | None = None  # at the load that the windows have reached
+        self.passed: list[Place] = []  # this load and those after it on which nothing happens
 
-    def walk(self, here: Modes, there: Modes) -> None:
-        """Go from one load to the next."""
+    def go_on(self, there: Place) -> None:
+        """Go to the next load of the ramp; what nothing happens on the way to is not decomposed."""
+        self.passed.append(there)
+        if len(self.passed) == 1:
+            return
+        here = self.passed[-2]
+        prospect = self.prospect(here, there)
+        if prospect is not None and prospect.changing == 0 and prospect.staying == len(self.windows.open):
+            return
+        before = self.caught_up()
+        self.modes = Modes.of(*there)
+        self.walk(before, self.modes, alone=prospect is not None and prospect.changing == 1)
+        self.passed = [there]
+
+    def prospect(self, here: Place, there: Place) -> Prospect | None:
+        """What may happen between two neighbouring loads; None if that is not known."""
+        planes = self.outlook.meetings(here.matrix, there.matrix)
+        if planes is None:
+            return None
+        changing = staying = 0
+        for plane in planes:
+            a = continued(here.matrix, Block.of(here.matrix, plane, plane))
+            b = None if a is None else continued(there.matrix, a)
+            if a is None or b is None:
+                return None
+            if not self.keeps_sign(State(*here, a), State(*there, b)):
+                changing += 1
+            elif a.discriminant < 0:
+                staying += 1
+        return Prospect(changing, staying)
+
+    def keeps_sign(self, here: State, there: State) -> bool:
+        """Whether the discriminant of a pair surely has one sign between two loads."""
+        if here.discriminant * there.discriminant <= 0:
+            return False
+        sign, change = np.sign(here.discriminant), there.matrix - here.matrix
+        ends = ((state.discriminant, state.block.slope(change)) for state in (here, there))
+        width, _ = deepest_dip(*(sign * np.array([number]) for end in ends for number in end))
+        return bool(width[0] * (there.fx - here.fx) <= self.narrowest)
+
+    def caught_up(self) -> Modes:
+        """The modes at the last load but one, the windows carried over the loads that were skipped."""
+        first, *later = self.passed[:-1]
+        if later:
+            modes = Modes.of(*later[-1])
+            if not self.windows.open and not modes.complex_pairs:
+                return modes
+        if self.modes is None:
+            self.modes = Modes.of(*first)
+            self.windows.start(self.modes)
+        if not later:
+            return self.modes
+        step = Step(self.modes, modes)
+        if step.consistent and not step.opening and not step.closing:
+            self.windows.advance(step, self.edge, "contact change")
+            return modes
+        # Modes are not recognised over so many increments: one by one.
+        for place in later:
+            before, self.modes = self.modes, Modes.of(*place)
+            self.walk(before, self.modes)
+        return self.modes
+
+    def walk(self, here: Modes, there: Modes, alone: bool = False) -> None:
+        """Go from one load to the next; `alone` if only one pair may change on the way."""
         step = Step(here, there)
         if there.fx - here.fx > self.narrowest:
             halfway = 0.5 * (here.fx + there.fx)
-            middle = step.hidden_window(self.narrowest) if step.consistent else halfway
             edges = step.closing + step.opening
+            alone = alone and step.consistent and len(edges) == 1
+            middle = None if alone else step.hidden_window(self.narrowest) if step.consistent else halfway
             if middle is None and edges:
                 solution = self.solve(step, *edges[0])
                 if solution is None:
                     middle = halfway
                 elif here.fx < solution[1].fx < solution[2].fx < there.fx:
+                    edge, below, above = solution
+                    first, last = step.states(*edges[0])
+                    if alone and self.keeps_sign(first, below) and self.keeps_sign(above, last):
+                        self.windows.advance(step, lambda *_: edge, "contact change")
+                        return
                     # What lies on either side of this edge has yet to be looked at.
-                    edge, before, behind = solution
+                    before, behind = Modes.of(below.fx, below.matrix), Modes.of(above.fx, above.matrix)
                     self.walk(here, before)
                     self.windows.advance(Step(before, behind), lambda *_: edge, "contact change")
                     self.walk(behind, there)
@@ -316,22 +411,15 @@ class _Search:
                 continue
         return None
 
-    def solve(self, step: "Step", pair: Pair, image: Pair) -> tuple[Edge, Modes, Modes] | None:
-        """The edge of a pair that is complex at one end only, and the modes close by on either side.
+    def solve(self, step: "Step", pair: Pair, image: Pair) -> tuple[Edge, State, State] | None:
+        """The edge of a pair that is complex at one end only, and its states close by on either side.
 
         None if the search for it comes upon a load without equilibrium.
         """
-        here, there = step.here, step.there
-        ends = [State(here.fx, here.matrix, here.block(pair)), State(there.fx, there.matrix, there.block(image))]
         try:
-            edge, below, above = locate(self.operator, *ends)
+            return locate(self.operator, *step.states(pair, image))
         except RuntimeError:
             return None
-        return (
-            edge,
-            here if below.fx == here.fx else Modes.of(below.fx, below.matrix),
-            there if above.fx == there.fx else Modes.of(above.fx, above.matrix),
-        )
 
 
 def window_between(onset: Edge, end: Edge | None) -> Window:
