@@ -21,6 +21,7 @@ from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
 from .modes import Modes, Operator
+from .spectrum import believable, unit_rounding
 from .tracking import Block, continued
 
 ROOT = 1e-7
@@ -56,6 +57,12 @@ class State:
     @property
     def discriminant(self) -> float:
         return self.block.discriminant
+
+    @property
+    def definite(self) -> bool:
+        """Whether the pair is real, or complex, by more than rounding."""
+        split = complex(self.block.mean, 0.5 * np.sqrt(abs(self.discriminant)))
+        return believable(split, self.block.overlap, unit_rounding(self.matrix.data))
 
     def at(self, fx: float, operator: Operator) -> "State":
         """The same pair at another load: continued, or found among all modes if need be."""

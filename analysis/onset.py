@@ -178,7 +178,7 @@ def scan_windows(packings: Sequence[Packing], form: Form = "consistent") -> tupl
     increasing([packing.fx for packing in packings])
     states = [Modes.of(packing.fx, full_operator(packing, form)) for packing in packings]
     windows = OpenWindows()
-    windows.start(states[0])
+    windows.start(states[0].fx, [states[0].block(pair) for pair in states[0].complex_pairs])
     for here, there in pairwise(states):
         windows.advance(Step(here, there), lambda step, _, image: step.halfway(step.there.block(image), "scan"), "scan")
     return windows.all()

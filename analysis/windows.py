@@ -14,15 +14,16 @@ again, until no window wider than a stated width can hide. The same is done wher
 inconsistent.
 
 **Increments on which nothing happens** are most of them, and need no decomposition. A projection names the few pairs
-that may meet (:mod:`~faultgouge.analysis.projection`), and each of these is followed by itself
-(:mod:`~faultgouge.analysis.tracking`): if its D, known to all digits at both loads with its slopes, surely keeps its
-sign in between, by the same curves, then so do all. Where one pair alone may change, what lies on either side of its
-edge is told from its own D as well. In every other case all modes of both loads are computed.
+that may meet (:mod:`~faultgouge.analysis.meetings`), and each of these is followed by itself
+(:mod:`~faultgouge.analysis.tracking`): its D, known to all digits at both loads with its slopes, tells by the same
+curves whether it keeps its sign. If all do, windows that are open go on and nothing else happens. If one does not, its
+edge is solved for, and its D tells of either side. Where more than one may change, or a pair cannot be followed, all
+modes of both loads are computed.
 
 The edges themselves are solved for, see :mod:`~faultgouge.analysis.edges`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -31,9 +32,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
 from .edges import Edge, Kind, State, locate
+from .meetings import Outlook
 from .modes import Modes, Operator, Pair, assign
 from .packing import Floats
-from .projection import Outlook
 from .spectrum import Complexes
 from .tracking import Block, continued
 
@@ -110,10 +111,27 @@ def complex_windows(
         If the loads are not at least two increasing numbers.
     """
     loads = increasing(forces)
-    search = _Search(operator, 1e-7 * np.abs(loads).max() if narrowest is None else narrowest)
-    for load in loads:
-        search.go_on(Place(float(load), csr_array(operator(float(load)))))
+    narrowest = 1e-7 * float(np.abs(loads).max()) if narrowest is None else narrowest
+    try:
+        return _walked(operator, loads, narrowest, Outlook())
+    except _LostTrackError:
+        return _walked(operator, loads, narrowest, None)
+
+
+def _walked(
+    operator: Callable[[float], Operator], loads: Floats, narrowest: float, outlook: Outlook | None
+) -> tuple[Window, ...]:
+    search = _Search(operator, narrowest, outlook)
+    here = Place(float(loads[0]), csr_array(operator(float(loads[0]))))
+    for load in loads[1:]:
+        there = Place(float(load), csr_array(operator(float(load))))
+        search.go_on(here, there)
+        here = there
     return search.windows.all()
+
+
+class _LostTrackError(RuntimeError):
+    """Pairs that were followed one by one are not those of a decomposition."""
 
 
 class Step:
@@ -250,33 +268,49 @@ def deepest_dip(d0: Floats, s0: Floats, d1: Floats, s1: Floats) -> tuple[Floats,
 
 
 class OpenWindows:
-    """The windows that are open at the load reached so far, and those that are closed."""
+    """The windows that are open at the load reached so far, by the blocks of their pairs there; and the closed ones."""
 
     def __init__(self) -> None:
-        self.open: dict[Pair, Edge] = {}
+        self.open: list[tuple[Block, Edge]] = []
         self.closed: list[Window] = []
 
-    def start(self, first: Modes) -> None:
+    def start(self, fx: float, blocks: Iterable[Block]) -> None:
         """Begin with the pairs that are complex at the smallest load."""
-        for pair in first.complex_pairs:
-            block = first.block(pair)
-            self.open[pair] = Edge(first.fx, 0.0, block.mean, block.overlap, "start")
+        self.open = [(block, Edge(fx, 0.0, block.mean, block.overlap, "start")) for block in blocks]
 
-    def advance(self, step: "Step", edge: Callable[["Step", Pair, Pair], Edge], lost: Kind) -> None:
+    def take(self, block: Block) -> Edge:
+        """The onset of the open window of a pair, which is no longer among them."""
+        for place, (known, edge) in enumerate(self.open):
+            if known.same_plane(block):
+                del self.open[place]
+                return edge
+        raise _LostTrackError
+
+    def advance(self, step: Step, edge: Callable[[Step, Pair, Pair], Edge], lost: Kind) -> None:
         """Carry them over a step; pairs that are not recognised end and begin halfway."""
-        now = {image: self.open.pop(pair) for pair, image in step.staying}
+        here, there = step.here, step.there
+        now = [(there.block(image), self.take(here.block(pair))) for pair, image in step.staying]
         for pair, image in step.closing:
-            self.closed.append(window_between(self.open.pop(pair), edge(step, pair, image)))
+            self.closed.append(window_between(self.take(here.block(pair)), edge(step, pair, image)))
         for pair, image in step.opening:
-            now[image] = edge(step, pair, image)
+            now.append((there.block(image), edge(step, pair, image)))
         for pair in step.lost:
-            self.closed.append(window_between(self.open.pop(pair), step.halfway(step.here.block(pair), lost)))
+            block = here.block(pair)
+            self.closed.append(window_between(self.take(block), step.halfway(block, lost)))
         for image in step.found:
-            now[image] = step.halfway(step.there.block(image), lost)
+            block = there.block(image)
+            now.append((block, step.halfway(block, lost)))
+        self.carry(now)
+
+    def carry(self, now: list[tuple[Block, Edge]]) -> None:
+        """Go on with these windows; all others must have been taken."""
+        if self.open:
+            raise _LostTrackError
         self.open = now
 
     def all(self) -> tuple[Window, ...]:
-        still = [window_between(edge, None) for edge in self.open.values()]
+        """All windows by increasing onset."""
+        still = [window_between(edge, None) for _, edge in self.open]
         return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
 
 
@@ -287,53 +321,91 @@ class Place(NamedTuple):
     matrix: csr_array
 
 
-class Prospect(NamedTuple):
-    """What a projection and the pairs that it names say of an increment."""
+class Followed(NamedTuple):
+    """A pair at both ends of an increment, and whether it surely stays real, or complex, all through."""
 
-    changing: int  # pairs that may become complex or real in it
-    staying: int  # pairs that are complex all through it
+    here: State
+    there: State
+    steady: bool
 
 
 class _Search:
     """Walks along the loads, with as many loads in between as it takes to be sure."""
 
-    def __init__(self, operator: Callable[[float], Operator], narrowest: float) -> None:
-        self.operator, self.narrowest = operator, narrowest
+    def __init__(self, operator: Callable[[float], Operator], narrowest: float, outlook: Outlook | None) -> None:
+        self.operator, self.narrowest, self.outlook = operator, narrowest, outlook
         self.windows = OpenWindows()
-        self.outlook = Outlook()
-        self.modes: Modes | None = None  # at the load that the windows have reached
-        self.passed: list[Place] = []  # this load and those after it on which nothing happens
+        self.begun = False
+        self.modes: Modes | None = None  # the last that were computed
+        self.known: list[State] = []  # pairs at the load reached so far
 
-    def go_on(self, there: Place) -> None:
-        """Go to the next load of the ramp; what nothing happens on the way to is not decomposed."""
-        self.passed.append(there)
-        if len(self.passed) == 1:
+    def go_on(self, here: Place, there: Place) -> None:
+        """Go to the next load: with the pairs that may meet if they are few and plain, else with all modes."""
+        pairs = self.pairs(here, there)
+        self.known = [pair.there for pair in pairs or []]
+        if pairs is not None and self.follow(pairs):
             return
-        here = self.passed[-2]
-        prospect = self.prospect(here, there)
-        if prospect is not None and prospect.changing == 0 and prospect.staying == len(self.windows.open):
-            return
-        before = self.caught_up()
+        before = self.modes if self.modes is not None and self.modes.fx == here.fx else Modes.of(*here)
+        self.begin(here.fx, [before.block(pair) for pair in before.complex_pairs])
         self.modes = Modes.of(*there)
-        self.walk(before, self.modes, alone=prospect is not None and prospect.changing == 1)
-        self.passed = [there]
+        self.walk(before, self.modes)
 
-    def prospect(self, here: Place, there: Place) -> Prospect | None:
-        """What may happen between two neighbouring loads; None if that is not known."""
-        planes = self.outlook.meetings(here.matrix, there.matrix)
+    def begin(self, fx: float, blocks: list[Block]) -> None:
+        """At the smallest load, open the windows of the pairs that are complex there."""
+        if not self.begun:
+            self.windows.start(fx, blocks)
+            self.begun = True
+
+    def pairs(self, here: Place, there: Place) -> list[Followed] | None:
+        """The pairs that may meet, or are complex, between two neighbouring loads; None if they cannot be told."""
+        planes = None if self.outlook is None else self.outlook.meetings(here.matrix, there.matrix)
         if planes is None:
             return None
-        changing = staying = 0
+        pairs: list[Followed] = []
         for plane in planes:
-            a = continued(here.matrix, Block.of(here.matrix, plane, plane))
+            guess = Block.of(here.matrix, plane, plane)
+            block = next((each.block for each in self.known if each.block.same_plane(guess)), None)
+            a = block or continued(here.matrix, guess)
             b = None if a is None else continued(there.matrix, a)
-            if a is None or b is None:
+            if a is None or b is None or any(each.here.block.same_plane(a) for each in pairs):
                 return None
-            if not self.keeps_sign(State(*here, a), State(*there, b)):
-                changing += 1
-            elif a.discriminant < 0:
-                staying += 1
-        return Prospect(changing, staying)
+            ends = State(*here, a), State(*there, b)
+            if not ends[0].definite or not ends[1].definite:
+                return None
+            pairs.append(Followed(*ends, self.keeps_sign(*ends)))
+        return pairs
+
+    def follow(self, pairs: list[Followed]) -> bool:
+        """Carry the windows over an increment by these pairs alone; False if that takes more."""
+        changing = [pair for pair in pairs if not pair.steady]
+        edge = self.plain_edge(*changing[0][:2]) if len(changing) == 1 else None
+        if changing and edge is None:
+            return False
+        self.begin(
+            pairs[0].here.fx if pairs else 0.0, [pair.here.block for pair in pairs if pair.here.discriminant < 0]
+        )
+        now = []
+        for here, there, steady in pairs:
+            if here.discriminant > 0 and steady:
+                continue
+            onset = self.windows.take(here.block) if here.discriminant < 0 else edge
+            if there.discriminant < 0:
+                now.append((there.block, onset))
+            else:
+                self.windows.closed.append(window_between(onset, edge))
+        self.windows.carry(now)
+        return True
+
+    def plain_edge(self, here: State, there: State) -> Edge | None:
+        """The edge of a pair if it has one and no more between two loads, as far as its D tells."""
+        if here.discriminant * there.discriminant > 0:
+            return None
+        try:
+            edge, below, above = locate(self.operator, here, there)
+        except RuntimeError:
+            return None
+        plain = here.fx < below.fx < above.fx < there.fx
+        return edge if plain and self.keeps_sign(here, below) and self.keeps_sign(above, there) else None
 
     def keeps_sign(self, here: State, there: State) -> bool:
         """Whether the discriminant of a pair surely has one sign between two loads."""
@@ -344,48 +416,21 @@ class _Search:
         width, _ = deepest_dip(*(sign * np.array([number]) for end in ends for number in end))
         return bool(width[0] * (there.fx - here.fx) <= self.narrowest)
 
-    def caught_up(self) -> Modes:
-        """The modes at the last load but one, the windows carried over the loads that were skipped."""
-        first, *later = self.passed[:-1]
-        if later:
-            modes = Modes.of(*later[-1])
-            if not self.windows.open and not modes.complex_pairs:
-                return modes
-        if self.modes is None:
-            self.modes = Modes.of(*first)
-            self.windows.start(self.modes)
-        if not later:
-            return self.modes
-        step = Step(self.modes, modes)
-        if step.consistent and not step.opening and not step.closing:
-            self.windows.advance(step, self.edge, "contact change")
-            return modes
-        # Modes are not recognised over so many increments: one by one.
-        for place in later:
-            before, self.modes = self.modes, Modes.of(*place)
-            self.walk(before, self.modes)
-        return self.modes
-
-    def walk(self, here: Modes, there: Modes, alone: bool = False) -> None:
-        """Go from one load to the next; `alone` if only one pair may change on the way."""
+    def walk(self, here: Modes, there: Modes) -> None:
+        """Go from one load to the next."""
         step = Step(here, there)
         if there.fx - here.fx > self.narrowest:
             halfway = 0.5 * (here.fx + there.fx)
+            middle = step.hidden_window(self.narrowest) if step.consistent else halfway
             edges = step.closing + step.opening
-            alone = alone and step.consistent and len(edges) == 1
-            middle = None if alone else step.hidden_window(self.narrowest) if step.consistent else halfway
             if middle is None and edges:
                 solution = self.solve(step, *edges[0])
                 if solution is None:
                     middle = halfway
                 elif here.fx < solution[1].fx < solution[2].fx < there.fx:
-                    edge, below, above = solution
-                    first, last = step.states(*edges[0])
-                    if alone and self.keeps_sign(first, below) and self.keeps_sign(above, last):
-                        self.windows.advance(step, lambda *_: edge, "contact change")
-                        return
                     # What lies on either side of this edge has yet to be looked at.
-                    before, behind = Modes.of(below.fx, below.matrix), Modes.of(above.fx, above.matrix)
+                    edge, *sides = solution
+                    before, behind = (Modes.of(side.fx, side.matrix) for side in sides)
                     self.walk(here, before)
                     self.windows.advance(Step(before, behind), lambda *_: edge, "contact change")
                     self.walk(behind, there)

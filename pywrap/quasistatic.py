@@ -16,8 +16,9 @@ contact of stiffness k by :math:`k \epsilon |x|`. `rounding_floor` sums this ove
 equilibrium whose residual no longer falls and is of this order is at the floor, and is reported as such. Where the last
 two residuals show that another iteration would gain nothing, it is not made.
 
-Between two equilibria that start from the same one q is nearly proportional to the increment: where a second one is
-known, the iteration starts from its displacement, in proportion.
+From one equilibrium to another q is nearly proportional to the increment: where a third one is known, the iteration
+starts from the displacement of that one, in proportion. The ramp of an onset takes the equilibrium before the last,
+which saves one of four evaluations; a ramp that is stored does not, so that it goes on to the bit where it was cut off.
 
 Where Newton fails the increment is halved, since the path matters: friction remembers.
 """
@@ -125,8 +126,8 @@ def equilibrate(
     force_tolerance : float, optional
         Residual to stop at. By default the iteration ends at the floor.
     beside : Equilibrium, optional
-        Another one that follows from the last, at another fx: a better guess than no displacement at all. It does not
-        change what is found, except for the rounding.
+        Another one near the last, at another fx: its displacement is a better guess than none. It does not change what
+        is found, except for the rounding.
 
     Returns
     -------

@@ -180,20 +180,20 @@ class EquilibriumPath:
     def __init__(self, engine: Engine, start: Equilibrium, scene: Scene) -> None:
         self._engine, self._scene = engine, scene
         self.kept = [start]
-        # the last equilibrium that was not kept, and the one that it follows from
-        self._recent: tuple[Equilibrium, Equilibrium] | None = None
+        self._beside: tuple[Equilibrium, Equilibrium] | None = None  # an equilibrium, and another one near it
 
     def __call__(self, fx: float) -> Packing:
         """The packing in equilibrium at fx."""
         below = next((each for each in reversed(self.kept) if each.fx <= fx), self.kept[0])
         if below.fx == fx:
             return below.packing
-        beside = self._recent[1] if self._recent and self._recent[0] is below else None
+        beside = self._beside[1] if self._beside and self._beside[0] is below else None
         found = next_equilibrium(self._engine, below, fx, self._scene, beside)
         if fx > self.kept[-1].fx:
             self.kept.append(found)
+            self._beside = found, below
         else:
-            self._recent = below, found
+            self._beside = below, found
         return found.packing
 
     def climb(self, forces: NDArray[np.float64]) -> Iterator[Equilibrium]:

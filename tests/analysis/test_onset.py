@@ -8,8 +8,8 @@ import pytest
 from faultgouge.analysis import Contacts, OnsetError, complex_windows, find_onset, follow, scan_windows, spectrum
 from faultgouge.analysis import onset as onset_module
 from faultgouge.analysis.large import first_window
+from faultgouge.analysis.meetings import Outlook
 from faultgouge.analysis.modes import Modes, assign, full_operator, loaded
-from faultgouge.analysis.projection import Outlook
 from faultgouge.analysis.windows import deepest_dip
 
 RNG = np.random.default_rng(5)

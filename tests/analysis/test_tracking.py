@@ -9,8 +9,9 @@ from scipy.sparse import csr_array
 
 from faultgouge.analysis import Contacts, Packing
 from faultgouge.analysis.large import first_window
+from faultgouge.analysis.meetings import meetings
 from faultgouge.analysis.modes import Modes, full_operator
-from faultgouge.analysis.projection import Projection, meetings
+from faultgouge.analysis.projection import Projection
 from faultgouge.analysis.tracking import Block, continued
 
 
