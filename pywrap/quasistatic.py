@@ -178,16 +178,15 @@ def _newton(
         force = engine.net_force
         residual = _largest(force, trial)
         floor = rounding_floor(trial)
-        gained = best is None or residual <= 0.5 * best.residual
-        # What a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved.
-        if (guess is None or evaluation > 1) and (best is None or residual < best.residual):
-            best = Equilibrium(trial, residual, floor, evaluation)
-        if best is not None and not gained:
+        if best is not None and residual > 0.5 * best.residual:
             if best.residual < 10 * floor:
                 return best, evaluation
             worse += 1
             if worse > FRUITLESS:
                 return None, evaluation
+        # What a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved.
+        if (guess is None or evaluation > 1) and (best is None or residual < best.residual):
+            best = Equilibrium(trial, residual, floor, evaluation)
         if best is not None and residual <= (force_tolerance if force_tolerance is not None else 0.1 * floor):
             return best, evaluation
         # What is not rounding falls by no less than it did the time before: it may be far below the floor now.
