@@ -35,6 +35,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
+from .edges import State
 from .large import first_window
 from .modes import Modes, assign, full_operator
 from .packing import Packing
@@ -178,7 +179,8 @@ def scan_windows(packings: Sequence[Packing], form: Form = "consistent") -> tupl
     increasing([packing.fx for packing in packings])
     states = [Modes.of(packing.fx, full_operator(packing, form)) for packing in packings]
     windows = OpenWindows()
-    windows.start(states[0].fx, [states[0].block(pair) for pair in states[0].complex_pairs])
+    first = states[0]
+    windows.start(State(first.fx, first.matrix, first.block(pair)) for pair in first.complex_pairs)
     for here, there in pairwise(states):
         windows.advance(Step(here, there), lambda step, _, image: step.halfway(step.there.block(image), "scan"), "scan")
     return windows.all()

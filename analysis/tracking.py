@@ -94,6 +94,11 @@ class Block:
         left = np.linalg.svd(self.left.T @ other.left, compute_uv=False)
         return bool(min(right[-1], left[-1]) > 0.5)
 
+    def closest(self, others: list["Block"]) -> "Block | None":
+        """The one of them on the same plane; if there are several, that with the closest eigenvalues."""
+        same = [other for other in others if self.same_plane(other)]
+        return min(same, key=lambda other: abs(other.mean - self.mean), default=None)
+
 
 def _overlap(b: Floats, metric: Floats) -> float:
     """The smaller |y^H x| from the eigenvectors z, w of the block: x = V z and y = U (U^T V)^-T w."""

@@ -274,17 +274,18 @@ class OpenWindows:
         self.open: list[tuple[Block, Edge]] = []
         self.closed: list[Window] = []
 
-    def start(self, fx: float, blocks: Iterable[Block]) -> None:
+    def start(self, pairs: Iterable[State]) -> None:
         """Begin with the pairs that are complex at the smallest load."""
-        self.open = [(block, Edge(fx, 0.0, block.mean, block.overlap, "start")) for block in blocks]
+        self.open = [(each.block, Edge(each.fx, 0.0, each.block.mean, each.block.overlap, "start")) for each in pairs]
 
     def take(self, block: Block) -> Edge:
         """The onset of the open window of a pair, which is no longer among them."""
-        for place, (known, edge) in enumerate(self.open):
-            if known.same_plane(block):
-                del self.open[place]
-                return edge
-        raise _LostTrackError
+        known = block.closest([each for each, _ in self.open])
+        if known is None:
+            raise _LostTrackError
+        (edge,) = (edge for each, edge in self.open if each is known)
+        self.open = [(each, edge) for each, edge in self.open if each is not known]
+        return edge
 
     def advance(self, step: Step, edge: Callable[[Step, Pair, Pair], Edge], lost: Kind) -> None:
         """Carry them over a step; pairs that are not recognised end and begin halfway."""
@@ -346,14 +347,14 @@ class _Search:
         if pairs is not None and self.follow(pairs):
             return
         before = self.modes if self.modes is not None and self.modes.fx == here.fx else Modes.of(*here)
-        self.begin(here.fx, [before.block(pair) for pair in before.complex_pairs])
+        self.begin([State(here.fx, here.matrix, before.block(pair)) for pair in before.complex_pairs])
         self.modes = Modes.of(*there)
         self.walk(before, self.modes)
 
-    def begin(self, fx: float, blocks: list[Block]) -> None:
+    def begin(self, complex_pairs: list[State]) -> None:
         """At the smallest load, open the windows of the pairs that are complex there."""
         if not self.begun:
-            self.windows.start(fx, blocks)
+            self.windows.start(complex_pairs)
             self.begun = True
 
     def pairs(self, here: Place, there: Place) -> list[Followed] | None:
@@ -364,8 +365,7 @@ class _Search:
         pairs: list[Followed] = []
         for plane in planes:
             guess = Block.of(here.matrix, plane, plane)
-            block = next((each.block for each in self.known if each.block.same_plane(guess)), None)
-            a = block or continued(here.matrix, guess)
+            a = guess.closest([each.block for each in self.known]) or continued(here.matrix, guess)
             b = None if a is None else continued(there.matrix, a)
             if a is None or b is None or any(each.here.block.same_plane(a) for each in pairs):
                 return None
@@ -378,21 +378,20 @@ class _Search:
     def follow(self, pairs: list[Followed]) -> bool:
         """Carry the windows over an increment by these pairs alone; False if that takes more."""
         changing = [pair for pair in pairs if not pair.steady]
-        edge = self.plain_edge(*changing[0][:2]) if len(changing) == 1 else None
-        if changing and edge is None:
+        solved = [self.plain_edge(pair.here, pair.there) for pair in changing[:1]]
+        edges = [edge for edge in solved if edge is not None]
+        if len(edges) < len(changing):
             return False
-        self.begin(
-            pairs[0].here.fx if pairs else 0.0, [pair.here.block for pair in pairs if pair.here.discriminant < 0]
-        )
-        now = []
+        self.begin([pair.here for pair in pairs if pair.here.discriminant < 0])
+        now: list[tuple[Block, Edge]] = []
         for here, there, steady in pairs:
             if here.discriminant > 0 and steady:
                 continue
-            onset = self.windows.take(here.block) if here.discriminant < 0 else edge
+            onset = self.windows.take(here.block) if here.discriminant < 0 else edges[0]
             if there.discriminant < 0:
                 now.append((there.block, onset))
             else:
-                self.windows.closed.append(window_between(onset, edge))
+                self.windows.closed.append(window_between(onset, edges[0]))
         self.windows.carry(now)
         return True
 
