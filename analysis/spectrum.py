@@ -38,7 +38,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, eigvals
 from scipy.optimize import linear_sum_assignment
-from scipy.sparse import csc_array, csr_array, diags_array, eye_array
+from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from .packing import Floats, Indices, Packing
@@ -181,11 +181,19 @@ def dynamical_matrix(packing: Packing, form: Form = "consistent") -> tuple[csr_a
         Which of the 3N coordinates (x.., y.., R theta..) its rows are. A coordinate whose row of K is zero
         feels no force: its eigenvalue is zero and says nothing.
     """
-    stiffness = stiffness_matrix(packing, form)
-    active = np.flatnonzero(np.diff(stiffness.indptr))
+    matrix = mass_weighted(stiffness_matrix(packing, form), packing)
+    active = np.flatnonzero(np.diff(matrix.indptr))
+    return matrix[active][:, active], active
+
+
+def mass_weighted(stiffness: csr_array, packing: Packing) -> csr_array:
+    """M^(-1/2) K M^(-1/2), zero rows and all, shape (3N, 3N); 1 / time^2."""
     mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
-    scale = diags_array(1.0 / np.sqrt(mass[active]))
-    return csr_array(scale @ stiffness[active][:, active] @ scale), active
+    scale = 1.0 / np.sqrt(mass)
+    rows = np.repeat(scale, np.diff(stiffness.indptr))
+    return csr_array(
+        (rows * stiffness.data * scale[stiffness.indices], stiffness.indices, stiffness.indptr), shape=stiffness.shape
+    )
 
 
 def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:

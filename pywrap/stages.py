@@ -134,11 +134,13 @@ def loads(settings: Ramp) -> NDArray[np.float64]:
     return multiples * settings.step
 
 
-def next_equilibrium(engine: Engine, last: Equilibrium, fx: float, scene: Scene) -> Equilibrium:
-    """The equilibrium at fx that follows from the last one, by the scene's method."""
+def next_equilibrium(
+    engine: Engine, last: Equilibrium, fx: float, scene: Scene, beside: Equilibrium | None = None
+) -> Equilibrium:
+    """The equilibrium at fx that follows from the last one, by the scene's method; `beside` as in `equilibrate`."""
     settings = _ramp_of(scene)
     if settings.method == "newton":
-        return equilibrate(engine, last, fx, settings.force_tolerance)
+        return equilibrate(engine, last, fx, settings.force_tolerance, beside)
     floor = rounding_floor(last.packing)
     engine.restore(last.packing)
     engine.set_fx(fx)
@@ -175,15 +177,20 @@ class EquilibriumPath:
     def __init__(self, engine: Engine, start: Equilibrium, scene: Scene) -> None:
         self._engine, self._scene = engine, scene
         self.kept = [start]
+        self._beside: tuple[Equilibrium, Equilibrium] | None = None  # an equilibrium, and another one near it
 
     def __call__(self, fx: float) -> Packing:
         """The packing in equilibrium at fx."""
         below = next((each for each in reversed(self.kept) if each.fx <= fx), self.kept[0])
         if below.fx == fx:
             return below.packing
-        found = next_equilibrium(self._engine, below, fx, self._scene)
+        beside = self._beside[1] if self._beside and self._beside[0] is below else None
+        found = next_equilibrium(self._engine, below, fx, self._scene, beside)
         if fx > self.kept[-1].fx:
             self.kept.append(found)
+            self._beside = found, below
+        else:
+            self._beside = below, found
         return found.packing
 
     def climb(self, forces: NDArray[np.float64]) -> Iterator[Equilibrium]:
