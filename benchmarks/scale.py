@@ -1,13 +1,13 @@
 """Settle, ramp and tracked onset of packings of growing size: time, memory, and how they grow.
 
-Square packings of disks of two radii, width 1.192 sqrt(N), with an upper layer whose diameters add up to 1.3 times the
-width. Each size runs in a process of its own, with one thread, so that its peak of memory is its own.
+Square packings of disks of two radii, width 1.192 sqrt(N). The upper layers are such as come to rest: others may sink into
+the bed for long, so that times of settling are those of favourable cases. Each size runs in a process of its own, with
+one thread, so that its peak of memory is its own.
 
     settle     from the loose start to the rounding floor, at F_x = 0
     newton     one increment of F_x by 1e-3 from there, median of three
     K dq = F   one linear solve in it
-    onset      the first window of complex eigenvalues, found without all eigenvalues (analysis.first_window), the ramp
-               to it included
+    onset      the first window of complex eigenvalues, found without all eigenvalues, the ramp to it included
 
     python benchmarks/scale.py [--disks 1000 3000] [--no-onset] [--output scale.json]
 
@@ -30,10 +30,9 @@ from pathlib import Path
 
 import numpy as np
 
-from faultgouge.analysis import stiffness_matrix
-from faultgouge.analysis.onset import first_window
+from faultgouge.analysis import OnsetError, find_onset
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate, settle
-from faultgouge.pywrap.quasistatic import _solve
+from faultgouge.pywrap.quasistatic import newton_step
 from faultgouge.pywrap.stages import EquilibriumPath
 
 STEP, UNTIL = 1e-3, 0.05
@@ -78,7 +77,7 @@ def measured(disks: int, seed: int, with_onset: bool) -> dict[str, float | int |
         row["newton"] = statistics.median(times) if times else None
         row["evaluations"] = here.evaluations
         begin = time.perf_counter()
-        _solve(here.packing, here.packing.net_force)
+        newton_step(here.packing, here.packing.net_force)
         row["solve"] = time.perf_counter() - begin
         if with_onset:
             row |= onset(engine, start, wanted)
@@ -91,10 +90,10 @@ def onset(engine: Engine, start: Equilibrium, wanted: Scene) -> dict[str, float 
     begin = time.perf_counter()
     path = EquilibriumPath(engine, start, wanted)
     try:
-        window = first_window(lambda fx: stiffness_matrix(path(fx)), STEP * np.arange(round(UNTIL / STEP) + 1))
-    except NoEquilibriumError:
-        window = None
-    return {"onset": time.perf_counter() - begin, "fx_c": window.fx_onset if window else None}
+        fx_c = find_onset(path, STEP * np.arange(round(UNTIL / STEP) + 1)).fx_c
+    except (NoEquilibriumError, OnsetError):
+        fx_c = None
+    return {"onset": time.perf_counter() - begin, "fx_c": fx_c}
 
 
 def text(value: float | int | None, format_: str) -> str:

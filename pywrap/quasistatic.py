@@ -257,8 +257,21 @@ def _largest(force: Floats, packing: Packing) -> float:
     return float(np.delete(per_disk, packing.rattlers).max(initial=0.0))
 
 
-def _solve(packing: Packing, force: Floats) -> Floats | None:
-    """K^-1 F on the coordinates that K knows, contacts below the floor left out; None if K is singular."""
+def newton_step(packing: Packing, force: Floats) -> Floats | None:
+    """K^-1 F on the coordinates that K knows, contacts below the floor left out; None if K is singular.
+
+    Parameters
+    ----------
+    packing : Packing
+        Where K is taken.
+    force : ndarray, shape (3N,)
+        F, force.
+
+    Returns
+    -------
+    ndarray, shape (3N,), or None
+        The displacement, length.
+    """
     solve = _factored(packing)
     return None if solve is None else solve(force)
 
