@@ -1,7 +1,8 @@
 # make reproduce   sets everything up and runs the paper's protocol into results/
 # make test        sets everything up and runs all tests
 # make check       format, lint and types
-# make benchmark   time per step beside LAMMPS's own granular styles; the onset, solved and scanned
+# make benchmark   time per step beside LAMMPS's own granular styles; the onset, solved and scanned; error against run time
+# make pictures    the report that the documentation shows, in docs/report
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
 # make clean       removes what the others made
 
@@ -15,7 +16,7 @@ SOURCES := $(shell find pair_mindlin_smooth lammps_inputs analysis pywrap studie
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: reproduce test check format benchmark docs clean
+.PHONY: reproduce test check format benchmark pictures docs clean
 
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
@@ -37,6 +38,10 @@ format: $(VENV)/.check
 benchmark: $(VENV)/.installed
 	$(BIN)/python benchmarks/time_per_step.py
 	$(BIN)/python benchmarks/onset_against_scan.py
+	$(BIN)/faultgouge report -o report
+
+pictures: $(VENV)/.installed
+	$(BIN)/faultgouge report -o docs/report
 
 docs: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet -r docs/requirements.txt

@@ -167,10 +167,9 @@ def _written(output: Path, quick: bool, done: list[Study], failed: dict[str, str
 
 
 def _page(where: dict[str, Any], quick: bool, done: list[Study], failed: dict[str, str]) -> str:
-    lines = ["# Error against run time", "", "Which method to take when:", ""]
-    for study in done:
-        lines.append(f"- **[{study.name}](#{stem(study.name)})**: {study.advice[0]} {study.advice[1]}")
-    lines += [f"- **{name}**: failed. {says}" for name, says in failed.items()]
+    lines = ["# Error against run time", "", "Which method to take when:", "", "| for | |", "|---|---|"]
+    lines += [f"| [{study.name}](#{stem(study.name)}) | {' '.join(study.advice)} |" for study in done]
+    lines += [f"| {name} | failed: {says} |" for name, says in failed.items()]
     lines += [
         "",
         f"Measured on {where['cores']} cores of {where['cpu']}, one thread, with a load of {where['load'][0]:.1f}, "

@@ -79,12 +79,19 @@ class Target:
         return float(self.rounding * self.condition / np.abs(self.exact).min())
 
     @property
-    def coordinates(self) -> float:
-        """What one unit in the last place of each coordinate, up or down, changes, relative."""
+    def coordinates(self) -> tuple[float, float]:
+        """What one unit in the last place of each coordinate, up or down, changes: the eigenvalues, and the mean of the
+        pair, relative."""
         sign = np.random.default_rng(0).choice([-1.0, 1.0], self.packing.position.shape)
         position = np.nextafter(self.packing.position, sign * np.inf)
-        found, *_ = _refined(replace(self.packing, position=position), self.shift)
-        return self.off(np.array([complex(each.value) for each in found]))
+        moved = Target.of(replace(self.packing, position=position), self.shift)
+        return self.off(moved.exact), float(abs(moved.mean / self.mean - 1))
+
+    @property
+    def mean(self) -> complex:
+        """Mean of the two of these eigenvalues that are closest to one another: the pair, 1 / time^2."""
+        apart = np.abs(self.exact[:, None] - self.exact) + np.diag(np.full(COUNT, np.inf))
+        return complex(self.exact[list(np.unravel_index(np.argmin(apart), apart.shape))].mean())
 
     def off(self, values: Complexes) -> float:
         """Largest relative error of the eigenvalues, each against the nearest; no less than the rounding of a
@@ -142,7 +149,7 @@ def near(settings: Settings) -> Study:
         "eigenvalues, near an exceptional point",
         f"at a distance of {APART:g} below it",
         "Take shift-invert for the pair itself ({sparse.error:.0e}), but trust no single eigenvalue of it: rounding "
-        "of the coordinates moves it by {coordinates:.0e}, and the pair's mean and discriminant by far less.",
+        "of the coordinates moves it by {coordinates:.0e}, and the mean of the pair by {mean:.0e}.",
     )
 
 
@@ -168,7 +175,8 @@ def _study(settings: Settings, target: Target, name: str, place: str, otherwise:
         for (method, parameter, _), ((found, evaluations), seconds) in zip(runs, results, strict=True)
     )
     last = {point.method: point for point in points}  # shift-invert's with the smallest tolerance
-    dense, sparse, coordinates = last[DENSE], last[ARPACK], target.coordinates
+    dense, sparse = last[DENSE], last[ARPACK]
+    coordinates, mean = target.coordinates
     return Study(
         name=name,
         question=f"The {COUNT} eigenvalues about the pair that coalesces at the onset, {place}; kappa = "
@@ -184,7 +192,7 @@ def _study(settings: Settings, target: Target, name: str, place: str, otherwise:
         advice=(
             f"Take the dense solver for {len(target.packing)} disks: all eigenvalues in {dense.seconds:.2g} s, "
             f"these to {dense.error:.0e}.",
-            otherwise.format(sparse=sparse, coordinates=coordinates),
+            otherwise.format(sparse=sparse, coordinates=coordinates, mean=mean),
         ),
         theory=(
             Theory("u |A| kappa", (target.attainable,)),

@@ -13,7 +13,7 @@ from matplotlib.ticker import NullFormatter
 from ..figures import INK, STYLE
 from .study import Point, Study
 
-MARKERS = "osD^vPX"
+MARKERS = "osD^vP"
 DASHES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
 SHADE = "#e9e9e9"
 
@@ -31,8 +31,7 @@ def figure_of(study: Study) -> Figure:
     bottom, top = _limits(study)
     for number, method in enumerate(study.methods):
         points = study.of(method)
-        style: dict[str, Any] = {"color": f"C{number % 6}", "marker": MARKERS[number % len(MARKERS)]}
-        style |= {"markerfacecolor": "white"} if number > 5 else {}
+        style: dict[str, Any] = {"color": f"C{number}", "marker": MARKERS[number]}
         error = [max(point.error, bottom) for point in points]
         clip = {"clip_on": False, "zorder": 3}
         left.plot([point.seconds for point in points], error, label=method, **style, **clip)

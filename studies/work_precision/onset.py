@@ -17,10 +17,9 @@ from functools import partial
 
 import numpy as np
 
-from ...analysis import Packing, find_onset, spectrum
+from ...analysis import Onset, Packing, find_onset, spectrum
 from ...analysis.spectrum import SAFETY
 from ...pywrap import Engine, Equilibrium, Scene
-from ...pywrap.scene import Ramp
 from ...pywrap.stages import EquilibriumPath
 from .study import Point, Settings, Study, Theory
 from .timing import timed
@@ -65,9 +64,14 @@ class Ways:
                 low = middle
         return 0.5 * (low + high), len(path.kept) - 1 + halvings
 
-    def root(self, increment: float, beyond: float) -> tuple[float, int, float]:
-        """The onset by the root of the discriminant on a ramp to the first increment beyond a force, the number of
-        equilibria, and the error that it states."""
+    def root(self, increment: float, beyond: float) -> tuple[float, int]:
+        """The onset by the root of the discriminant on a ramp to the first increment beyond a force, and the number of
+        equilibria."""
+        found, computed = self.solved(increment, beyond)
+        return found.fx_c, computed
+
+    def solved(self, increment: float, beyond: float) -> tuple[Onset, int]:
+        """The same, with the error that it states."""
         path, computed = self._path("newton"), 0
 
         def equilibrium(fx: float) -> Packing:
@@ -75,8 +79,8 @@ class Ways:
             computed += 1
             return path(fx)
 
-        onset = find_onset(equilibrium, increment * np.arange(np.ceil(beyond / increment) + 1))
-        return onset.fx_c, computed, onset.error
+        found = find_onset(equilibrium, increment * np.arange(np.ceil(beyond / increment) + 1))
+        return found, computed
 
     def beyond(self, onset: float) -> tuple[float, float]:
         """The error that a bisection ends at, and |y^H x| at `BEYOND` beyond the onset."""
@@ -93,8 +97,8 @@ class Ways:
         return path, k
 
     def _path(self, method: str) -> EquilibriumPath:
-        settings = self._scene.ramp or Ramp(step=1e-3, until=1.0)
-        scene = self._scene.model_copy(update={"ramp": settings.model_copy(update={"method": method})})
+        assert self._scene.ramp is not None  # it is the scene of a ramp
+        scene = self._scene.model_copy(update={"ramp": self._scene.ramp.model_copy(update={"method": method})})
         return EquilibriumPath(self._engine, self._start, scene)
 
 
@@ -109,8 +113,9 @@ def _study(settings: Settings, ways: Ways) -> Study:
     quick = settings.quick
     check, finest = (2e-3, 1e-3) if quick else (5e-4, 2.5e-4)
     guess = ways.scan(1e-3)[0] + 0.5e-3
-    exact, _, stated = ways.root(finest, guess)
-    reference_error = stated + abs(ways.root(check, guess)[0] - exact)
+    found, _ = ways.solved(finest, guess)
+    exact = found.fx_c
+    reference_error = found.error + abs(ways.root(check, guess)[0] - exact)
     runs: list[tuple[str, float, Callable[[], tuple[float, int]]]] = []
     for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
         runs.append((OVERDAMPED, increment, partial(ways.scan, increment, "overdamped")))
@@ -119,7 +124,7 @@ def _study(settings: Settings, ways: Ways) -> Study:
     for halvings in (5, 25) if quick else (2, 5, 10, 15, 20, 25, 30):
         runs.append((BISECTION, 1e-3 * 2.0**-halvings, partial(ways.bisect, 1e-3, halvings)))
     for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
-        runs.append((ROOT, increment, lambda increment=increment: ways.root(increment, exact)[:2]))  # type: ignore[misc]
+        runs.append((ROOT, increment, partial(ways.root, increment, exact)))
     repeats = min(settings.repeats, 3)
     results = timed([run for _, _, run in runs], repeats, settings.progress)
     resolution = float(np.spacing(exact))
