@@ -37,7 +37,7 @@ def figure_of(study: Study) -> Figure:
         left.plot([point.seconds for point in points], error, label=method, **style, **clip)
         _second(right, points, error, study.abscissa, style | clip)
     for number, line in enumerate(study.theory):
-        grey: dict[str, Any] = {"color": "0.45", "linewidth": 0.8, "linestyle": DASHES[number % len(DASHES)]}
+        grey: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": DASHES[number], "zorder": 4}
         if line.parameter:
             right.plot(line.parameter, line.error, label=line.label, **grey)
         else:
@@ -75,12 +75,12 @@ def _whole_decades(axes: Axes) -> None:
 
 def _limits(study: Study) -> tuple[float, float]:
     """Decades that hold every error, and the reference's if it is not far below."""
-    errors = np.array([point.error for point in study.points if point.error > 0])
-    floors = [line.error[0] for line in study.theory if not line.parameter and line.error[0] > 0.01 * errors.min()]
-    low = min(errors.min(), *floors) if floors else errors.min()
-    if study.reference_error > 0.01 * low:
-        low = min(low, study.reference_error)
-    return 10.0 ** (np.floor(np.log10(low)) - 0.5), 10.0 ** (np.ceil(np.log10(errors.max())) + 0.3)
+    errors = [point.error for point in study.points if point.error > 0]
+    floors = [line.error[0] for line in study.theory if not line.parameter]
+    low, high = min(errors), max(errors + floors)
+    # what lies further below than two decades is of no concern, and would flatten the rest
+    low = min([low, *(each for each in [*floors, study.reference_error] if each > 0.01 * low)])
+    return 10.0 ** (np.floor(np.log10(low)) - 0.5), 10.0 ** (np.ceil(np.log10(high)) + 0.3)
 
 
 def _label(text: str, width: int = 44) -> str:
