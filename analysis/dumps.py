@@ -23,6 +23,7 @@ from typing import TextIO
 
 import numpy as np
 
+from .compensated import normalized
 from .files import PackingFileError
 from .law import MindlinLaw
 from .packing import FLOOR, Contacts, Floats, Packing, nearest_image
@@ -36,15 +37,21 @@ DISK = {
     "mass": ("mass",),
     "angle": ("theta", "d_theta"),
     "floor_slip": ("floor_slip", "f_floor[3]"),
+    "x_low": ("x_low", "f_low[1]"),
+    "y_low": ("y_low", "f_low[2]"),
+    "floor_slip_low": ("floor_slip_low", "f_floor[8]"),
 }
-"""Columns of the disks' dump and the names that they may have."""
+"""Columns of the disks' dump and the names that they may have. Low parts are there in compensated arithmetic alone."""
 
 CONTACT = {
     "first": ("id1", "c_ids[1]"),
     "second": ("id2", "c_ids[2]"),
     "slip": ("slip", "c_contact[3]"),
+    "slip_low": ("slip_low", "c_contact[4]"),
 }
 """Columns of the contacts' dump and the names that they may have."""
+
+LOW_PARTS = ("x_low", "y_low", "floor_slip_low", "slip_low")
 
 TOP_TYPE = 2
 """LAMMPS atom type of the disks of the upper layer."""
@@ -124,7 +131,9 @@ def read_dump(
 
     order = np.argsort(disk["id"])
     disk = {name: column[order] for name, column in disk.items()}
-    position = np.column_stack([disk["x"], disk["y"]])
+    position, low = np.column_stack([disk["x"], disk["y"]]), None
+    if "x_low" in disk:
+        position, low = normalized(position, np.column_stack([disk["x_low"], disk["y_low"]]))
     box_length = float(shown.bounds[0, 1] - shown.bounds[0, 0]) if shown.boundary[0].startswith("p") else None
     index = {}
     for partner in ("first", "second"):
@@ -135,6 +144,7 @@ def read_dump(
     i, j, radius = index["first"], index["second"], disk["radius"]
     touch = np.hypot(*nearest_image(position[i] - position[j], box_length).T) < radius[i] + radius[j]
     floor = np.flatnonzero(radius - position[:, 1] > 0)
+    slip_low = np.concatenate([pair["slip_low"][touch], disk["floor_slip_low"][floor]]) if low is not None else None
     try:
         return Packing(
             position=position,
@@ -148,10 +158,12 @@ def read_dump(
                 np.concatenate([i[touch], floor]),
                 np.concatenate([j[touch], np.full(len(floor), FLOOR)]),
                 np.concatenate([pair["slip"][touch], disk["floor_slip"][floor]]),
+                slip_low,
             ),
             law=law,
             fx=given.get("fx", 0.0) if fx is None else fx,
             fy=given.get("fy", 0.0) if fy is None else fy,
+            position_low=low,
         )
     except ValueError as error:
         raise PackingFileError(f"{disks} and {contacts} describe no possible packing: {error}") from error
@@ -234,6 +246,8 @@ def _columns(path: Path, frame: DumpFrame, names: Mapping[str, tuple[str, ...]])
     columns = {}
     for field, candidates in names.items():
         present = [name for name in candidates if name in frame.columns]
+        if not present and field in LOW_PARTS:
+            continue
         if not present:
             raise PackingFileError(f"{path} has no column {' or '.join(candidates)}.")
         columns[field] = frame.rows[:, frame.columns.index(present[0])]

@@ -27,7 +27,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .packing import Floats, nearest_image
+from .compensated import separation
+from .packing import Floats
 
 BLOCKS = 24
 """Stretches over which D is averaged: enough for an error, few enough to hold many periods each."""
@@ -56,7 +57,13 @@ class Growth:
     end: float
 
 
-def mean_square_displacement(position: ArrayLike, reference: ArrayLike, box_length: float | None = None) -> Floats:
+def mean_square_displacement(
+    position: ArrayLike,
+    reference: ArrayLike,
+    box_length: float | None = None,
+    low: ArrayLike | None = None,
+    reference_low: ArrayLike | None = None,
+) -> Floats:
     """D of one or more configurations.
 
     Parameters
@@ -67,13 +74,16 @@ def mean_square_displacement(position: ArrayLike, reference: ArrayLike, box_leng
         Centres in the equilibrium.
     box_length : float, optional
         Period along x: differences are taken to the nearest image.
+    low, reference_low : array_like, optional
+        Low parts of the coordinates, of the same shapes.
 
     Returns
     -------
     ndarray, shape (...)
         Mean over disks of dx^2 + dy^2, length^2.
     """
-    moved = nearest_image(np.asarray(position, dtype=np.float64) - np.asarray(reference, dtype=np.float64), box_length)
+    arrays = [None if each is None else np.asarray(each, dtype=np.float64) for each in (low, reference_low)]
+    moved, _ = separation(np.asarray(position), arrays[0], np.asarray(reference), arrays[1], box_length)
     return np.mean(np.sum(moved**2, axis=-1), axis=-1)
 
 

@@ -88,12 +88,12 @@ class MindlinLaw:
             t* = mu kn overlap / kt, length; zero for a law without friction.
         """
         overlap = _closed(overlap)
-        return self.mu * (self.kn / self.kt) * overlap if self.frictional else np.zeros_like(overlap)
+        return overlap * self.mu * self.kn / self.kt if self.frictional else np.zeros_like(overlap)
 
     def clamped(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
         """Slip brought back into [-t*, t*], length: what a contact remembers after an increment."""
         limit = self.slip_limit(overlap)
-        return np.clip(np.asarray(slip, dtype=np.float64), -limit, limit)
+        return np.clip(np.asarray(slip, dtype=np.result_type(slip, np.float64)), -limit, limit)
 
     def normal_force(self, overlap: ArrayLike) -> Floats:
         """Repulsion f_n = kn overlap^(3/2), force."""
@@ -143,10 +143,11 @@ class MindlinLaw:
 
 
 def _closed(overlap: ArrayLike) -> Floats:
-    """Overlaps, those of open contacts set to zero."""
-    return np.maximum(np.asarray(overlap, dtype=np.float64), 0.0)
+    """Overlaps, those of open contacts set to zero; long doubles stay so."""
+    return np.maximum(np.asarray(overlap, dtype=np.result_type(overlap, np.float64)), 0.0)
 
 
 def _ratio(numerator: Floats, denominator: Floats) -> Floats:
     """numerator / denominator, zero where the denominator is: an open contact has no slip either."""
-    return np.divide(numerator, denominator, out=np.zeros(np.shape(numerator)), where=denominator > 0)
+    zeros = np.zeros(np.shape(numerator), np.result_type(numerator, denominator))
+    return np.divide(numerator, denominator, out=zeros, where=denominator > 0)

@@ -12,6 +12,9 @@ With the coordinates :math:`q = (x_1..x_N, y_1..y_N, u_1..u_N)`, :math:`u_i = R_
 :math:`(F_x, F_y, T/R)`; a contact puts :math:`f_n \mathbf n + f_t \boldsymbol\tau` on i, the opposite on j,
 and :math:`-f_t` as T/R on both, because the lever arm is the full radius. Each disk of the upper layer
 carries :math:`(f_x, -f_y)` besides.
+
+Coordinates and slips are doubles, or doubles with low parts (:mod:`~faultgouge.analysis.compensated`), if
+compensated arithmetic has found them.
 """
 
 from collections.abc import Iterable
@@ -23,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from .compensated import Pair, exact_sum, normalized, overlap_and_distance, separation
 from .law import MindlinLaw
 
 Floats = NDArray[np.float64]
@@ -47,6 +51,8 @@ class Contacts:
         Second partner; -1 is the floor.
     slip : array_like, shape (C,)
         Slip of each contact along tau, length.
+    slip_low : array_like, shape (C,), optional
+        Low parts of the slips, length; none by default.
 
     Raises
     ------
@@ -58,6 +64,7 @@ class Contacts:
     i: Indices
     j: Indices
     slip: Floats
+    slip_low: Floats | None = None
 
     def __post_init__(self) -> None:
         i, j = _integers("i", self.i), _integers("j", self.j)
@@ -79,6 +86,8 @@ class Contacts:
             raise ValueError(f"The contact ({first[k]}, {second[k]}) is listed twice.")
         for name, value in (("i", first), ("j", second), ("slip", slip[order])):
             object.__setattr__(self, name, _frozen(value))
+        if self.slip_low is not None:
+            object.__setattr__(self, "slip_low", _frozen(_floats("slip_low", self.slip_low, order.shape)[order]))
 
     def __len__(self) -> int:
         return len(self.i)
@@ -136,6 +145,8 @@ class Packing:
         The disks of the upper layer, which carry the load; none by default.
     fx, fy : float
         Force on each disk of the upper layer: fx along +x, fy downwards.
+    position_low : array_like, shape (N, 2), optional
+        Low parts of the coordinates, length: the packing is then a compensated one. None by default.
 
     Raises
     ------
@@ -155,6 +166,7 @@ class Packing:
     top: NDArray[np.bool_] = None  # type: ignore[assignment]
     fx: float = 0.0
     fy: float = 0.0
+    position_low: Floats | None = None
 
     def __post_init__(self) -> None:
         n = len(np.atleast_1d(self.radius))
@@ -167,6 +179,8 @@ class Packing:
             "mass": _floats("mass", np.ones(n) if self.mass is None else self.mass, (n,)),
             "top": np.array(np.zeros(n, bool) if self.top is None else self.top),
         }
+        if self.position_low is not None:
+            arrays["position_low"] = _floats("position_low", self.position_low, (n, 2))
         for name in ("radius", "mass"):
             if np.any(arrays[name] <= 0):
                 raise ValueError(f"Every {name} must be positive; disk {np.argmin(arrays[name])} has another.")
@@ -193,29 +207,49 @@ class Packing:
         """u = R theta, length, shape (N,)."""
         return self.radius * self.angle
 
+    @property
+    def compensated(self) -> bool:
+        """Whether coordinates have low parts."""
+        return self.position_low is not None
+
+    @property
+    def coordinate_rounding(self) -> float:
+        """What a coordinate is known to, length: its last place, or that of its low part (see compensated.h)."""
+        if not self.compensated:
+            return float(np.finfo(float).eps * np.abs(self.position).max())
+        exponent = int(np.frexp(2 * self.radius.max())[1])
+        return float(np.ldexp(1.0, exponent - 26 - 52))
+
     @cached_property
     def geometry(self) -> ContactGeometry:
         """Normals, tangents, distances and overlaps of the contacts."""
+        return self._measured[0]
+
+    @cached_property
+    def _measured(self) -> tuple[ContactGeometry, Pair, Pair]:
+        """The geometry, and the branch vectors and overlaps with their low parts."""
         i, j, floor = self.contacts.i, self.contacts.j, self.contacts.floor
-        branch = nearest_image(self.position[i] - self.position[j], self.box_length)
-        branch[floor] = np.column_stack([np.zeros(floor.sum()), self.position[i[floor], 1]])
-        distance = np.hypot(branch[:, 0], branch[:, 1])
-        distance[floor] = branch[floor, 1]  # signed: a centre below the floor is pushed up all the same
+        low = self.position_low
+        low_i, low_j = (None, None) if low is None else (low[i], low[j])
+        branch = separation(self.position[i], low_i, self.position[j], low_j, self.box_length)
+        foot = np.zeros((floor.sum(), 2))
+        branch[0][floor] = foot + self.position[i[floor]] * (0.0, 1.0)
+        branch[1][floor] = foot if low is None else low[i[floor]] * (0.0, 1.0)
+        reach = exact_sum(self.radius[i], np.where(floor, 0.0, self.radius[j]))
+        overlap, distance = overlap_and_distance(branch, reach)
+        distance[floor] = branch[0][floor, 1]  # signed: a centre below the floor is pushed up all the same
+        height = exact_sum(self.radius[i[floor]], -distance[floor])
+        overlap[0][floor], overlap[1][floor] = normalized(height[0], height[1] - branch[1][floor, 1])
         if np.any(distance[~floor] == 0):
             raise ValueError("Two disks in contact have the same centre.")
-        normal = np.empty_like(branch)
-        normal[~floor] = branch[~floor] / distance[~floor, None]
+        normal = np.empty_like(branch[0])
+        normal[~floor] = branch[0][~floor] / distance[~floor, None]
         normal[floor] = (0.0, 1.0)
-        reach = self.radius[i] + np.where(floor, 0.0, self.radius[j])
-        geometry = ContactGeometry(
-            normal=normal,
-            tangent=np.column_stack([-normal[:, 1], normal[:, 0]]),
-            distance=distance,
-            overlap=reach - distance,
-        )
+        tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
+        geometry = ContactGeometry(normal=normal, tangent=tangent, distance=distance, overlap=overlap[0])
         for array in geometry:
             array.flags.writeable = False
-        return geometry
+        return geometry, branch, overlap
 
     @property
     def normal_force(self) -> Floats:
@@ -236,17 +270,37 @@ class Packing:
 
     @cached_property
     def net_force(self) -> Floats:
-        """Force on every coordinate, load included: (Fx_1.., Fy_1.., T_1/R_1..), shape (3N,)."""
-        n, i, j = len(self), self.contacts.i, self.contacts.j
-        fn, ft, pair = self.normal_force, self.tangential_force, ~self.contacts.floor
-        on_i = fn[:, None] * self.geometry.normal + ft[:, None] * self.geometry.tangent
-        total = np.zeros((3, n))
+        """Force on every coordinate, load included: (Fx_1.., Fy_1.., T_1/R_1..), shape (3N,).
+
+        Of a compensated packing it is summed in numpy's long doubles, which have 64 bits on x86.
+        """
+        i, j, pair = self.contacts.i, self.contacts.j, ~self.contacts.floor
+        fn, ft, normal = self._contact_forces
+        on_i = np.column_stack([fn * normal[:, 0] - ft * normal[:, 1], fn * normal[:, 1] + ft * normal[:, 0]])
+        total = np.zeros((3, len(self)), fn.dtype)
         total[0, self.top] = self.fx
         total[1, self.top] = -self.fy
         for axis in (0, 1):
-            total[axis] += np.bincount(i, on_i[:, axis], n) - np.bincount(j[pair], on_i[pair, axis], n)
-        total[2] = -np.bincount(i, ft, n) - np.bincount(j[pair], ft[pair], n)
-        return _frozen(total.ravel())
+            np.add.at(total[axis], i, on_i[:, axis])
+            np.subtract.at(total[axis], j[pair], on_i[pair, axis])
+        np.subtract.at(total[2], i, ft)
+        np.subtract.at(total[2], j[pair], ft[pair])
+        return _frozen(total.ravel().astype(np.float64))
+
+    @property
+    def _contact_forces(self) -> tuple[NDArray, NDArray, NDArray]:
+        """f_n, f_t and n of the contacts; of a compensated packing in long doubles, which keep what low parts add."""
+        if not self.compensated:
+            return self.normal_force, self.tangential_force, self.geometry.normal
+        _, branch, overlap = self._measured
+        delta = np.add(*overlap, dtype=np.longdouble)
+        low = self.contacts.slip_low
+        slip = np.add(self.contacts.slip, 0.0 if low is None else low, dtype=np.longdouble)
+        between = np.add(*branch, dtype=np.longdouble)
+        distance = np.sqrt(np.sum(between * between, axis=1))
+        distance[self.contacts.floor] = between[self.contacts.floor, 1]
+        normal = between / distance[:, None]
+        return self.law.normal_force(delta), self.law.tangential_force(delta, slip), normal
 
     def loaded(self, least: float) -> "Packing":
         """The packing without the contacts that carry no more than a given force.
@@ -262,7 +316,10 @@ class Packing:
         kept = self.normal_force > least
         if np.all(kept):
             return self
-        contacts = Contacts(self.contacts.i[kept], self.contacts.j[kept], self.contacts.slip[kept])
+        low = self.contacts.slip_low
+        contacts = Contacts(
+            self.contacts.i[kept], self.contacts.j[kept], self.contacts.slip[kept], None if low is None else low[kept]
+        )
         return replace(self, contacts=contacts)
 
     @property
@@ -314,8 +371,8 @@ def touching(position: ArrayLike, radius: ArrayLike, box_length: float | None = 
         wrapped[wrapped[:, 0] >= box_length, 0] = 0.0  # a tiny negative x modulo L rounds to L
     tree = cKDTree(wrapped, boxsize=None if box_length is None else [box_length, 0.0])
     i, j = tree.query_pairs(2 * radius.max(), output_type="ndarray").T
-    distance = np.hypot(*nearest_image(position[i] - position[j], box_length).T)
-    near = radius[i] + radius[j] - distance > 0
+    branch = separation(position[i], None, position[j], None, box_length)
+    near = overlap_and_distance(branch, exact_sum(radius[i], radius[j]))[0][0] > 0
     floor = np.flatnonzero(radius - position[:, 1] > 0)
     return Contacts(
         np.concatenate([i[near], floor]),

@@ -172,7 +172,10 @@ class RunFile:
         """
         self._check_same(packing)
         count = len(self)
-        contacts = np.column_stack([packing.contacts.i, packing.contacts.j, packing.contacts.slip])
+        columns = [packing.contacts.i, packing.contacts.j, packing.contacts.slip]
+        if packing.contacts.slip_low is not None:
+            columns.append(packing.contacts.slip_low)
+        contacts = np.column_stack(columns)
         frame: dict[str, ArrayLike] = {
             "angle": packing.angle,
             "fx": packing.fx,
@@ -180,6 +183,8 @@ class RunFile:
             "residual": packing.residual,
             "contacts": contacts,
         }
+        if packing.position_low is not None:
+            frame["position_low"] = packing.position_low
         taken = frame.keys() & scalars.keys()
         if taken:
             raise ValueError(f"The name {min(taken)} is taken: the packing itself says it.")
@@ -229,6 +234,7 @@ class RunFile:
         rows = self._file["observables/contacts/value"][frame]
         rows = rows[~np.isnan(rows[:, 0])]
         parameters = self._file["parameters"]
+        low = self._file.get("observables/position_low")
         return Packing(
             position=self._file["particles/disks/position/value"][frame, :, :2],
             radius=parameters["radius"][...],
@@ -237,10 +243,16 @@ class RunFile:
             inertia_factor=parameters["inertia_factor"][()],
             box_length=parameters["box_length"][()] if "box_length" in parameters else None,
             top=parameters["top"][...].astype(np.bool_),
-            contacts=Contacts(rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64), rows[:, 2]),
+            contacts=Contacts(
+                rows[:, 0].astype(np.int64),
+                rows[:, 1].astype(np.int64),
+                rows[:, 2],
+                rows[:, 3] if rows.shape[1] > 3 else None,
+            ),
             law=MindlinLaw(*(parameters[name][()] for name in ("kn", "kt", "mu"))),
             fx=self._file["observables/fx/value"][frame],
             fy=self._file["observables/fy/value"][frame],
+            position_low=low["value"][frame] if low is not None else None,
         )
 
     def append_series(self, name: str, **columns: ArrayLike) -> None:

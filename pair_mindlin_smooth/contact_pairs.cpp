@@ -47,7 +47,7 @@ ContactPairs::Image image_between(Vector seen, Vector original, const Domain &do
 }    // namespace
 
 void ContactPairs::build(const NeighList &list, Atom &atom, const Domain &domain, const std::vector<Vector> &original,
-                         bool with_slips)
+                         bool with_slips, bool compensated)
 {
   const int nlocal = atom.nlocal;
   const OwnedDisks owned(atom);
@@ -97,8 +97,10 @@ void ContactPairs::build(const NeighList &list, Atom &atom, const Domain &domain
               [&](int a, int b) { return partner(a) < partner(b); });
 
   force.assign(size(), PairForce{0.0, 0.0, 0.0});
+  if (compensated) force_low.assign(size(), PairForce{0.0, 0.0, 0.0});
   if (!with_slips) return;
   slip.assign(size(), 0.0);
+  if (compensated) slip_low.assign(size(), 0.0);
   touching.assign(size(), 0);
 }
 

@@ -21,9 +21,10 @@ class NeighList;
 
 namespace faultgouge {
 
-struct PairForce {
-  double x, y;          // on the first disk; the second one feels the opposite
-  double tangential;    // f_t, the same for both: their torques are -R f_t
+struct alignas(32) PairForce {
+  double x, y;            // on the first disk; the second one feels the opposite
+  double tangential;      // f_t, the same for both: their torques are -R f_t
+  double unused = 0.0;    // four make a vector
 };
 
 class ContactPairs {
@@ -31,7 +32,7 @@ public:
   // list: half list that holds the pairs with ghosts at both their owners (newton off)
   // original: coordinates of disks owned elsewhere, before LAMMPS shifted them by box lengths
   void build(const LAMMPS_NS::NeighList &list, LAMMPS_NS::Atom &atom, const LAMMPS_NS::Domain &domain,
-             const std::vector<Vector> &original, bool with_slips);
+             const std::vector<Vector> &original, bool with_slips, bool compensated);
 
   int size() const { return static_cast<int>(first.size()); }
 
@@ -43,9 +44,9 @@ public:
   };
   std::vector<Image> image;
   std::vector<LAMMPS_NS::tagint> first_tag, second_tag;    // and their IDs
-  std::vector<PairForce> force;
-  std::vector<double> slip;      // only with_slips
-  std::vector<char> touching;    // only with_slips
+  std::vector<PairForce> force, force_low;                 // low parts only if compensated
+  std::vector<double> slip, slip_low;                      // only with_slips
+  std::vector<char> touching;                              // only with_slips
 };
 
 }    // namespace faultgouge

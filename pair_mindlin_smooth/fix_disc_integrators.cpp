@@ -3,15 +3,20 @@
 #include "atom.h"
 #include "domain.h"
 #include "error.h"
+#include "fix_low_parts.h"
+#include "modify.h"
 #include "update.h"
 
 #include <cmath>
+#include <cstring>
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
 
 FixDiscIntegrator::FixDiscIntegrator(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg)
 {
+  carries_low_parts = narg > 3 && strcmp(arg[narg - 1], "compensated") == 0;
+  numbers = narg - 3 - (carries_low_parts ? 1 : 0);
   time_integrate = 1;
   dynamic_group_allow = 1;
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->torque_flag)
@@ -28,7 +33,7 @@ double FixDiscIntegrator::positive_argument(const char *name, const char *text)
 
 int FixDiscIntegrator::setmask()
 {
-  return INITIAL_INTEGRATE;
+  return INITIAL_INTEGRATE | FINAL_INTEGRATE;
 }
 
 void FixDiscIntegrator::init()
@@ -41,7 +46,30 @@ void FixDiscIntegrator::init()
   int is_double, columns;
   angle = atom->find_custom("theta", is_double, columns);
   if (!is_double || columns > 0) angle = -1;
+  low_parts = nullptr;
+  if (carries_low_parts) {
+    low_parts = dynamic_cast<FixLowParts *>(modify->get_fix_by_id(FixLowParts::ID));
+    if (!low_parts)
+      error->all(FLERR, "fix {} with the keyword compensated needs pair_style mindlin/smooth KN KT MU compensated",
+                 style);
+  }
   reset_dt();
+}
+
+// after all that act on the disks: this fix comes last
+void FixDiscIntegrator::setup(int /*vflag*/)
+{
+  complete_forces();
+}
+
+void FixDiscIntegrator::final_integrate()
+{
+  complete_forces();
+}
+
+void FixDiscIntegrator::complete_forces()
+{
+  if (low_parts) low_parts->complete_forces();
 }
 
 void FixDiscIntegrator::reset_dt()
@@ -51,20 +79,22 @@ void FixDiscIntegrator::reset_dt()
 
 void FixDiscIntegrator::move(int i)
 {
-  atom->x[i][0] += dt * atom->v[i][0];
-  atom->x[i][1] += dt * atom->v[i][1];
+  const double dx = dt * atom->v[i][0], dy = dt * atom->v[i][1];
+  if (low_parts) {
+    low_parts->move(i, dx, dy);
+  } else {
+    atom->x[i][0] += dx;
+    atom->x[i][1] += dy;
+  }
   if (angle >= 0) atom->dvector[angle][i] += dt * atom->omega[i][2];
 }
 
 FixNVEDisc::FixNVEDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg)
 {
-  if (narg != 4) error->all(FLERR, "fix nve/disc takes one number, I0 = I/(m R^2), but got {} arguments", narg - 3);
+  if (numbers != 1)
+    error->all(FLERR, "fix nve/disc takes one number, I0 = I/(m R^2), and optionally compensated, but got {} numbers",
+               numbers);
   inertia_factor = positive_argument("I0", arg[3]);
-}
-
-int FixNVEDisc::setmask()
-{
-  return INITIAL_INTEGRATE | FINAL_INTEGRATE;
 }
 
 void FixNVEDisc::kick(int i)
@@ -87,15 +117,30 @@ void FixNVEDisc::initial_integrate(int /*vflag*/)
 
 void FixNVEDisc::final_integrate()
 {
+  complete_forces();
   for (int i = 0; i < atom->nlocal; i++)
     if (atom->mask[i] & groupbit) kick(i);
 }
 
+FixDisplaceDisc::FixDisplaceDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg)
+{
+  if (numbers != 0) error->all(FLERR, "fix displace/disc takes no argument but compensated, but got {}", arg[3]);
+}
+
+void FixDisplaceDisc::initial_integrate(int /*vflag*/)
+{
+  for (int i = 0; i < atom->nlocal; i++)
+    if (atom->mask[i] & groupbit) move(i);
+}
+
 FixOverdampedDisc::FixOverdampedDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg)
 {
-  if (narg != 5)
-    error->all(FLERR, "fix overdamped/disc takes two numbers, GAMMA and I0 = I/(m R^2), but got {} arguments",
-               narg - 3);
+  if (numbers != 2)
+    error->all(
+        FLERR,
+        "fix overdamped/disc takes two numbers, GAMMA and I0 = I/(m R^2), and optionally compensated, but got {} "
+        "numbers",
+        numbers);
   damping = positive_argument("GAMMA", arg[3]);
   inertia_factor = positive_argument("I0", arg[4]);
 }

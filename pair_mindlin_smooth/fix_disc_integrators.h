@@ -3,7 +3,9 @@
 //   fix ID group nve/disc I0                 velocity Verlet, undamped
 //   fix ID group overdamped/disc GAMMA I0    v = F/GAMMA, R omega = (T/R)/(GAMMA I0): the relaxation
 //                                            of the coordinates (x, y, R theta) by their forces
+//   fix ID group displace/disc               moves by v dt and omega dt, whatever the forces
 //
+// With the keyword compensated at the end they carry the low parts of coordinates, see pair mindlin/smooth.
 // Where the input has a per-atom property d_theta (fix property/atom), it takes up the rotation angle.
 
 #ifndef LMP_FIX_DISC_INTEGRATORS_H
@@ -18,28 +20,41 @@ public:
   FixDiscIntegrator(class LAMMPS *, int, char **);
   int setmask() override;
   void init() override;
+  void setup(int) override;
+  void final_integrate() override;
   void reset_dt() override;
+
+  bool compensated() const { return carries_low_parts; }
 
 protected:
   double dt = 0.0;
   double inertia_factor = 1.0;
+  int numbers;    // arguments without the keyword
 
   double positive_argument(const char *name, const char *text);
   void move(int i);    // by v dt and omega dt
+  void complete_forces();
 
 private:
-  int angle = -1;    // index of d_theta among the custom per-atom vectors, -1: there is none
+  bool carries_low_parts;
+  class FixLowParts *low_parts = nullptr;    // null: plain doubles
+  int angle = -1;                            // index of d_theta among the custom per-atom vectors, -1: there is none
 };
 
 class FixNVEDisc : public FixDiscIntegrator {
 public:
   FixNVEDisc(class LAMMPS *, int, char **);
-  int setmask() override;
   void initial_integrate(int) override;
   void final_integrate() override;
 
 private:
   void kick(int i);    // by half a step
+};
+
+class FixDisplaceDisc : public FixDiscIntegrator {
+public:
+  FixDisplaceDisc(class LAMMPS *, int, char **);
+  void initial_integrate(int) override;
 };
 
 class FixOverdampedDisc : public FixDiscIntegrator {

@@ -13,6 +13,7 @@ using namespace FixConst;
 
 FixSlipHistory::FixSlipHistory(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg),
+    width(narg > 3 && strcmp(arg[3], "compensated") == 0 ? 3 : 2),
     capacity(8)    // six equal disks touch one; rows grow where a disk has more
 {
   restart_peratom = 1;
@@ -78,24 +79,27 @@ void FixSlipHistory::clear(int i)
 int FixSlipHistory::count(int i) const
 {
   int n = 0;
-  while (n < capacity && array_atom[i][1 + 2 * n] != 0.0) n++;
+  while (n < capacity && array_atom[i][1 + width * n] != 0.0) n++;
   return n;
 }
 
 // partners must come in the order of their IDs
-void FixSlipHistory::append(int i, tagint partner, double slip)
+void FixSlipHistory::append(int i, tagint partner, double slip, double slip_low)
 {
   const int n = count(i);
   if (n == capacity) set_capacity(2 * capacity);
+  double *entry = array_atom[i] + 1 + width * n;
   array_atom[i][0] = static_cast<double>(atom->tag[i]);
-  array_atom[i][1 + 2 * n] = static_cast<double>(partner);
-  array_atom[i][2 + 2 * n] = slip;
+  entry[0] = static_cast<double>(partner);
+  entry[1] = slip;
+  if (compensated()) entry[2] = slip_low;
 }
 
 const double *FixSlipHistory::find(int i, tagint partner) const
 {
-  for (int n = 0; n < capacity && array_atom[i][1 + 2 * n] != 0.0; n++)
-    if (array_atom[i][1 + 2 * n] == static_cast<double>(partner)) return &array_atom[i][2 + 2 * n];
+  const double *const end = array_atom[i] + size_peratom_cols;
+  for (const double *entry = array_atom[i] + 1; entry < end && entry[0] != 0.0; entry += width)
+    if (entry[0] == static_cast<double>(partner)) return entry + 1;
   return nullptr;
 }
 
@@ -103,7 +107,7 @@ void FixSlipHistory::set_capacity(int wanted)
 {
   const int old_cols = array_atom ? size_peratom_cols : 0;
   capacity = wanted;
-  size_peratom_cols = 1 + 2 * capacity;
+  size_peratom_cols = 1 + width * capacity;
   maxexchange = 1 + size_peratom_cols;
   if (!array_atom || size_peratom_cols == old_cols) return;
 
@@ -138,7 +142,7 @@ void FixSlipHistory::set_arrays(int i)
 int FixSlipHistory::pack_exchange(int i, double *buf)
 {
   if (source) source->store_slips();
-  const int n = 1 + 2 * count(i);
+  const int n = 1 + width * count(i);
   buf[0] = n;
   std::copy(array_atom[i], array_atom[i] + n, buf + 1);
   return n + 1;
@@ -147,7 +151,7 @@ int FixSlipHistory::pack_exchange(int i, double *buf)
 int FixSlipHistory::unpack_exchange(int nlocal, double *buf)
 {
   const int n = static_cast<int>(buf[0]);
-  if ((n - 1) / 2 > capacity) set_capacity((n - 1) / 2);
+  if ((n - 1) / width > capacity) set_capacity((n - 1) / width);
   clear(nlocal);
   std::copy(buf + 1, buf + 1 + n, array_atom[nlocal]);
   return n + 1;
@@ -157,7 +161,7 @@ int FixSlipHistory::unpack_exchange(int nlocal, double *buf)
 int FixSlipHistory::pack_restart(int i, double *buf)
 {
   if (source) source->store_slips();
-  const int n = 1 + 2 * count(i);
+  const int n = 1 + width * count(i);
   buf[0] = n + 1;
   std::copy(array_atom[i], array_atom[i] + n, buf + 1);
   return n + 1;
@@ -169,7 +173,7 @@ void FixSlipHistory::unpack_restart(int nlocal, int nth)
   int m = 0;
   for (int i = 0; i < nth; i++) m += static_cast<int>(extra[m]);
   const int n = static_cast<int>(extra[m++]) - 1;
-  if ((n - 1) / 2 > capacity) set_capacity((n - 1) / 2);
+  if ((n - 1) / width > capacity) set_capacity((n - 1) / width);
   clear(nlocal);
   std::copy(extra + m, extra + m + n, array_atom[nlocal]);
 }
@@ -177,12 +181,12 @@ void FixSlipHistory::unpack_restart(int nlocal, int nth)
 int FixSlipHistory::size_restart(int i)
 {
   if (source) source->store_slips();
-  return 2 + 2 * count(i);
+  return 2 + width * count(i);
 }
 
 int FixSlipHistory::maxsize_restart()
 {
-  return 2 + 2 * capacity;
+  return 2 + width * capacity;
 }
 
 double FixSlipHistory::memory_usage()

@@ -1,7 +1,8 @@
 // The slips of the contacts, kept with the disks: fix slip/history, made by pair mindlin/smooth.
 //
 // Row i of the per-atom array is [own ID, partner ID, slip, partner ID, slip, ..., 0, 0]: the contacts of
-// disk i in the order of the partners' IDs; both partners keep theirs. It is up to date whenever no run is
+// disk i in the order of the partners' IDs; both partners keep theirs. In compensated arithmetic each slip is
+// followed by its low part. It is up to date whenever no run is
 // under way, moves with the disks between ranks, and goes through restart files. Written from outside
 // (library scatter) it takes effect at the next run's setup.
 
@@ -37,8 +38,9 @@ public:
   void set_source(SlipSource *s) { source = s; }
   void check_owners() const;
   void clear(int i);
-  void append(int i, tagint partner, double slip);
-  const double *find(int i, tagint partner) const;    // its slip, or nullptr where there is no contact
+  bool compensated() const { return width == 3; }
+  void append(int i, tagint partner, double slip, double slip_low);
+  const double *find(int i, tagint partner) const;    // its slip (and low part); nullptr where there is no contact
 
   void grow_arrays(int) override;
   void copy_arrays(int, int, int) override;
@@ -53,6 +55,7 @@ public:
 
 private:
   SlipSource *source = nullptr;
+  int width;       // numbers of a contact: partner, slip, and the slip's low part if compensated
   int capacity;    // contacts that a row holds
   int nmax = 0;
 

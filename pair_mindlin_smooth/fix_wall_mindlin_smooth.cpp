@@ -3,6 +3,8 @@
 #include "atom.h"
 #include "domain.h"
 #include "error.h"
+#include "fix_low_parts.h"
+#include "force.h"
 #include "input.h"
 #include "memory.h"
 #include "modify.h"
@@ -11,14 +13,24 @@
 
 #include <algorithm>
 #include <cstring>
+#include <type_traits>
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
+using faultgouge::Compensated;
+using faultgouge::exact_sum;
+using faultgouge::leading;
 using faultgouge::MindlinLaw;
+using faultgouge::value;
 
 FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg)
 {
-  if (narg != 8) error->all(FLERR, "fix wall/mindlin/smooth takes KN KT MU ylo COORD, but got {} arguments", narg - 3);
+  compensated = narg == 9 && strcmp(arg[8], "compensated") == 0;
+  columns = compensated ? SLIP_LOW + 1 : OVERLAP + 1;
+  if (narg != (compensated ? 9 : 8))
+    error->all(FLERR,
+               "fix wall/mindlin/smooth takes KN KT MU ylo COORD and optionally compensated, but got {} arguments",
+               narg - 3);
   law.kn = utils::numeric(FLERR, arg[3], false, lmp);
   law.kt = utils::numeric(FLERR, arg[4], false, lmp);
   set_mu(arg[5]);
@@ -37,8 +49,8 @@ FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : 
   create_attribute = 1;
   peratom_flag = 1;
   peratom_freq = 1;
-  size_peratom_cols = COLUMNS;
-  maxexchange = COLUMNS;
+  size_peratom_cols = columns;
+  maxexchange = columns;
   scalar_flag = 1;
   global_freq = 1;
   extscalar = 1;
@@ -66,6 +78,13 @@ void FixWallMindlinSmooth::init()
   if (domain->dimension != 2) error->all(FLERR, "fix wall/mindlin/smooth is for disks in the plane: use dimension 2");
   if (domain->periodicity[1])
     error->all(FLERR, "fix wall/mindlin/smooth needs a box that is not periodic in y: use boundary p f p");
+  low_parts = dynamic_cast<FixLowParts *>(modify->get_fix_by_id(FixLowParts::ID));
+  if (force->pair_match("mindlin/smooth", 1) && compensated != (low_parts != nullptr))
+    error->all(FLERR,
+               "fix wall/mindlin/smooth and pair mindlin/smooth must both have the keyword compensated, or neither");
+  if (compensated && !low_parts)
+    error->all(FLERR, "fix wall/mindlin/smooth with the keyword compensated needs pair_style mindlin/smooth KN KT MU "
+                      "compensated");
   if (!mu_variable.empty()) {
     mu_index = input->variable->find(mu_variable.c_str());
     if (mu_index < 0 || !input->variable->equalstyle(mu_index))
@@ -121,49 +140,88 @@ void FixWallMindlinSmooth::update_mu()
 void FixWallMindlinSmooth::post_force(int /*vflag*/)
 {
   if (mu_index >= 0) update_mu();
-  if (has_friction)
-    contact_forces<true>();
+  if (compensated && has_friction)
+    contact_forces<Compensated, true>();
+  else if (compensated)
+    contact_forces<Compensated, false>();
+  else if (has_friction)
+    contact_forces<double, true>();
   else
-    contact_forces<false>();
+    contact_forces<double, false>();
 }
 
-template <bool FRICTION> void FixWallMindlinSmooth::contact_forces()
+template <> double FixWallMindlinSmooth::overlap_of<double>(int i) const
 {
+  return atom->radius[i] - (atom->x[i][1] - height);
+}
+
+template <> Compensated FixWallMindlinSmooth::overlap_of<Compensated>(int i) const
+{
+  const Compensated above = exact_sum(atom->radius[i], -atom->x[i][1]) + Compensated(height);
+  return normalized(above - Compensated(low_parts->array_atom[i][FixLowParts::Y]));
+}
+
+template <> void FixWallMindlinSmooth::add_force(int i, double x, double y, double torque)
+{
+  atom->f[i][0] += x;
+  atom->f[i][1] += y;
+  atom->torque[i][2] += torque;
+}
+
+template <> void FixWallMindlinSmooth::add_force(int i, Compensated x, Compensated y, Compensated torque)
+{
+  double *const low = low_parts->array_atom[i];
+  const auto add = [](double &sum, double &sum_low, Compensated force) {
+    const Compensated total = Compensated(sum, sum_low) + force;
+    sum = total.high;
+    sum_low = total.low;
+  };
+  add(atom->f[i][0], low[FixLowParts::FX], x);
+  add(atom->f[i][1], low[FixLowParts::FY], y);
+  add(atom->torque[i][2], low[FixLowParts::TORQUE], torque);
+}
+
+template <class NUMBER, bool FRICTION> void FixWallMindlinSmooth::contact_forces()
+{
+  constexpr bool COMPENSATED = std::is_same<NUMBER, Compensated>::value;
   const bool advance = !update->setupflag;    // at setup the disks have not moved
   const double dt = update->dt;
-  const double limit_ratio = FRICTION ? law.slip_limit_ratio() : 0.0;
+  const NUMBER limit_ratio = FRICTION ? law.slip_limit_ratio<NUMBER>() : NUMBER(0.0);
+  const double margin = COMPENSATED ? 2.0 * low_parts->grid().spacing : 0.0;    // the coordinate is a high part
   energy = 0.0;
   for (int i = 0; i < atom->nlocal; i++) {
     if (!(atom->mask[i] & groupbit)) continue;
     double *contact = array_atom[i];
     const double radius = atom->radius[i];
-    const double overlap = radius - (atom->x[i][1] - height);
-    if (overlap <= 0.0) {
+    const bool far = atom->x[i][1] - height > radius + margin;
+    const NUMBER overlap = far ? NUMBER(0.0) : overlap_of<NUMBER>(i);
+    if (leading(overlap) <= 0.0) {
       if (contact[OVERLAP] > 0.0) set_arrays(i);
       continue;
     }
-    const double normal = law.normal_force(overlap);
-    energy += law.normal_energy(overlap);
-    atom->f[i][1] += normal;
+    const NUMBER normal = law.normal_force(overlap);
+    NUMBER tangential = 0.0;
+    energy += law.normal_energy(value(overlap));
 
     if constexpr (FRICTION) {
-      const double limit = limit_ratio * overlap;
-      double slip = contact[OVERLAP] > 0.0 ? contact[SLIP] : 0.0;
+      const NUMBER limit = limit_ratio * overlap;
+      NUMBER slip = contact[OVERLAP] > 0.0 ? contact[SLIP] : 0.0;
+      if constexpr (COMPENSATED) slip.low = contact[OVERLAP] > 0.0 ? contact[SLIP_LOW] : 0.0;
       if (advance) {
-        if (contact[OVERLAP] > 0.0) slip -= (atom->v[i][0] + radius * atom->omega[i][2]) * dt;
-        slip = faultgouge::clamp_slip(slip, limit);
+        const double increment = contact[OVERLAP] > 0.0 ? -(atom->v[i][0] + radius * atom->omega[i][2]) * dt : 0.0;
+        slip = faultgouge::advanced_slip(slip, increment, limit);
       }
-      const double tangential = law.tangential_force(normal, slip, limit);
-      atom->f[i][0] -= tangential;
-      atom->torque[i][2] -= radius * tangential;
-      contact[TANGENTIAL] = tangential;
-      contact[SLIP] = slip;
-      contact[SLIP_RATIO] = limit > 0.0 ? slip / limit : 0.0;
+      tangential = law.tangential_force(normal, slip, limit);
+      contact[TANGENTIAL] = value(tangential);
+      contact[SLIP] = leading(slip);
+      contact[SLIP_RATIO] = value(limit) > 0.0 ? value(slip) / value(limit) : 0.0;
+      if constexpr (COMPENSATED) contact[SLIP_LOW] = slip.low;
     }
-    contact[NORMAL] = normal;
+    add_force<NUMBER>(i, -tangential, normal, -(radius * tangential));
+    contact[NORMAL] = value(normal);
     contact[NX] = 0.0;
     contact[NY] = 1.0;
-    contact[OVERLAP] = overlap;
+    contact[OVERLAP] = value(overlap);
   }
 }
 
@@ -185,37 +243,37 @@ void *FixWallMindlinSmooth::extract(const char *name, int &dim)
 
 void FixWallMindlinSmooth::grow_arrays(int n)
 {
-  memory->grow(array_atom, n, COLUMNS, "wall/mindlin/smooth:array");
+  memory->grow(array_atom, n, columns, "wall/mindlin/smooth:array");
   for (int i = nmax; i < n; i++) set_arrays(i);
   nmax = n;
 }
 
 void FixWallMindlinSmooth::copy_arrays(int i, int j, int /*delflag*/)
 {
-  std::copy(array_atom[i], array_atom[i] + COLUMNS, array_atom[j]);
+  std::copy(array_atom[i], array_atom[i] + columns, array_atom[j]);
 }
 
 void FixWallMindlinSmooth::set_arrays(int i)
 {
-  std::fill(array_atom[i], array_atom[i] + COLUMNS, 0.0);
+  std::fill(array_atom[i], array_atom[i] + columns, 0.0);
 }
 
 int FixWallMindlinSmooth::pack_exchange(int i, double *buf)
 {
-  std::copy(array_atom[i], array_atom[i] + COLUMNS, buf);
-  return COLUMNS;
+  std::copy(array_atom[i], array_atom[i] + columns, buf);
+  return columns;
 }
 
 int FixWallMindlinSmooth::unpack_exchange(int nlocal, double *buf)
 {
-  std::copy(buf, buf + COLUMNS, array_atom[nlocal]);
-  return COLUMNS;
+  std::copy(buf, buf + columns, array_atom[nlocal]);
+  return columns;
 }
 
 // LAMMPS finds a fix's data in a restart file by the length that starts each record
 int FixWallMindlinSmooth::pack_restart(int i, double *buf)
 {
-  buf[0] = COLUMNS + 1;
+  buf[0] = columns + 1;
   return 1 + pack_exchange(i, buf + 1);
 }
 
@@ -229,15 +287,15 @@ void FixWallMindlinSmooth::unpack_restart(int nlocal, int nth)
 
 int FixWallMindlinSmooth::size_restart(int /*nlocal*/)
 {
-  return COLUMNS + 1;
+  return columns + 1;
 }
 
 int FixWallMindlinSmooth::maxsize_restart()
 {
-  return COLUMNS + 1;
+  return columns + 1;
 }
 
 double FixWallMindlinSmooth::memory_usage()
 {
-  return static_cast<double>(nmax) * COLUMNS * sizeof(double);
+  return static_cast<double>(nmax) * columns * sizeof(double);
 }

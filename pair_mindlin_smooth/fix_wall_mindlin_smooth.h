@@ -1,9 +1,10 @@
-// fix ID group wall/mindlin/smooth KN KT MU ylo COORD
+// fix ID group wall/mindlin/smooth KN KT MU ylo COORD [compensated]
 //
 // The flat floor at y = COORD below the disks: the law of mindlin_law.h with n = (0, 1), tau = (-1, 0).
 // MU may be v_NAME, an equal-style variable that is evaluated in every step; fix_modify ID mu MU changes it. Each
 // disk has one slip. The per-atom array has the columns of pair mindlin/smooth's single():
-// f_n, f_t, slip, slip/slip_limit, n_x, n_y, overlap, and zeros for a disk that does not touch.
+// f_n, f_t, slip, slip/slip_limit, n_x, n_y, overlap, with compensated the slip's low part, and zeros for a disk
+// that does not touch.
 
 #ifndef LMP_FIX_WALL_MINDLIN_SMOOTH_H
 #define LMP_FIX_WALL_MINDLIN_SMOOTH_H
@@ -40,19 +41,24 @@ public:
   double memory_usage() override;
 
 private:
-  enum Column { NORMAL, TANGENTIAL, SLIP, SLIP_RATIO, NX, NY, OVERLAP, COLUMNS };
+  enum Column { NORMAL, TANGENTIAL, SLIP, SLIP_RATIO, NX, NY, OVERLAP, SLIP_LOW };
 
   faultgouge::MindlinLaw law;
   double height;
   double energy = 0.0;    // elastic energy of this rank's contacts
   bool has_friction = false;
+  bool compensated = false;
+  class FixLowParts *low_parts = nullptr;
+  int columns;
   std::string mu_variable;    // empty where mu is a number
   int mu_index = -1;          // of that variable
   int nmax = 0;
 
   void set_mu(const char *);
   void update_mu();
-  template <bool FRICTION> void contact_forces();
+  template <class NUMBER> NUMBER overlap_of(int i) const;
+  template <class NUMBER, bool FRICTION> void contact_forces();
+  template <class NUMBER> void add_force(int i, NUMBER x, NUMBER y, NUMBER torque);
 };
 
 }    // namespace LAMMPS_NS

@@ -4,6 +4,7 @@
 #include "comm.h"
 #include "domain.h"
 #include "error.h"
+#include "fix_disc_integrators.h"
 #include "force.h"
 #include "memory.h"
 #include "modify.h"
@@ -15,25 +16,31 @@
 #include <cstring>
 
 using namespace LAMMPS_NS;
+using faultgouge::Compensated;
+using faultgouge::Disks;
+using faultgouge::FixedPointGrid;
+using faultgouge::leading;
 using faultgouge::MindlinLaw;
 using faultgouge::PairForce;
+using faultgouge::Period;
+using faultgouge::value;
 
 PairMindlinSmooth::PairMindlinSmooth(LAMMPS *lmp) : Pair(lmp)
 {
   single_enable = 1;
-  single_extra = 7;
+  single_extra = 8;
   svector = new double[single_extra];
   restartinfo = 1;
   one_coeff = 1;
   finitecutflag = 1;
   no_virial_fdotr_compute = 1;    // forces act on owned disks only, so that a sum over ghosts would miss some
   centroidstressflag = CENTROID_SAME;
-  comm_forward = 2;
 }
 
 PairMindlinSmooth::~PairMindlinSmooth()
 {
   if (history && modify->get_fix_by_id(FixSlipHistory::ID)) modify->delete_fix(FixSlipHistory::ID);
+  if (low_parts && modify->get_fix_by_id(FixLowParts::ID)) modify->delete_fix(FixLowParts::ID);
   delete[] svector;
   if (allocated) {
     memory->destroy(setflag);
@@ -55,8 +62,14 @@ void PairMindlinSmooth::allocate()
 
 void PairMindlinSmooth::settings(int narg, char **arg)
 {
-  if (narg != 3)
-    error->all(FLERR, "pair_style mindlin/smooth takes three numbers, KN KT MU, but got {} arguments", narg);
+  if (narg < 3 || narg > 4)
+    error->all(
+        FLERR,
+        "pair_style mindlin/smooth takes three numbers, KN KT MU, and optionally compensated, but got {} arguments",
+        narg);
+  compensated = narg == 4;
+  if (compensated && strcmp(arg[3], "compensated") != 0)
+    error->all(FLERR, "pair_style mindlin/smooth knows the keyword compensated, but not {}", arg[3]);
   law.kn = utils::numeric(FLERR, arg[0], false, lmp);
   law.kt = utils::numeric(FLERR, arg[1], false, lmp);
   law.mu = utils::numeric(FLERR, arg[2], false, lmp);
@@ -87,6 +100,9 @@ void PairMindlinSmooth::init_style()
   has_friction = law.frictional();
   if (has_friction && !comm->ghost_velocity)
     error->all(FLERR, "pair mindlin/smooth needs the velocities of ghost disks: use comm_modify vel yes");
+  if (compensated && update->whichflag == 2)
+    error->all(FLERR, "pair mindlin/smooth: a minimizer does not carry the low parts of coordinates: minimize without "
+                      "the keyword compensated");
   if (has_friction && update->whichflag == 2)
     error->all(FLERR,
                "pair mindlin/smooth with friction cannot be minimized, since its forces depend on the path: relax "
@@ -95,16 +111,9 @@ void PairMindlinSmooth::init_style()
   // newton off: pairs of owned disks once, pairs with ghosts at both their owners
   neighbor->add_request(this, NeighConst::REQ_NEWTON_OFF);
 
-  // made here and not with the pair style, because data of a restart file reach a fix when it is made
-  history = dynamic_cast<FixSlipHistory *>(modify->get_fix_by_id(FixSlipHistory::ID));
-  if (has_friction && !history)
-    history = dynamic_cast<FixSlipHistory *>(modify->add_fix(fmt::format("{} all slip/history", FixSlipHistory::ID)));
-  if (!has_friction && history) {
-    modify->delete_fix(FixSlipHistory::ID);
-    history = nullptr;
-  }
-  if (history) history->set_source(this);
-  slips_in_fix = true;
+  make_fixes();
+  if (compensated) check_integrators();
+  comm_forward = compensated ? 4 : 2;
 
   std::vector<double> mine(atom->ntypes + 1, 0.0);
   for (int i = 0; i < atom->nlocal; i++) mine[atom->type[i]] = std::max(mine[atom->type[i]], atom->radius[i]);
@@ -117,6 +126,43 @@ void PairMindlinSmooth::init_style()
                  "pair mindlin/smooth: the periodic box is {} long in {}, less than two diameters of the largest disk "
                  "({}), and a disk could touch two images of one neighbour: use a larger box",
                  domain->prd[d], "xy"[d], diameter);
+  if (compensated) low_parts->set_reach(diameter);
+}
+
+// made at init and not with the pair style, because data of a restart file reach a fix when it is made
+void PairMindlinSmooth::make_fixes()
+{
+  history = dynamic_cast<FixSlipHistory *>(modify->get_fix_by_id(FixSlipHistory::ID));
+  if (history && (!has_friction || history->compensated() != compensated)) {
+    modify->delete_fix(FixSlipHistory::ID);
+    history = nullptr;
+  }
+  if (has_friction && !history)
+    history = dynamic_cast<FixSlipHistory *>(
+        modify->add_fix(fmt::format("{} all slip/history{}", FixSlipHistory::ID, compensated ? " compensated" : "")));
+  if (history) history->set_source(this);
+  slips_in_fix = true;
+
+  low_parts = dynamic_cast<FixLowParts *>(modify->get_fix_by_id(FixLowParts::ID));
+  if (compensated && !low_parts)
+    low_parts = dynamic_cast<FixLowParts *>(modify->add_fix(fmt::format("{} all low/parts", FixLowParts::ID)));
+  if (!compensated && low_parts) {
+    modify->delete_fix(FixLowParts::ID);
+    low_parts = nullptr;
+  }
+}
+
+void PairMindlinSmooth::check_integrators() const
+{
+  for (const auto &fix : modify->get_fix_list()) {
+    if (!fix->time_integrate) continue;
+    const auto *integrator = dynamic_cast<const FixDiscIntegrator *>(fix);
+    if (!integrator || !integrator->compensated())
+      error->all(FLERR,
+                 "pair mindlin/smooth: fix {} of style {} moves disks without the low parts of their coordinates: use "
+                 "nve/disc, overdamped/disc or displace/disc with the keyword compensated",
+                 fix->id, fix->style);
+  }
 }
 
 double PairMindlinSmooth::init_one(int i, int j)
@@ -139,11 +185,12 @@ void PairMindlinSmooth::rebuild_pairs()
     store_slips();
     history->check_owners();
   }
-  pairs.build(*list, *atom, *domain, original, has_friction);
+  pairs.build(*list, *atom, *domain, original, has_friction, compensated);
   if (!has_friction) return;
   for (int p = 0; p < pairs.size(); p++)
     if (const double *slip = history->find(pairs.first[p], pairs.second_tag[p])) {
-      pairs.slip[p] = *slip;
+      pairs.slip[p] = slip[0];
+      if (compensated) pairs.slip_low[p] = slip[1];
       pairs.touching[p] = 1;
     }
 }
@@ -151,134 +198,102 @@ void PairMindlinSmooth::rebuild_pairs()
 void PairMindlinSmooth::compute(int eflag, int vflag)
 {
   ev_init(eflag, vflag);
-  if (comm->nprocs > 1 && (domain->xperiodic || domain->yperiodic)) communicate_originals();
+  if (comm->nprocs > 1 && (compensated || domain->xperiodic || domain->yperiodic)) communicate_originals();
   if (neighbor->ago == 0) rebuild_pairs();
 
   // at setup the disks have not moved since the slips were last advanced
-  const bool advance = !update->setupflag;
-  if (!has_friction)
-    contact_forces<false, false>();
-  else if (advance)
-    contact_forces<true, true>();
-  else
-    contact_forces<true, false>();
+  const int coincident = contact_forces(!update->setupflag);
+  if (coincident >= 0)
+    error->one(FLERR, "Disks {} and {} have the same centre, so that their contact has no direction",
+               pairs.first_tag[coincident], pairs.second_tag[coincident]);
+  if (has_friction) slips_in_fix = false;
 
-  if (has_friction)
-    sum_forces<true>();
+  const faultgouge::Forces forces{atom->f,         atom->torque,    compensated ? low_parts->array_atom : nullptr,
+                                  FixLowParts::FX, FixLowParts::FY, FixLowParts::TORQUE};
+  if (compensated)
+    faultgouge::sum_compensated_forces(pairs, disks(), forces);
   else
-    sum_forces<false>();
-  if (evflag) tally();
+    faultgouge::sum_forces(pairs, disks(), forces);
+  if (!evflag) return;
+  if (compensated)
+    tally<Compensated>();
+  else
+    tally<double>();
 }
 
 void PairMindlinSmooth::communicate_originals()
 {
   original.resize(atom->nlocal + atom->nghost);
   for (int i = 0; i < atom->nlocal; i++) original[i] = {atom->x[i][0], atom->x[i][1]};
+  if (compensated) {
+    original_low.resize(original.size());
+    for (int i = 0; i < atom->nlocal; i++) {
+      const double *const low = low_parts->array_atom[i];
+      original_low[i] = {low[FixLowParts::X], low[FixLowParts::Y]};
+    }
+  }
   comm->forward_comm(this);
 }
 
 int PairMindlinSmooth::pack_forward_comm(int n, int *list, double *buf, int /*pbc_flag*/, int * /*pbc*/)
 {
+  int m = 0;
   for (int k = 0; k < n; k++) {
-    buf[2 * k] = original[list[k]].x;
-    buf[2 * k + 1] = original[list[k]].y;
+    buf[m++] = original[list[k]].x;
+    buf[m++] = original[list[k]].y;
+    if (!compensated) continue;
+    buf[m++] = original_low[list[k]].x;
+    buf[m++] = original_low[list[k]].y;
   }
-  return 2 * n;
+  return m;
 }
 
 void PairMindlinSmooth::unpack_forward_comm(int n, int first, double *buf)
 {
-  for (int k = 0; k < n; k++) original[first + k] = {buf[2 * k], buf[2 * k + 1]};
+  int m = 0;
+  for (int i = first; i < first + n; i++) {
+    original[i] = {buf[m], buf[m + 1]};
+    m += 2;
+    if (!compensated) continue;
+    original_low[i] = {buf[m], buf[m + 1]};
+    m += 2;
+  }
 }
 
-// from the second disk of a pair to the first
-inline faultgouge::Vector PairMindlinSmooth::branch(int p) const
+Disks PairMindlinSmooth::disks() const
 {
-  const int i = pairs.first[p], j = pairs.second[p];
-  const double *const xi = atom->x[i], *const xj = atom->x[j];
-  const auto image = pairs.image[p];
-  if (image.x == 0 && image.y == 0) return {xi[0] - xj[0], xi[1] - xj[1]};
-  const faultgouge::Vector other = j < atom->nlocal ? faultgouge::Vector{xj[0], xj[1]} : original[j];
-  return {(xi[0] - other.x) - image.x * domain->prd[0], (xi[1] - other.y) - image.y * domain->prd[1]};
+  return {atom->nlocal,         atom->x[0],      atom->v[0],
+          atom->omega[0],       atom->radius,    compensated ? low_parts->array_atom[0] : nullptr,
+          FixLowParts::COLUMNS, original.data(), original_low.data()};
 }
 
-template <bool FRICTION, bool ADVANCE> void PairMindlinSmooth::contact_forces()
+Period PairMindlinSmooth::period() const
 {
-  const double *const *const v = atom->v;
-  const double *const *const omega = atom->omega;
-  const double *const radius = atom->radius;
+  if (!compensated) return {domain->prd[0], domain->prd[1], 0.0, 0.0};
+  return {low_parts->period(0), low_parts->period(1), low_parts->period_low(0), low_parts->period_low(1)};
+}
+
+// Returns a pair of disks with one centre, or -1.
+int PairMindlinSmooth::contact_forces(bool advance)
+{
   const double dt = update->dt;
-  const MindlinLaw local = law;
-  const double limit_ratio = FRICTION ? local.slip_limit_ratio() : 0.0;
-
-  for (int p = 0, n = pairs.size(); p < n; p++) {
-    const int i = pairs.first[p], j = pairs.second[p];
-    const auto [rx, ry] = branch(p);
-    const double reach = radius[i] + radius[j];
-    const double rsq = rx * rx + ry * ry;
-    double r, overlap;
-    if (rsq >= reach * reach || (overlap = reach - (r = std::sqrt(rsq))) <= 0.0) {
-      pairs.force[p] = PairForce{0.0, 0.0, 0.0};
-      if constexpr (FRICTION) pairs.touching[p] = 0;
-      continue;
-    }
-    if (r == 0.0)
-      error->one(FLERR, "Disks {} and {} have the same centre, so that their contact has no direction",
-                 pairs.first_tag[p], pairs.second_tag[p]);
-
-    const double nx = rx / r, ny = ry / r;
-    const double normal = local.normal_force(overlap);
-    if constexpr (!FRICTION) {
-      pairs.force[p] = PairForce{normal * nx, normal * ny, 0.0};
-      continue;
-    }
-
-    const double limit = limit_ratio * overlap;
-    double slip = pairs.touching[p] ? pairs.slip[p] : 0.0;
-    if constexpr (ADVANCE) {
-      if (pairs.touching[p]) {
-        const faultgouge::Vector d{(v[i][0] - v[j][0]) * dt, (v[i][1] - v[j][1]) * dt};
-        slip += faultgouge::midpoint_slip({rx, ry}, d) - (radius[i] * omega[i][2] + radius[j] * omega[j][2]) * dt;
-      }
-      slip = faultgouge::clamp_slip(slip, limit);
-    }
-    pairs.slip[p] = slip;
-    pairs.touching[p] = 1;
-    const double tangential = local.tangential_force(normal, slip, limit);
-    pairs.force[p] = PairForce{normal * nx - tangential * ny, normal * ny + tangential * nx, tangential};
-  }
-  if constexpr (FRICTION) slips_in_fix = false;
-}
-
-template <bool FRICTION> void PairMindlinSmooth::sum_forces()
-{
-  double *const *const f = atom->f;
-  double *const *const torque = atom->torque;
-  for (int i = 0; i < atom->nlocal; i++) {
-    double fx = 0.0, fy = 0.0, tangential = 0.0;
-    for (int k = pairs.start[i]; k < pairs.start[i + 1]; k++) {
-      const PairForce &contact = pairs.force[pairs.row[k] >> 1];
-      const double sign = pairs.row[k] & 1 ? -1.0 : 1.0;
-      fx += sign * contact.x;
-      fy += sign * contact.y;
-      if constexpr (FRICTION) tangential += contact.tangential;
-    }
-    f[i][0] += fx;
-    f[i][1] += fy;
-    if constexpr (FRICTION) torque[i][2] -= atom->radius[i] * tangential;
-  }
+  if (!compensated) return faultgouge::contact_forces(pairs, disks(), period(), law, dt, has_friction, advance);
+  return faultgouge::compensated_contact_forces(pairs, disks(), period(), law, dt, has_friction, advance,
+                                                low_parts->grid());
 }
 
 // The energy is the elastic one of the normal force; the tangential force has none.
-void PairMindlinSmooth::tally()
+template <class NUMBER> void PairMindlinSmooth::tally()
 {
+  const FixedPointGrid grid = compensated ? low_parts->grid() : FixedPointGrid{};
   for (int p = 0; p < pairs.size(); p++) {
     const PairForce &contact = pairs.force[p];
     if (contact.x == 0.0 && contact.y == 0.0) continue;
     const int i = pairs.first[p], j = pairs.second[p];
-    const auto [rx, ry] = branch(p);
-    const double overlap = atom->radius[i] + atom->radius[j] - std::sqrt(rx * rx + ry * ry);
-    ev_tally_xyz(i, j, atom->nlocal, 0, law.normal_energy(overlap), 0.0, contact.x, contact.y, 0.0, rx, ry, 0.0);
+    const auto r = faultgouge::branch<NUMBER>(pairs, p, disks(), period());
+    const auto where = geometry(r, atom->radius[i], atom->radius[j], grid);
+    ev_tally_xyz(i, j, atom->nlocal, 0, law.normal_energy(value(where.overlap)), 0.0, contact.x, contact.y, 0.0,
+                 value(r.x), value(r.y), 0.0);
   }
 }
 
@@ -292,33 +307,59 @@ void PairMindlinSmooth::store_slips()
     for (int k = pairs.start[i]; k < pairs.start[i + 1]; k++) {
       const int p = pairs.row[k] >> 1;
       if (!pairs.touching[p]) continue;
-      history->append(i, pairs.row[k] & 1 ? pairs.first_tag[p] : pairs.second_tag[p], pairs.slip[p]);
+      history->append(i, pairs.row[k] & 1 ? pairs.first_tag[p] : pairs.second_tag[p], pairs.slip[p],
+                      compensated ? pairs.slip_low[p] : 0.0);
     }
   }
 }
 
 // The contact as it stands: nothing is advanced and nothing is written.
-double PairMindlinSmooth::single(int i, int j, int, int, double rsq, double, double, double &fforce)
+double PairMindlinSmooth::single(int i, int j, int, int, double, double, double, double &fforce)
 {
   std::fill(svector, svector + single_extra, 0.0);
   fforce = 0.0;
-  const double r = std::sqrt(rsq), overlap = atom->radius[i] + atom->radius[j] - r;
-  if (overlap <= 0.0) return 0.0;
+  const int p = i < atom->nlocal ? pair_of(i, j) : pair_of(j, i);
+  if (p < 0) return 0.0;
+  const double energy = compensated ? measure<Compensated>(p, i) : measure<double>(p, i);
+  if (energy > 0.0) fforce = svector[0] / (atom->radius[i] + atom->radius[j] - svector[6]);
+  return energy;
+}
 
-  const double normal = law.normal_force(overlap);
-  fforce = normal / r;
-  svector[0] = normal;
+// the pair of an owned disk with another, or -1
+int PairMindlinSmooth::pair_of(int i, int j) const
+{
+  if (i + 1 >= static_cast<int>(pairs.start.size())) return -1;
+  for (int k = pairs.start[i]; k < pairs.start[i + 1]; k++) {
+    const int p = pairs.row[k] >> 1;
+    if ((pairs.row[k] & 1 ? pairs.first_tag[p] : pairs.second_tag[p]) == atom->tag[j]) return p;
+  }
+  return -1;
+}
+
+// what single() hands out, as seen from disk i; returns the energy, 0 where there is no contact
+template <class NUMBER> double PairMindlinSmooth::measure(int p, int i)
+{
+  const auto r = faultgouge::branch<NUMBER>(pairs, p, disks(), period());
+  const double radius_i = atom->radius[pairs.first[p]], radius_j = atom->radius[pairs.second[p]];
+  const auto contact = geometry(r, radius_i, radius_j, compensated ? low_parts->grid() : FixedPointGrid{});
+  if (leading(contact.overlap) <= 0.0) return 0.0;
+
+  const double overlap = value(contact.overlap), inverse = value(contact.inverse);
+  const double sign = atom->tag[i] == pairs.first_tag[p] ? 1.0 : -1.0;
+  svector[0] = law.normal_force(overlap);
   if (has_friction) {
     store_slips();
-    const double *stored = i < atom->nlocal ? history->find(i, atom->tag[j]) : history->find(j, atom->tag[i]);
-    const double limit = law.slip_limit_ratio() * overlap;
+    const int owned = pairs.first[p];
+    const double *stored = history->find(owned, pairs.second_tag[p]);
+    const double limit = law.slip_limit_ratio<double>() * overlap;
     const double slip = stored ? *stored : 0.0;
-    svector[1] = law.tangential_force(normal, slip, limit);
+    svector[1] = law.tangential_force(svector[0], slip, limit);
     svector[2] = slip;
     svector[3] = limit > 0.0 ? slip / limit : 0.0;
+    if (stored && compensated) svector[7] = stored[1];
   }
-  svector[4] = (atom->x[i][0] - atom->x[j][0]) / r;
-  svector[5] = (atom->x[i][1] - atom->x[j][1]) / r;
+  svector[4] = sign * value(r.x) * inverse;
+  svector[5] = sign * value(r.y) * inverse;
   svector[6] = overlap;
   return law.normal_energy(overlap);
 }
@@ -348,16 +389,22 @@ void PairMindlinSmooth::read_restart(FILE *fp)
 void PairMindlinSmooth::write_restart_settings(FILE *fp)
 {
   fwrite(&law, sizeof(MindlinLaw), 1, fp);
+  fwrite(&compensated, sizeof(bool), 1, fp);
 }
 
 void PairMindlinSmooth::read_restart_settings(FILE *fp)
 {
-  if (comm->me == 0) utils::sfread(FLERR, &law, sizeof(MindlinLaw), 1, fp, nullptr, error);
+  if (comm->me == 0) {
+    utils::sfread(FLERR, &law, sizeof(MindlinLaw), 1, fp, nullptr, error);
+    utils::sfread(FLERR, &compensated, sizeof(bool), 1, fp, nullptr, error);
+  }
   MPI_Bcast(&law, sizeof(MindlinLaw), MPI_BYTE, 0, world);
+  MPI_Bcast(&compensated, sizeof(bool), MPI_BYTE, 0, world);
 }
 
 double PairMindlinSmooth::memory_usage()
 {
-  const double per_pair = 2 * sizeof(int) + 2 * sizeof(tagint) + sizeof(PairForce) + sizeof(double) + 1;
+  const double numbers = (compensated ? 2.0 : 1.0) * (sizeof(PairForce) + sizeof(double));
+  const double per_pair = 2 * sizeof(int) + 2 * sizeof(tagint) + numbers + 1;
   return Pair::memory_usage() + pairs.size() * per_pair + (pairs.row.size() + pairs.start.size()) * sizeof(int);
 }

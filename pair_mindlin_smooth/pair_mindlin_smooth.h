@@ -1,12 +1,15 @@
-// pair_style mindlin/smooth KN KT MU
+// pair_style mindlin/smooth KN KT MU [compensated]
 //
 // Frictional disks in the plane: the law of mindlin_law.h with a slip history in fix slip/history. With
-// MU = 0 or KT = 0 there is no tangential force, no history and no fix.
+// MU = 0 or KT = 0 there is no tangential force, no history and no fix. compensated: coordinates, slips and forces
+// with low parts (compensated.h), kept in fix low/parts.
 
 #ifndef LMP_PAIR_MINDLIN_SMOOTH_H
 #define LMP_PAIR_MINDLIN_SMOOTH_H
 
+#include "contact_kernel.h"
 #include "contact_pairs.h"
+#include "fix_low_parts.h"
 #include "fix_slip_history.h"
 #include "mindlin_law.h"
 #include "pair.h"
@@ -40,21 +43,27 @@ private:
   faultgouge::MindlinLaw law;
   faultgouge::ContactPairs pairs;
   FixSlipHistory *history = nullptr;
+  FixLowParts *low_parts = nullptr;
+  bool compensated = false;
   bool has_friction = false;           // as compiled into this run, at init
   bool slips_in_fix = true;            // false while pairs.slip is newer
   double *largest_radius = nullptr;    // of each type
 
   // LAMMPS adds box lengths to the coordinates of ghosts, with a rounding that depends on which of two disks
   // is the ghost; with the original coordinates both owners of a pair find the same to the bit
-  std::vector<faultgouge::Vector> original;
+  std::vector<faultgouge::Vector> original, original_low;
 
   void allocate();
+  void make_fixes();
+  void check_integrators() const;
   void rebuild_pairs();
   void communicate_originals();
-  faultgouge::Vector branch(int pair) const;
-  template <bool FRICTION, bool ADVANCE> void contact_forces();
-  template <bool FRICTION> void sum_forces();
-  void tally();
+  faultgouge::Disks disks() const;
+  faultgouge::Period period() const;
+  int contact_forces(bool advance);
+  template <class NUMBER> void tally();
+  int pair_of(int i, int j) const;
+  template <class NUMBER> double measure(int pair, int i);
 };
 
 }    // namespace LAMMPS_NS

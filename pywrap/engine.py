@@ -2,15 +2,15 @@
 
 The instance is set up by the deck part ``system.in``, the same file that ``lmp -in`` runs, and driven by its
 companions. A `Packing` goes in and a `Packing` comes out, bit for bit; slips travel through the per-atom arrays
-of fix ``slips`` (pairs) and fix ``floor``. All methods are collective over the ranks of the communicator, and
-every rank sees the whole packing.
+of fix ``slips`` (pairs) and fix ``floor``, low parts of coordinates through that of fix ``low``. All methods are
+collective over the ranks of the communicator, and every rank sees the whole packing.
 """
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from ctypes import POINTER, c_double
 from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
@@ -23,13 +23,14 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from ..analysis import Contacts, Packing
+from ..analysis.compensated import normalized
 from ..analysis.packing import FLOOR, touching
 
 Floats = NDArray[np.float64]
 
 DECKS = Path(str(files("faultgouge.lammps_inputs")))
-FLOOR_COLUMNS = 7
-FLOOR_SLIP, FLOOR_OVERLAP = 2, 6
+FLOOR_SLIP, FLOOR_OVERLAP, FLOOR_SLIP_LOW = 2, 6, 7
+LOW_COLUMNS = 5
 
 
 class EngineError(RuntimeError):
@@ -62,6 +63,8 @@ class Motion(NamedTuple):
     ----------
     position : ndarray, shape (N, 2)
         Centres, length.
+    position_low : ndarray, shape (N, 2), or None
+        Their low parts, in compensated arithmetic.
     velocity : ndarray, shape (N, 2)
         Length / time.
     spin : ndarray, shape (N,)
@@ -71,6 +74,7 @@ class Motion(NamedTuple):
     """
 
     position: Floats
+    position_low: Floats | None
     velocity: Floats
     spin: Floats
     friction: float
@@ -101,7 +105,7 @@ class Engine:
     Parameters
     ----------
     packing : Packing
-        Positions, angles, slips, law and load to begin with.
+        Positions, angles, slips, law and load to begin with. The arithmetic is compensated if it is.
     communicator : mpi4py.MPI.Comm, optional
         The ranks that share the packing; all of them by default.
     log : Path, optional
@@ -138,10 +142,10 @@ class Engine:
     @property
     def packing(self) -> Packing:
         """The configuration as it stands, with its slips and its load."""
-        position = self._gather("x", 3)[:, :2]
+        position, low = self._positions()
         angle = self._gather("d_theta", 1)[:, 0]
         contacts = self._contacts() if self._static.law.frictional else self._touching(position)
-        return replace(self._static, position=position, angle=angle, contacts=contacts)
+        return replace(self._static, position=position, position_low=low, angle=angle, contacts=contacts)
 
     @property
     def net_force(self) -> Floats:
@@ -219,9 +223,8 @@ class Engine:
         self._scatter("v", np.column_stack([dx, dy, zero]))
         self._scatter("omega", np.column_stack([zero, zero, du / base.radius]))
         self._command("timestep 1.0")
-        with self._fix("move", "all nve/noforce"):
+        with self._displacing():
             self._command("run 1 post no")
-        self._scatter("d_theta", base.angle + du / base.radius)
         return self.packing
 
     def dump(self, stem: Path) -> None:
@@ -291,9 +294,7 @@ class Engine:
         """Go on with the undamped dynamics by so many steps."""
         self._command(f"run {steps} pre no post no")
         friction = self._lammps.extract_variable("friction") if self._weakening else self._static.law.mu
-        return Motion(
-            self._gather("x", 3)[:, :2], self._gather("v", 3)[:, :2], self._gather("omega", 3)[:, 2], float(friction)
-        )
+        return Motion(*self._positions(), self._gather("v", 3)[:, :2], self._gather("omega", 3)[:, 2], float(friction))
 
     def _load(self, packing: Packing) -> None:
         law = packing.law
@@ -312,30 +313,37 @@ class Engine:
                 fx=packing.fx,
                 fy=packing.fy,
                 inertia=packing.inertia_factor,
+                precision="compensated" if packing.compensated else "double",
             )
             self._include("system.in")
         self._scatter("rmass", packing.mass)
         self._scatter("d_theta", packing.angle)
-        if law.frictional:
-            with self._fix("move", "all nve/noforce"):
-                self._command("run 0 post no")  # makes fix slips
+        if law.frictional or packing.compensated:
+            with self._displacing():
+                self._command("run 0 post no")  # makes the fixes slips and low
             self._write(packing)
 
     def _write(self, packing: Packing) -> None:
         """Positions, angles and slips of a packing into LAMMPS; they take effect at the next run's setup."""
         self._scatter("x", np.column_stack([packing.position, np.zeros(len(packing))]))
         self._scatter("d_theta", packing.angle)
+        if self._static.compensated:
+            low = np.zeros((len(packing), LOW_COLUMNS))
+            low[:, :2] = 0.0 if packing.position_low is None else packing.position_low
+            self._scatter("f_low", low)
         if packing.law.frictional:
             self._scatter("f_slips", self._slip_rows(packing))
             floor = packing.contacts.floor
-            column = np.zeros((len(packing), FLOOR_COLUMNS))
+            column = np.zeros((len(packing), self._floor_columns))
             column[packing.contacts.i[floor], FLOOR_SLIP] = packing.contacts.slip[floor]
+            if self._static.compensated and packing.contacts.slip_low is not None:
+                column[packing.contacts.i[floor], FLOOR_SLIP_LOW] = packing.contacts.slip_low[floor]
             column[packing.contacts.i[floor], FLOOR_OVERLAP] = packing.geometry.overlap[floor]
             self._scatter("f_floor", column)
 
     def _slip_rows(self, packing: Packing) -> Floats:
         """Rows [own ID, partner ID, slip, ...] of fix slip/history, see fix_slip_history.h."""
-        pair = ~packing.contacts.floor
+        width, pair = self._slip_width, ~packing.contacts.floor
         owner = np.concatenate([packing.contacts.i[pair], packing.contacts.j[pair]])
         partner = np.concatenate([packing.contacts.j[pair], packing.contacts.i[pair]])
         slip = np.tile(packing.contacts.slip[pair], 2)
@@ -343,13 +351,36 @@ class Engine:
         owner, partner, slip = owner[order], partner[order], slip[order]
         place = np.arange(len(owner)) - np.searchsorted(owner, owner)
         most = int(place.max(initial=-1)) + 1
-        if 1 + 2 * most > self._slip_columns:
+        if 1 + width * most > self._slip_columns:
             self._command(f"fix_modify slips capacity {most}")
         rows = np.zeros((len(packing), self._slip_columns))
         rows[owner, 0] = owner + 1
-        rows[owner, 1 + 2 * place] = partner + 1
-        rows[owner, 2 + 2 * place] = slip
+        rows[owner, 1 + width * place] = partner + 1
+        rows[owner, 2 + width * place] = slip
+        if self._static.compensated and packing.contacts.slip_low is not None:
+            rows[owner, 3 + width * place] = np.tile(packing.contacts.slip_low[pair], 2)[order]
         return rows
+
+    @property
+    def _slip_width(self) -> int:
+        """Numbers of a contact in a row of fix slip/history."""
+        return 3 if self._static.compensated else 2
+
+    @property
+    def _floor_columns(self) -> int:
+        return FLOOR_SLIP_LOW + 1 if self._static.compensated else FLOOR_OVERLAP + 1
+
+    def _positions(self) -> tuple[Floats, Floats | None]:
+        """Coordinates as doubles and, in compensated arithmetic, what these lack."""
+        position = self._gather("x", 3)[:, :2]
+        return (
+            normalized(position, self._gather("f_low", LOW_COLUMNS)[:, :2])
+            if self._static.compensated
+            else (position, None)
+        )
+
+    def _displacing(self) -> AbstractContextManager[None]:
+        return self._fix("move", "all displace/disc" + (" compensated" if self._static.compensated else ""))
 
     @property
     def _slip_columns(self) -> int:
@@ -358,15 +389,19 @@ class Engine:
         return int(self._lammps.extract_fix("slips", LMP_STYLE_ATOM, LMP_SIZE_COLS))
 
     def _contacts(self) -> Contacts:
-        rows = self._gather("f_slips", self._slip_columns)
-        partner = rows[:, 1::2].astype(np.int64) - 1
+        rows, width = self._gather("f_slips", self._slip_columns), self._slip_width
+        partner = rows[:, 1::width].astype(np.int64) - 1
         i, place = np.nonzero(partner > np.arange(len(rows))[:, None])
-        column = self._gather("f_floor", FLOOR_COLUMNS)
+        column = self._gather("f_floor", self._floor_columns)
         floor = np.flatnonzero(column[:, FLOOR_OVERLAP] > 0)
+        low = None
+        if self._static.compensated:
+            low = np.concatenate([rows[i, 3 + width * place], column[floor, FLOOR_SLIP_LOW]])
         return Contacts(
             i=np.concatenate([i, floor]),
             j=np.concatenate([partner[i, place], np.full(len(floor), FLOOR)]),
-            slip=np.concatenate([rows[i, 2 + 2 * place], column[floor, FLOOR_SLIP]]),
+            slip=np.concatenate([rows[i, 2 + width * place], column[floor, FLOOR_SLIP]]),
+            slip_low=low,
         )
 
     def _touching(self, position: Floats) -> Contacts:

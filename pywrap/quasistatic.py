@@ -13,7 +13,11 @@ sticks or slides on the way changes K, and the iteration goes on with the new co
 
 Doubles bound what can be reached: a coordinate x is known to :math:`\epsilon |x|`, which changes the force of a
 contact of stiffness k by :math:`k \epsilon |x|`. `rounding_floor` sums this over the contacts of each disk. An
-equilibrium whose residual no longer falls and is of this order is at the floor, and is reported as such.
+equilibrium whose residual no longer falls and is of this order is at the floor, and is reported as such. In
+compensated arithmetic a coordinate is known to 1e-23, and the next bound is the displacement itself, a double:
+:math:`k \epsilon |q|`. From there on displacements count from the iterate. What is left, :math:`q'`, is of order
+:math:`\epsilon |q|`, and that its slips start at an iterate changes them by :math:`|q| |q'|`, which is less than they
+can resolve.
 
 Where Newton fails the increment is halved, since the path matters: friction remembers.
 """
@@ -81,15 +85,22 @@ class Equilibrium:
         return self.packing.fx
 
 
-def rounding_floor(packing: Packing) -> float:
+def rounding_floor(packing: Packing, displaced: float = 0.0) -> float:
     """Residual that one unit in the last place of each coordinate leaves, force.
 
     The forces of a disk's contacts are summed as independent errors, and the largest over disks is taken.
+
+    Parameters
+    ----------
+    packing : Packing
+        The configuration.
+    displaced : float
+        Length of the displacement that led to it, a double, whose last place counts as well.
     """
     contacts, geometry = packing.contacts, packing.geometry
     if len(contacts) == 0:
         return 0.0
-    unit = np.finfo(float).eps * np.abs(packing.position).max()
+    unit = packing.coordinate_rounding + np.finfo(float).eps * displaced
     error = (packing.law.normal_stiffness(geometry.overlap) * unit) ** 2
     per_disk = np.bincount(contacts.i, error, len(packing))
     pair = ~contacts.floor
@@ -162,6 +173,8 @@ def _newton(engine: Engine, base: Packing, force_tolerance: float | None) -> tup
             return None, evaluation  # a floating part: the linear response is no small displacement
         if evaluation <= FREEING:
             step.reshape(3, -1)[:, _hit(trial)] *= 1.5
+        if base.compensated and residual < 10 * rounding_floor(trial, np.abs(displacement).max()):
+            base, displacement = trial, np.zeros_like(displacement)
         displacement = displacement + step
     return None, ITERATIONS
 

@@ -383,15 +383,16 @@ class Scene(_Section):
 
     Attributes
     ----------
-    precision : {"double"}
-        Arithmetic of the coordinates.
+    precision : {"double", "compensated"}
+        Arithmetic of coordinates, slips and forces: doubles, or doubles with low parts, for forces that balance to
+        1e-17 instead of 1e-11.
     packing, law, load, relax
         Sections that every scene has; relax may be left out in TOML.
     ramp, perturb, friction, output
         Sections or None, which means that the feature is not in the run.
     """
 
-    precision: Literal["double"] = "double"
+    precision: Literal["double", "compensated"] = "double"
     packing: Annotated[
         Annotated[GeneratedPacking, Tag("generated")] | Annotated[StoredPacking, Tag("stored")],
         Discriminator(_kind_of_packing),

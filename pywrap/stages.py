@@ -340,7 +340,11 @@ def _undamped(
                 watch(step * dt, motion)
             yield Sample(
                 time=step * dt,
-                msd=float(mean_square_displacement(motion.position, packing.position, packing.box_length)),
+                msd=float(
+                    mean_square_displacement(
+                        motion.position, packing.position, packing.box_length, motion.position_low, packing.position_low
+                    )
+                ),
                 kinetic_energy=float(
                     0.5 * (packing.mass @ np.sum(motion.velocity**2, axis=1) + inertia @ motion.spin**2)
                 ),
@@ -422,7 +426,8 @@ class Record:
     def append_motion(self, time: float, motion: Motion) -> None:
         """Write positions of an undamped run, series trajectory."""
         if self.communicator.rank == 0 and self._file is not None:
-            self._file.append_series("trajectory", time=[time], position=[motion.position])
+            low = {} if motion.position_low is None else {"position_low": [motion.position_low]}
+            self._file.append_series("trajectory", time=[time], position=[motion.position], **low)
 
     def _open(self, packing: Packing) -> RunFile:
         if self._file is None:
@@ -459,6 +464,7 @@ def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None) -> Pa
         law=settling,
         contacts=touching(start.position, start.radius, start.box_length),
         fy=scene.load.fy,
+        position_low=np.zeros_like(start.position) if scene.precision == "compensated" else None,
     )
     with Engine(loose, communicator) as engine:
         engine.settle(SETTLING_TOLERANCE * scene.load.fy)
@@ -494,6 +500,10 @@ def _stored(scene: Scene, law: MindlinLaw) -> Packing:
             if len(file) == 0:
                 raise PackingFileError(f"{path} has no equilibrium in it")
             packing = replace(file.packing(0), law=law, inertia_factor=scene.inertia_factor, fy=scene.load.fy)
+    if scene.precision == "double":
+        packing = replace(packing, position_low=None)
+    elif not packing.compensated:
+        packing = replace(packing, position_low=np.zeros_like(packing.position))
     if packing.residual > OUT_OF_BALANCE * scene.load.fy:
         raise SceneError(
             f"{path}: the packing is not in balance, a disk feels {packing.residual:.3g} under fy = {scene.load.fy:g}: "

@@ -1,0 +1,246 @@
+#include "contact_kernel.h"
+
+#include <type_traits>
+
+// Fused multiply-add makes exact products fast, and vectors of four do the rest.
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__)
+#define FAULTGOUGE_DISPATCH __attribute__((target_clones("fma", "default")))
+#else
+#define FAULTGOUGE_DISPATCH
+#endif
+
+namespace faultgouge {
+
+namespace {
+
+// so many contacts that their columns stay in the first-level cache
+constexpr int BATCH = 64;
+
+struct DoubleColumn {
+  double value[BATCH];
+  FAULTGOUGE_INLINE double load(int k) const { return value[k]; }
+  FAULTGOUGE_INLINE void store(int k, double number) { value[k] = number; }
+};
+
+struct CompensatedColumn {
+  double high[BATCH], low[BATCH];
+  FAULTGOUGE_INLINE Compensated load(int k) const { return {high[k], low[k]}; }
+  FAULTGOUGE_INLINE void store(int k, Compensated number)
+  {
+    high[k] = number.high;
+    low[k] = number.low;
+  }
+};
+
+template <class Number> struct Batch {
+  using Column = std::conditional_t<std::is_same_v<Number, double>, DoubleColumn, CompensatedColumn>;
+
+  int count = 0;
+  int pair[BATCH];
+  Column branch_x, branch_y, slip, overlap, force_x, force_y, tangential;
+  double radius_i[BATCH], radius_j[BATCH], moved_x[BATCH], moved_y[BATCH], rolled[BATCH];
+};
+
+// high parts of a contact cannot be farther apart than its reach and this
+FAULTGOUGE_INLINE double margin(double, const FixedPointGrid &)
+{
+  return 0.0;
+}
+FAULTGOUGE_INLINE double margin(Compensated, const FixedPointGrid &grid)
+{
+  return 8.0 * grid.spacing;
+}
+
+FAULTGOUGE_INLINE void set_force(ContactPairs &pairs, int p, double x, double y, double tangential)
+{
+  pairs.force[p] = PairForce{x, y, tangential};
+}
+
+FAULTGOUGE_INLINE void set_force(ContactPairs &pairs, int p, Compensated x, Compensated y, Compensated tangential)
+{
+  pairs.force[p] = PairForce{x.high, y.high, tangential.high};
+  pairs.force_low[p] = PairForce{x.low, y.low, tangential.low};
+}
+
+template <class Number, bool FRICTION> FAULTGOUGE_INLINE void open(ContactPairs &pairs, int p)
+{
+  set_force(pairs, p, Number(0.0), Number(0.0), Number(0.0));
+  if constexpr (FRICTION) pairs.touching[p] = 0;
+}
+
+template <class Number, bool FRICTION, bool ADVANCE>
+FAULTGOUGE_INLINE void add(Batch<Number> &batch, const ContactPairs &pairs, int p, const Branch<Number> &r,
+                           const Disks &disks, double dt)
+{
+  const int k = batch.count++, i = pairs.first[p], j = pairs.second[p];
+  batch.pair[k] = p;
+  batch.branch_x.store(k, r.x);
+  batch.branch_y.store(k, r.y);
+  batch.radius_i[k] = disks.radius[i];
+  batch.radius_j[k] = disks.radius[j];
+  if constexpr (!FRICTION) return;
+
+  const bool known = pairs.touching[p];
+  if constexpr (std::is_same_v<Number, double>)
+    batch.slip.store(k, known ? pairs.slip[p] : 0.0);
+  else
+    batch.slip.store(k, known ? Compensated(pairs.slip[p], pairs.slip_low[p]) : Compensated());
+  if constexpr (ADVANCE) {
+    const double *const vi = disks.v + 3 * i, *const vj = disks.v + 3 * j;
+    const double step = known ? dt : 0.0;    // a new contact begins without slip
+    batch.moved_x[k] = (vi[0] - vj[0]) * step;
+    batch.moved_y[k] = (vi[1] - vj[1]) * step;
+    batch.rolled[k] = (disks.radius[i] * disks.omega[3 * i + 2] + disks.radius[j] * disks.omega[3 * j + 2]) * step;
+  }
+}
+
+template <class Number, bool FRICTION, bool ADVANCE>
+FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law, const FixedPointGrid grid)
+{
+  const Number limit_ratio = FRICTION ? law.slip_limit_ratio<Number>() : Number(0.0);
+  for (int k = 0; k < batch.count; k++) {
+    const Branch<Number> r{batch.branch_x.load(k), batch.branch_y.load(k)};
+    const Geometry<Number> contact = geometry(r, batch.radius_i[k], batch.radius_j[k], grid);
+    const Number nx = r.x * contact.inverse, ny = r.y * contact.inverse;
+    const Number normal = law.normal_force(contact.overlap);
+    batch.overlap.store(k, contact.overlap);
+    if constexpr (!FRICTION) {
+      batch.force_x.store(k, normal * nx);
+      batch.force_y.store(k, normal * ny);
+      continue;
+    }
+
+    const Number limit = limit_ratio * contact.overlap;
+    Number slip = batch.slip.load(k);
+    if constexpr (ADVANCE) {
+      const double moved =
+          midpoint_slip({value(r.x), value(r.y)}, {batch.moved_x[k], batch.moved_y[k]}) - batch.rolled[k];
+      slip = advanced_slip(slip, moved, limit);
+    }
+    const Number tangential = law.tangential_force(normal, slip, limit);
+    batch.slip.store(k, slip);
+    batch.tangential.store(k, tangential);
+    batch.force_x.store(k, normal * nx - tangential * ny);
+    batch.force_y.store(k, normal * ny + tangential * nx);
+  }
+}
+
+template <class Number, bool FRICTION> FAULTGOUGE_INLINE void empty(Batch<Number> &batch, ContactPairs &pairs)
+{
+  for (int k = 0; k < batch.count; k++) {
+    const int p = batch.pair[k];
+    if (leading(batch.overlap.load(k)) <= 0.0) {
+      open<Number, FRICTION>(pairs, p);
+      continue;
+    }
+    const Number tangential = FRICTION ? batch.tangential.load(k) : Number(0.0);
+    set_force(pairs, p, batch.force_x.load(k), batch.force_y.load(k), tangential);
+    if constexpr (FRICTION) {
+      pairs.touching[p] = 1;
+      pairs.slip[p] = leading(batch.slip.load(k));
+      if constexpr (std::is_same_v<Number, Compensated>) pairs.slip_low[p] = batch.slip.low[k];
+    }
+  }
+  batch.count = 0;
+}
+
+template <class Number, bool FRICTION, bool ADVANCE>
+FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
+                                 double dt, const FixedPointGrid &grid)
+{
+  Batch<Number> batch;
+  int coincident = -1;
+  for (int p = 0, n = pairs.size(); p < n; p++) {
+    const Branch<double> high = leading_branch(pairs, p, disks, box);
+    const double rsq = high.x * high.x + high.y * high.y;
+    const double reach = disks.radius[pairs.first[p]] + disks.radius[pairs.second[p]] + margin(Number(), grid);
+    if (rsq >= reach * reach) {
+      open<Number, FRICTION>(pairs, p);
+      continue;
+    }
+    if (rsq == 0.0) coincident = p;
+    Branch<Number> r{high.x, high.y};
+    if constexpr (std::is_same_v<Number, Compensated>) {
+      const Branch<double> low = low_branch(pairs, p, disks, box);
+      r.x.low = low.x;
+      r.y.low = low.y;
+    }
+    add<Number, FRICTION, ADVANCE>(batch, pairs, p, r, disks, dt);
+    if (batch.count < BATCH) continue;
+    evaluate<Number, FRICTION, ADVANCE>(batch, law, grid);
+    empty<Number, FRICTION>(batch, pairs);
+  }
+  evaluate<Number, FRICTION, ADVANCE>(batch, law, grid);
+  empty<Number, FRICTION>(batch, pairs);
+  return coincident;
+}
+
+// x, y and tangential force of a pair, as its first disk or, for odd entries of a row, its second one feels them
+using Four = double __attribute__((vector_size(32)));
+
+FAULTGOUGE_INLINE void load(Four &felt, const std::vector<PairForce> &force, int entry)
+{
+  const PairForce &pair = force[entry >> 1];
+  const double sign = entry & 1 ? -1.0 : 1.0;
+  felt = Four{sign * pair.x, sign * pair.y, pair.tangential, 0.0};
+}
+
+}    // namespace
+
+FAULTGOUGE_DISPATCH
+int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law, double dt,
+                   bool friction, bool advance)
+{
+  const FixedPointGrid none{};
+  if (!friction) return all_forces<double, false, false>(pairs, disks, box, law, dt, none);
+  if (advance) return all_forces<double, true, true>(pairs, disks, box, law, dt, none);
+  return all_forces<double, true, false>(pairs, disks, box, law, dt, none);
+}
+
+FAULTGOUGE_DISPATCH
+int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
+                               double dt, bool friction, bool advance, const FixedPointGrid &grid)
+{
+  if (!friction) return all_forces<Compensated, false, false>(pairs, disks, box, law, dt, grid);
+  if (advance) return all_forces<Compensated, true, true>(pairs, disks, box, law, dt, grid);
+  return all_forces<Compensated, true, false>(pairs, disks, box, law, dt, grid);
+}
+
+FAULTGOUGE_DISPATCH
+void sum_forces(const ContactPairs &pairs, const Disks &disks, const Forces &forces)
+{
+  for (int i = 0; i < disks.owned; i++) {
+    Four sum{}, more{};
+    for (int k = pairs.start[i]; k < pairs.start[i + 1]; k++) {
+      load(more, pairs.force, pairs.row[k]);
+      sum += more;
+    }
+    forces.f[i][0] += sum[0];
+    forces.f[i][1] += sum[1];
+    forces.torque[i][2] -= disks.radius[i] * sum[2];
+  }
+}
+
+FAULTGOUGE_DISPATCH
+void sum_compensated_forces(const ContactPairs &pairs, const Disks &disks, const Forces &forces)
+{
+  for (int i = 0; i < disks.owned; i++) {
+    Four sum{}, low{}, more{}, more_low{};
+    for (int k = pairs.start[i]; k < pairs.start[i + 1]; k++) {
+      load(more, pairs.force, pairs.row[k]);
+      load(more_low, pairs.force_low, pairs.row[k]);
+      const Four total = sum + more, part = total - sum;    // exact_sum of compensated.h
+      low += ((sum - (total - part)) + (more - part)) + more_low;
+      sum = total;
+    }
+    const Compensated torque = -disks.radius[i] * Compensated(sum[2], low[2]);
+    forces.f[i][0] += sum[0];
+    forces.f[i][1] += sum[1];
+    forces.torque[i][2] += torque.high;
+    forces.low[i][forces.low_fx] = low[0];
+    forces.low[i][forces.low_fy] = low[1];
+    forces.low[i][forces.low_torque] = torque.low;
+  }
+}
+
+}    // namespace faultgouge

@@ -1,0 +1,124 @@
+// The forces of all neighbour pairs, in double or compensated arithmetic. No LAMMPS types.
+//
+// Pairs are told apart from contacts by their distance first. Contacts are then worked on in batches, with loops
+// without branches that compilers turn into vector instructions; every operation on its own is that of IEEE 754, so
+// that the width of the vectors changes nothing.
+
+#ifndef FAULTGOUGE_CONTACT_KERNEL_H
+#define FAULTGOUGE_CONTACT_KERNEL_H
+
+#include "contact_pairs.h"
+#include "mindlin_law.h"
+
+namespace faultgouge {
+
+// The disks of a rank, owned ones first; beyond them the coordinates are those that other owners have, not images.
+struct Disks {
+  int owned;
+  const double *x, *v, *omega;    // three numbers a disk
+  const double *radius;
+  const double *low;                          // rows of fix low/parts; only compensated
+  int low_columns;                            // and how long they are
+  const Vector *elsewhere, *elsewhere_low;    // of disks owned elsewhere, null where nothing needs them
+};
+
+// Lengths of the periodic box, and what they lack to a multiple of the grid
+struct Period {
+  double x, y, x_low, y_low;
+};
+
+template <class Number> struct Branch {
+  Number x, y;
+};
+
+template <class Number> struct Geometry {
+  Number overlap;
+  Number inverse;    // of the distance
+};
+
+// from the second disk of a pair to the first, in the coordinates' high parts if these are compensated
+FAULTGOUGE_INLINE Branch<double> leading_branch(const ContactPairs &pairs, int p, const Disks &disks, const Period &box)
+{
+  const int i = pairs.first[p], j = pairs.second[p];
+  const double *const xi = disks.x + 3 * i, *const xj = disks.x + 3 * j;
+  const auto image = pairs.image[p];
+  if (image.x == 0 && image.y == 0) return {xi[0] - xj[0], xi[1] - xj[1]};
+  const Vector other = j < disks.owned ? Vector{xj[0], xj[1]} : disks.elsewhere[j];
+  return {(xi[0] - other.x) - image.x * box.x, (xi[1] - other.y) - image.y * box.y};
+}
+
+FAULTGOUGE_INLINE Branch<double> low_branch(const ContactPairs &pairs, int p, const Disks &disks, const Period &box)
+{
+  const int i = pairs.first[p], j = pairs.second[p];
+  const double *const low = disks.low + disks.low_columns * i, *const low_j = disks.low + disks.low_columns * j;
+  const auto image = pairs.image[p];
+  const Vector other = j < disks.owned ? Vector{low_j[0], low_j[1]} : disks.elsewhere_low[j];
+  return {(low[0] - other.x) - image.x * box.x_low, (low[1] - other.y) - image.y * box.y_low};
+}
+
+template <class Number> Branch<Number> branch(const ContactPairs &pairs, int p, const Disks &disks, const Period &box);
+
+template <>
+FAULTGOUGE_INLINE Branch<double> branch(const ContactPairs &pairs, int p, const Disks &disks, const Period &box)
+{
+  return leading_branch(pairs, p, disks, box);
+}
+
+template <>
+FAULTGOUGE_INLINE Branch<Compensated> branch(const ContactPairs &pairs, int p, const Disks &disks, const Period &box)
+{
+  const Branch<double> high = leading_branch(pairs, p, disks, box), low = low_branch(pairs, p, disks, box);
+  return {{high.x, low.x}, {high.y, low.y}};
+}
+
+// The overlap is not positive where the disks do not touch; it is c - r in double, c = R_i + R_j.
+FAULTGOUGE_INLINE Geometry<double> geometry(const Branch<double> &r, double radius_i, double radius_j,
+                                            const FixedPointGrid &)
+{
+  const double distance = std::sqrt(r.x * r.x + r.y * r.y);
+  return {(radius_i + radius_j) - distance, 1.0 / distance};
+}
+
+// Here it is D / (c + r) with D = c^2 - r^2, to 20 digits however small: the squares of high parts are exact.
+FAULTGOUGE_INLINE Geometry<Compensated> geometry(const Branch<Compensated> &r, double radius_i, double radius_j,
+                                                 const FixedPointGrid &grid)
+{
+  const Compensated sum = exact_sum(radius_i, radius_j);
+  const double rsq = r.x.high * r.x.high + r.y.high * r.y.high;
+  const double rsq_low = (2.0 * r.x.high + r.x.low) * r.x.low + (2.0 * r.y.high + r.y.low) * r.y.low;
+  const double reach = grid.whole(sum.high), reach_low = (sum.high - reach) + sum.low;
+  const Compensated gap = exact_sum((reach * reach - r.x.high * r.x.high) - r.y.high * r.y.high,
+                                    (2.0 * reach + reach_low) * reach_low - rsq_low);
+  // gap = overlap (2 c - overlap): an approximation, and what it lacks
+  const double distance = std::sqrt(rsq + rsq_low);
+  const double overlap = gap.high / (sum.high + distance);
+  const Compensated other = exact_sum(2.0 * sum.high, -overlap);
+  const Compensated product = exact_product(overlap, other.high);
+  const double lacks = (gap.high - product.high) + (gap.low - product.low) - overlap * (other.low + 2.0 * sum.low);
+  const double inverse = 1.0 / distance;
+  const Compensated result{overlap, lacks * (0.5 * inverse)};
+  const Compensated exact = ordered_sum(sum, -result);
+  return {result, {inverse, (__builtin_fma(-inverse, exact.high, 1.0) - inverse * exact.low) * inverse}};
+}
+
+// All pairs: their forces, slips and whether they touch. With advance the slips advance by v dt and omega dt. Returns a
+// pair of disks with one centre, or -1. Compiled for several processors, of which the one at hand is chosen at run
+// time; results are the same on all.
+int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law, double dt,
+                   bool friction, bool advance);
+int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
+                               double dt, bool friction, bool advance, const FixedPointGrid &grid);
+
+// Where forces go: rows of f and torque, and with compensated arithmetic of fix low/parts
+struct Forces {
+  double *const *f, *const *torque, *const *low;
+  int low_fx, low_fy, low_torque;    // columns of low
+};
+
+// Each disk adds up its pairs in the order of the partners' IDs.
+void sum_forces(const ContactPairs &pairs, const Disks &disks, const Forces &forces);
+void sum_compensated_forces(const ContactPairs &pairs, const Disks &disks, const Forces &forces);
+
+}    // namespace faultgouge
+
+#endif
