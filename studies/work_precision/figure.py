@@ -22,16 +22,20 @@ SHADE = "#e9e9e9"
 def figure_of(study: Study) -> Figure:
     """Two panels that share the errors, doubly logarithmic.
 
-    Methods with a parameter are lines through their points, from coarse to fine; where the second panel is over the
-    parameter, the others are horizontal lines there. Theory is grey; what lies in the shade is below the reference's
-    own error. Errors of zero stand at the lower edge.
+    A method in compensated arithmetic has the colour of the plain one, hollow and broken. Methods with a parameter are
+    lines through their points, from coarse to fine; where the second panel is over the parameter, the others are
+    horizontal lines there. Theory is grey; what lies in the shade is below the reference's own error. Errors of zero
+    stand at the lower edge.
     """
     figure = Figure(figsize=(6.8, 3.5), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     bottom, top = _limits(study)
-    for number, method in enumerate(study.methods):
-        points = study.of(method)
+    families = list(dict.fromkeys(map(_family, study.methods)))
+    for method in study.methods:
+        points, number = study.of(method), families.index(_family(method))
         style: dict[str, Any] = {"color": f"C{number}", "marker": MARKERS[number]}
+        if method != _family(method):
+            style |= {"markerfacecolor": "white", "linestyle": "--"}
         error = [max(point.error, bottom) for point in points]
         clip = {"clip_on": False, "zorder": 3}
         left.plot([point.seconds for point in points], error, label=method, **style, **clip)
@@ -55,6 +59,11 @@ def figure_of(study: Study) -> Figure:
         _whole_decades(axes)
         axes.grid(color=INK, alpha=0.12, linewidth=0.4)
     return figure
+
+
+def _family(method: str) -> str:
+    """The method without its arithmetic."""
+    return method.removesuffix(", compensated")
 
 
 def _second(axes: Axes, points: list[Point], error: list[float], abscissa: str, style: dict[str, Any]) -> None:

@@ -21,6 +21,7 @@ from ...analysis import Onset, Packing, find_onset, spectrum
 from ...analysis.spectrum import SAFETY
 from ...pywrap import Engine, Equilibrium, Scene
 from ...pywrap.stages import EquilibriumPath
+from .precision import compensated
 from .study import Point, Settings, Study, Theory
 from .timing import timed
 
@@ -105,17 +106,19 @@ class Ways:
 def onset(settings: Settings) -> Study:
     """The study: four ways to the onset of the ramp."""
     start = settings.ramp[0]
-    with Engine(start.packing) as engine:
-        return _study(settings, Ways(engine, start, settings.scene))
+    exact_start = compensated(start)
+    with Engine(start.packing) as engine, Engine(exact_start.packing) as exact_engine:
+        exact = Ways(exact_engine, exact_start, settings.scene)
+        return _study(settings, Ways(engine, start, settings.scene), exact)
 
 
-def _study(settings: Settings, ways: Ways) -> Study:
+def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     quick = settings.quick
     check, finest = (2e-3, 1e-3) if quick else (5e-4, 2.5e-4)
     guess = ways.scan(1e-3)[0] + 0.5e-3
-    found, _ = ways.solved(finest, guess)
+    found, _ = reference.solved(finest, guess)
     exact = found.fx_c
-    reference_error = found.error + abs(ways.root(check, guess)[0] - exact)
+    reference_error = found.error + abs(reference.root(check, guess)[0] - exact)
     runs: list[tuple[str, float, Callable[[], tuple[float, int]]]] = []
     for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
         runs.append((OVERDAMPED, increment, partial(ways.scan, increment, "overdamped")))
@@ -144,8 +147,8 @@ def _study(settings: Settings, ways: Ways) -> Study:
         parameter="increment of F_x; bisection: width that is left",
         evaluations="equilibria, each with its eigenvalues",
         abscissa="evaluations",
-        reference=f"the root of the discriminant on a ramp with increments of {finest:g}; its error is the one that "
-        f"it states and its difference from increments of {check:g}",
+        reference=f"the root of the discriminant in compensated arithmetic on a ramp with increments of {finest:g}; "
+        f"its error is the one that it states and its difference from increments of {check:g}",
         reference_error=reference_error,
         points=points,
         advice=(

@@ -23,14 +23,18 @@ from ...analysis import Packing, dynamical_matrix
 from ...analysis.packing import Floats
 from ...pywrap import Engine, Equilibrium, equilibrate
 from ...pywrap.quasistatic import rounding_floor
+from .fire import fire
+from .precision import compensated
 from .study import Point, Settings, Study, Theory
 from .timing import timed
 
 FROM, TO = 0.010, 0.011
 """F_x before and after: an increment far from the onset."""
 
-METHODS = ("overdamped, step of the decks", "overdamped, step from K", "Verlet with drag", "FIRE", "Newton")
-OVERDAMPED, FASTER, VERLET, FIRE, NEWTON = METHODS
+METHODS = ("overdamped, step of the decks", "overdamped", "FIRE", "Verlet with drag", "Newton")
+DECKS, OVERDAMPED, FIRE, VERLET, NEWTON = METHODS
+COMPENSATED = ", compensated"
+"""Ends the name of a method in compensated arithmetic."""
 
 CHUNK = 200
 """Steps between two looks at the forces, so that the cost is known to so many steps."""
@@ -50,7 +54,7 @@ class Increment:
     start : Equilibrium
         At `FROM`.
     end : Packing
-        At `TO`, by Newton's method.
+        At `TO`, by Newton's method in compensated arithmetic.
     """
 
     engine: Engine
@@ -59,10 +63,9 @@ class Increment:
 
     def distance(self, packing: Packing) -> float:
         """Largest difference of a coordinate (x, y, R theta) of a disk that is held, length."""
-        apart = np.column_stack(
-            [packing.position - self.end.position, packing.scaled_angle - self.end.scaled_angle],
-        )
-        return float(np.abs(np.delete(apart, self.end.rattlers, axis=0)).max())
+        apart = packing.position - self.end.position + (_low(packing) - _low(self.end))
+        turned = packing.scaled_angle - self.end.scaled_angle
+        return float(np.abs(np.delete(np.column_stack([apart, turned]), self.end.rattlers, axis=0)).max())
 
     def overdamped(self, time_step: float | None, tolerance: float) -> tuple[Packing, int]:
         """The paper's dynamics until no disk feels more than a force."""
@@ -98,110 +101,93 @@ class Increment:
         return found.packing, found.evaluations
 
 
-def fire(
-    force: Callable[[Floats], Floats], start: Floats, longest: float, tolerance: float, most: int = 20_000
-) -> tuple[Floats, int]:
-    """A root of F by the fast inertial relaxation engine, unit masses, with the parameters of its authors.
-
-    Parameters
-    ----------
-    force : callable
-        F(q), shape (n,) to (n,).
-    start : ndarray, shape (n,)
-        Where to begin, at rest.
-    longest : float
-        Longest time step; a tenth of it is the first.
-    tolerance : float
-        Largest component of F to end at.
-    most : int
-        Evaluations after which it ends in any case.
-
-    Returns
-    -------
-    tuple of ndarray and int
-        q, and the number of evaluations of F.
-    """
-    position, velocity = start.copy(), np.zeros_like(start)
-    step, mixing, downhill = 0.1 * longest, 0.1, 0
-    now, evaluations = force(position), 1
-    while np.abs(now).max() > tolerance and evaluations < most:
-        if velocity @ now > 0:
-            velocity = (1 - mixing) * velocity + mixing * np.linalg.norm(velocity) / np.linalg.norm(now) * now
-            downhill += 1
-            if downhill > 5:
-                step, mixing = min(1.1 * step, longest), 0.99 * mixing
-        else:
-            velocity[:], step, mixing, downhill = 0.0, 0.5 * step, 0.1, 0
-        velocity = velocity + step * now
-        position = position + step * velocity
-        now, evaluations = force(position), evaluations + 1
-    return position, evaluations
+def _low(packing: Packing) -> Floats:
+    return np.zeros_like(packing.position) if packing.position_low is None else packing.position_low
 
 
 def relaxation(settings: Settings) -> Study:
-    """The four ways, each to several accuracies."""
-    start = settings.at(FROM)
-    with Engine(start.packing) as engine:
-        end = equilibrate(engine, start, TO)
-        return _study(settings, Increment(engine, start, end.packing))
+    """The four ways, each to several accuracies, three of them in both arithmetics."""
+    plain = settings.at(FROM)
+    careful = compensated(plain)
+    with Engine(plain.packing) as engine, Engine(careful.packing) as careful_engine:
+        end = equilibrate(careful_engine, careful, TO)
+        return _study(
+            settings,
+            Increment(engine, plain, end.packing),
+            Increment(careful_engine, careful, end.packing),
+            end,
+        )
 
 
-def _study(settings: Settings, increment: Increment) -> Study:
-    end = increment.end
-    matrix, _ = dynamical_matrix(end)
+def _study(settings: Settings, plain: Increment, careful: Increment, end: Equilibrium) -> Study:
+    matrix, _ = dynamical_matrix(end.packing)
     values = np.linalg.eigvals(matrix.toarray()).real
     slowest, fastest = float(values.min()), float(values.max())
     # errors of the forces as independent ones on all coordinates, through K^-1
-    rounding = rounding_floor(end) * float(np.sqrt(np.mean(values**-2.0)))
-    steps = {FASTER: STABLE * 2 / fastest, VERLET: STABLE * 2 / np.sqrt(fastest)}
-    drag = 2 * np.sqrt(slowest)
-    runs: list[tuple[str, float, Callable[[], tuple[Packing, int]]]] = []
-    for force in np.logspace(-3, -9, 4 if settings.quick else 7):
-        runs.append((OVERDAMPED, force, partial(increment.overdamped, None, force)))
-        runs.append((FASTER, force, partial(increment.overdamped, steps[FASTER], force)))
+    softness = float(np.sqrt(np.mean(values**-2.0)))
+    rounding = rounding_floor(plain.start.packing) * softness
+    relax_step, verlet_step, drag = STABLE * 2 / fastest, STABLE * 2 / np.sqrt(fastest), 2 * np.sqrt(slowest)
+    runs: list[tuple[str, float, Increment, Callable[[], tuple[Packing, int]]]] = []
+    for force in np.logspace(-3, -9, 4 if settings.quick else 7).tolist():
+        runs.append((DECKS, force, plain, partial(plain.overdamped, None, force)))
+        runs.append((OVERDAMPED, force, plain, partial(plain.overdamped, relax_step, force)))
         if force > (1e-6 if settings.quick else 1e-7):  # its evaluations are slow, and its convergence steady
-            runs.append((FIRE, force, partial(increment.fire, steps[VERLET], force)))
-    runs += [(VERLET, n, partial(increment.verlet, steps[VERLET], drag, n)) for n in (50, 100, 200, 400, 800)]
-    runs += [(NEWTON, force, partial(increment.newton, force)) for force in (1e-1, 1e-3, 1e-6)]
-    runs += [(NEWTON, 0.0, partial(increment.newton, None))]
-    results = timed([run for _, _, run in runs], settings.repeats, settings.progress)
+            runs.append((FIRE, force, plain, partial(plain.fire, verlet_step, force)))
+    for force in (1e-5, 1e-9, 1e-13):
+        runs.append((OVERDAMPED + COMPENSATED, force, careful, partial(careful.overdamped, relax_step, force)))
+    for steps in (50, 100, 200, 400, 800):
+        runs.append((VERLET, steps, plain, partial(plain.verlet, verlet_step, drag, steps)))
+        runs.append((VERLET + COMPENSATED, steps, careful, partial(careful.verlet, verlet_step, drag, steps)))
+    for force in (1e-1, 1e-4, 1e-7, 0.0):
+        runs.append((NEWTON, force, plain, partial(plain.newton, force or None)))
+    for force in (1e-1, 1e-4, 1e-7, 1e-12, 0.0):
+        runs.append((NEWTON + COMPENSATED, force, careful, partial(careful.newton, force or None)))
+    runs.sort(key=lambda run: run[0])
+    results = timed([run for *_, run in runs], settings.repeats, settings.progress)
+    reference_error = end.floor * softness
     points = tuple(
-        Point(method, float(parameter), increment.distance(packing) or rounding, seconds, evaluations)
-        for (method, parameter, _), ((packing, evaluations), seconds) in zip(runs, results, strict=True)
+        Point(method, parameter, increment.distance(packing) or reference_error, seconds, evaluations)
+        for (method, parameter, increment, _), ((packing, evaluations), seconds) in zip(runs, results, strict=True)
     )
-    first = increment.distance(increment.start.packing)
+    first = plain.distance(plain.start.packing)
     many = np.geomspace(10, 3e4, 100)
-    decay = {FASTER: slowest * steps[FASTER], VERLET: 0.5 * drag * steps[VERLET]}
+    decay = {OVERDAMPED: slowest * relax_step, VERLET: 0.5 * drag * verlet_step}
     theory = [_decay(f"slowest mode, {name}", first, rate, many) for name, rate in decay.items()]
-    best = {method: min((p for p in points if p.method == method), key=lambda p: p.error) for method in METHODS}
+    best = {name: min((p for p in points if p.method == name), key=lambda p: p.error) for name, *_ in runs}
+    newton, careful_newton, verlet = best[NEWTON], best[NEWTON + COMPENSATED], best[VERLET]
     return Study(
         name="relaxation",
-        question=f"The equilibrium of {len(end)} disks at F_x = {TO:g}, from that at {FROM:g}: how far from it the "
-        "packing still is.",
+        question=f"The equilibrium of {len(end.packing)} disks at F_x = {TO:g}, from that at {FROM:g}: how far from "
+        "it the packing still is.",
         error="largest error of x, y, R theta; length",
         parameter="largest force on a disk at which it ends; Verlet: number of steps",
         evaluations="force evaluations",
         abscissa="evaluations",
-        reference="Newton's equilibrium at the rounding floor; its error, estimated, is what the rounding of the "
-        "forces makes through K^-1, and it is shown in the figure as that. What the dynamics differ in because of "
-        "their path is in their errors",
-        reference_error=rounding,
+        reference="Newton's equilibrium in compensated arithmetic; its error is estimated from what the rounding "
+        "of the forces makes through K^-1, and it is shown in the figure as that. What the others differ in "
+        "because of their path is in their errors",
+        reference_error=reference_error,
         points=points,
         advice=(
-            f"Take Newton's method: {best[NEWTON].evaluations} evaluations to the rounding floor, "
-            f"{best[NEWTON].seconds:.2g} s, and no parameter to choose.",
+            f"Take Newton's method: {newton.error:.0e} after {newton.evaluations} evaluations ({newton.seconds:.2g} "
+            f"s) in doubles, {careful_newton.error:.0e} after {careful_newton.evaluations} in compensated "
+            f"arithmetic ({careful_newton.seconds:.2g} s), and no parameter to choose.",
             "Take Verlet with drag where the path has to be a motion: with a drag of 2 omega_min, spins included, "
-            f"it errs by {best[VERLET].error:.0e} after {best[VERLET].evaluations} steps, where the paper's "
-            f"overdamped dynamics errs by {best[OVERDAMPED].error:.0e} after {best[OVERDAMPED].evaluations}.",
+            f"it errs by {verlet.error:.0e} after {verlet.evaluations} steps ({verlet.seconds:.2g} s), where the "
+            f"paper's overdamped dynamics errs by {best[DECKS].error:.0e} after {best[DECKS].evaluations} "
+            f"({best[DECKS].seconds:.2g} s).",
         ),
-        theory=(*theory, Theory("rounding of the coordinates", (rounding,))),
+        theory=(*theory, Theory("rounding of doubles", (rounding,))),
         remarks=(
             f"The eigenvalues of K/m go from {slowest:.3g} to {fastest:.3g}: overdamped dynamics needs a number of "
-            "steps proportional to their ratio, Verlet with critical drag to its root.",
+            "steps proportional to their ratio, Verlet with critical drag to its root. Overdamped means with the "
+            "longest stable step, from K, where the step of the decks is not named.",
             "FIRE is on the displacement from the last equilibrium, with slips advanced along the straight path "
             "from there in every evaluation, as in Newton's method; run as a motion, its stops and restarts would "
             "be in the slips. An evaluation of FIRE or Newton goes through Python, one of the dynamics does not.",
-            "Nothing slides in this increment. Where contacts slide, ways that differ may end in different equilibria.",
+            "The dynamics in compensated arithmetic ends beside Newton's equilibrium, not on it: it has taken another "
+            "path, and slips depend on it.",
+            "Nothing slides in this increment. Where contacts slide, ways that differ may end further apart.",
         ),
     )
 
