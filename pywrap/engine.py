@@ -285,9 +285,8 @@ class Engine:
     def drag(self, rate: float) -> Iterator[None]:
         """Drag -rate m v on every disk, and of 4/3 of that rate on its spin (for I = m R^2), for dynamics that is to
         come to rest; to be entered before `undamped`. The rate is 1 / time."""
-        with self._fix(
-            "drag", f"all langevin 0.0 0.0 {float(1 / rate)!r} 1 omega yes"
-        ):  # without temperature: drag alone
+        # a thermostat without temperature is drag alone
+        with self._fix("drag", f"all langevin 0.0 0.0 {float(1 / rate)!r} 1 omega yes"):
             yield
 
     def advance(self, steps: int) -> Motion:

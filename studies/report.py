@@ -100,13 +100,15 @@ def report(
     for name, study in studies.items():
         settings = Settings(scene, equilibria, quick, 3 if quick else 5, partial(_named, progress, name))
         try:
-            done.append(study(settings))
-            save(figure_of(done[-1]), output / stem(name))
+            found = study(settings)
+            json.dumps(found.as_dict(), allow_nan=False)  # a number that is none is a failure of its study
+            save(figure_of(found), output / stem(name))
         except Exception as error:  # whatever it is, it must not take the other studies along
-            failed[name] = (
-                f"{type(error).__name__}: {str(error).strip().splitlines()[0]}" if str(error) else repr(error)
-            )
-        say(f"{name}: {done[-1].advice[0] if name not in failed else failed[name]}")
+            failed[name] = f"{type(error).__name__}: {(str(error).splitlines() or ['no reason given'])[0]}"
+            say(f"{name}: failed: {failed[name]}")
+        else:
+            done.append(found)
+            say(f"{name}: {found.advice[0]}")
         result = _written(output, quick, done, failed)
     if failed:
         raise ReportError(

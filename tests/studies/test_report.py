@@ -35,6 +35,13 @@ def settings():
     return Settings(scene, tuple(ramp(scene)), quick=True, repeats=1)
 
 
+def test_the_shipped_packing_is_the_reference(settings, reference):
+    packing = settings.scene.packing.file
+    stored = json.loads(packing.read_text())
+    assert all(stored[name] == reference[name] for name in stored)
+    assert settings.scene.law.mus[0] == reference["cases"][0]["mu"]
+
+
 @pytest.fixture(scope="module")
 def sheared(settings):
     """The packing at F_x = 0.02, some of its contacts brought to sliding, and one disk turned."""
@@ -246,5 +253,9 @@ def test_quick_report(tmp_path):
         for study in result["studies"]
     }
     assert best["onset"]["root of the discriminant"] < 1e-8 < best["onset"]["scan, Newton"]
+    # that of an independent code
+    question = next(study["question"] for study in result["studies"] if study["name"] == "onset")
+    assert "F_x^c = 0.02183305641" in question
+    assert best["relaxation"]["Newton, compensated"] < 1e-18
     assert best["relaxation"]["Newton"] < 1e-12
     assert best["Jacobian"]["analytic"] < 1e-11 < best["Jacobian"]["central differences"]
