@@ -27,7 +27,7 @@ def reference() -> dict:
     return json.loads(REFERENCE.read_text())
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def reference_packing(reference: dict) -> Callable[[float], Packing]:
     """The reference packing with zero slips, for a friction coefficient."""
 

@@ -7,11 +7,13 @@ from faultgouge.pywrap.engine import DECKS
 SHORT = {"settle.in": (), "ramp.in": ("-var", "until", "2e-3"), "perturb.in": ("-var", "time", "0.5")}
 
 
+@pytest.mark.parametrize("precision", ["double", "compensated"])
 @pytest.mark.parametrize("deck", SHORT)
-def test_deck_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path, deck):
+def test_deck_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path, deck, precision):
     written = []
     for ranks in (1, 2):
-        done = lmp(DECKS / deck, "-var", "decks", str(DECKS), *SHORT[deck], ranks=ranks)
+        variables = ["-var", "decks", str(DECKS), "-var", "precision", precision]
+        done = lmp(DECKS / deck, *variables, *SHORT[deck], ranks=ranks)
         assert done.returncode == 0, done.stdout[-2000:]
         assert "WARNING" not in done.stdout
         written.append({path.name: path.read_text() for path in sorted(tmp_path.glob("*.disks"))})
@@ -57,6 +59,14 @@ def test_model_of_the_refusals_runs(lmp):
         ({"pair": "pair_style mindlin/smooth 2e5 5e4"}, "takes three numbers, KN KT MU"),
         ({"pair": "pair_style mindlin/smooth 2e5 5e4 -1"}, "KN must be positive, KT and MU not negative"),
         ({"pair": "pair_style mindlin/smooth nan 5e4 1"}, "instead of 'nan'"),
+        ({"pair": "pair_style mindlin/smooth 2e5 5e4 1 exact"}, "knows the keyword compensated, but not exact"),
+        ({"pair": "pair_style mindlin/smooth 2e5 5e4 1 compensated"}, "moves disks without the low parts"),
+        ({"fix": "fix 1 all nve/disc 1.0 compensated"}, "needs pair_style mindlin/smooth KN KT MU compensated"),
+        (
+            {"pair": "pair_style mindlin/smooth 2e5 0 0 compensated", "run": "minimize 0 1e-6 10 10"},
+            "does not carry the low parts",
+        ),
+        ({"fix": "fix 1 all wall/mindlin/smooth 2e5 5e4 1.0 ylo 0.0 compensated"}, "must both have the keyword"),
         ({"coeff": "pair_coeff 1 1"}, "must start with * *"),
         ({"vel": ""}, "use comm_modify vel yes"),
         ({"dimension": 3}, "use dimension 2"),

@@ -27,16 +27,19 @@ def law(mu, overlap, slip):
 
 
 def close(measured, expected):
-    # Both sides evaluate the law in a dozen roundings; the overlap is given to the law as LAMMPS has it.
+    # Both sides evaluate the law in a dozen roundings; the overlap is given to the law as the pair style has it.
     np.testing.assert_allclose(measured, expected, rtol=1e-13, atol=1e-13 * np.abs(expected).max())
 
 
-def single_contact(position, radius, contacts, mu):
-    return Packing(position=position, radius=radius, law=MindlinLaw(kn=KN, kt=KT, mu=mu), contacts=contacts)
+def single_contact(position, radius, contacts, mu, compensated=False):
+    low = np.zeros_like(position) if compensated else None
+    law = MindlinLaw(kn=KN, kt=KT, mu=mu)
+    return Packing(position=position, radius=radius, law=law, contacts=contacts, position_low=low)
 
 
+@pytest.mark.parametrize("compensated", [False, True], ids=["double", "compensated"])
 @pytest.mark.parametrize(("overlap", "radii", "mu"), [*itertools.product(OVERLAPS, RADII, FRICTIONS)])
-def test_two_disks(overlap, radii, mu):
+def test_two_disks(overlap, radii, mu, compensated):
     # the size ratio bounds the overlap that leaves the smaller centre outside of the other disk
     overlap = overlap * min(radii)
     angle = 0.3
@@ -46,12 +49,14 @@ def test_two_disks(overlap, radii, mu):
     position = np.array([centre + distance * normal, centre])
     for fraction in SLIPS:
         slip = fraction * mu * KN / KT * overlap
-        packing = single_contact(position, np.array(radii), Contacts([0], [1], [slip]), mu)
+        packing = single_contact(position, np.array(radii), Contacts([0], [1], [slip]), mu, compensated)
         with Engine(packing) as engine:
             engine.displace(packing, np.zeros(6))
             force = engine.net_force.reshape(3, 2)
         n, tau = packing.geometry.normal[0], packing.geometry.tangent[0]
-        f_n, f_t = law(mu, packing.geometry.overlap[0], slip)
+        branch = position[0] - position[1]
+        in_doubles = sum(radii) - np.sqrt(branch @ branch)
+        f_n, f_t = law(mu, packing.geometry.overlap[0] if compensated else in_doubles, slip)
         close(force[:2, 0], f_n * n + f_t * tau)
         close(force[2], [-f_t, -f_t])
         assert np.array_equal(force[:2, 0], -force[:2, 1])  # momentum, exactly

@@ -8,6 +8,7 @@ HEAD = """
 newton          {newton}
 variable        decks index {decks}
 variable        fx index 3.0
+variable        precision index {precision}
 include         {decks}/system.in
 atom_modify     sort {sort} 0.0
 timestep        2e-3
@@ -15,7 +16,7 @@ timestep        2e-3
 START = (
     HEAD
     + """
-fix             move all nve/disc 1.0
+fix             move all nve/disc 1.0 ${{compensated}}
 {extra}
 """
 )
@@ -23,18 +24,27 @@ fix             move all nve/disc 1.0
 # neighbour lists are built some 360 times
 RUN = """
 run             2000
-write_dump      all custom middle id x y vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g
+write_dump      all custom middle id x y {low} vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g
 {middle}
 run             2000
-write_dump      all custom end id x y vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g
+write_dump      all custom end id x y {low} vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g
 """
 DEFAULTS = {"newton": "on", "sort": "1000", "extra": "", "middle": "", "decks": DECKS}
+PRECISIONS = {
+    "double": {"precision": "double", "low": ""},
+    "compensated": {"precision": "compensated", "low": "f_low[*]"},
+}
+
+
+@pytest.fixture(params=PRECISIONS)
+def defaults(request):
+    return {**DEFAULTS, **PRECISIONS[request.param]}
 
 
 @pytest.fixture
-def trajectory(lmp, tmp_path):
+def trajectory(lmp, tmp_path, defaults):
     def run(*, script=START + RUN, ranks=1, **changes):
-        done = lmp(script.format(**{**DEFAULTS, **changes}), ranks=ranks)
+        done = lmp(script.format(**{**defaults, **changes}), ranks=ranks)
         assert done.returncode == 0, done.stdout[-2000:]
         return (tmp_path / "middle").read_text(), (tmp_path / "end").read_text()
 
@@ -72,29 +82,38 @@ def test_same_trajectory(trajectory, changes):
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_restart_in_the_same_process(trajectory, ranks):
+def test_restart_in_the_same_process(trajectory, defaults, ranks):
     again = (
         """
 write_restart   middle.restart
 clear
 variable        restart index middle.restart
 """
-        + HEAD.format(**DEFAULTS)
+        + HEAD.format(**defaults)
         + """
-fix             move all nve/disc 1.0
+fix             move all nve/disc 1.0 ${compensated}
 """
     )
     assert trajectory(ranks=ranks, middle=again) == trajectory()
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_restart_in_a_new_process(trajectory, lmp, tmp_path, ranks):
+def test_restart_in_a_new_process(trajectory, defaults, lmp, tmp_path, ranks):
     straight = trajectory(ranks=ranks, middle="write_restart middle.restart")
     (tmp_path / "end").unlink()
-    second = (START + RUN[RUN.index("{middle}") :]).format(**{**DEFAULTS, "middle": ""})
+    second = (START + RUN[RUN.index("{middle}") :]).format(**{**defaults, "middle": ""})
     done = lmp(second, "-var", "restart", "middle.restart", ranks=3 - ranks)
     assert done.returncode == 0, done.stdout[-2000:]
     assert (tmp_path / "end").read_text() == straight[1] == trajectory()[1]
+
+
+@pytest.mark.parametrize("defaults", ["compensated"], indirect=True)
+def test_compensated_run_in_one_piece_or_two(lmp, tmp_path, trajectory, defaults):
+    """Disks are wrapped into the box at every set-up: on the grid that is exact."""
+    pieces = trajectory()[1]
+    done = lmp((START + RUN[RUN.index("{middle}") :].replace("2000", "4000")).format(**defaults))
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert (tmp_path / "end").read_text() == pieces
 
 
 def test_restart_without_the_plugin_says_so(lmp, trajectory, monkeypatch):

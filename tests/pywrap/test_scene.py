@@ -182,7 +182,7 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ),
         ({"perturb": {"fx": 0.1, "time": 1.0, "amplitude": math.nan}}, "perturb.amplitude = nan is refused"),
         # choices
-        ({"precision": "single"}, "precision = 'single' is refused: give 'double'."),
+        ({"precision": "single"}, "precision = 'single' is refused: give 'double' or 'compensated'."),
         (
             {"ramp": {"until": 1.0, "method": "fire"}},
             "ramp.method = 'fire' is refused: give 'newton' or 'overdamped'.",

@@ -1,0 +1,167 @@
+"""Compensated arithmetic against 50 decimal digits, and what must hold exactly."""
+
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, mean_square_displacement
+from faultgouge.pywrap import Engine, Equilibrium, equilibrate
+from faultgouge.pywrap.quasistatic import rounding_floor
+
+mpmath.mp.dps = 50
+mpf = mpmath.mpf
+
+
+def exact(high, low):
+    return mpf(float(high)) + (0 if low is None else mpf(float(low)))
+
+
+def true_net_force(packing):
+    """(F_x, F_y, T/R) of every disk from coordinates and slips in 50 digits: the law once more, in full."""
+    law, c, n = packing.law, packing.contacts, len(packing)
+    kn, kt, mu = mpf(law.kn), mpf(law.kt), mpf(law.mu)
+    low = packing.position_low if packing.compensated else np.zeros((n, 2))
+    position = [[exact(packing.position[k, d], low[k, d]) for d in (0, 1)] for k in range(n)]
+    total = [[mpf(packing.fx) if top else mpf(0), -mpf(packing.fy) if top else mpf(0), mpf(0)] for top in packing.top]
+    slip_low = c.slip_low if c.slip_low is not None else np.zeros(len(c))
+    for i, j, s, s_low in zip(c.i.tolist(), c.j.tolist(), c.slip, slip_low, strict=True):
+        reach = mpf(packing.radius[i]) + (mpf(packing.radius[j]) if j >= 0 else 0)
+        x, y = (position[i][d] - position[j][d] if j >= 0 else position[i][d] * d for d in (0, 1))
+        if packing.box_length is not None and j >= 0:
+            x -= mpf(packing.box_length) * mpmath.nint(x / mpf(packing.box_length))
+        r = mpmath.sqrt(x * x + y * y)
+        overlap = reach - r
+        if overlap <= 0:
+            continue
+        slip, limit = exact(s, s_low), mu * kn / kt * overlap
+        ratio = min(abs(slip) / limit, mpf(1)) if limit else mpf(1)
+        normal = kn * overlap * mpmath.sqrt(overlap)
+        tangential = -mpmath.sign(slip) * mu * normal * (ratio + ratio**2 - ratio**3)
+        force = [(normal * x - tangential * y) / r, (normal * y + tangential * x) / r, -tangential]
+        for k, sign in ((i, 1), (j, -1)):
+            if k >= 0:
+                total[k] = [total[k][0] + sign * force[0], total[k][1] + sign * force[1], total[k][2] + force[2]]
+    return np.array(total).T
+
+
+def compensated(packing):
+    return replace(packing, position_low=np.zeros_like(packing.position))
+
+
+def at_rest(packing, fx):
+    with Engine(packing) as engine:
+        start = equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), 0.0)
+        return equilibrate(engine, start, fx)
+
+
+@pytest.fixture(scope="module")
+def equilibrium(reference_packing):
+    """The reference packing at F_x = 0.01."""
+    return at_rest(compensated(reference_packing(1.0)), 0.01)
+
+
+@pytest.mark.parametrize("overlap", [1e-12, 1e-9, 1e-6, 1e-3, 0.3])
+@pytest.mark.parametrize("radii", [(0.5, 0.7), (0.02, 1.0), (0.1, 0.3)])
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_force_of_two_disks(overlap, radii, mu):
+    """A force is right to its last place, at any overlap, inside of the box and across its end."""
+    rng = np.random.default_rng(3)
+    overlap *= min(radii)
+    for angle, across in zip(rng.uniform(0, 2 * np.pi, 8), [False, True] * 4, strict=True):
+        away = (sum(radii) - overlap) * np.array([np.cos(angle), np.sin(angle)])
+        centre = np.array([0.1 if across else 7.3, 4.0])
+        slip = rng.uniform(-1.2, 1.2) * mu * 3.5 * overlap
+        packing = Packing(
+            position=np.array([centre + away, centre]),
+            position_low=1e-17 * rng.standard_normal((2, 2)),
+            radius=np.array(radii),
+            law=MindlinLaw(2e5, 2e5 / 3.5, mu),
+            contacts=Contacts([0], [1], [slip], [1e-17 * slip]) if mu else Contacts([0], [1], [0.0], [0.0]),
+            box_length=11.9,
+        )
+        with Engine(packing) as engine:
+            engine.displace(packing, np.zeros(6))
+            force = engine.net_force.reshape(3, 2)
+        if mu:
+            limit = packing.law.slip_limit(packing.geometry.overlap)[0]
+            clamped = Contacts([0], [1], np.clip([slip], -limit, limit), [1e-17 * slip * (abs(slip) < limit)])
+            packing = replace(packing, contacts=clamped)
+        true = true_net_force(packing).astype(np.float64)
+        # The last place of the double that is handed out. An overlap is known to 2^-77 of 2^e, e.g. to 1e-11 at 1e-12,
+        # and the force to 3/2 of that.
+        known = 1.5 * packing.coordinate_rounding / overlap
+        assert np.abs(force - true).max() <= (3e-16 + 3 * known) * np.abs(true).max()
+
+
+def test_reference_packing_is_balanced_in_truth(equilibrium):
+    packing = equilibrium.packing
+    true = true_net_force(packing).astype(np.float64)
+    moved = np.delete(true, packing.rattlers, axis=1)
+    assert np.linalg.norm(moved, axis=0).max() < 1e-17  # a hundred times better than 1e-15
+    assert equilibrium.residual < 1e-17
+    with Engine(packing) as engine:
+        engine.displace(packing, np.zeros(3 * len(packing)))
+        # what LAMMPS finds differs from the truth by the rounding of 2^-77 times stiffness, and of long sums
+        assert np.abs(engine.net_force - true.ravel()).max() < 1e-18 * 5
+    # numpy's long doubles: 64 bits of forces of order 3
+    assert np.abs(packing.net_force - true.ravel()).max() < 1e-17
+
+
+def test_doubles_leave_a_million_times_more(equilibrium):
+    packing = replace(equilibrium.packing, position_low=None)
+    packing = replace(packing, contacts=Contacts(packing.contacts.i, packing.contacts.j, packing.contacts.slip))
+    plain = at_rest(packing, packing.fx)
+    assert 1e-12 < plain.residual < 1e-10
+    assert plain.residual > 1e6 * equilibrium.residual
+
+
+def test_overdamped_dynamics_balances_as_well(equilibrium):
+    """From 1e-4 away: relaxation is linear, and goes on to 1e-15, where doubles stop at 1e-11."""
+    packing = equilibrium.packing
+    with Engine(packing) as engine:
+        engine.set_fx(packing.fx + 1e-6)
+        relaxation = engine.relax(1e-15)
+        assert relaxation.status == "yes"
+        assert relaxation.residual <= 1e-15
+
+
+def test_state_goes_through_lammps_to_the_bit(equilibrium):
+    packing = equilibrium.packing
+    with Engine(packing) as engine:
+        for _ in range(2):
+            back = engine.displace(packing, np.zeros(3 * len(packing)))
+            for name in ("position", "position_low", "angle"):
+                assert np.array_equal(getattr(back, name), getattr(packing, name)), name
+            assert np.array_equal(back.contacts.slip, packing.contacts.slip)
+            assert np.array_equal(back.contacts.slip_low, packing.contacts.slip_low)
+            engine.displace(packing, 1e-4 * np.ones(3 * len(packing)))
+
+
+def test_stable_run_stays_below_1e_30(equilibrium):
+    packing = equilibrium.packing
+    largest = 0.0
+    with Engine(packing) as engine, engine.undamped(2e-4):
+        for _ in range(20):
+            motion = engine.advance(5000)
+            largest = max(largest, msd(motion, packing))
+    assert 0 < largest < 1e-32  # 100,000 steps
+
+
+def test_response_is_linear_down_to_1e_14(equilibrium):
+    packing, response = equilibrium.packing, []
+    amplitudes = np.geomspace(1e-14, 1e-8, 7)
+    for amplitude in amplitudes:
+        with Engine(packing) as engine, engine.undamped(2e-4, amplitude=amplitude, omega=0.01):
+            response.append(msd(engine.advance(5000), packing) / amplitude**2)
+    # the 1e-19 that are left in the net forces are 1e-5 of the smallest push; the largest moves disks by 1e-9, where
+    # the smallest overlap is 1e-6
+    np.testing.assert_allclose(response, response[3], rtol=1e-3)
+
+
+def msd(motion, packing):
+    box = packing.box_length
+    return float(
+        mean_square_displacement(motion.position, packing.position, box, motion.position_low, packing.position_low)
+    )
