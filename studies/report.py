@@ -98,7 +98,7 @@ def report(
     failed: dict[str, str] = {}
     result = _written(output, quick, done, failed)
     for name, study in studies.items():
-        settings = Settings(scene, equilibria, quick, 3 if quick else 5, partial(_named, progress, name))
+        settings = Settings(scene, equilibria, quick, progress=partial(_named, progress, name))
         try:
             found = study(settings)
             json.dumps(found.as_dict(), allow_nan=False)  # a number that is none is a failure of its study

@@ -1,11 +1,11 @@
 r"""Error of eigenvalues over the time that they take, far from an exceptional point and near one.
 
 The dense solver is backward stable: it returns the eigenvalues of :math:`A + E`, :math:`|E| \sim u |A|_F`, and so errs
-by :math:`u |A|_F \kappa` at the most, with the condition :math:`\kappa = 1/|y^H x|`, which grows without bound towards
-an exceptional point. Shift-invert Arnoldi finds the few eigenvalues nearest to a shift, to a tolerance, and with less
-rounding than that the nearer they are. More digits than the elements of A have are of no use: how far the rounding of
-the coordinates alone moves the eigenvalues is measured. The mean of the two eigenvalues of a pair and their
-discriminant have no such condition; that is what the onset is solved with.
+by about :math:`u |A|_F \kappa`, with the condition :math:`\kappa = 1/|y^H x|`, which grows without bound towards an
+exceptional point. Shift-invert Arnoldi finds the few eigenvalues nearest to a shift, to a tolerance, and with less
+rounding the nearer they are. More digits than the coordinates have are of no use: how far their rounding alone moves
+the eigenvalues is measured. The mean of the two eigenvalues of a pair and their discriminant have no such condition;
+that is what the onset is solved with.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ import numpy as np
 from scipy.linalg import eig, eigvals
 
 from ...analysis import Packing, dynamical_matrix, eigenpairs
-from ...analysis.spectrum import Complexes, unit_rounding
+from ...analysis.spectrum import Complexes
 from ...pywrap import Engine, equilibrate
-from .extended import Refined, refined
+from .extended import refined_near
 from .onset import Ways
 from .study import Point, Settings, Study, Theory
 from .timing import timed
@@ -68,7 +68,7 @@ class Target:
     @classmethod
     def of(cls, packing: Packing, shift: float) -> Target:
         """Solve the eigenproblem and refine what is nearest to the shift."""
-        found, condition, rounding = _refined(packing, shift)
+        found, condition, rounding = refined_near(packing, shift, COUNT)
         exact = np.array([complex(each.value) for each in found])
         error = max(each.error / abs(each.value) for each in found)
         return cls(packing, shift, exact, float(error), condition, rounding)
@@ -110,18 +110,8 @@ class Target:
 
     def refined(self) -> tuple[Complexes, int | None]:
         """The same from LAPACK and Newton's method in extended precision, and the number of steps."""
-        found, *_ = _refined(self.packing, self.shift)
+        found, *_ = refined_near(self.packing, self.shift, COUNT)
         return np.array([complex(each.value) for each in found]), sum(each.steps for each in found)
-
-
-def _refined(packing: Packing, shift: float) -> tuple[list[Refined], float, float]:
-    """The eigenvalues nearest to a shift, their largest condition, and u |A|_F."""
-    matrix = dynamical_matrix(packing)[0].toarray()
-    values, left, right = eig(matrix, left=True, right=True)
-    nearest = np.argsort(np.abs(values - shift))[:COUNT]
-    condition = 1 / np.abs(np.sum(left.conj() * right, axis=0))
-    found = [refined(matrix, complex(values[k]), right[:, k], float(condition[k])) for k in nearest]
-    return found, float(condition[nearest].max()), unit_rounding(matrix)
 
 
 def far(settings: Settings) -> Study:

@@ -17,9 +17,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import eig
 
+from ...analysis import Packing, dynamical_matrix
 from ...analysis.packing import Floats
-from ...analysis.spectrum import Complexes
+from ...analysis.spectrum import Complexes, unit_rounding
 
 ITERATIONS = 30
 """At the most. Near an exceptional point the bordered system is nearly singular and a step gains only a few digits."""
@@ -76,3 +78,23 @@ def refined(matrix: Floats, value: complex, vector: Complexes, condition: float)
         if moved < rounding:
             break
     return Refined(lam, moved + rounding, steps)
+
+
+def refined_near(packing: Packing, shift: float, count: int) -> tuple[list[Refined], float, float]:
+    """The eigenvalues of a packing's operator that are nearest to a shift.
+
+    Returns
+    -------
+    eigenvalues : list of Refined
+        By their distance from the shift.
+    condition : float
+        The largest kappa of them.
+    rounding : float
+        u |A|_F, 1 / time^2.
+    """
+    matrix = dynamical_matrix(packing)[0].toarray()
+    values, left, right = eig(matrix, left=True, right=True)
+    nearest = np.argsort(np.abs(values - shift))[:count]
+    condition = 1 / np.abs(np.sum(left.conj() * right, axis=0))
+    found = [refined(matrix, complex(values[k]), right[:, k], float(condition[k])) for k in nearest]
+    return found, float(condition[nearest].max()), unit_rounding(matrix)

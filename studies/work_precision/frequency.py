@@ -40,7 +40,7 @@ def frequency(settings: Settings) -> Study:
     """The frequency of the fastest mode of a stable packing."""
     equilibrium = settings.at(0.01)
     mode = Mode.of(equilibrium.packing, growing=False)
-    periods = 50 if settings.quick else 200
+    periods = 50 if settings.quick else 100
     study = partial(
         Study,
         name="time step: frequency",
@@ -65,7 +65,7 @@ def growth(settings: Settings) -> Study:
     """The growth rate of D in a packing above its onset."""
     equilibrium = settings.at(0.024)
     mode = Mode.of(equilibrium.packing, growing=True)
-    time = 5.0 if settings.quick else 20.0
+    time = 5.0 if settings.quick else 10.0
     study = partial(
         Study,
         name="time step: growth rate",
@@ -97,7 +97,7 @@ def _study(
 ) -> Study:
     """Runs of a length over the time step; the advice is filled in."""
     exact = mode.exact
-    shares = SHARES[:5] if settings.quick else SHARES
+    shares = SHARES[: len(SHARES) - settings.quick]
     steps = [share * mode.limit for share in shares]
     fine_mode = Mode.of(compensated(equilibrium).packing, mode.growing)
     with Engine(mode.packing) as engine, Engine(fine_mode.packing) as fine_engine:

@@ -131,7 +131,7 @@ def _study(settings: Settings, plain: Increment, careful: Increment, end: Equili
     for force in np.logspace(-3, -9, 4 if settings.quick else 7).tolist():
         runs.append((DECKS, force, plain, partial(plain.overdamped, None, force)))
         runs.append((OVERDAMPED, force, plain, partial(plain.overdamped, relax_step, force)))
-        if force > (1e-6 if settings.quick else 1e-7):  # its evaluations are slow, and its convergence steady
+        if force > 1e-6:  # its evaluations are slow, and its convergence steady
             runs.append((FIRE, force, plain, partial(plain.fire, verlet_step, force)))
     for force in (1e-5, 1e-9, 1e-13):
         runs.append((OVERDAMPED + COMPENSATED, force, careful, partial(careful.overdamped, relax_step, force)))

@@ -44,7 +44,7 @@ class Settings:
     scene: Scene
     ramp: tuple[Equilibrium, ...]
     quick: bool = False
-    repeats: int = 5
+    repeats: int = 3
     progress: Progress = no_progress
 
     def at(self, fx: float) -> Equilibrium:
