@@ -102,8 +102,8 @@ FAULTGOUGE_INLINE Geometry<Compensated> geometry(const Branch<Compensated> &r, d
 }
 
 // All pairs: their forces, slips and whether they touch. With advance the slips advance by v dt and omega dt. Returns a
-// pair of disks with one centre, or -1. Compiled for several processors, of which the one at hand is chosen at run
-// time; results are the same on all.
+// pair with one centre inside of the other disk, where the law means nothing, or -1. Compiled for several processors,
+// of which the one at hand is chosen at run time; results are the same on all.
 int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law, double dt,
                    bool friction, bool advance);
 int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,

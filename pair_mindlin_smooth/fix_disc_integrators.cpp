@@ -80,6 +80,11 @@ void FixDiscIntegrator::reset_dt()
 void FixDiscIntegrator::move(int i)
 {
   const double dx = dt * atom->v[i][0], dy = dt * atom->v[i][1];
+  if (!(dx * dx + dy * dy <= atom->radius[i] * atom->radius[i]))
+    error->one(FLERR,
+               "fix {}: disk {} would move by ({}, {}) in one step, farther than its radius {}: the time step is too "
+               "long, or a force too large",
+               style, atom->tag[i], dx, dy, atom->radius[i]);
   if (low_parts) {
     low_parts->move(i, dx, dy);
   } else {
