@@ -92,7 +92,7 @@ def _study(settings: Settings, engine: Engine, packing: Packing) -> Study:
         ),
         theory=(
             Theory("truncation + rounding", tuple((truncation + rounding).tolist()), tuple(fine.tolist())),
-            Theory("rounding of the overlaps", (analytic,)),
+            Theory("overlaps as plain differences", (analytic,)),
         ),
         remarks=(
             f"The smallest overlap is {overlap.min():.1e}: a step above it opens the contact.",
