@@ -103,7 +103,7 @@ FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law, cons
   for (int k = 0; k < batch.count; k++) {
     const Branch<Number> r{batch.branch_x.load(k), batch.branch_y.load(k)};
     const Geometry<Number> contact = geometry(r, batch.radius_i[k], batch.radius_j[k], grid);
-    const Number nx = r.x * contact.inverse, ny = r.y * contact.inverse;
+    const Number nx = contact.direction(r.x), ny = contact.direction(r.y);
     const Number normal = law.normal_force(contact.overlap);
     batch.overlap.store(k, contact.overlap);
     if constexpr (!FRICTION) {

@@ -31,9 +31,16 @@ template <class Number> struct Branch {
   Number x, y;
 };
 
-template <class Number> struct Geometry {
-  Number overlap;
-  Number inverse;    // of the distance
+template <class Number> struct Geometry;
+
+template <> struct Geometry<double> {
+  double overlap, distance;
+  FAULTGOUGE_INLINE double direction(double component) const { return component / distance; }
+};
+
+template <> struct Geometry<Compensated> {
+  Compensated overlap, inverse;    // of the distance
+  FAULTGOUGE_INLINE Compensated direction(Compensated component) const { return component * inverse; }
 };
 
 // from the second disk of a pair to the first, in the coordinates' high parts if these are compensated
@@ -76,7 +83,7 @@ FAULTGOUGE_INLINE Geometry<double> geometry(const Branch<double> &r, double radi
                                             const FixedPointGrid &)
 {
   const double distance = std::sqrt(r.x * r.x + r.y * r.y);
-  return {(radius_i + radius_j) - distance, 1.0 / distance};
+  return {(radius_i + radius_j) - distance, distance};
 }
 
 // Here it is D / (c + r) with D = c^2 - r^2, to 20 digits however small: the squares of high parts are exact.

@@ -355,7 +355,7 @@ template <class NUMBER> double PairMindlinSmooth::measure(int p, int i)
   const auto contact = geometry(r, radius_i, radius_j, compensated ? low_parts->grid() : FixedPointGrid{});
   if (leading(contact.overlap) <= 0.0) return 0.0;
 
-  const double overlap = value(contact.overlap), inverse = value(contact.inverse);
+  const double overlap = value(contact.overlap);
   const double sign = atom->tag[i] == pairs.first_tag[p] ? 1.0 : -1.0;
   svector[0] = law.normal_force(overlap);
   if (has_friction) {
@@ -369,8 +369,8 @@ template <class NUMBER> double PairMindlinSmooth::measure(int p, int i)
     svector[3] = limit > 0.0 ? slip / limit : 0.0;
     if (stored && compensated) svector[7] = stored[1];
   }
-  svector[4] = sign * value(r.x) * inverse;
-  svector[5] = sign * value(r.y) * inverse;
+  svector[4] = sign * value(contact.direction(r.x));
+  svector[5] = sign * value(contact.direction(r.y));
   svector[6] = overlap;
   return law.normal_energy(overlap);
 }

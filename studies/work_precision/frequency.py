@@ -24,11 +24,12 @@ SHARES = (0.8, 0.4, 0.2, 0.1, 0.05, 0.025)
 
 METHODS = (
     "run",
+    "run, compensated",
     "run, dispersion taken out",
     "run, dispersion taken out, compensated",
     "eigenvalue of K, no run",
 )
-RUN, CORRECTED, COMPENSATED, SPECTRUM = METHODS
+RUN, CAREFUL_RUN, CORRECTED, COMPENSATED, SPECTRUM = METHODS
 
 
 def corrected(frequency: complex, dt: float) -> complex:
@@ -108,6 +109,7 @@ def _study(
     points = []
     for method, one, found_at, change in (
         (RUN, mode, plain, lambda found, _: found),
+        (CAREFUL_RUN, fine_mode, careful, lambda found, _: found),
         (CORRECTED, mode, plain, corrected),
         (COMPENSATED, fine_mode, careful, corrected),
     ):
@@ -123,7 +125,7 @@ def _study(
     raw = {share: point.error for share, point in zip(shares, points, strict=False)}
     fine = np.geomspace(steps[-1], steps[0], 60)
     predicted = [abs(mode.quantity(complex(discrete_frequency(mode.eigenvalue, dt))) / exact - 1) for dt in fine]
-    order = fit_order(points, RUN, 2, least=10 * noise, most=0.01)
+    order = fit_order(points, CAREFUL_RUN, 2, least=10 * careful_noise, most=0.01)
     figures = {
         "coarse": shares[1],
         "noise": noise,

@@ -75,6 +75,11 @@ def test_model_of_the_refusals_runs(lmp):
         ({"fix": "fix 1 all nve/disc"}, "takes one number, I0"),
         ({"fix": "fix 1 all nve/disc 0.0"}, "I0 must be a positive number"),
         ({"fix": "fix 1 all overdamped/disc 1.0"}, "takes two numbers, GAMMA and I0"),
+        (
+            {"fix": "fix 1 all nve/disc 1.0 turning no"},
+            "and the keywords rotation yes|no and compensated, but got turning",
+        ),
+        ({"fix": "fix 1 all nve/disc 1.0 rotation"}, "rotation takes yes or no"),
         ({"fix": "fix 1 all wall/mindlin/smooth 2e5 5e4 1.0 0.0"}, "takes KN KT MU ylo COORD"),
         ({"fix": "fix 1 all wall/mindlin/smooth 2e5 5e4 1.0 yhi 0.0"}, "knows a floor only"),
         ({"fix": "fix 1 all wall/mindlin/smooth 2e5 -5e4 1.0 ylo 0.0"}, "KT and MU not negative"),
