@@ -1,8 +1,8 @@
 """Settle, ramp and tracked onset of packings of growing size: time, memory, and how they grow.
 
-Square packings of disks of two radii, width 1.192 sqrt(N). The upper layers are such as come to rest: others may sink into
-the bed for long, so that times of settling are those of favourable cases. Each size runs in a process of its own, with
-one thread, so that its peak of memory is its own.
+Square packings of disks of two radii, width 1.192 sqrt(N). The upper layers are such as come to rest: others may sink
+into the bed for long, so that times of settling are those of favourable cases. Each size runs in a process of its own,
+with one thread, so that its peak of memory is its own.
 
     settle     from the loose start to the rounding floor, at F_x = 0
     newton     one increment of F_x by 1e-3 from there, median of three

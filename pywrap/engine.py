@@ -217,8 +217,10 @@ class Engine:
         chunk : int
             Steps between two looks at the forces.
         """
-        step = {} if time_step is None else {"relax_step": time_step}
-        self._variables(force_tolerance=force_tolerance, damping=damping, chunk=chunk, **step)
+        self._variables(force_tolerance=force_tolerance, damping=damping, chunk=chunk)
+        self._command("variable relax_step delete")  # that of an earlier call
+        if time_step is not None:
+            self._variables(relax_step=time_step)
         start = self._lammps.extract_global("ntimestep")
         self._include("relax.in")
         return Relaxation(
@@ -309,6 +311,14 @@ class Engine:
             self._command("unfix move")
             if amplitude != 0:
                 self._command("unfix push")
+
+    @contextmanager
+    def drag(self, rate: float) -> Iterator[None]:
+        """Drag -rate m v on every disk, and of 4/3 of that rate on its spin (for I = m R^2), for dynamics that is to
+        come to rest; to be entered before `undamped`. The rate is 1 / time."""
+        # a thermostat without temperature is drag alone
+        with self._fix("drag", f"all langevin 0.0 0.0 {float(1 / rate)!r} 1 omega yes"):
+            yield
 
     def advance(self, steps: int) -> Motion:
         """Go on with the undamped dynamics by so many steps."""

@@ -255,6 +255,20 @@ def reproduce(
     _say(f"written: {output}/report.md")
 
 
+@app.command(epilog="Example: [bold]faultgouge report --quick -o report[/bold]")
+def report(
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for report, figures and numbers.")] = Path(
+        "report"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: a minute instead of ten.")] = False,
+) -> None:
+    """Error against run time: which method to take when, for six tasks, with figures and numbers."""
+    from faultgouge.studies.report import report as run_studies
+
+    run_studies(output, quick, _say, lambda runs, name: _progress(runs, name, len(runs)))
+    _say(f"written: {output}/report.md")
+
+
 def main() -> None:
     """Run the command; what goes wrong is said in one sentence."""
     # one thread for BLAS: its threads cost more than they bring at these sizes, and change the last digits of a solve
@@ -280,7 +294,15 @@ def _sentence(error: Exception) -> str:
     show = getattr(error, "format_message", None)
     if show:
         return str(show()).strip()
-    expected = {"SceneError", "PackingFileError", "NoEquilibriumError", "EngineError", "OnsetError", "OSError"}
+    expected = {
+        "SceneError",
+        "PackingFileError",
+        "NoEquilibriumError",
+        "EngineError",
+        "OnsetError",
+        "ReportError",
+        "OSError",
+    }
     if {base.__name__ for base in type(error).__mro__} & expected:
         return str(error).strip()
     place = error.__traceback__
