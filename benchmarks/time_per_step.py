@@ -1,13 +1,15 @@
 """Time per step of pair mindlin/smooth beside LAMMPS's own granular styles, on the same packing in one run.
 
-A hexagonal packing with six contacts a disk, stirred a little so that contacts live: the same positions, radii,
-velocities, neighbour settings and time step for every style. Styles take turns, so that what else the machine does
-falls on all alike; medians and the spread of several turns are printed, and ratios within one turn.
+A hexagonal packing with six contacts a disk; or a disordered one, of 1,000 disks of two radii that `settle` has
+brought to rest, repeated along x. Stirred a little so that contacts live: the same positions, radii, velocities,
+neighbour settings and time step for every style. Styles take turns, so that what else the machine does falls on all
+alike; medians and the spread of several turns are printed, and ratios within one turn.
 
-    python benchmarks/time_per_step.py [--ranks 1 2] [--disks 100 10000]
+    python benchmarks/time_per_step.py [--packing hexagonal disordered] [--disks 100 10000] [--ranks 1 2]
 """
 
 import argparse
+import itertools
 import json
 import platform
 import statistics
@@ -15,6 +17,9 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from faultgouge.pywrap import Scene, settle
+from faultgouge.pywrap.engine import data_file
 
 BIN = Path(sys.executable).parent
 
@@ -31,20 +36,29 @@ STYLES = {
 }
 """Pair style, its coefficients, and the integrator."""
 
-DECK = """
-units           lj
-dimension       2
-boundary        p p p
-atom_style      sphere
-atom_modify     map yes
-comm_modify     vel yes
-processors      * 1 1
-newton          off
+HEXAGONAL = """
 lattice         hex {density}
 region          box block 0 {nx} 0 {ny} -0.5 0.5 units lattice
 create_box      1 box
 create_atoms    1 box
 set             group all diameter 1.0
+"""
+
+DISORDERED = """
+read_data       {data}
+replicate       {times} 1 1
+"""
+
+DECK = """
+units           lj
+dimension       2
+boundary        p {y} p
+atom_style      sphere
+atom_modify     map yes
+comm_modify     vel yes
+processors      * 1 1
+newton          off
+{disks}
 set             group all mass 1.0
 velocity        all create 1e-8 12345 loop geom
 pair_style      {pair}
@@ -59,16 +73,29 @@ run             {steps}
 """
 
 
-def microseconds_per_step(style: str, disks: int, ranks: int) -> float:
-    """Loop time of one run over its steps, in microseconds."""
+def hexagonal(disks: int) -> str:
+    """Input lines that make about so many disks."""
     nx = round((disks / 2 * 3**0.5) ** 0.5)
-    ny = round(disks / 2 / nx)
+    return HEXAGONAL.format(density=2 / 3**0.5 / SPACING**2, nx=nx, ny=round(disks / 2 / nx))
+
+
+def settled(folder: Path) -> Path:
+    """A LAMMPS data file of 1,000 disks at rest."""
+    scene = Scene.from_mapping(
+        {"packing": {"disks": 1000, "top": 32, "width": 37.7, "seed": 2}, "law": {"kn": KN}, "load": {"fy": 3.0}}
+    )
+    path = folder / "settled.data"
+    path.write_text(data_file(settle(scene).packing))
+    return path
+
+
+def microseconds_per_step(style: str, disks: int, ranks: int, data: Path | None = None) -> float:
+    """Loop time of one run over its steps, in microseconds; of the hexagonal packing, or of a data file repeated."""
     steps = max(200, 2_000_000 // disks)
     pair, coefficients, integrator = STYLES[style]
     deck = DECK.format(
-        density=2 / 3**0.5 / SPACING**2,
-        nx=nx,
-        ny=ny,
+        y="p" if data is None else "f",
+        disks=hexagonal(disks) if data is None else DISORDERED.format(data=data, times=max(1, disks // 1000)),
         pair=pair,
         coefficients=coefficients,
         integrator=integrator,
@@ -86,30 +113,55 @@ def microseconds_per_step(style: str, disks: int, ranks: int) -> float:
     return 1e6 * float(loops[1][3]) / float(loops[1][8])
 
 
+def table(title: str, turns: list[dict[tuple[str, int], float]], all_ranks: list[int]) -> list[dict[str, object]]:
+    """Print one packing, and return its rows."""
+    rows: list[dict[str, object]] = []
+    for ranks in all_ranks:
+        print(
+            f"\n{title + f', {ranks} rank' + 's' * (ranks > 1):66s}of gran/hertz/history   speed-up over {all_ranks[0]}"
+        )
+        for style in STYLES:
+            times = [turn[style, ranks] for turn in turns]
+            ratio = statistics.median(turn[style, ranks] / turn["gran/hertz/history", ranks] for turn in turns)
+            gain = statistics.median(turn[style, all_ranks[0]] / turn[style, ranks] for turn in turns)
+            print(
+                f"  {style:30s}{statistics.median(times):12.2f} {f'[{min(times):.2f}, {max(times):.2f}]':24s}"
+                f"{ratio:10.2f}{gain:20.2f}"
+            )
+            rows.append(
+                {"packing": title, "ranks": ranks, "style": style, "microseconds": times, "ratio": ratio, "gain": gain}
+            )
+    return rows
+
+
 def main() -> None:
     """Print the table, and write it as JSON if asked to."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--disks", type=int, nargs="+", default=[100, 10_000])
+    parser.add_argument("--packing", nargs="+", choices=["hexagonal", "disordered"], default=["hexagonal"])
     parser.add_argument("--turns", type=int, default=5)
     parser.add_argument("--output", type=Path, help="also write the numbers to this file")
     options = parser.parse_args()
 
     print(f"{platform.processor() or platform.machine()}; microseconds per step, median of {options.turns} [extremes]")
     rows = []
-    for disks in options.disks:
-        for ranks in options.ranks:
+    with tempfile.TemporaryDirectory() as folder:
+        data = settled(Path(folder)) if "disordered" in options.packing else None
+        for packing, disks in itertools.product(options.packing, options.disks):
+            if packing == "disordered" and disks < 1000:
+                continue
             turns = [
-                {style: microseconds_per_step(style, disks, ranks) for style in STYLES} for _ in range(options.turns)
+                {
+                    (style, ranks): microseconds_per_step(
+                        style, disks, ranks, data if packing == "disordered" else None
+                    )
+                    for style in STYLES
+                    for ranks in options.ranks
+                }
+                for _ in range(options.turns)
             ]
-            print(f"\n{disks} disks, {ranks} rank{'s' * (ranks > 1)}" + " " * 30 + "of gran/hertz/history")
-            for style in STYLES:
-                times = [turn[style] for turn in turns]
-                ratio = statistics.median(turn[style] / turn["gran/hertz/history"] for turn in turns)
-                print(
-                    f"  {style:30s}{statistics.median(times):10.2f} [{min(times):.2f}, {max(times):.2f}]{ratio:10.2f}"
-                )
-                rows.append({"disks": disks, "ranks": ranks, "style": style, "microseconds": times, "ratio": ratio})
+            rows += table(f"{packing}, {disks} disks", turns, options.ranks)
     if options.output:
         options.output.write_text(json.dumps(rows, indent=1) + "\n")
 

@@ -185,13 +185,12 @@ struct FixedPointGrid {
   // the closest multiple of 2^-52 g, for |a| <= g/2
   FAULTGOUGE_INLINE double fine(double a) const { return (a + 1.5 * spacing) - 1.5 * spacing; }
 
-  // a coordinate, with its high part a multiple of g again, after it has moved by d
+  // a coordinate, with its high part a multiple of g again, after it has moved by d, which is rounded to 2^-52 g first:
+  // all that follows is exact, however the coordinate was divided into high and low part before
   FAULTGOUGE_INLINE Compensated moved(Compensated x, double d) const
   {
-    const double step = whole(d);
-    const double rest = x.low + (d - step);
-    const double carry = whole(rest);
-    return {x.high + (step + carry), fine(rest - carry)};
+    const double step = whole(d), rest = x.low + fine(d - step), carry = whole(rest);
+    return {x.high + (step + carry), rest - carry};
   }
 
   // any coordinate as a multiple of g and a rest

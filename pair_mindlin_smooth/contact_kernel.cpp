@@ -1,11 +1,12 @@
 #include "contact_kernel.h"
 
 #include <algorithm>
+#include <cstring>
 #include <type_traits>
 
 // Fused multiply-add makes exact products fast, and vectors of four do the rest.
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__)
-#define FAULTGOUGE_DISPATCH __attribute__((target_clones("fma", "default")))
+#define FAULTGOUGE_DISPATCH __attribute__((target_clones("avx512f", "fma", "default")))
 #else
 #define FAULTGOUGE_DISPATCH
 #endif
@@ -38,7 +39,7 @@ template <class Number> struct Batch {
 
   int count = 0;
   int pair[BATCH];
-  Column branch_x, branch_y, slip, overlap, force_x, force_y, tangential;
+  Column branch_x, branch_y, slip, overlap, normal, normal_x, normal_y, tangential, force_x, force_y;
   double radius_i[BATCH], radius_j[BATCH], moved_x[BATCH], moved_y[BATCH], rolled[BATCH];
 };
 
@@ -54,14 +55,14 @@ FAULTGOUGE_INLINE double margin(Compensated, const FixedPointGrid &grid)
 
 FAULTGOUGE_INLINE void set_force(ContactPairs &pairs, int p, double x, double y, double tangential)
 {
-  pairs.force[p] = PairForce{x, y, tangential};
+  pairs.force[p] = PairForce{x, y, tangential, 0.0};
 }
 
 FAULTGOUGE_INLINE void set_force(ContactPairs &pairs, int p, Compensated x, Compensated y, Compensated tangential)
 {
-  pairs.force[p] = PairForce{x.high, y.high, tangential.high};
+  pairs.force[p] = PairForce{x.high, y.high, tangential.high, 0.0};
   pairs.force_low[p] =
-      PairForceLow{static_cast<float>(x.low), static_cast<float>(y.low), static_cast<float>(tangential.low)};
+      PairForceLow{static_cast<float>(x.low), static_cast<float>(y.low), static_cast<float>(tangential.low), 0.0f};
 }
 
 template <class Number, bool FRICTION> FAULTGOUGE_INLINE void open(ContactPairs &pairs, int p)
@@ -96,35 +97,59 @@ FAULTGOUGE_INLINE void add(Batch<Number> &batch, const ContactPairs &pairs, int 
   }
 }
 
-template <class Number, bool FRICTION, bool ADVANCE>
-FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law, const FixedPointGrid grid)
+// overlaps, directions and normal forces
+template <class Number>
+FAULTGOUGE_INLINE void normal_forces(Batch<Number> &batch, const MindlinLaw law, const FixedPointGrid grid)
 {
-  const Number limit_ratio = FRICTION ? law.slip_limit_ratio<Number>() : Number(0.0);
   for (int k = 0; k < batch.count; k++) {
     const Branch<Number> r{batch.branch_x.load(k), batch.branch_y.load(k)};
     const Geometry<Number> contact = geometry(r, batch.radius_i[k], batch.radius_j[k], grid);
-    const Number nx = contact.direction(r.x), ny = contact.direction(r.y);
     const Number normal = law.normal_force(contact.overlap);
     batch.overlap.store(k, contact.overlap);
-    if constexpr (!FRICTION) {
-      batch.force_x.store(k, normalized(normal * nx));
-      batch.force_y.store(k, normalized(normal * ny));
-      continue;
-    }
+    batch.normal.store(k, normal);
+    batch.normal_x.store(k, contact.direction(r.x));
+    batch.normal_y.store(k, contact.direction(r.y));
+  }
+}
 
-    const Number limit = limit_ratio * contact.overlap;
+// slips, advanced if wanted, and tangential forces
+template <class Number, bool ADVANCE>
+FAULTGOUGE_INLINE void tangential_forces(Batch<Number> &batch, const MindlinLaw law)
+{
+  const Number limit_ratio = law.slip_limit_ratio<Number>();
+  for (int k = 0; k < batch.count; k++) {
+    const Number limit = limit_ratio * batch.overlap.load(k);
     Number slip = batch.slip.load(k);
     if constexpr (ADVANCE) {
-      const double moved =
-          midpoint_slip({value(r.x), value(r.y)}, {batch.moved_x[k], batch.moved_y[k]}) - batch.rolled[k];
-      slip = advanced_slip(slip, moved, limit);
+      const Vector r{value(batch.branch_x.load(k)), value(batch.branch_y.load(k))};
+      slip = advanced_slip(slip, midpoint_slip(r, {batch.moved_x[k], batch.moved_y[k]}) - batch.rolled[k], limit);
     }
-    const Number tangential = law.tangential_force(normal, slip, limit);
     batch.slip.store(k, slip);
-    batch.tangential.store(k, normalized(tangential));
-    batch.force_x.store(k, normalized(normal * nx - tangential * ny));
-    batch.force_y.store(k, normalized(normal * ny + tangential * nx));
+    batch.tangential.store(k, normalized(law.tangential_force(batch.normal.load(k), slip, limit)));
   }
+}
+
+template <class Number, bool FRICTION> FAULTGOUGE_INLINE void components(Batch<Number> &batch)
+{
+  for (int k = 0; k < batch.count; k++) {
+    const Number nx = batch.normal_x.load(k), ny = batch.normal_y.load(k), normal = batch.normal.load(k);
+    Number x = normal * nx, y = normal * ny;
+    if constexpr (FRICTION) {
+      const Number tangential = batch.tangential.load(k);
+      x = x - tangential * ny;
+      y = y + tangential * nx;
+    }
+    batch.force_x.store(k, normalized(x));
+    batch.force_y.store(k, normalized(y));
+  }
+}
+
+template <class Number, bool FRICTION, bool ADVANCE>
+FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law, const FixedPointGrid grid)
+{
+  normal_forces(batch, law, grid);
+  if constexpr (FRICTION) tangential_forces<Number, ADVANCE>(batch, law);
+  components<Number, FRICTION>(batch);
 }
 
 // puts the results where they belong; returns a pair with one centre inside of the other disk, or else what it is given
@@ -179,14 +204,27 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
   return empty<Number, FRICTION>(batch, pairs, crushed);
 }
 
-// x, y and tangential force of a pair, as its first disk or, for odd entries of a row, its second one feels them
+// x, y and tangential force of a pair, and their signs for its first and its second disk
 using Four = double __attribute__((vector_size(32)));
+using FourLow = float __attribute__((vector_size(16)));
+constexpr double SIGN[2][4] = {{1.0, 1.0, 1.0, 1.0}, {-1.0, -1.0, 1.0, 1.0}};
 
-template <class Force> FAULTGOUGE_INLINE void load(Four &felt, const std::vector<Force> &force, int entry)
+template <class Vector, class Numbers> FAULTGOUGE_INLINE void load(Vector &vector, const Numbers &numbers)
 {
-  const Force &pair = force[entry >> 1];
-  const double sign = entry & 1 ? -1.0 : 1.0;
-  felt = Four{sign * pair.x, sign * pair.y, pair.tangential, 0.0};
+  static_assert(sizeof(Vector) == sizeof(Numbers), "one vector");
+  std::memcpy(&vector, &numbers, sizeof(Vector));
+}
+
+template <class Number>
+FAULTGOUGE_INLINE FloorContact<Number> on_floor(const MindlinLaw &law, Number overlap, Number slip, double increment,
+                                                bool friction, bool advance)
+{
+  FloorContact<Number> contact{law.normal_force(overlap), 0.0, slip, 0.0};
+  if (!friction) return contact;
+  contact.slip_limit = law.slip_limit_ratio<Number>() * overlap;
+  if (advance) contact.slip = advanced_slip(slip, increment, contact.slip_limit);
+  contact.tangential = law.tangential_force(contact.normal, contact.slip, contact.slip_limit);
+  return contact;
 }
 
 }    // namespace
@@ -214,10 +252,11 @@ FAULTGOUGE_DISPATCH
 void sum_forces(const ContactPairs &pairs, const Disks &disks, const Forces &forces)
 {
   for (int i = 0; i < disks.owned; i++) {
-    Four sum{}, more{};
+    Four sum{}, more{}, sign{};
     for (int k = pairs.start[i]; k < pairs.start[i + 1]; k++) {
-      load(more, pairs.force, pairs.row[k]);
-      sum += more;
+      load(more, pairs.force[pairs.row[k] >> 1]);
+      load(sign, SIGN[pairs.row[k] & 1]);
+      sum += sign * more;
     }
     forces.f[i][0] += sum[0];
     forces.f[i][1] += sum[1];
@@ -229,12 +268,16 @@ FAULTGOUGE_DISPATCH
 void sum_compensated_forces(const ContactPairs &pairs, const Disks &disks, const Forces &forces)
 {
   for (int i = 0; i < disks.owned; i++) {
-    Four sum{}, low{}, more{}, more_low{};
+    Four sum{}, low{}, more{}, sign{};
+    FourLow more_low{};
     for (int k = pairs.start[i]; k < pairs.start[i + 1]; k++) {
-      load(more, pairs.force, pairs.row[k]);
-      load(more_low, pairs.force_low, pairs.row[k]);
+      const int p = pairs.row[k] >> 1;
+      load(more, pairs.force[p]);
+      load(more_low, pairs.force_low[p]);
+      load(sign, SIGN[pairs.row[k] & 1]);
+      more *= sign;
       const Four total = sum + more, part = total - sum;    // exact_sum of compensated.h
-      low += ((sum - (total - part)) + (more - part)) + more_low;
+      low += ((sum - (total - part)) + (more - part)) + sign * __builtin_convertvector(more_low, Four);
       sum = total;
     }
     const Compensated torque = -disks.radius[i] * Compensated(sum[2], low[2]);
@@ -245,6 +288,20 @@ void sum_compensated_forces(const ContactPairs &pairs, const Disks &disks, const
     forces.low[i][forces.low_fy] = low[1];
     forces.low[i][forces.low_torque] = torque.low;
   }
+}
+
+FAULTGOUGE_DISPATCH
+FloorContact<double> floor_contact(const MindlinLaw &law, double overlap, double slip, double increment, bool friction,
+                                   bool advance)
+{
+  return on_floor(law, overlap, slip, increment, friction, advance);
+}
+
+FAULTGOUGE_DISPATCH
+FloorContact<Compensated> floor_contact(const MindlinLaw &law, Compensated overlap, Compensated slip, double increment,
+                                        bool friction, bool advance)
+{
+  return on_floor(law, overlap, slip, increment, friction, advance);
 }
 
 }    // namespace faultgouge

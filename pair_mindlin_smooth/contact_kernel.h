@@ -116,6 +116,16 @@ int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, c
 int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
                                double dt, bool friction, bool advance, const FixedPointGrid &grid);
 
+// A contact with the floor: n = (0, 1) and tau = (-1, 0)
+template <class Number> struct FloorContact {
+  Number normal, tangential, slip, slip_limit;
+};
+
+FloorContact<double> floor_contact(const MindlinLaw &law, double overlap, double slip, double increment, bool friction,
+                                   bool advance);
+FloorContact<Compensated> floor_contact(const MindlinLaw &law, Compensated overlap, Compensated slip, double increment,
+                                        bool friction, bool advance);
+
 // Where forces go: rows of f and torque, and with compensated arithmetic of fix low/parts
 struct Forces {
   double *const *f, *const *torque, *const *low;

@@ -44,10 +44,18 @@ ContactPairs::Image image_between(Vector seen, Vector original, const Domain &do
           static_cast<signed char>(std::lround((seen.y - original.y) / domain.prd[1]))};
 }
 
+bool within_reach(const Atom &atom, int i, int j, double skin)
+{
+  const double dx = atom.x[i][0] - atom.x[j][0], dy = atom.x[i][1] - atom.x[j][1];
+  // a little more than the reach and the skin, for roundings and low parts of coordinates
+  const double farthest = 1.000001 * (atom.radius[i] + atom.radius[j] + skin);
+  return dx * dx + dy * dy <= farthest * farthest;
+}
+
 }    // namespace
 
-void ContactPairs::build(const NeighList &list, Atom &atom, const Domain &domain, const std::vector<Vector> &original,
-                         bool with_slips, bool compensated)
+void ContactPairs::build(const NeighList &list, double skin, Atom &atom, const Domain &domain,
+                         const std::vector<Vector> &original, bool with_slips, bool compensated)
 {
   const int nlocal = atom.nlocal;
   const OwnedDisks owned(atom);
@@ -59,6 +67,7 @@ void ContactPairs::build(const NeighList &list, Atom &atom, const Domain &domain
     const int i = list.ilist[ii];
     for (int jj = 0; jj < list.numneigh[i]; jj++) {
       int j = list.firstneigh[i][jj] & NEIGHMASK;
+      if (!within_reach(atom, i, j, skin)) continue;
       Image shift{0, 0};
       if (j >= nlocal) {
         const double *seen = atom.x[j];
@@ -96,8 +105,8 @@ void ContactPairs::build(const NeighList &list, Atom &atom, const Domain &domain
     std::sort(row.begin() + start[i], row.begin() + start[i + 1],
               [&](int a, int b) { return partner(a) < partner(b); });
 
-  force.assign(size(), PairForce{0.0, 0.0, 0.0});
-  if (compensated) force_low.assign(size(), PairForceLow{0.0f, 0.0f, 0.0f});
+  force.assign(size(), PairForce{});
+  if (compensated) force_low.assign(size(), PairForceLow{});
   if (!with_slips) return;
   slip.assign(size(), 0.0);
   if (compensated) slip_low.assign(size(), 0.0);

@@ -21,21 +21,24 @@ class NeighList;
 
 namespace faultgouge {
 
-struct PairForce {
+// four numbers, so that they load as one vector
+struct alignas(32) PairForce {
   double x, y;          // on the first disk; the second one feels the opposite
   double tangential;    // f_t, the same for both: their torques are -R f_t
+  double unused;
 };
 
 // what it lacks, 1e-16 of it, to seven digits
-struct PairForceLow {
-  float x, y, tangential;
+struct alignas(16) PairForceLow {
+  float x, y, tangential, unused;
 };
 
 class ContactPairs {
 public:
-  // list: half list that holds the pairs with ghosts at both their owners (newton off)
+  // list: half list that holds the pairs with ghosts at both their owners (newton off). Its cutoff is that of the
+  //   largest disks; pairs farther apart than their own reach and the skin cannot meet before the next list
   // original: coordinates of disks owned elsewhere, before LAMMPS shifted them by box lengths
-  void build(const LAMMPS_NS::NeighList &list, LAMMPS_NS::Atom &atom, const LAMMPS_NS::Domain &domain,
+  void build(const LAMMPS_NS::NeighList &list, double skin, LAMMPS_NS::Atom &atom, const LAMMPS_NS::Domain &domain,
              const std::vector<Vector> &original, bool with_slips, bool compensated);
 
   int size() const { return static_cast<int>(first.size()); }

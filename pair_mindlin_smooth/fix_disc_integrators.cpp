@@ -83,7 +83,13 @@ void FixDiscIntegrator::final_integrate()
 
 void FixDiscIntegrator::complete_forces()
 {
-  if (low_parts) low_parts->complete_forces();
+  if (!low_parts) return;
+  for (int i = 0; i < atom->nlocal; i++) complete_force<true>(i);
+}
+
+template <bool COMPENSATED> void FixDiscIntegrator::complete_force(int i)
+{
+  if constexpr (COMPENSATED) low_parts->complete_force(i);
 }
 
 void FixDiscIntegrator::reset_dt()
@@ -143,10 +149,11 @@ void FixNVEDisc::initial_integrate(int /*vflag*/)
 
 void FixNVEDisc::final_integrate()
 {
-  complete_forces();
-  choose([this](auto rotates, auto) {
-    for (int i = 0; i < atom->nlocal; i++)
+  choose([this](auto rotates, auto compensates) {
+    for (int i = 0; i < atom->nlocal; i++) {
+      complete_force<decltype(compensates)::value>(i);
       if (atom->mask[i] & groupbit) kick<decltype(rotates)::value>(i);
+    }
   });
 }
 

@@ -36,6 +36,7 @@ protected:
 
   double positive_argument(const char *name, const char *text);
   template <bool ROTATION, bool COMPENSATED> void move(int i);    // by v dt and omega dt
+  template <bool COMPENSATED> void complete_force(int i);
   void complete_forces();
 
   // work(rotates, compensates) with both known at compile time

@@ -82,17 +82,6 @@ void FixLowParts::wrap(int i, int dimension)
   }
 }
 
-void FixLowParts::complete_forces()
-{
-  for (int i = 0; i < atom->nlocal; i++) {
-    double *const low = array_atom[i];
-    atom->f[i][0] += low[FX];
-    atom->f[i][1] += low[FY];
-    atom->torque[i][2] += low[TORQUE];
-    low[FX] = low[FY] = low[TORQUE] = 0.0;
-  }
-}
-
 void FixLowParts::grow_arrays(int n)
 {
   memory->grow(array_atom, n, COLUMNS, "low/parts:array");

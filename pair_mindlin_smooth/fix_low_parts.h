@@ -39,7 +39,14 @@ public:
     low[X] = x.low;
     low[Y] = y.low;
   }
-  void complete_forces();    // by their low parts
+  void complete_force(int i)    // by its low part
+  {
+    double *const low = array_atom[i];
+    atom->f[i][0] += low[FX];
+    atom->f[i][1] += low[FY];
+    atom->torque[i][2] += low[TORQUE];
+    low[FX] = low[FY] = low[TORQUE] = 0.0;
+  }
 
   void grow_arrays(int) override;
   void copy_arrays(int, int, int) override;

@@ -1,6 +1,7 @@
 #include "fix_wall_mindlin_smooth.h"
 
 #include "atom.h"
+#include "contact_kernel.h"
 #include "domain.h"
 #include "error.h"
 #include "fix_low_parts.h"
@@ -186,7 +187,6 @@ template <class NUMBER, bool FRICTION> void FixWallMindlinSmooth::contact_forces
   constexpr bool COMPENSATED = std::is_same<NUMBER, Compensated>::value;
   const bool advance = !update->setupflag;    // at setup the disks have not moved
   const double dt = update->dt;
-  const NUMBER limit_ratio = FRICTION ? law.slip_limit_ratio<NUMBER>() : NUMBER(0.0);
   const double margin = COMPENSATED ? 2.0 * low_parts->grid().spacing : 0.0;    // the coordinate is a high part
   energy = 0.0;
   for (int i = 0; i < atom->nlocal; i++) {
@@ -199,23 +199,19 @@ template <class NUMBER, bool FRICTION> void FixWallMindlinSmooth::contact_forces
       if (contact[OVERLAP] > 0.0) set_arrays(i);
       continue;
     }
-    const NUMBER normal = law.normal_force(overlap);
-    NUMBER tangential = 0.0;
     energy += law.normal_energy(value(overlap));
 
+    const bool known = contact[OVERLAP] > 0.0;    // a new contact begins without slip
+    NUMBER slip = known && FRICTION ? contact[SLIP] : 0.0;
+    if constexpr (COMPENSATED && FRICTION) slip.low = known ? contact[SLIP_LOW] : 0.0;
+    const double increment = known && FRICTION ? -(atom->v[i][0] + radius * atom->omega[i][2]) * dt : 0.0;
+    const auto [normal, tangential, kept, limit] =
+        faultgouge::floor_contact(law, overlap, slip, increment, FRICTION, advance);
     if constexpr (FRICTION) {
-      const NUMBER limit = limit_ratio * overlap;
-      NUMBER slip = contact[OVERLAP] > 0.0 ? contact[SLIP] : 0.0;
-      if constexpr (COMPENSATED) slip.low = contact[OVERLAP] > 0.0 ? contact[SLIP_LOW] : 0.0;
-      if (advance) {
-        const double increment = contact[OVERLAP] > 0.0 ? -(atom->v[i][0] + radius * atom->omega[i][2]) * dt : 0.0;
-        slip = faultgouge::advanced_slip(slip, increment, limit);
-      }
-      tangential = law.tangential_force(normal, slip, limit);
       contact[TANGENTIAL] = value(tangential);
-      contact[SLIP] = leading(slip);
-      contact[SLIP_RATIO] = value(limit) > 0.0 ? value(slip) / value(limit) : 0.0;
-      if constexpr (COMPENSATED) contact[SLIP_LOW] = slip.low;
+      contact[SLIP] = leading(kept);
+      contact[SLIP_RATIO] = value(limit) > 0.0 ? value(kept) / value(limit) : 0.0;
+      if constexpr (COMPENSATED) contact[SLIP_LOW] = kept.low;
     }
     add_force<NUMBER>(i, -tangential, normal, -(radius * tangential));
     contact[NORMAL] = value(normal);

@@ -185,7 +185,7 @@ void PairMindlinSmooth::rebuild_pairs()
     store_slips();
     history->check_owners();
   }
-  pairs.build(*list, *atom, *domain, original, has_friction, compensated);
+  pairs.build(*list, neighbor->skin, *atom, *domain, original, has_friction, compensated);
   if (!has_friction) return;
   for (int p = 0; p < pairs.size(); p++)
     if (const double *slip = history->find(pairs.first[p], pairs.second_tag[p])) {
