@@ -193,11 +193,11 @@ struct FixedPointGrid {
     return {x.high + (step + carry), rest - carry};
   }
 
-  // any coordinate as a multiple of g and a rest
+  // any coordinate as a multiple of g and a rest that is a multiple of 2^-52 g
   FAULTGOUGE_INLINE Compensated split(Compensated x) const
   {
     const double high = whole(x.high);
-    return moved({high, x.low}, x.high - high);
+    return moved(moved({high, 0.0}, x.high - high), x.low);
   }
 };
 
