@@ -1,0 +1,110 @@
+r"""Spectra that are hard: pairs about to coalesce, rattlers, stiffnesses over ten decades.
+
+**Near-defective pairs.** The block
+
+.. math:: B = \begin{pmatrix} 1-d & e \\ -e & 1+d \end{pmatrix}, \qquad \lambda = 1 \mp \sqrt{D}/2, \quad D = 4(d-e)(d+e) ,
+
+is hidden in an operator of 60 modes by a rotation. With e = d (1 - eps) the pair is real, with e = d (1 + eps) complex,
+and its split :math:`\sqrt{|D|}` is of order :math:`\sqrt{8\epsilon}\,d`. Rounding of the operator, u |A|, changes D by
+about 4 d u |A|, however small eps is; it changes the split by the root of that, if eps is small enough. So D is what the
+onset is computed from, and a pair counts as complex only if its imaginary part exceeds 50 times its own rounding
+(`analysis.spectrum`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from ...analysis import Contacts, spectrum
+from ...analysis.modes import Modes
+from ...analysis.spectrum import SAFETY, unit_rounding
+from .case import Case, Outcome, measured
+from .packings import bed, crystal, law, sheared
+
+GROUP = "eigenvalues"
+
+SIZE, SPLIT = 60, 0.05
+
+
+def _near_defective(eps: float, sign: int) -> Outcome:
+    coupling = SPLIT * (1 + sign * eps)
+    exact = 4 * (SPLIT - coupling) * (SPLIT + coupling)
+    generator = np.random.default_rng(2)
+    matrix = np.diag(np.linspace(2, 30, SIZE))
+    matrix[:2, :2] = [[1 - SPLIT, coupling], [-coupling, 1 + SPLIT]]
+    turn = np.linalg.qr(generator.standard_normal((SIZE, SIZE)))[0]
+    matrix = turn @ matrix @ turn.T
+    modes = Modes.of(0.0, csr_array(matrix))
+    first, second = np.argsort(np.abs(modes.values - 1))[:2]
+    found = modes.block((int(first), int(second))).discriminant
+    rounding = unit_rounding(matrix)
+    believed = modes.partner[first] >= 0
+    if believed and sign < 0:
+        return Outcome("fails", None, None, "a real pair is reported as complex")
+    split = abs(np.sqrt(complex(found)) - np.sqrt(complex(exact))) / abs(np.sqrt(complex(exact)))
+    report = "as complex" if believed else "as real, its imaginary part being within its rounding error" * (sign > 0)
+    return measured(
+        abs(found - exact),
+        SAFETY * rounding * 4 * SPLIT,
+        f"error of D = {exact:.2g}, whose rounding is 4 d u |A| = {rounding * 4 * SPLIT:.0e}, and {SAFETY:g} times that "
+        f"the bound; the split has a relative error of {split:.0e}; the pair is reported {report or 'as real'}",
+    )
+
+
+def _rattlers() -> Outcome:
+    """30 % of the disks touch nothing: the others' eigenvalues are what they were."""
+    settled = sheared(bed()).packing
+    extra = round(len(settled) * 3 / 7)
+    c = settled.contacts
+    height = settled.position[:, 1].max() + 2.0 + 1.5 * np.arange(extra)
+    hovering = np.column_stack([np.linspace(0.0, 5.0, extra), height])
+    both = replace(
+        settled,
+        position=np.vstack([settled.position, hovering]),
+        radius=np.append(settled.radius, np.full(extra, 0.5)),
+        angle=np.append(settled.angle, np.zeros(extra)),
+        mass=np.append(settled.mass, np.ones(extra)),
+        top=np.append(settled.top, np.zeros(extra, bool)),
+        contacts=Contacts(c.i, c.j, c.slip),
+    )
+    alone, found = spectrum(settled), spectrum(both)
+    if len(found.eigenvalues) != len(alone.eigenvalues):
+        return Outcome("fails", None, None, f"{len(found.eigenvalues)} eigenvalues instead of {len(alone.eigenvalues)}")
+    return measured(
+        np.abs(found.eigenvalues - alone.eigenvalues).max() / alone.rounding,
+        0.0,
+        f"eigenvalues with {len(found.rattlers)} rattlers of {len(both)} disks against those without the disks that were "
+        "added, in units of u |A|: the same to the bit",
+    )
+
+
+def _scales() -> Outcome:
+    """Eigenvalues over k_n are the same for all k_n at the same load over k_n."""
+    scaled = [
+        np.sort(spectrum(crystal(3, 2, law(kn))).eigenvalues.real) / kn for kn in (1e2, 1e4, 1e6, 1e8, 1e10, 1e12)
+    ]
+    return measured(
+        np.abs(np.array(scaled) - scaled[0]).max() / scaled[0].max(),
+        SAFETY * np.finfo(float).eps,
+        "eigenvalues / k_n of a crystal for k_n from 1e2 to 1e12, in units of the largest: 50 roundings",
+    )
+
+
+CASES = [
+    *(
+        Case(
+            GROUP,
+            f"pair at eps = {sign * 10.0**-exponent:+.0e}, {'complex' if sign > 0 else 'real'}",
+            partial(_near_defective, 10.0**-exponent, sign),
+            exponent in (4, 10, 16),
+        )
+        for exponent in (4, 6, 8, 10, 12, 14, 16)
+        for sign in (-1, 1)
+    ),
+    Case(GROUP, "30 % rattlers", _rattlers, True),
+    Case(GROUP, "eigenvalues over k_n", _scales, True),
+]
