@@ -1,7 +1,8 @@
 # make reproduce   sets everything up and runs the paper's protocol into results/
 # make test        sets everything up and runs all tests
 # make check       format, lint and types
-# make benchmark   time per step beside LAMMPS's own granular styles; the onset, solved and scanned
+# make benchmark   time per step beside LAMMPS's own granular styles; what each part of a scene costs; the onset, solved and
+#                  scanned
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
 # make clean       removes what the others made
 
@@ -36,6 +37,8 @@ format: $(VENV)/.check
 
 benchmark: $(VENV)/.installed
 	$(BIN)/python benchmarks/time_per_step.py
+	$(BIN)/faultgouge explain scenes/paper.toml
+	$(BIN)/faultgouge explain scenes/frictionless.toml
 	$(BIN)/python benchmarks/onset_against_scan.py
 
 docs: $(VENV)/.installed

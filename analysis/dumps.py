@@ -6,7 +6,8 @@ name, under any of the names listed in `DISK` and `CONTACT`, in any order; furth
 ``%.17g`` everything comes back to the bit.
 
 Disks of type 2 form the upper layer. The floor's slip stands in the disks' dump, for a floor contact belongs
-to one disk. Pairs that do not overlap, which LAMMPS lists up to its cutoff, are no contacts.
+to one disk. Pairs that do not overlap, which LAMMPS lists up to its cutoff, are no contacts. Without friction
+there are neither slips nor angles, and their columns may be missing.
 
 Law, load and inertia are no part of a dump. They are given by the caller or by a sidecar file of the same
 name with the suffix ".params", which has one ``key value`` a line out of kn, kt, mu, fx, fy, inertia_factor;
@@ -120,14 +121,15 @@ def read_dump(
     disks = Path(disks)
     contacts = disks.with_suffix(".contacts") if contacts is None else Path(contacts)
     shown = _snapshot(disks, frame)
-    disk = _columns(disks, shown, DISK)
-    pair = _columns(contacts, _snapshot_of_step(contacts, shown.step), CONTACT)
     given = _sidecar(disks.with_suffix(".params"))
     try:
         law = law or MindlinLaw(given["kn"], given["kt"], given["mu"])
     except KeyError as error:
         sidecar = disks.with_suffix(".params")
         raise PackingFileError(f"The law of {disks} is not given: {sidecar} does not name {error}.") from None
+    absent = () if law.frictional else ("angle", "floor_slip", "slip")
+    disk = _columns(disks, shown, DISK, absent)
+    pair = _columns(contacts, _snapshot_of_step(contacts, shown.step), CONTACT, absent)
 
     order = np.argsort(disk["id"])
     disk = {name: column[order] for name, column in disk.items()}
@@ -144,7 +146,9 @@ def read_dump(
     i, j, radius = index["first"], index["second"], disk["radius"]
     touch = np.hypot(*nearest_image(position[i] - position[j], box_length).T) < radius[i] + radius[j]
     floor = np.flatnonzero(radius - position[:, 1] > 0)
-    slip_low = np.concatenate([pair["slip_low"][touch], disk["floor_slip_low"][floor]]) if low is not None else None
+    slip_low = None
+    if "slip_low" in pair and "floor_slip_low" in disk:
+        slip_low = np.concatenate([pair["slip_low"][touch], disk["floor_slip_low"][floor]])
     try:
         return Packing(
             position=position,
@@ -242,15 +246,19 @@ def _snapshot_of_step(path: Path, step: int) -> DumpFrame:
     raise PackingFileError(f"{path} has no snapshot of step {step}.")
 
 
-def _columns(path: Path, frame: DumpFrame, names: Mapping[str, tuple[str, ...]]) -> dict[str, Floats]:
+def _columns(
+    path: Path, frame: DumpFrame, names: Mapping[str, tuple[str, ...]], absent: tuple[str, ...]
+) -> dict[str, Floats]:
+    """Columns by field; of the fields that may be absent, zeros."""
     columns = {}
     for field, candidates in names.items():
         present = [name for name in candidates if name in frame.columns]
-        if not present and field in LOW_PARTS:
-            continue
-        if not present:
+        if present:
+            columns[field] = frame.rows[:, frame.columns.index(present[0])]
+        elif field in absent:
+            columns[field] = np.zeros(len(frame.rows))
+        elif field not in LOW_PARTS:
             raise PackingFileError(f"{path} has no column {' or '.join(candidates)}.")
-        columns[field] = frame.rows[:, frame.columns.index(present[0])]
     return columns
 
 

@@ -24,6 +24,9 @@ force follows the turning contact. ``form="paper"`` leaves out the last term, as
 Charan, Pomyalov and Procaccia does: there the slip vector is differentiated with
 :math:`\partial t/\partial r = 1 - \mathbf n \mathbf n^T` and the turning of the tangent is lost.
 ``form="consistent"`` is the exact derivative of the integrated forces.
+
+Without friction only N and P are left, and K is an operator on the 2N coordinates (x, y): rows and columns of rotations
+are empty.
 """
 
 from typing import Literal
@@ -49,7 +52,8 @@ def stiffness_matrix(packing: Packing, form: Form = "consistent") -> csr_array:
     Returns
     -------
     scipy.sparse.csr_array, shape (3N, 3N)
-        Force / length, in the order (x.., y.., R theta..). Rows of rattlers are empty.
+        Force / length, in the order (x.., y.., R theta..). Rows of rattlers are empty, and so are all rows and columns
+        of rotations without friction.
 
     Raises
     ------
@@ -58,18 +62,19 @@ def stiffness_matrix(packing: Packing, form: Form = "consistent") -> csr_array:
     """
     n, i, j, pair = len(packing), packing.contacts.i, packing.contacts.j, ~packing.contacts.floor
     blocks = contact_stiffness(packing, form)
+    axes = 3 if packing.law.frictional else 2
     # Two disks share one contact, so the off-diagonal blocks are final; only the diagonal ones are sums.
-    diagonal = np.empty((n, 3, 3))
-    for row in range(3):
-        for column in range(3):
+    diagonal = np.empty((n, axes, axes))
+    for row in range(axes):
+        for column in range(axes):
             diagonal[:, row, column] = np.bincount(i, blocks[:, row, column], n)
             diagonal[:, row, column] += np.bincount(j[pair], blocks[pair, row + 3, column + 3], n)
-    every, axis = np.arange(n, dtype=np.int32), np.arange(0, 3 * n, n, dtype=np.int32)
+    every, axis = np.arange(n, dtype=np.int32), np.arange(0, axes * n, n, dtype=np.int32)
     i, j = (
         i[pair].astype(np.int32),
         j[pair].astype(np.int32),
     )  # half the memory of what the sparse format sorts
-    values = np.concatenate([diagonal, blocks[pair, :3, 3:], blocks[pair, 3:, :3]])
+    values = np.concatenate([diagonal, blocks[pair, :axes, 3 : 3 + axes], blocks[pair, 3 : 3 + axes, :axes]])
     rows = np.concatenate([every, i, j])[:, None, None] + axis[:, None]
     columns = np.concatenate([every, j, i])[:, None, None] + axis
     where = tuple(np.broadcast_to(index, values.shape).ravel() for index in (rows, columns))
@@ -91,22 +96,27 @@ def contact_stiffness(packing: Packing, form: Form = "consistent") -> Floats:
     Returns
     -------
     ndarray, shape (C, 6, 6)
-        Force / length; the rows and columns of j are zero for the floor.
+        Force / length; the rows and columns of j are zero for the floor, those of u without friction.
     """
     if form not in ("consistent", "paper"):
         raise ValueError(f'form = "{form}" must be "consistent" or "paper".')
     law, slip, floor = packing.law, packing.contacts.slip, packing.contacts.floor
     normal, tangent, distance, overlap = packing.geometry
-    zero, one = np.zeros((len(slip), 1)), np.ones((len(slip), 1))
+    zero = np.zeros((len(slip), 1))
     big_n = np.hstack([normal, zero, -normal, zero])
     big_p = np.hstack([tangent, zero, -tangent, zero])
-    big_t = np.hstack([tangent, -one, -tangent, -one])
-    big_n[floor, 3:] = big_t[floor, 3:] = big_p[floor] = 0.0
+    big_n[floor, 3:] = big_p[floor] = 0.0
     # Only contacts of finite length turn; the floor's distance is a height and may even be zero.
     turning = np.where(floor, 0.0, 1.0) / np.where(floor, 1.0, distance)
     fn_over_r = law.normal_force(overlap) * turning
-    ft_over_r = law.tangential_force(overlap, slip) * turning * (form == "consistent")
     c = law.normal_stiffness(overlap)
+    if not law.frictional:
+        left = np.stack([big_n, big_p], axis=2)
+        return left @ np.stack([c[:, None] * big_n, -fn_over_r[:, None] * big_p], axis=1)
+    one = np.ones_like(zero)
+    big_t = np.hstack([tangent, -one, -tangent, -one])
+    big_t[floor, 3:] = 0.0
+    ft_over_r = law.tangential_force(overlap, slip) * turning * (form == "consistent")
     a = law.tangential_slip_derivative(overlap, slip)
     b = law.tangential_overlap_derivative(overlap, slip)
     left = np.stack([big_n, big_p, big_t], axis=2)

@@ -23,11 +23,13 @@ SPACING = 0.999  # of disks of diameter 1: overlaps of 1e-3
 
 # The built-in styles have the radius in their laws: their stiffness is scaled to the same force at this overlap.
 STYLES = {
-    "mindlin/smooth": f"pair_style mindlin/smooth {KN} {KT} 1.0\npair_coeff * *",
-    "mindlin/smooth, mu = 0": f"pair_style mindlin/smooth {KN} {KT} 0.0\npair_coeff * *",
-    "gran/hertz/history": f"pair_style gran/hertz/history {2 * KN} {2 * KT} 0.0 0.0 1.0 1\npair_coeff * *",
-    "granular": f"pair_style granular\npair_coeff * * hertz {2 * KN} 0.0 tangential mindlin {2 * KT} 0.0 1.0",
+    "mindlin/smooth": (f"mindlin/smooth {KN} {KT} 1.0", "", "nve/disc 0.5"),
+    "mindlin/smooth, compensated": (f"mindlin/smooth {KN} {KT} 1.0 compensated", "", "nve/disc 0.5 compensated"),
+    "mindlin/smooth, mu = 0": (f"mindlin/smooth {KN} {KT} 0.0", "", "nve/disc 0.5"),
+    "gran/hertz/history": (f"gran/hertz/history {2 * KN} {2 * KT} 0.0 0.0 1.0 1", "", "nve/sphere disc"),
+    "granular": ("granular", f"hertz {2 * KN} 0.0 tangential mindlin {2 * KT} 0.0 1.0", "nve/sphere disc"),
 }
+"""Pair style, its coefficients, and the integrator."""
 
 DECK = """
 units           lj
@@ -45,10 +47,11 @@ create_atoms    1 box
 set             group all diameter 1.0
 set             group all mass 1.0
 velocity        all create 1e-8 12345 loop geom
-{style}
+pair_style      {pair}
+pair_coeff      * * {coefficients}
 neighbor        0.1 bin
 neigh_modify    every 1 delay 0 check yes
-fix             move all nve/sphere disc
+fix             move all {integrator}
 timestep        1e-4
 thermo          1000000
 run             {warm}
@@ -61,7 +64,17 @@ def microseconds_per_step(style: str, disks: int, ranks: int) -> float:
     nx = round((disks / 2 * 3**0.5) ** 0.5)
     ny = round(disks / 2 / nx)
     steps = max(200, 2_000_000 // disks)
-    deck = DECK.format(density=2 / 3**0.5 / SPACING**2, nx=nx, ny=ny, style=STYLES[style], warm=steps // 4, steps=steps)
+    pair, coefficients, integrator = STYLES[style]
+    deck = DECK.format(
+        density=2 / 3**0.5 / SPACING**2,
+        nx=nx,
+        ny=ny,
+        pair=pair,
+        coefficients=coefficients,
+        integrator=integrator,
+        warm=steps // 4,
+        steps=steps,
+    )
     with tempfile.TemporaryDirectory() as folder:
         script = Path(folder) / "in"
         script.write_text(deck)
@@ -94,7 +107,7 @@ def main() -> None:
                 times = [turn[style] for turn in turns]
                 ratio = statistics.median(turn[style] / turn["gran/hertz/history"] for turn in turns)
                 print(
-                    f"  {style:24s}{statistics.median(times):10.2f} [{min(times):.2f}, {max(times):.2f}]{ratio:10.2f}"
+                    f"  {style:30s}{statistics.median(times):10.2f} [{min(times):.2f}, {max(times):.2f}]{ratio:10.2f}"
                 )
                 rows.append({"disks": disks, "ranks": ranks, "style": style, "microseconds": times, "ratio": ratio})
     if options.output:

@@ -79,6 +79,11 @@ FAULTGOUGE_INLINE Compensated exact_product(double a, double b)
   return {product, __builtin_fma(a, b, -product)};
 }
 
+FAULTGOUGE_INLINE double normalized(double a)
+{
+  return a;
+}
+
 // the same number with the high part the closest double
 FAULTGOUGE_INLINE Compensated normalized(Compensated a)
 {
@@ -178,24 +183,22 @@ struct FixedPointGrid {
   }
 
   // the closest multiple of 2^-52 g, for |a| <= g/2
-  double fine(double a) const { return (a + 1.5 * spacing) - 1.5 * spacing; }
+  FAULTGOUGE_INLINE double fine(double a) const { return (a + 1.5 * spacing) - 1.5 * spacing; }
 
-  // x + low becomes x + low + d, with x a multiple of g again
-  void add(double &x, double &low, double d) const
+  // a coordinate, with its high part a multiple of g again, after it has moved by d
+  FAULTGOUGE_INLINE Compensated moved(Compensated x, double d) const
   {
     const double step = whole(d);
-    const double rest = low + (d - step);
+    const double rest = x.low + (d - step);
     const double carry = whole(rest);
-    x += step + carry;
-    low = fine(rest - carry);
+    return {x.high + (step + carry), fine(rest - carry)};
   }
 
-  // any x + low as a multiple of g and a rest
-  void split(double &x, double &low) const
+  // any coordinate as a multiple of g and a rest
+  FAULTGOUGE_INLINE Compensated split(Compensated x) const
   {
-    const double high = whole(x), rest = x - high;
-    x = high;
-    add(x, low, rest);
+    const double high = whole(x.high);
+    return moved({high, x.low}, x.high - high);
   }
 };
 

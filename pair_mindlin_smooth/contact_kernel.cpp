@@ -1,5 +1,6 @@
 #include "contact_kernel.h"
 
+#include <algorithm>
 #include <type_traits>
 
 // Fused multiply-add makes exact products fast, and vectors of four do the rest.
@@ -59,7 +60,8 @@ FAULTGOUGE_INLINE void set_force(ContactPairs &pairs, int p, double x, double y,
 FAULTGOUGE_INLINE void set_force(ContactPairs &pairs, int p, Compensated x, Compensated y, Compensated tangential)
 {
   pairs.force[p] = PairForce{x.high, y.high, tangential.high};
-  pairs.force_low[p] = PairForce{x.low, y.low, tangential.low};
+  pairs.force_low[p] =
+      PairForceLow{static_cast<float>(x.low), static_cast<float>(y.low), static_cast<float>(tangential.low)};
 }
 
 template <class Number, bool FRICTION> FAULTGOUGE_INLINE void open(ContactPairs &pairs, int p)
@@ -101,12 +103,12 @@ FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law, cons
   for (int k = 0; k < batch.count; k++) {
     const Branch<Number> r{batch.branch_x.load(k), batch.branch_y.load(k)};
     const Geometry<Number> contact = geometry(r, batch.radius_i[k], batch.radius_j[k], grid);
-    const Number nx = r.x * contact.inverse, ny = r.y * contact.inverse;
+    const Number nx = contact.direction(r.x), ny = contact.direction(r.y);
     const Number normal = law.normal_force(contact.overlap);
     batch.overlap.store(k, contact.overlap);
     if constexpr (!FRICTION) {
-      batch.force_x.store(k, normal * nx);
-      batch.force_y.store(k, normal * ny);
+      batch.force_x.store(k, normalized(normal * nx));
+      batch.force_y.store(k, normalized(normal * ny));
       continue;
     }
 
@@ -119,16 +121,19 @@ FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law, cons
     }
     const Number tangential = law.tangential_force(normal, slip, limit);
     batch.slip.store(k, slip);
-    batch.tangential.store(k, tangential);
-    batch.force_x.store(k, normal * nx - tangential * ny);
-    batch.force_y.store(k, normal * ny + tangential * nx);
+    batch.tangential.store(k, normalized(tangential));
+    batch.force_x.store(k, normalized(normal * nx - tangential * ny));
+    batch.force_y.store(k, normalized(normal * ny + tangential * nx));
   }
 }
 
-template <class Number, bool FRICTION> FAULTGOUGE_INLINE void empty(Batch<Number> &batch, ContactPairs &pairs)
+// puts the results where they belong; returns a pair with one centre inside of the other disk, or else what it is given
+template <class Number, bool FRICTION>
+FAULTGOUGE_INLINE int empty(Batch<Number> &batch, ContactPairs &pairs, int crushed)
 {
   for (int k = 0; k < batch.count; k++) {
     const int p = batch.pair[k];
+    if (!(leading(batch.overlap.load(k)) <= std::min(batch.radius_i[k], batch.radius_j[k]))) crushed = p;
     if (leading(batch.overlap.load(k)) <= 0.0) {
       open<Number, FRICTION>(pairs, p);
       continue;
@@ -142,6 +147,7 @@ template <class Number, bool FRICTION> FAULTGOUGE_INLINE void empty(Batch<Number
     }
   }
   batch.count = 0;
+  return crushed;
 }
 
 template <class Number, bool FRICTION, bool ADVANCE>
@@ -149,7 +155,7 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
                                  double dt, const FixedPointGrid &grid)
 {
   Batch<Number> batch;
-  int coincident = -1;
+  int crushed = -1;
   for (int p = 0, n = pairs.size(); p < n; p++) {
     const Branch<double> high = leading_branch(pairs, p, disks, box);
     const double rsq = high.x * high.x + high.y * high.y;
@@ -158,7 +164,6 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
       open<Number, FRICTION>(pairs, p);
       continue;
     }
-    if (rsq == 0.0) coincident = p;
     Branch<Number> r{high.x, high.y};
     if constexpr (std::is_same_v<Number, Compensated>) {
       const Branch<double> low = low_branch(pairs, p, disks, box);
@@ -168,19 +173,18 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
     add<Number, FRICTION, ADVANCE>(batch, pairs, p, r, disks, dt);
     if (batch.count < BATCH) continue;
     evaluate<Number, FRICTION, ADVANCE>(batch, law, grid);
-    empty<Number, FRICTION>(batch, pairs);
+    crushed = empty<Number, FRICTION>(batch, pairs, crushed);
   }
   evaluate<Number, FRICTION, ADVANCE>(batch, law, grid);
-  empty<Number, FRICTION>(batch, pairs);
-  return coincident;
+  return empty<Number, FRICTION>(batch, pairs, crushed);
 }
 
 // x, y and tangential force of a pair, as its first disk or, for odd entries of a row, its second one feels them
 using Four = double __attribute__((vector_size(32)));
 
-FAULTGOUGE_INLINE void load(Four &felt, const std::vector<PairForce> &force, int entry)
+template <class Force> FAULTGOUGE_INLINE void load(Four &felt, const std::vector<Force> &force, int entry)
 {
-  const PairForce &pair = force[entry >> 1];
+  const Force &pair = force[entry >> 1];
   const double sign = entry & 1 ? -1.0 : 1.0;
   felt = Four{sign * pair.x, sign * pair.y, pair.tangential, 0.0};
 }

@@ -31,9 +31,16 @@ template <class Number> struct Branch {
   Number x, y;
 };
 
-template <class Number> struct Geometry {
-  Number overlap;
-  Number inverse;    // of the distance
+template <class Number> struct Geometry;
+
+template <> struct Geometry<double> {
+  double overlap, distance;
+  FAULTGOUGE_INLINE double direction(double component) const { return component / distance; }
+};
+
+template <> struct Geometry<Compensated> {
+  Compensated overlap, inverse;    // of the distance
+  FAULTGOUGE_INLINE Compensated direction(Compensated component) const { return component * inverse; }
 };
 
 // from the second disk of a pair to the first, in the coordinates' high parts if these are compensated
@@ -76,7 +83,7 @@ FAULTGOUGE_INLINE Geometry<double> geometry(const Branch<double> &r, double radi
                                             const FixedPointGrid &)
 {
   const double distance = std::sqrt(r.x * r.x + r.y * r.y);
-  return {(radius_i + radius_j) - distance, 1.0 / distance};
+  return {(radius_i + radius_j) - distance, distance};
 }
 
 // Here it is D / (c + r) with D = c^2 - r^2, to 20 digits however small: the squares of high parts are exact.
@@ -102,8 +109,8 @@ FAULTGOUGE_INLINE Geometry<Compensated> geometry(const Branch<Compensated> &r, d
 }
 
 // All pairs: their forces, slips and whether they touch. With advance the slips advance by v dt and omega dt. Returns a
-// pair of disks with one centre, or -1. Compiled for several processors, of which the one at hand is chosen at run
-// time; results are the same on all.
+// pair with one centre inside of the other disk, where the law means nothing, or -1. Compiled for several processors,
+// of which the one at hand is chosen at run time; results are the same on all.
 int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law, double dt,
                    bool friction, bool advance);
 int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,

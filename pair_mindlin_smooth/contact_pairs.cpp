@@ -97,7 +97,7 @@ void ContactPairs::build(const NeighList &list, Atom &atom, const Domain &domain
               [&](int a, int b) { return partner(a) < partner(b); });
 
   force.assign(size(), PairForce{0.0, 0.0, 0.0});
-  if (compensated) force_low.assign(size(), PairForce{0.0, 0.0, 0.0});
+  if (compensated) force_low.assign(size(), PairForceLow{0.0f, 0.0f, 0.0f});
   if (!with_slips) return;
   slip.assign(size(), 0.0);
   if (compensated) slip_low.assign(size(), 0.0);

@@ -21,10 +21,14 @@ class NeighList;
 
 namespace faultgouge {
 
-struct alignas(32) PairForce {
-  double x, y;            // on the first disk; the second one feels the opposite
-  double tangential;      // f_t, the same for both: their torques are -R f_t
-  double unused = 0.0;    // four make a vector
+struct PairForce {
+  double x, y;          // on the first disk; the second one feels the opposite
+  double tangential;    // f_t, the same for both: their torques are -R f_t
+};
+
+// what it lacks, 1e-16 of it, to seven digits
+struct PairForceLow {
+  float x, y, tangential;
 };
 
 class ContactPairs {
@@ -44,9 +48,10 @@ public:
   };
   std::vector<Image> image;
   std::vector<LAMMPS_NS::tagint> first_tag, second_tag;    // and their IDs
-  std::vector<PairForce> force, force_low;                 // low parts only if compensated
-  std::vector<double> slip, slip_low;                      // only with_slips
-  std::vector<char> touching;                              // only with_slips
+  std::vector<PairForce> force;
+  std::vector<PairForceLow> force_low;    // only if compensated
+  std::vector<double> slip, slip_low;     // only with_slips
+  std::vector<char> touching;             // only with_slips
 };
 
 }    // namespace faultgouge

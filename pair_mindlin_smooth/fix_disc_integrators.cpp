@@ -13,10 +13,24 @@
 using namespace LAMMPS_NS;
 using namespace FixConst;
 
-FixDiscIntegrator::FixDiscIntegrator(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg)
+FixDiscIntegrator::FixDiscIntegrator(LAMMPS *lmp, int narg, char **arg, int numbers) :
+    Fix(lmp, narg, arg),
+    numbers(numbers)
 {
-  carries_low_parts = narg > 3 && strcmp(arg[narg - 1], "compensated") == 0;
-  numbers = narg - 3 - (carries_low_parts ? 1 : 0);
+  static const char *const needs[] = {"no number", "one number, I0 = I/(m R^2)",
+                                      "two numbers, GAMMA and I0 = I/(m R^2)"};
+  if (narg < 3 + numbers) error->all(FLERR, "fix {} takes {}, but got {} arguments", style, needs[numbers], narg - 3);
+  for (int k = 3 + numbers; k < narg; k++) {
+    if (strcmp(arg[k], "compensated") == 0) {
+      carries_low_parts = true;
+    } else if (strcmp(arg[k], "rotation") == 0) {
+      if (++k == narg) error->all(FLERR, "fix {}: rotation takes yes or no", style);
+      rotation = utils::logical(FLERR, arg[k], false, lmp) == 1;
+    } else {
+      error->all(FLERR, "fix {} takes {} and the keywords rotation yes|no and compensated, but got {}", style,
+                 needs[numbers], arg[k]);
+    }
+  }
   time_integrate = 1;
   dynamic_group_allow = 1;
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->torque_flag)
@@ -33,7 +47,7 @@ double FixDiscIntegrator::positive_argument(const char *name, const char *text)
 
 int FixDiscIntegrator::setmask()
 {
-  return INITIAL_INTEGRATE | FINAL_INTEGRATE;
+  return INITIAL_INTEGRATE | (carries_low_parts ? FINAL_INTEGRATE : 0);
 }
 
 void FixDiscIntegrator::init()
@@ -77,82 +91,95 @@ void FixDiscIntegrator::reset_dt()
   dt = update->dt;
 }
 
-void FixDiscIntegrator::move(int i)
+template <bool ROTATION, bool COMPENSATED> void FixDiscIntegrator::move(int i)
 {
   const double dx = dt * atom->v[i][0], dy = dt * atom->v[i][1];
-  if (low_parts) {
+  if (!(dx * dx + dy * dy <= atom->radius[i] * atom->radius[i]))
+    error->one(FLERR,
+               "fix {}: disk {} would move by ({}, {}) in one step, farther than its radius {}: the time step is too "
+               "long, or a force too large",
+               style, atom->tag[i], dx, dy, atom->radius[i]);
+  if constexpr (COMPENSATED) {
     low_parts->move(i, dx, dy);
   } else {
     atom->x[i][0] += dx;
     atom->x[i][1] += dy;
   }
-  if (angle >= 0) atom->dvector[angle][i] += dt * atom->omega[i][2];
+  if constexpr (ROTATION)
+    if (angle >= 0) atom->dvector[angle][i] += dt * atom->omega[i][2];
 }
 
-FixNVEDisc::FixNVEDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg)
+FixNVEDisc::FixNVEDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg, 1)
 {
-  if (numbers != 1)
-    error->all(FLERR, "fix nve/disc takes one number, I0 = I/(m R^2), and optionally compensated, but got {} numbers",
-               numbers);
   inertia_factor = positive_argument("I0", arg[3]);
 }
 
-void FixNVEDisc::kick(int i)
+int FixNVEDisc::setmask()
 {
-  const double radius = atom->radius[i];
+  return INITIAL_INTEGRATE | FINAL_INTEGRATE;
+}
+
+template <bool ROTATION> void FixNVEDisc::kick(int i)
+{
   const double per_mass = 0.5 * dt / atom->rmass[i];
   atom->v[i][0] += per_mass * atom->f[i][0];
   atom->v[i][1] += per_mass * atom->f[i][1];
-  atom->omega[i][2] += per_mass / (inertia_factor * radius * radius) * atom->torque[i][2];
+  if constexpr (ROTATION) {
+    const double radius = atom->radius[i];
+    atom->omega[i][2] += per_mass / (inertia_factor * radius * radius) * atom->torque[i][2];
+  }
 }
 
 void FixNVEDisc::initial_integrate(int /*vflag*/)
 {
-  for (int i = 0; i < atom->nlocal; i++)
-    if (atom->mask[i] & groupbit) {
-      kick(i);
-      move(i);
-    }
+  choose([this](auto rotates, auto compensates) {
+    for (int i = 0; i < atom->nlocal; i++)
+      if (atom->mask[i] & groupbit) {
+        kick<decltype(rotates)::value>(i);
+        move<decltype(rotates)::value, decltype(compensates)::value>(i);
+      }
+  });
 }
 
 void FixNVEDisc::final_integrate()
 {
   complete_forces();
-  for (int i = 0; i < atom->nlocal; i++)
-    if (atom->mask[i] & groupbit) kick(i);
+  choose([this](auto rotates, auto) {
+    for (int i = 0; i < atom->nlocal; i++)
+      if (atom->mask[i] & groupbit) kick<decltype(rotates)::value>(i);
+  });
 }
 
-FixDisplaceDisc::FixDisplaceDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg)
+FixDisplaceDisc::FixDisplaceDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg, 0)
 {
-  if (numbers != 0) error->all(FLERR, "fix displace/disc takes no argument but compensated, but got {}", arg[3]);
 }
 
 void FixDisplaceDisc::initial_integrate(int /*vflag*/)
 {
-  for (int i = 0; i < atom->nlocal; i++)
-    if (atom->mask[i] & groupbit) move(i);
+  choose([this](auto rotates, auto compensates) {
+    for (int i = 0; i < atom->nlocal; i++)
+      if (atom->mask[i] & groupbit) move<decltype(rotates)::value, decltype(compensates)::value>(i);
+  });
 }
 
-FixOverdampedDisc::FixOverdampedDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg)
+FixOverdampedDisc::FixOverdampedDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg, 2)
 {
-  if (numbers != 2)
-    error->all(
-        FLERR,
-        "fix overdamped/disc takes two numbers, GAMMA and I0 = I/(m R^2), and optionally compensated, but got {} "
-        "numbers",
-        numbers);
   damping = positive_argument("GAMMA", arg[3]);
   inertia_factor = positive_argument("I0", arg[4]);
 }
 
 void FixOverdampedDisc::initial_integrate(int /*vflag*/)
 {
-  for (int i = 0; i < atom->nlocal; i++)
-    if (atom->mask[i] & groupbit) {
-      const double radius = atom->radius[i];
+  choose([this](auto rotates, auto compensates) {
+    for (int i = 0; i < atom->nlocal; i++) {
+      if (!(atom->mask[i] & groupbit)) continue;
       atom->v[i][0] = atom->f[i][0] / damping;
       atom->v[i][1] = atom->f[i][1] / damping;
-      atom->omega[i][2] = atom->torque[i][2] / (damping * inertia_factor * radius * radius);
-      move(i);
+      if constexpr (decltype(rotates)::value) {
+        const double radius = atom->radius[i];
+        atom->omega[i][2] = atom->torque[i][2] / (damping * inertia_factor * radius * radius);
+      }
+      move<decltype(rotates)::value, decltype(compensates)::value>(i);
     }
+  });
 }

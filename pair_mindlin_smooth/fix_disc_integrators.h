@@ -5,7 +5,8 @@
 //                                            of the coordinates (x, y, R theta) by their forces
 //   fix ID group displace/disc               moves by v dt and omega dt, whatever the forces
 //
-// With the keyword compensated at the end they carry the low parts of coordinates, see pair mindlin/smooth.
+// Keywords: with rotation no they leave spins and angles out, since without friction nothing turns a disk; with
+// compensated they carry the low parts of coordinates, see pair mindlin/smooth.
 // Where the input has a per-atom property d_theta (fix property/atom), it takes up the rotation angle.
 
 #ifndef LMP_FIX_DISC_INTEGRATORS_H
@@ -13,11 +14,13 @@
 
 #include "fix.h"
 
+#include <type_traits>
+
 namespace LAMMPS_NS {
 
 class FixDiscIntegrator : public Fix {
 public:
-  FixDiscIntegrator(class LAMMPS *, int, char **);
+  FixDiscIntegrator(class LAMMPS *, int, char **, int numbers);
   int setmask() override;
   void init() override;
   void setup(int) override;
@@ -29,14 +32,30 @@ public:
 protected:
   double dt = 0.0;
   double inertia_factor = 1.0;
-  int numbers;    // arguments without the keyword
+  const int numbers;    // arguments before the keywords
 
   double positive_argument(const char *name, const char *text);
-  void move(int i);    // by v dt and omega dt
+  template <bool ROTATION, bool COMPENSATED> void move(int i);    // by v dt and omega dt
   void complete_forces();
 
+  // work(rotates, compensates) with both known at compile time
+  template <class Work> void choose(Work work) const
+  {
+    using Yes = std::true_type;
+    using No = std::false_type;
+    if (rotation && low_parts)
+      work(Yes(), Yes());
+    else if (rotation)
+      work(Yes(), No());
+    else if (low_parts)
+      work(No(), Yes());
+    else
+      work(No(), No());
+  }
+
 private:
-  bool carries_low_parts;
+  bool rotation = true;
+  bool carries_low_parts = false;
   class FixLowParts *low_parts = nullptr;    // null: plain doubles
   int angle = -1;                            // index of d_theta among the custom per-atom vectors, -1: there is none
 };
@@ -44,11 +63,12 @@ private:
 class FixNVEDisc : public FixDiscIntegrator {
 public:
   FixNVEDisc(class LAMMPS *, int, char **);
+  int setmask() override;
   void initial_integrate(int) override;
   void final_integrate() override;
 
 private:
-  void kick(int i);    // by half a step
+  template <bool ROTATION> void kick(int i);    // by half a step
 };
 
 class FixDisplaceDisc : public FixDiscIntegrator {

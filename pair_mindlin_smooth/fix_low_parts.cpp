@@ -54,7 +54,11 @@ double FixLowParts::period_low(int dimension) const
 void FixLowParts::setup_pre_exchange()
 {
   for (int i = 0; i < atom->nlocal; i++)
-    for (int d = 0; d < 2; d++) spacing.split(atom->x[i][d], array_atom[i][d]);
+    for (int d = 0; d < 2; d++) {
+      const auto [high, low] = spacing.split({atom->x[i][d], array_atom[i][d]});
+      atom->x[i][d] = high;
+      array_atom[i][d] = low;
+    }
   pre_exchange();
 }
 

@@ -32,8 +32,12 @@ public:
   double period_low(int dimension) const;    // and the rest
   void move(int i, double dx, double dy)
   {
-    spacing.add(atom->x[i][0], array_atom[i][X], dx);
-    spacing.add(atom->x[i][1], array_atom[i][Y], dy);
+    double *const high = atom->x[i], *const low = array_atom[i];
+    const faultgouge::Compensated x = spacing.moved({high[0], low[X]}, dx), y = spacing.moved({high[1], low[Y]}, dy);
+    high[0] = x.high;
+    high[1] = y.high;
+    low[X] = x.low;
+    low[Y] = y.low;
   }
   void complete_forces();    // by their low parts
 

@@ -202,10 +202,8 @@ void PairMindlinSmooth::compute(int eflag, int vflag)
   if (neighbor->ago == 0) rebuild_pairs();
 
   // at setup the disks have not moved since the slips were last advanced
-  const int coincident = contact_forces(!update->setupflag);
-  if (coincident >= 0)
-    error->one(FLERR, "Disks {} and {} have the same centre, so that their contact has no direction",
-               pairs.first_tag[coincident], pairs.second_tag[coincident]);
+  const int crushed = contact_forces(!update->setupflag);
+  if (crushed >= 0) refuse(crushed);
   if (has_friction) slips_in_fix = false;
 
   const faultgouge::Forces forces{atom->f,         atom->torque,    compensated ? low_parts->array_atom : nullptr,
@@ -273,13 +271,26 @@ Period PairMindlinSmooth::period() const
   return {low_parts->period(0), low_parts->period(1), low_parts->period_low(0), low_parts->period_low(1)};
 }
 
-// Returns a pair of disks with one centre, or -1.
+// Returns a pair with one centre inside of the other disk, or -1.
 int PairMindlinSmooth::contact_forces(bool advance)
 {
   const double dt = update->dt;
   if (!compensated) return faultgouge::contact_forces(pairs, disks(), period(), law, dt, has_friction, advance);
   return faultgouge::compensated_contact_forces(pairs, disks(), period(), law, dt, has_friction, advance,
                                                 low_parts->grid());
+}
+
+void PairMindlinSmooth::refuse(int p) const
+{
+  const auto r = faultgouge::leading_branch(pairs, p, disks(), period());
+  const double distance = std::hypot(r.x, r.y);
+  if (distance == 0.0)
+    error->one(FLERR, "Disks {} and {} have the same centre, so that their contact has no direction",
+               pairs.first_tag[p], pairs.second_tag[p]);
+  error->one(FLERR,
+             "Disks {} and {} are only {} apart, the centre of one inside of the other, where the contact law does not "
+             "hold: lower the load or the time step, or raise KN",
+             pairs.first_tag[p], pairs.second_tag[p], distance);
 }
 
 // The energy is the elastic one of the normal force; the tangential force has none.
@@ -344,7 +355,7 @@ template <class NUMBER> double PairMindlinSmooth::measure(int p, int i)
   const auto contact = geometry(r, radius_i, radius_j, compensated ? low_parts->grid() : FixedPointGrid{});
   if (leading(contact.overlap) <= 0.0) return 0.0;
 
-  const double overlap = value(contact.overlap), inverse = value(contact.inverse);
+  const double overlap = value(contact.overlap);
   const double sign = atom->tag[i] == pairs.first_tag[p] ? 1.0 : -1.0;
   svector[0] = law.normal_force(overlap);
   if (has_friction) {
@@ -358,8 +369,8 @@ template <class NUMBER> double PairMindlinSmooth::measure(int p, int i)
     svector[3] = limit > 0.0 ? slip / limit : 0.0;
     if (stored && compensated) svector[7] = stored[1];
   }
-  svector[4] = sign * value(r.x) * inverse;
-  svector[5] = sign * value(r.y) * inverse;
+  svector[4] = sign * value(contact.direction(r.x));
+  svector[5] = sign * value(contact.direction(r.y));
   svector[6] = overlap;
   return law.normal_energy(overlap);
 }
@@ -404,7 +415,8 @@ void PairMindlinSmooth::read_restart_settings(FILE *fp)
 
 double PairMindlinSmooth::memory_usage()
 {
-  const double numbers = (compensated ? 2.0 : 1.0) * (sizeof(PairForce) + sizeof(double));
+  const double low = compensated ? sizeof(faultgouge::PairForceLow) + sizeof(double) : 0.0;
+  const double numbers = sizeof(PairForce) + sizeof(double) + low;
   const double per_pair = 2 * sizeof(int) + 2 * sizeof(tagint) + numbers + 1;
   return Pair::memory_usage() + pairs.size() * per_pair + (pairs.row.size() + pairs.start.size()) * sizeof(int);
 }

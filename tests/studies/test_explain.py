@@ -1,0 +1,195 @@
+"""explain: what it says is what LAMMPS holds, what it measures is measured, and a wrong claim is found out."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from time import sleep
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from faultgouge.pywrap import Scene, settle
+from faultgouge.studies.costs import in_turns
+from faultgouge.studies.explain import _affordable, _switched, explain
+from faultgouge.studies.switches import Feature, Loaded, Push, Run, features
+
+BIN = Path(sys.executable).parent
+SCENES = files("faultgouge") / "scenes"
+
+BROUGHT = {
+    "floor": {"fix floor", "array f_floor (7 columns)"},
+    "tangential history": {
+        "part friction.in",
+        "fix angle",
+        "fix slips",
+        "array f_slips (17 columns)",
+        "array d_theta",
+        "velocities of ghosts",
+    },
+    "periodicity": {"periodic x"},
+    "dynamic friction": {"part weaken.in", "fix weaken", "compute velocity"},
+    "perturbation": {"part push.in", "fix push"},
+    "compensated coordinates": {"fix low", "array f_floor (8 columns)", "array f_low (5 columns)"},
+    "dumps": {"part write.in", "file run.1.contacts", "file run.1.disks", "file run.1.params"},
+    "per-contact output": {"compute contact", "dump contact"},
+    "trajectory": {"dataset trajectory/position", "dataset trajectory/time"},
+    "MPI": {"messages between ranks"},
+    "threads": {"a second thread"},
+}
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return explain(Scene.from_toml(SCENES / "paper.toml"))
+
+
+@pytest.fixture(scope="module")
+def frictionless():
+    mapping = Scene.from_toml(SCENES / "frictionless.toml").resolved()
+    return explain(Scene.from_mapping(mapping | {"output": {"dumps": True, "trajectory": True}}))
+
+
+def included(explanation):
+    return {part.name for part in explanation.parts if part.included}
+
+
+def test_what_is_in(paper, frictionless):
+    always = {"floor", "periodicity"}
+    assert included(paper) == always | {"tangential history", "dynamic friction", "perturbation"}
+    assert included(frictionless) == always | {"dumps", "per-contact output", "trajectory"}
+
+
+def test_what_each_part_brings(paper, frictionless):
+    low = BROUGHT["compensated coordinates"]
+    for explanation, compensated in ((paper, low | {"array f_slips (25 columns)"}), (frictionless, low)):
+        found = {part.name: {each for each in part.adds if "rotations" not in each} for part in explanation.parts}
+        assert found == BROUGHT | {"compensated coordinates": compensated}
+
+
+def test_what_is_left_out_is_not_loaded(frictionless):
+    loaded = set(frictionless.loaded.everything)
+    for name in ("tangential history", "dynamic friction", "perturbation"):
+        assert not BROUGHT[name] & loaded, name
+    assert frictionless.loaded.parts == ("system.in", "undamped.in")
+
+
+def test_what_both_compute_agrees_to_the_bit(paper, frictionless):
+    for explanation in (paper, frictionless):
+        for part in explanation.parts:
+            if part.name in ("compensated coordinates", "threads"):  # another arithmetic, another order of sums
+                assert part.identical is False
+            else:
+                assert part.identical, part.name
+
+
+def test_costs_are_ratios_with_their_spread(paper):
+    for part in paper.parts:
+        low, middle, high = part.cost.ratio
+        assert 0 < low <= middle <= high, part.name
+        assert min(part.cost.without + part.cost.with_it) > 0
+    costs = {part.name: part.cost.ratio[1] for part in paper.parts}
+    # a history makes a step half as long again, or twice as long, on every machine
+    assert costs["tangential history"] > 1.2
+    assert costs["dynamic friction"] > 1.2
+
+
+def test_defaults_are_those_of_the_file(paper):
+    assert paper.defaults["friction.B"] == 0.2
+    assert paper.defaults["packing.periodic"] is True
+    assert "packing.seed" not in paper.defaults
+    assert not any(key.startswith("relax") for key in paper.defaults)
+
+
+def test_json_holds_everything(paper):
+    copy = json.loads(json.dumps(paper.as_dict()))
+    assert [part["name"] for part in copy["parts"]] == list(BROUGHT)
+    assert copy["parts"][0]["cost"].keys() == {"per", "without", "with", "ratio", "quartiles"}
+    assert copy["loaded"]["fixes"] == list(paper.loaded.fixes)
+
+
+def test_of_a_large_packing_a_strip_is_explained():
+    scene = Scene.from_mapping(
+        {
+            "packing": {"disks": 3000, "top": 62, "width": 65.3},
+            "law": {"kn": 2e5},
+            "load": {"fy": 3.0},
+            "perturb": {"fx": 0.0, "time": 1.0, "amplitude": 1e-9, "omega": 1.0, "target": [2999]},
+        }
+    )
+    strip, remark = _affordable(scene)
+    assert "a strip of 400 of the 3000 disks" in remark
+    whole = scene.packing
+    assert strip.packing.disks / strip.packing.width == pytest.approx(whole.disks / whole.width, rel=1e-9)
+    assert strip.packing.top / strip.packing.width == pytest.approx(whole.top / whole.width, rel=0.05)
+    assert strip.perturb.target == "top"
+    small = Scene.from_toml(SCENES / "paper.toml")
+    assert _affordable(small)[0] == small
+
+
+@pytest.fixture(scope="module")
+def run():
+    return Run(settle(Scene.from_toml(SCENES / "minimal.toml"), communicator=MPI.COMM_SELF).packing)
+
+
+def test_a_wrong_claim_is_found_out(run, tmp_path):
+    """A push that is said to touch nobody, and one that is said to leave the motion."""
+    nobody = np.zeros(len(run.packing), dtype=bool)
+    pushed = replace(run, push=Push(1.0, 1.0, None))
+    with run.started(MPI.COMM_SELF, tmp_path / "log") as engine:
+        loaded = Loaded.of(engine, tmp_path / "log")
+    for touched, moves in ((nobody, True), (run.packing.top, False)):
+        part = _switched(Feature("push", "", run, pushed, touched, moves), loaded, 50, tmp_path)
+        assert part.identical is False
+        assert not part.included
+    honest = _switched(Feature("push", "", run, pushed, run.packing.top, True), loaded, 50, tmp_path)
+    assert honest.identical is True
+
+
+def test_open_scene_has_no_period(run):
+    side = {feature.name: feature for feature in features(run)}["periodicity"]
+    again = {feature.name: feature for feature in features(side.without)}["periodicity"]
+    assert side.reason == "x has the period 11.9"
+    assert again.reason == "the sides are open"
+    assert again.without.packing.box_length is None
+    assert not again.touched.any()  # a period wide enough for all: no contact across it
+
+
+def test_turns_measure_time():
+    cost = in_turns("nap", lambda: sleep(0.01), lambda: sleep(0.04), turns=5, parallel=True)
+    assert min(cost.without) >= 0.01
+    assert 1.5 < cost.ratio[1] < 5
+    assert len(cost.without) == len(cost.with_it) == 5
+
+
+def test_work_of_one_thread_is_timed_without_its_pauses():
+    def work():
+        sum(range(100_000))
+
+    cost = in_turns("sum", work, lambda: (work(), sleep(0.02)), turns=5)
+    assert cost.ratio[1] < 2
+    assert cost.medians[1] < 0.02
+
+
+def test_turns_begin_with_either():
+    order = []
+    in_turns("call", lambda: order.append("without"), lambda: order.append("with"), turns=3)
+    assert order == ["with", "without", "without", "with"] * 2
+
+
+def test_command_prints_a_table(tmp_path):
+    done = subprocess.run(
+        [BIN / "faultgouge", "explain", str(SCENES / "minimal.toml")], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    for name in BROUGHT:
+        assert name in done.stdout
+    assert "deck parts: system.in, friction.in, undamped.in\n" in done.stdout
+    assert "not imported: matplotlib, MDAnalysis" in done.stdout
+    assert "law.mu = 1.0" in done.stdout
+    refused = subprocess.run([BIN / "faultgouge", "explain", "no.toml"], capture_output=True, text=True, timeout=120)
+    assert refused.returncode == 2
+    assert len(refused.stderr.strip().splitlines()) == 1
