@@ -298,7 +298,7 @@ class Engine:
 
     def _load(self, packing: Packing) -> None:
         law = packing.law
-        with _shared_folder(self.communicator) as folder:
+        with shared_folder(self.communicator) as folder:
             data = folder / "packing.data"
             if self.communicator.rank == 0:
                 data.write_text(data_file(packing))
@@ -492,7 +492,7 @@ def data_file(packing: Packing) -> str:
 
 
 @contextmanager
-def _shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
+def shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
     """A temporary folder of rank 0 that all ranks know."""
     keeper = tempfile.TemporaryDirectory(prefix="faultgouge-") if communicator.rank == 0 else None
     try:

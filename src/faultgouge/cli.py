@@ -255,6 +255,25 @@ def reproduce(
     _say(f"written: {output}/report.md")
 
 
+@app.command(epilog="Example: [bold]mpiexec -n 2 faultgouge stability -o stability[/bold]")
+def stability(
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for table, picture and numbers.")] = Path(
+        "stability"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="The small part of the cases.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
+    from faultgouge.studies.stability import check
+    from faultgouge.studies.stability import stability as try_cases
+
+    result = try_cases(output, quick, _say, lambda cases: _progress(cases, "cases", len(cases)))
+    _say(f"{len(result['cases'])} cases tried; written: {output}/stability.md")
+    if as_json:
+        _print_json(result)
+    check(result)
+
+
 def main() -> None:
     """Run the command; what goes wrong is said in one sentence."""
     # one thread for BLAS: its threads cost more than they bring at these sizes, and change the last digits of a solve
@@ -280,7 +299,15 @@ def _sentence(error: Exception) -> str:
     show = getattr(error, "format_message", None)
     if show:
         return str(show()).strip()
-    expected = {"SceneError", "PackingFileError", "NoEquilibriumError", "EngineError", "OnsetError", "OSError"}
+    expected = {
+        "SceneError",
+        "PackingFileError",
+        "NoEquilibriumError",
+        "EngineError",
+        "OnsetError",
+        "StabilityError",
+        "OSError",
+    }
     if {base.__name__ for base in type(error).__mro__} & expected:
         return str(error).strip()
     place = error.__traceback__

@@ -32,12 +32,12 @@ SHARES = (0.1, -0.4, 1.0, 0.02, -0.99, 0.7, -1.0)
 
 def balance(equilibrium: Equilibrium) -> Outcome:
     """Whether an equilibrium is one."""
+    overlap = equilibrium.packing.geometry.overlap
     return measured(
         equilibrium.residual / equilibrium.floor,
         FLOORS,
-        f"largest force on a disk, {equilibrium.residual:.1e}, in units of what rounding leaves, {equilibrium.floor:.1e}; "
-        "overlaps are from "
-        "{:.1e} to {:.1e}".format(*np.percentile(equilibrium.packing.geometry.overlap, [0, 100])),
+        f"largest force on a disk, {equilibrium.residual:.1e}, in units of what rounding leaves, "
+        f"{equilibrium.floor:.1e}; overlaps are from {overlap.min():.1e} to {overlap.max():.1e}",
     )
 
 
@@ -69,10 +69,12 @@ def derivative(packing: Packing) -> Outcome:
             worst = max(worst, float(np.abs(2 * narrow - wide - matrix @ q).max()))
     # Net forces are rounded once, coordinates known to their low parts; six differences over h, of six contacts.
     scale = np.abs(matrix).max()
-    rounding = 40 * (np.finfo(float).eps * np.abs(packing.net_force).max() / scale + packing.coordinate_rounding) / width
+    rounding = (
+        40 * (np.finfo(float).eps * np.abs(packing.net_force).max() / scale + packing.coordinate_rounding) / width
+    )
     return measured(
         worst / scale,
         1e-8 + rounding,
-        f"largest difference of -dF/dq and K q, in units of max |K|, {DIRECTIONS} directions, q = +-1, h = {width:.0e}; "
+        f"largest difference of -dF/dq and K q, in units of max |K|, {DIRECTIONS} directions q, h = {width:.0e}; "
         "the bound is their rounding over h, and 1e-8 of curvature",
     )

@@ -111,9 +111,7 @@ def _at_the_bound() -> Outcome:
 
 def _opens_and_closes() -> Outcome:
     """A disk leaves one neighbour and reaches the next within one step."""
-    packing = _disks(
-        [(3.0, 3.0), (3.999, 3.0), (5.0, 3.0)], Contacts([0], [1], [1e-4], [0.0])
-    )
+    packing = _disks([(3.0, 3.0), (3.999, 3.0), (5.0, 3.0)], Contacts([0], [1], [1e-4], [0.0]))
     there = np.array([0.0, 2e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     with Engine(packing) as engine:
         over = engine.displace(packing, there)

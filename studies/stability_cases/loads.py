@@ -63,10 +63,6 @@ CASES = [
         for share in (0.0, 1e-3, 1.0, 10.0)
         for case in _both(f"k_t = {share:g} k_n", partial(bed, law(kt_share=share)), share == 10)
     ),
-    *(
-        case
-        for ratio in (10, 50)
-        for case in _both(f"sizes 1 : {ratio}", partial(arches, ratio), ratio == 50)
-    ),
+    *(case for ratio in (10, 50) for case in _both(f"sizes 1 : {ratio}", partial(arches, ratio), ratio == 50)),
     Case(GROUP, "F_x without friction", _flows, True),
 ]

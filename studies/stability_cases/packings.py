@@ -31,8 +31,12 @@ def law(kn: float = KN, kt_share: float = 2 / 7, mu: float = 1.0) -> MindlinLaw:
     return MindlinLaw(kn, kt_share * kn, mu)
 
 
+PAPERS = law()
+"""The paper's law."""
+
+
 def crystal(
-    columns: int, rows: int = 2, law: MindlinLaw = law(), load: float = LOAD, compensated: bool = False
+    columns: int, rows: int = 2, law: MindlinLaw = PAPERS, load: float = LOAD, compensated: bool = False
 ) -> Packing:
     """A crystal at rest up to rounding, with no slip yet; load is F_y / k_n."""
     reach = load ** (2 / 3)
@@ -56,7 +60,7 @@ def crystal(
     )
 
 
-def arches(ratio: float, law: MindlinLaw = law(), load: float = 1e-6) -> Packing:
+def arches(ratio: float, law: MindlinLaw = PAPERS, load: float = 1e-6) -> Packing:
     """Three disks of radius 1, each on two of radius 1/ratio, which touch so that they cannot roll."""
     small, reach = 1.0 / ratio, load ** (2 / 3)
     half = small - 0.5 * reach
@@ -81,7 +85,7 @@ def arches(ratio: float, law: MindlinLaw = law(), load: float = 1e-6) -> Packing
 
 
 @cache
-def bed(law: MindlinLaw = law(), load: float = LOAD, radii: tuple[float, ...] = (0.5, 0.7), seed: int = 1) -> Packing:
+def bed(law: MindlinLaw = PAPERS, load: float = LOAD, radii: tuple[float, ...] = (0.5, 0.7), seed: int = 1) -> Packing:
     """24 disks that have settled without friction in a box 5.95 wide, with the friction of the law from then on."""
     scene = Scene.from_mapping(
         {
