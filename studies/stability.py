@@ -9,6 +9,7 @@ whose number changes no figure; rank 0 writes.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from itertools import groupby
@@ -127,7 +128,7 @@ def stability_figure(done: Sequence[tuple[Case, Outcome]]) -> Figure:
             place += 0.5
         axes.axvline(1, color=INK, linewidth=0.8)
         axes.set(xscale="log", xlim=(0.4 * LOWEST, 30), ylim=(rows - 0.5, -1), xlabel="figure / bound")
-        axes.set_yticks(list(names), list(names.values()), fontsize=5.5)
+        axes.set_yticks(list(names), [_typeset(name) for name in names.values()], fontsize=5.5)
         axes.set_xticks([LOWEST, 1e-4, 1e-2, 1], ["0", "$10^{-4}$", "$10^{-2}$", "1"])
         axes.tick_params(axis="y", length=0, which="both")
         axes.minorticks_off()
@@ -139,6 +140,10 @@ def stability_figure(done: Sequence[tuple[Case, Outcome]]) -> Figure:
     legend = [f"{count['holds']} hold", f"{count['refused']} refused, as they should be", f"{count['fails']} fail"]
     figure.legend(marks, legend, loc="outside upper center", ncols=3)
     return figure
+
+
+def _typeset(name: str) -> str:
+    return re.sub("([kF])_([a-z])", r"$\1_\2$", name).replace("mu =", r"$\mu$ =").replace("eps =", r"$\epsilon$ =")
 
 
 def _draw(axes: Any, place: float, outcome: Outcome) -> None:

@@ -16,6 +16,13 @@ from .packings import KN, at_rest, bed, crystal, law, sheared
 
 GROUP = "geometry"
 
+NONE = Contacts(*np.zeros((2, 0), int), np.zeros(0))
+
+
+def _contact(slip: float) -> Contacts:
+    """The contact of the first two disks."""
+    return Contacts(np.array([0]), np.array([1]), np.array([slip]), np.zeros(1))
+
 
 def _disks(position: list[tuple[float, float]], contacts: Contacts | None = None, **changes: object) -> Packing:
     """Disks of radius 1/2 with compensated coordinates."""
@@ -86,7 +93,7 @@ def _no_contact() -> Outcome:
 
 def _zero_overlap() -> Outcome:
     """Exactly touching is no contact, for the pair style as for the analysis."""
-    packing = _disks([(3.0, 3.0), (4.0, 3.0)], Contacts([0], [1], [0.0], [0.0]))
+    packing = _disks([(3.0, 3.0), (4.0, 3.0)], _contact(0.0))
     with Engine(packing) as engine:
         found = engine.displace(packing, np.zeros(6))
         force = np.abs(engine.net_force).max()
@@ -99,7 +106,7 @@ def _zero_overlap() -> Outcome:
 
 def _at_the_bound() -> Outcome:
     """|f_t| = mu f_n to the bit, and no tangential stiffness."""
-    packing = _disks([(3.0, 3.999), (3.0, 3.0)], Contacts([0], [1], [1.0], [0.0]))
+    packing = _disks([(3.0, 3.999), (3.0, 3.0)], _contact(1.0))
     with Engine(packing) as engine:
         engine.displace(packing, np.zeros(6))
         force = engine.net_force.reshape(3, 2)[:, 0]
@@ -111,7 +118,7 @@ def _at_the_bound() -> Outcome:
 
 def _opens_and_closes() -> Outcome:
     """A disk leaves one neighbour and reaches the next within one step."""
-    packing = _disks([(3.0, 3.0), (3.999, 3.0), (5.0, 3.0)], Contacts([0], [1], [1e-4], [0.0]))
+    packing = _disks([(3.0, 3.0), (3.999, 3.0), (5.0, 3.0)], _contact(1e-4))
     there = np.array([0.0, 2e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     with Engine(packing) as engine:
         over = engine.displace(packing, there)
@@ -128,7 +135,7 @@ def _grazing() -> Outcome:
         position=np.array([[2.999, 4.0], [3.0, 3.0]]),
         position_low=np.array([[0.0, -1e-12], [0.0, 0.0]]),
         radius=np.array([0.5, 0.5]),
-        contacts=Contacts([], [], []),
+        contacts=NONE,
         law=law(),
     )
     step = np.array([3.0 - aside.position[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -162,12 +169,12 @@ def _narrow_scene() -> Outcome:
 
 
 def _one_centre() -> Outcome:
-    packing = _disks([(3.0, 3.0), (3.0, 3.0)], Contacts([0], [1], [0.0]))
+    packing = _disks([(3.0, 3.0), (3.0, 3.0)], _contact(0.0))
     return refused(lambda: stiffness_matrix(packing), ValueError, "same centre")
 
 
 def _not_a_number() -> Outcome:
-    return refused(lambda: _disks([(3.0, float("nan"))], Contacts([], [], [])), ValueError, "not finite")
+    return refused(lambda: _disks([(3.0, float("nan"))], NONE), ValueError, "not finite")
 
 
 def _infinite() -> Outcome:

@@ -58,7 +58,7 @@ def _said(script: str) -> str:
     with tempfile.TemporaryDirectory(prefix="faultgouge-") as folder:
         file = Path(folder) / "in"
         file.write_text(script)
-        command = [Path(sys.executable).with_name("lmp"), "-in", file, "-log", "none"]
+        command = [str(Path(sys.executable).with_name("lmp")), "-in", str(file), "-log", "none"]
         try:
             done = subprocess.run(command, cwd=folder, env=alone, capture_output=True, text=True, timeout=SECONDS)
         except subprocess.TimeoutExpired:
