@@ -2,7 +2,8 @@
 # make test        sets everything up and runs all tests
 # make check       format, lint and types
 # make benchmark   time per step beside LAMMPS's own granular styles; what each part of a scene costs; the onset, solved and
-#                  scanned
+#                  scanned; error against run time; growth with size
+# make pictures    the report that the documentation shows, in docs/report
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
 # make clean       removes what the others made
 
@@ -16,7 +17,7 @@ SOURCES := $(shell find pair_mindlin_smooth lammps_inputs analysis pywrap studie
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: reproduce test check format benchmark docs clean
+.PHONY: reproduce test check format benchmark pictures docs clean
 
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
@@ -40,6 +41,11 @@ benchmark: $(VENV)/.installed
 	$(BIN)/faultgouge explain scenes/paper.toml
 	$(BIN)/faultgouge explain scenes/frictionless.toml
 	$(BIN)/python benchmarks/onset_against_scan.py
+	$(BIN)/python benchmarks/scale.py
+	$(BIN)/faultgouge report -o report
+
+pictures: $(VENV)/.installed
+	$(BIN)/faultgouge report -o docs/report
 
 docs: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet -r docs/requirements.txt

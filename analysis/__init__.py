@@ -2,15 +2,16 @@
 
 Everything takes a :class:`Packing` and nothing else. The physics is in the docstrings of the modules: `law`
 (the contact law), `packing` (geometry and forces), `stiffness` (the stability operator), `spectrum` (its
-eigenvalues), `onset` (where they become complex), `growth` (what a run shows of it). `runfile`, `dumps` and
-`files` read and write packings.
+eigenvalues), `onset` (where they become complex; `windows`, `edges`, `modes`, `tracking`, `meetings`,
+`projection` and `large` are its parts), `growth` (what a run shows of it). `runfile`, `dumps` and `files` read and
+write packings.
 """
 
 from .dumps import read_dump
 from .files import PackingFileError, read_packing
 from .growth import Growth, fit_growth, fit_oscillation, mean_square_displacement
 from .law import MindlinLaw
-from .onset import Onset, OnsetError, Window, complex_windows, find_onset, follow, scan_windows
+from .onset import Onset, OnsetError, find_onset, follow, scan_windows
 from .packing import FLOOR, ContactGeometry, Contacts, Packing, nearest_image, touching
 from .runfile import RunFile
 from .spectrum import (
@@ -25,6 +26,7 @@ from .spectrum import (
     stable_timestep,
 )
 from .stiffness import contact_stiffness, stiffness_matrix
+from .windows import Window, complex_windows
 
 __all__ = [
     "FLOOR",

@@ -15,8 +15,8 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_array
 
 from .packing import Floats, Indices, Packing
-from .spectrum import Complexes, believable, dynamical_matrix, unit_rounding
-from .stiffness import Form
+from .spectrum import Complexes, believable, mass_weighted, unit_rounding
+from .stiffness import Form, stiffness_matrix
 from .tracking import Block
 
 Pair = tuple[int, int]
@@ -33,9 +33,7 @@ SMALL_FORCE = 1e-6
 def full_operator(packing: Packing, form: Form = "consistent") -> csr_array:
     """A = M^(-1/2) K M^(-1/2) of the `loaded` packing, shape (3N, 3N), with its zero rows; 1 / time^2."""
     packing = loaded(packing)
-    matrix, active = dynamical_matrix(packing, form)
-    place = csr_array((np.ones(len(active)), (active, np.arange(len(active)))), shape=(3 * len(packing), len(active)))
-    return csr_array(place @ matrix @ place.T)
+    return mass_weighted(stiffness_matrix(packing, form), packing)
 
 
 def loaded(packing: Packing) -> Packing:

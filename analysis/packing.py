@@ -265,8 +265,10 @@ class Packing:
     def rattlers(self) -> Indices:
         """Indices of the disks that touch nothing; their rows of the stability operator are zero."""
         closed = self.geometry.overlap > 0
-        touched = np.concatenate([self.contacts.i[closed], self.contacts.j[closed & ~self.contacts.floor]])
-        return _frozen(np.setdiff1d(np.arange(len(self)), touched))
+        alone = np.ones(len(self), dtype=np.bool_)
+        alone[self.contacts.i[closed]] = False
+        alone[self.contacts.j[closed & ~self.contacts.floor]] = False
+        return _frozen(np.flatnonzero(alone))
 
     @cached_property
     def net_force(self) -> Floats:

@@ -38,7 +38,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, eigvals
 from scipy.optimize import linear_sum_assignment
-from scipy.sparse import csc_array, csr_array, diags_array, eye_array
+from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from .packing import Floats, Indices, Packing
@@ -151,11 +151,14 @@ class Eigenpairs:
     right, left : ndarray of complex, shape (3N, k)
         Unit vectors A x = lambda x and y^H A = lambda y^H in columns, in the order (x.., y.., R theta..);
         zero on coordinates that feel no force.
+    solves : int
+        Sparse solves that it took.
     """
 
     values: Complexes
     right: Complexes
     left: Complexes
+    solves: int
 
     @property
     def overlap(self) -> Floats:
@@ -181,11 +184,19 @@ def dynamical_matrix(packing: Packing, form: Form = "consistent") -> tuple[csr_a
         Which of the 3N coordinates (x.., y.., R theta..) its rows are. A coordinate whose row of K is zero
         feels no force: its eigenvalue is zero and says nothing.
     """
-    stiffness = stiffness_matrix(packing, form)
-    active = np.flatnonzero(np.diff(stiffness.indptr))
+    matrix = mass_weighted(stiffness_matrix(packing, form), packing)
+    active = np.flatnonzero(np.diff(matrix.indptr))
+    return matrix[active][:, active], active
+
+
+def mass_weighted(stiffness: csr_array, packing: Packing) -> csr_array:
+    """M^(-1/2) K M^(-1/2), zero rows and all, shape (3N, 3N); 1 / time^2."""
     mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
-    scale = diags_array(1.0 / np.sqrt(mass[active]))
-    return csr_array(scale @ stiffness[active][:, active] @ scale), active
+    scale = 1.0 / np.sqrt(mass)
+    rows = np.repeat(scale, np.diff(stiffness.indptr))
+    return csr_array(
+        (rows * stiffness.data * scale[stiffness.indices], stiffness.indices, stiffness.indptr), shape=stiffness.shape
+    )
 
 
 def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
@@ -227,7 +238,9 @@ def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
     )
 
 
-def eigenpairs(packing: Packing, near: complex, count: int, form: Form = "consistent") -> Eigenpairs:
+def eigenpairs(
+    packing: Packing, near: complex, count: int, form: Form = "consistent", tolerance: float = 0.0
+) -> Eigenpairs:
     """The eigenvalues nearest to a shift, with left and right vectors: shift-invert Arnoldi (ARPACK).
 
     One sparse LU factorisation of :math:`A - \\sigma` serves the right vectors and, transposed, the left
@@ -243,6 +256,9 @@ def eigenpairs(packing: Packing, near: complex, count: int, form: Form = "consis
         How many eigenvalues, at least 1 and at most E - 2 of the E coordinates that feel a force.
     form : {"consistent", "paper"}
         As in :func:`~faultgouge.analysis.stiffness_matrix`.
+    tolerance : float
+        Relative error of the eigenvalues of the inverted operator at which the iteration may end; 0 for that of
+        doubles.
 
     Returns
     -------
@@ -268,11 +284,18 @@ def eigenpairs(packing: Packing, near: complex, count: int, form: Form = "consis
     factor = splu(shifted)
     # A fixed start vector makes ARPACK, and with it every result, reproducible.
     start = np.ones(size, dtype=number)
-    inverse = LinearOperator(shifted.shape, factor.solve, dtype=number)
-    values, right = eigs(matrix, count, sigma=shift, OPinv=inverse, v0=start)
-    adjoint = LinearOperator(shifted.shape, lambda v: factor.solve(v, trans="H"), dtype=number)
-    mirrored, left = eigs(matrix.T, count, sigma=np.conj(shift), OPinv=adjoint, v0=start)
-    return _sorted_and_paired(values, right, mirrored.conj(), left, active, 3 * len(packing))
+    solves = 0
+
+    def solve(vector: Complexes, trans: str) -> Complexes:
+        nonlocal solves
+        solves += 1
+        return factor.solve(vector, trans=trans)
+
+    inverse = LinearOperator(shifted.shape, lambda v: solve(v, "N"), dtype=number)
+    values, right = eigs(matrix, count, sigma=shift, OPinv=inverse, v0=start, tol=tolerance)
+    adjoint = LinearOperator(shifted.shape, lambda v: solve(v, "H"), dtype=number)
+    mirrored, left = eigs(matrix.T, count, sigma=np.conj(shift), OPinv=adjoint, v0=start, tol=tolerance)
+    return _sorted_and_paired(values, right, mirrored.conj(), left, active, 3 * len(packing), solves)
 
 
 def growth_rate(eigenvalue: complex) -> float:
@@ -326,7 +349,13 @@ def believable(eigenvalue: complex, overlap: float | np.floating, rounding: floa
 
 
 def _sorted_and_paired(
-    values: Complexes, right: Complexes, mirrored: Complexes, left: Complexes, active: Indices, size: int
+    values: Complexes,
+    right: Complexes,
+    mirrored: Complexes,
+    left: Complexes,
+    active: Indices,
+    size: int,
+    solves: int,
 ) -> Eigenpairs:
     """Bring left vectors beside the right vectors of the same eigenvalue, spread over all coordinates."""
     order = np.lexsort((values.imag, values.real))
@@ -334,4 +363,4 @@ def _sorted_and_paired(
     _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored[None, :]))
     spread = np.zeros((2, size, len(values)), dtype=np.complex128)
     spread[0, active], spread[1, active] = right, left[:, partner]
-    return Eigenpairs(values, spread[0], spread[1])
+    return Eigenpairs(values, spread[0], spread[1], solves)

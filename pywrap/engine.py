@@ -8,6 +8,7 @@ collective over the ranks of the communicator, and every rank sees the whole pac
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -29,12 +30,27 @@ from ..analysis.packing import FLOOR, touching
 Floats = NDArray[np.float64]
 
 DECKS = Path(str(files("faultgouge.lammps_inputs")))
+LOOK = 1000
+"""Time steps between two looks at the forces."""
+
 FLOOR_SLIP, FLOOR_OVERLAP, FLOOR_SLIP_LOW = 2, 6, 7
 LOW_COLUMNS = 5
 
 
+DECORATION = re.compile(r"^'?ERROR( on proc \d+)?: | \([^ ()]+:\d+\)'?$")
+"""What surrounds the sentence of an error of LAMMPS: who says it, and where in the source."""
+
+
 class EngineError(RuntimeError):
-    """LAMMPS could not do what was asked: one sentence with its reason."""
+    """LAMMPS could not do what was asked: one sentence with its reason.
+
+    Attributes
+    ----------
+    one_rank : bool
+        Whether one rank alone knows of it. The others wait for it then, and only MPI's Abort ends them.
+    """
+
+    one_rank = False
 
 
 @dataclass(frozen=True)
@@ -126,7 +142,7 @@ class Engine:
         self._weakening = False
         arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none"]
         self._lammps = lammps(cmdargs=arguments, comm=self.communicator)
-        if "mindlin/smooth" not in self._lammps.available_styles("pair"):
+        if not self._lammps.has_style("pair", "mindlin/smooth"):
             raise EngineError(
                 "LAMMPS does not know pair style mindlin/smooth: its plugin was not loaded, reinstall faultgouge."
             )
@@ -174,10 +190,29 @@ class Engine:
         self._write(packing)
         self.set_fx(packing.fx)
 
-    def settle(self, force_tolerance: float) -> None:
-        """Let a loose start settle under the load (deck part bed.in)."""
-        self._variables(force_tolerance=force_tolerance)
+    def settle(self, force_tolerance: float, gather: float = 1.0, steps: int = 10_000_000) -> None:
+        """Let a loose start settle under the load (deck parts gather.in, bed.in).
+
+        Parameters
+        ----------
+        force_tolerance : float
+            Largest force on a disk.
+        gather : float
+            Share of its height to which the start is brought down evenly at first; 1 for not at all.
+        steps : int
+            Time steps of each stage, at the most.
+        """
+        self._variables(force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
+        if gather < 1:
+            self._variables(gather=gather)
+            self._include("gather.in")
         self._include("bed.in")
+
+    def damp(self, packing: Packing, force_tolerance: float, steps: int) -> None:
+        """Viscously damped dynamics from a packing at rest (deck part damp.in), for so many steps at the most."""
+        self.restore(packing)
+        self._variables(force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
+        self._include("damp.in")
 
     def relax(
         self, force_tolerance: float, damping: float = 1.0, time_step: float | None = None, chunk: int = 1000
@@ -195,8 +230,10 @@ class Engine:
         chunk : int
             Steps between two looks at the forces.
         """
-        step = {} if time_step is None else {"relax_step": time_step}
-        self._variables(force_tolerance=force_tolerance, damping=damping, chunk=chunk, **step)
+        self._variables(force_tolerance=force_tolerance, damping=damping, chunk=chunk)
+        self._command("variable relax_step delete")  # that of an earlier call
+        if time_step is not None:
+            self._variables(relax_step=time_step)
         start = self._lammps.extract_global("ntimestep")
         self._include("relax.in")
         return Relaxation(
@@ -287,6 +324,14 @@ class Engine:
             self._command("unfix move")
             if amplitude != 0:
                 self._command("unfix push")
+
+    @contextmanager
+    def drag(self, rate: float) -> Iterator[None]:
+        """Drag -rate m v on every disk, and of 4/3 of that rate on its spin (for I = m R^2), for dynamics that is to
+        come to rest; to be entered before `undamped`. The rate is 1 / time."""
+        # a thermostat without temperature is drag alone
+        with self._fix("drag", f"all langevin 0.0 0.0 {float(1 / rate)!r} 1 omega yes"):
+            yield
 
     def advance(self, steps: int) -> Motion:
         """Go on with the undamped dynamics by so many steps."""
@@ -461,9 +506,10 @@ class Engine:
     def _command(self, command: str) -> None:
         try:
             self._lammps.command(command)
-        except Exception as error:  # the LAMMPS module raises plain Exception
-            reason = str(error).removeprefix("ERROR: ").split(" (src/")[0].splitlines()[0]
-            raise EngineError(f"LAMMPS stopped: {reason}.") from error
+        except Exception as error:  # the LAMMPS module raises plain Exception, or MPIAbortException on one rank alone
+            failure = EngineError(f"LAMMPS stopped: {DECORATION.sub('', str(error).splitlines()[0])}.")
+            failure.one_rank = type(error).__name__ == "MPIAbortException"
+            raise failure from error
 
 
 def data_file(packing: Packing) -> str:
@@ -497,7 +543,7 @@ def shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
     keeper = tempfile.TemporaryDirectory(prefix="faultgouge-") if communicator.rank == 0 else None
     try:
         yield Path(communicator.bcast(keeper.name if keeper else None))
+        communicator.barrier()  # not after an error, which one rank may be alone with
     finally:
-        communicator.barrier()
         if keeper:
             keeper.cleanup()

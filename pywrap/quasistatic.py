@@ -13,23 +13,29 @@ sticks or slides on the way changes K, and the iteration goes on with the new co
 
 Doubles bound what can be reached: a coordinate x is known to :math:`\epsilon |x|`, which changes the force of a
 contact of stiffness k by :math:`k \epsilon |x|`. `rounding_floor` sums this over the contacts of each disk. An
-equilibrium whose residual no longer falls and is of this order is at the floor, and is reported as such. In
-compensated arithmetic a coordinate is known to 1e-23, and the next bound is the displacement itself, a double:
-:math:`k \epsilon |q|`. From there on displacements count from the iterate. What is left, :math:`q'`, is of order
-:math:`\epsilon |q|`, and that its slips start at an iterate changes them by :math:`|q| |q'|`, which is less than they
-can resolve.
+equilibrium whose residual no longer falls and is of this order is at the floor, and is reported as such. Where the last
+two residuals show that another iteration would gain nothing, it is not made. In compensated arithmetic a coordinate is
+known to 1e-23, and the next bound is the displacement itself, a double: :math:`k \epsilon |q|`. From there on
+displacements count from the iterate. What is left, :math:`q'`, is of order :math:`\epsilon |q|`, and that its slips
+start at an iterate changes them by :math:`|q| |q'|`, which is less than they can resolve.
+
+From one equilibrium to another q is nearly proportional to the increment: where a third one is known, the iteration
+starts from the displacement of that one, in proportion. The ramp of an onset takes the equilibrium before the last,
+which saves one of four evaluations; a ramp that is stored does not, so that it goes on to the bit where it was cut off.
 
 Where Newton fails the increment is halved, since the path matters: friction remembers.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, diags_array
+from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from ..analysis import Packing, stiffness_matrix
+from ..analysis import Packing, nearest_image, stiffness_matrix
 from .engine import Engine
 
 Floats = NDArray[np.float64]
@@ -46,6 +52,24 @@ FREEING = 3
 """Iterations in which a rattler that was hit gets one and a half times Newton's step: its force goes as delta^(3/2), a
 root of that order, and the factor makes the convergence quadratic again. Later ones take Newton's own step, since a
 rattler in a narrow cage would be thrown to and fro."""
+
+IDLE = 1e-7
+"""Share of the largest contact force up to which a contact carries nothing that matters."""
+
+CREEP = 0.1
+"""Share of its stiffness that is added to a disk with none but such contacts. One that is leant upon by a breath has
+next to no stiffness along the contact, and would be thrown through its cage; as it is, its force falls tenfold in an
+iteration, from a value that is small already."""
+
+SPARING = 300
+"""Disks beyond which factors of K are used again: a factorisation costs ten force evaluations and more."""
+
+KEPT = 0.1
+"""Factor of the residual in one iteration up to which the factors of K are good for another one."""
+
+GAIN = 1e-2
+"""Factor by which the first iteration reduces the residual, where nothing is known yet: 1e-2 is that of an increment of
+1e-3 from no displacement, and smaller ones have smaller factors."""
 
 DENSE = 400
 """Coordinates up to which a dense solve is the faster one: 1 ms against 3 ms at 285."""
@@ -108,7 +132,13 @@ def rounding_floor(packing: Packing, displaced: float = 0.0) -> float:
     return float(np.sqrt(per_disk.max()))
 
 
-def equilibrate(engine: Engine, last: Equilibrium, fx: float, force_tolerance: float | None = None) -> Equilibrium:
+def equilibrate(
+    engine: Engine,
+    last: Equilibrium,
+    fx: float,
+    force_tolerance: float | None = None,
+    beside: Equilibrium | None = None,
+) -> Equilibrium:
     """The equilibrium at fx that follows from the last one.
 
     Parameters
@@ -121,6 +151,9 @@ def equilibrate(engine: Engine, last: Equilibrium, fx: float, force_tolerance: f
         Force along x on each disk of the upper layer.
     force_tolerance : float, optional
         Residual to stop at. By default the iteration ends at the floor.
+    beside : Equilibrium, optional
+        Another one near the last, at another fx: its displacement is a better guess than none. It does not change what
+        is found, except for the rounding.
 
     Returns
     -------
@@ -132,11 +165,14 @@ def equilibrate(engine: Engine, last: Equilibrium, fx: float, force_tolerance: f
         If halving the increment leads nowhere.
     """
     here, target, evaluations = last, fx, 0
+    guess = None if beside is None else _displacement(last, beside) * ((fx - last.fx) / (beside.fx - last.fx))
     while True:
         engine.set_fx(target)
-        found, spent = _newton(engine, here.packing, force_tolerance)
+        found, spent = _newton(engine, here.packing, force_tolerance, guess)
         evaluations += spent
-        if found is None:
+        if found is None and guess is not None:
+            guess = None
+        elif found is None:
             if fx == here.fx or abs(target - here.fx) < SMALLEST_SHARE * abs(fx - last.fx):
                 raise NoEquilibriumError(
                     f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there"
@@ -148,11 +184,22 @@ def equilibrate(engine: Engine, last: Equilibrium, fx: float, force_tolerance: f
             here, target = found, fx
 
 
-def _newton(engine: Engine, base: Packing, force_tolerance: float | None) -> tuple[Equilibrium | None, int]:
+def _displacement(start: Equilibrium, end: Equilibrium) -> Floats:
+    """From one equilibrium to another, (dx.., dy.., R dtheta..)."""
+    a, b = start.packing, end.packing
+    moved = nearest_image(b.position - a.position, a.box_length)
+    return np.concatenate([moved[:, 0], moved[:, 1], b.scaled_angle - a.scaled_angle])
+
+
+def _newton(
+    engine: Engine, base: Packing, force_tolerance: float | None, guess: Floats | None = None
+) -> tuple[Equilibrium | None, int]:
     """Newton's method from one base at the engine's fx; None where it does not converge."""
-    displacement = np.zeros(3 * len(base))
+    displacement = np.zeros(3 * len(base)) if guess is None else guess
     best: Equilibrium | None = None
+    solve = None
     worse = 0  # iterations that gained nothing; changes of contacts cost some
+    earlier = last = np.inf  # residuals of the two iterations before
     for evaluation in range(1, ITERATIONS + 1):
         trial = engine.displace(base, displacement)
         force = engine.net_force
@@ -164,11 +211,19 @@ def _newton(engine: Engine, base: Packing, force_tolerance: float | None) -> tup
             worse += 1
             if worse > FRUITLESS:
                 return None, evaluation
-        if best is None or residual < best.residual:
+        # What a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved.
+        if (guess is None or evaluation > 1) and (best is None or residual < best.residual):
             best = Equilibrium(trial, residual, floor, evaluation)
-        if residual <= (force_tolerance if force_tolerance is not None else 0.1 * floor):
+        if best is not None and residual <= (force_tolerance if force_tolerance is not None else 0.1 * floor):
             return best, evaluation
-        step = _solve(trial, force)
+        # What is not rounding falls by no less than it did the time before: it may be far below the floor now.
+        factor = last / earlier if np.isfinite(earlier) else GAIN
+        if best is not None and residual < floor and factor * last < 0.1 * floor:
+            return best, evaluation
+        if solve is None or len(base) <= SPARING or residual > KEPT * last:
+            solve = _factored(trial)
+        earlier, last = last, residual
+        step = None if solve is None else solve(force)
         if step is None or np.abs(step).max() > 0.1 * base.radius.min():
             return None, evaluation  # a floating part: the linear response is no small displacement
         if evaluation <= FREEING:
@@ -187,31 +242,69 @@ def _hit(packing: Packing) -> NDArray[np.bool_]:
     return (count == 1) & ~packing.top
 
 
+def _idle(packing: Packing) -> NDArray[np.bool_]:
+    """Disks of which no contact carries more than `IDLE`, shape (N,)."""
+    contacts, carried = packing.contacts, packing.normal_force
+    most = np.zeros(len(packing))
+    np.maximum.at(most, contacts.i, carried)
+    pair = ~contacts.floor
+    np.maximum.at(most, contacts.j[pair], carried[pair])
+    return most <= IDLE * carried.max(initial=0.0)
+
+
 def _largest(force: Floats, packing: Packing) -> float:
     per_disk = np.linalg.norm(force.reshape(3, -1), axis=0)
     return float(np.delete(per_disk, packing.rattlers).max(initial=0.0))
 
 
-def _solve(packing: Packing, force: Floats) -> Floats | None:
-    """K^-1 F on the coordinates that K knows, contacts below the floor left out; None if K is singular."""
+def newton_step(packing: Packing, force: Floats) -> Floats | None:
+    """K^-1 F on the coordinates that K knows, contacts below the floor left out; None if K is singular.
+
+    Parameters
+    ----------
+    packing : Packing
+        Where K is taken.
+    force : ndarray, shape (3N,)
+        F, force.
+
+    Returns
+    -------
+    ndarray, shape (3N,), or None
+        The displacement, length.
+    """
+    solve = _factored(packing)
+    return None if solve is None else solve(force)
+
+
+def _factored(packing: Packing) -> Callable[[Floats], Floats | None] | None:
+    """The solution of K dq = F as a function of F, on the coordinates that K knows; None if K is singular."""
     packing = packing.loaded(rounding_floor(packing))
-    matrix = csc_array(stiffness_matrix(packing))
-    active = np.flatnonzero(matrix.diagonal() != 0)
-    block = matrix[active][:, active]
+    matrix = stiffness_matrix(packing)
     # A share of the diagonal of the size of its rounding keeps the solve finite where something floats, such
     # as the whole packing along a floor without friction; on stiff directions it changes nothing.
-    block = block + diags_array(1e-13 * block.diagonal())
-    try:
-        if len(active) <= DENSE:
-            step = np.linalg.solve(block.toarray(), force[active])
-        else:
+    share = np.where(np.tile(_idle(packing), 3), CREEP, 1e-13)
+    diagonal = (1 + share) * matrix.diagonal()
+    active = np.flatnonzero(diagonal)
+    block = matrix[active][:, active]
+    block.setdiag(diagonal[active])
+    if len(active) <= DENSE:
+        inverse = partial(np.linalg.solve, block.toarray())
+    else:
+        try:
             # nearly symmetric: the fill-reducing order of a symmetric matrix, pivots on the diagonal where good
-            factors = splu(
+            inverse = splu(
                 csc_array(block), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options={"SymmetricMode": True}
-            )
-            step = factors.solve(force[active])
-    except (RuntimeError, np.linalg.LinAlgError):
-        return None
-    full = np.zeros_like(force)
-    full[active] = step
-    return full if np.all(np.isfinite(step)) else None
+            ).solve
+        except RuntimeError:
+            return None
+
+    def solve(force: Floats) -> Floats | None:
+        try:
+            step = inverse(force[active])
+        except np.linalg.LinAlgError:
+            return None
+        full = np.zeros_like(force)
+        full[active] = step
+        return full if np.all(np.isfinite(step)) else None
+
+    return solve

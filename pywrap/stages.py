@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -33,9 +32,7 @@ from .engine import Engine, Motion, Weakening
 from .quasistatic import Equilibrium, NoEquilibriumError, equilibrate, rounding_floor
 from .rattlers import clear_rattlers
 from .scene import Friction, GeneratedPacking, Perturb, Ramp, Scene, SceneError
-
-SETTLING_TOLERANCE = 1e-9
-"""Force at which dynamics leaves settling to Newton's method, in units of F_y: the contacts are what they will be."""
+from .settling import settled
 
 ACCURATE_SHARE = 0.05
 """Time step of undamped runs in units of the stability limit 2/omega_max: the fastest mode is then resolved
@@ -137,11 +134,13 @@ def loads(settings: Ramp) -> NDArray[np.float64]:
     return multiples * settings.step
 
 
-def next_equilibrium(engine: Engine, last: Equilibrium, fx: float, scene: Scene) -> Equilibrium:
-    """The equilibrium at fx that follows from the last one, by the scene's method."""
+def next_equilibrium(
+    engine: Engine, last: Equilibrium, fx: float, scene: Scene, beside: Equilibrium | None = None
+) -> Equilibrium:
+    """The equilibrium at fx that follows from the last one, by the scene's method; `beside` as in `equilibrate`."""
     settings = _ramp_of(scene)
     if settings.method == "newton":
-        return equilibrate(engine, last, fx, settings.force_tolerance)
+        return equilibrate(engine, last, fx, settings.force_tolerance, beside)
     floor = rounding_floor(last.packing)
     engine.restore(last.packing)
     engine.set_fx(fx)
@@ -178,15 +177,20 @@ class EquilibriumPath:
     def __init__(self, engine: Engine, start: Equilibrium, scene: Scene) -> None:
         self._engine, self._scene = engine, scene
         self.kept = [start]
+        self._beside: tuple[Equilibrium, Equilibrium] | None = None  # an equilibrium, and another one near it
 
     def __call__(self, fx: float) -> Packing:
         """The packing in equilibrium at fx."""
         below = next((each for each in reversed(self.kept) if each.fx <= fx), self.kept[0])
         if below.fx == fx:
             return below.packing
-        found = next_equilibrium(self._engine, below, fx, self._scene)
+        beside = self._beside[1] if self._beside and self._beside[0] is below else None
+        found = next_equilibrium(self._engine, below, fx, self._scene, beside)
         if fx > self.kept[-1].fx:
             self.kept.append(found)
+            self._beside = found, below
+        else:
+            self._beside = below, found
         return found.packing
 
     def climb(self, forces: NDArray[np.float64]) -> Iterator[Equilibrium]:
@@ -467,12 +471,7 @@ def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None) -> Pa
         position_low=np.zeros_like(start.position) if scene.precision == "compensated" else None,
     )
     with Engine(loose, communicator) as engine:
-        engine.settle(SETTLING_TOLERANCE * scene.load.fy)
-        packing = engine.packing
-        # where parts float without friction this fails; the packing is then at rest to the tolerance above, and the
-        # rest is done with friction
-        with suppress(NoEquilibriumError):
-            packing = equilibrate(engine, _unpolished(packing), 0.0).packing
+        packing = settled(engine, loose)
     idle = len(packing.loaded(rounding_floor(packing)).rattlers)
     if idle > 0.5 * len(packing):
         raise NoEquilibriumError(

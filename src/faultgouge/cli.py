@@ -255,6 +255,20 @@ def reproduce(
     _say(f"written: {output}/report.md")
 
 
+@app.command(epilog="Example: [bold]faultgouge report --quick -o report[/bold]")
+def report(
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for report, figures and numbers.")] = Path(
+        "report"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: a minute instead of ten.")] = False,
+) -> None:
+    """Error against run time: which method to take when, for six tasks, with figures and numbers."""
+    from faultgouge.studies.report import report as run_studies
+
+    run_studies(output, quick, _say, lambda runs, name: _progress(runs, name, len(runs)))
+    _say(f"written: {output}/report.md")
+
+
 @app.command(epilog="Example: [bold]mpiexec -n 2 faultgouge stability -o stability[/bold]")
 def stability(
     output: Annotated[Path, typer.Option("-o", "--output", help="The folder for table, picture and numbers.")] = Path(
@@ -284,7 +298,12 @@ def main() -> None:
     except KeyboardInterrupt:
         _stop("interrupted: what was written is kept, and the same command goes on from there", 130)
     except Exception as error:
-        _stop(_sentence(error), _exit_code(error))
+        _stop(_sentence(error), _exit_code(error), alone=_is_parallel() and _of_one_rank(error))
+
+
+def _of_one_rank(error: Exception) -> bool:
+    """Whether the other ranks do not know of it, and wait: for LAMMPS, or for rank 0, which alone writes files."""
+    return isinstance(error, OSError) or getattr(error, "one_rank", False)
 
 
 def _exit_code(error: Exception) -> int:
@@ -305,6 +324,7 @@ def _sentence(error: Exception) -> str:
         "NoEquilibriumError",
         "EngineError",
         "OnsetError",
+        "ReportError",
         "StabilityError",
         "OSError",
     }
@@ -317,15 +337,23 @@ def _sentence(error: Exception) -> str:
     return f"this should not have happened ({type(error).__name__} at {where}: {error}): please report it"
 
 
-def _stop(sentence: str, code: int) -> None:
-    if sentence and _is_root():
+def _stop(sentence: str, code: int, alone: bool = False) -> None:
+    if sentence and (alone or _is_root()):
         Console(stderr=True, soft_wrap=True, highlight=False).print("[bold red]Error:[/bold red] ", end="")
-        print(sentence, file=sys.stderr)
+        print(sentence, file=sys.stderr, flush=True)
+    if alone:
+        from mpi4py import MPI
+
+        MPI.COMM_WORLD.Abort(code)
     sys.exit(code)
 
 
 def _is_root() -> bool:
     return int(os.environ.get("PMI_RANK", "0")) == 0
+
+
+def _is_parallel() -> bool:
+    return int(os.environ.get("PMI_SIZE", "1")) > 1
 
 
 def _scene(path: Path) -> Scene:

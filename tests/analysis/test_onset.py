@@ -7,8 +7,10 @@ import pytest
 
 from faultgouge.analysis import Contacts, OnsetError, complex_windows, find_onset, follow, scan_windows, spectrum
 from faultgouge.analysis import onset as onset_module
+from faultgouge.analysis.large import first_window
+from faultgouge.analysis.meetings import Outlook
 from faultgouge.analysis.modes import Modes, assign, full_operator, loaded
-from faultgouge.analysis.onset import deepest_dip, first_window
+from faultgouge.analysis.windows import deepest_dip
 
 RNG = np.random.default_rng(5)
 BASIS = np.eye(12) + 0.3 * RNG.normal(size=(12, 12))
@@ -191,6 +193,57 @@ def test_no_onset_is_said_so(ramp):
     path = ramp(1.0, 1e-3, 22)
     with pytest.raises(OnsetError, match=r"up to fx = 0\.0030"):
         find_onset(path, path.grid[:4])
+
+
+@pytest.mark.parametrize("mu", [1.0, 0.8])
+def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
+    """The same windows as from all modes at every load, which are computed next to the edges alone."""
+    path, decomposed = ramp(mu, 1e-3, 22), []
+    compute = Modes.of.__func__
+
+    def counted(cls, fx, matrix):
+        decomposed.append(fx)
+        return compute(cls, fx, matrix)
+
+    monkeypatch.setattr(Modes, "of", classmethod(counted))
+    quick = find_onset(path, path.grid)
+    few, decomposed[:] = len(decomposed), []
+    monkeypatch.setattr(Outlook, "meetings", lambda *_: None)  # nothing is known of any increment
+    every = find_onset(path, path.grid)
+    assert len(decomposed) >= 23
+    assert few <= 4 * len(quick.windows)
+    assert len(quick.windows) == len(every.windows)
+    for one, other in zip(quick.windows, every.windows, strict=True):
+        assert one.fx_onset == pytest.approx(other.fx_onset, abs=one.error + other.error)
+        assert (one.fx_end, one.kind) == (other.fx_end, other.kind)
+
+
+def family_with_a_long_window(f):
+    """A pair that is complex from 0.35 to 8.6, and one that is so between 5.2 and 5.3, in an orthonormal basis."""
+    matrix = np.diag(np.concatenate([[100.0, 100.0, 200.0, 200.0], 300 + 50 * OTHERS]))
+    matrix[0, 1], matrix[1, 0] = 1.0, (f - 0.35) * (f - 8.6)
+    matrix[2:4, 2:4] += [[f - 5.25, 0.05], [-0.05, 5.25 - f]]
+    return matrix
+
+
+def test_open_windows_keep_their_names_over_increments_that_are_skipped():
+    edges = [(window.fx_onset, window.fx_end) for window in complex_windows(family_with_a_long_window, np.arange(10.0))]
+    np.testing.assert_allclose(edges, [(0.35, 8.6), (5.2, 5.3)], atol=1e-9)
+
+
+def test_what_the_projection_misses_is_walked_again(monkeypatch):
+    """A window that opens on increments said to be quiet is found as soon as anything makes us look."""
+    quiet = Outlook.meetings
+
+    def blind(self, here, there):
+        return [] if there[1, 0] > -5.0 else quiet(self, here, there)
+
+    def operator(f):
+        return family_with_a_long_window(0.3 * f)
+
+    monkeypatch.setattr(Outlook, "meetings", blind)
+    first = complex_windows(operator, np.arange(10.0))[0]
+    assert first.fx_onset == pytest.approx(0.35 / 0.3, abs=1e-9)
 
 
 def test_json(ramp):

@@ -8,9 +8,11 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import Contacts, Packing
+from faultgouge.analysis.large import first_window
+from faultgouge.analysis.meetings import meetings
 from faultgouge.analysis.modes import Modes, full_operator
-from faultgouge.analysis.onset import first_window
-from faultgouge.analysis.tracking import Block, Projection, continued
+from faultgouge.analysis.projection import Projection
+from faultgouge.analysis.tracking import Block, continued
 
 
 def dense_block(matrix, reference):
@@ -58,6 +60,16 @@ def test_overlap_of_a_block_is_that_of_the_eigenvectors(ramp):
     assert modes.block(pair).overlap == pytest.approx(expected, rel=1e-8)
 
 
+@pytest.mark.parametrize("fx", [0.0215, 0.0218330564, 0.022])
+def test_slope_of_the_discriminant(ramp, fx):
+    """Against the difference of two blocks, from real through double to complex."""
+    path, step = ramp(1.0, 1e-3, 22), 1e-6
+    below, middle, above = (full_operator(path(fx + offset * step)) for offset in (-1, 0, 1))
+    block = dense_block(middle, pair_of(path(0.022)))
+    slope = (continued(above, block).discriminant - continued(below, block).discriminant) / 2
+    assert block.slope((above - below) / 2) == pytest.approx(slope, rel=1e-5)
+
+
 def test_block_without_coupling_of_unit_overlap():
     matrix = csr_array(np.diag([1.0, 2.0, 5.0]))
     block = Block.of(matrix, np.eye(3)[:, :2], np.eye(3)[:, :2])
@@ -79,6 +91,49 @@ def test_clusters_have_the_eigenvalues_of_the_operator(ramp):
             core = slice(cluster.core[0], cluster.core[1] + 1)
             values = np.sort(eigvals(block).real)[core]
             np.testing.assert_allclose(values, expected[cluster.modes][core], atol=accuracy * np.diff(expected).mean())
+
+
+@pytest.mark.parametrize("base", [0.0, 0.015, 0.021])
+def test_meetings_are_those_of_the_eigenvalues(ramp, base):
+    """Every pair that LAPACK has complex, or coming within its couplings, is named; most others are not."""
+    path = ramp(1.0, 1e-3, 22)
+    projection = Projection.of(full_operator(path(base)))
+    for load, most in ((base, 8), (base + 1e-3, 8)):
+        here, there = (full_operator(path(fx)) for fx in (load, load + 1e-3 if load < 0.0215 else load))
+        named = {tuple(pair) for pair in meetings(projection.levels(here), projection.levels(there))}
+        assert len(named) <= most
+        for matrix in (here, there):
+            modes = Modes.of(0.0, matrix)
+            for pair in modes.complex_pairs:
+                # the two modes of the projection that carry the plane
+                weight = np.linalg.norm(projection.basis.T @ modes.block(pair).right[projection.active], axis=1)
+                assert tuple(sorted(np.argsort(weight)[-2:])) in named
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("antisymmetric", [0.02, 0.1, 0.3])
+def test_no_complex_pair_escapes_the_meetings(seed, antisymmetric):
+    """Random levels and couplings, of spacing 1: as many complex pairs as LAPACK finds are named, or more."""
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(size=(2, 150, 150))
+    diagonal = np.diag(np.sort(rng.uniform(0, 150, 150)))
+    symmetric, turning = 0.02 * (noise[0] + noise[0].T), antisymmetric * (noise[1] - noise[1].T)
+    projection = Projection.of(csr_array(diagonal))
+    here, there = (projection.levels(csr_array(diagonal + share * (symmetric + turning))) for share in (0.9, 1.0))
+    named = meetings(here, there)
+    values, right = eig(diagonal + symmetric + turning)
+    for k in np.flatnonzero(values.imag > 0):
+        assert set(np.argsort(np.abs(right[:, k]))[-2:]) in [set(pair) for pair in named.tolist()]
+
+
+def test_meetings_of_crossing_levels_between_two_loads():
+    """Levels that exchange their order meet, coupled as weakly as may be; those that only come close do not."""
+    projection = Projection.of(csr_array(np.diag([1.0, 2.0, 5.0])))
+    here, crossed, close = (
+        projection.levels(csr_array(np.diag(d))) for d in ([1.0, 2.0, 5.0], [2.0, 1.9, 5.0], [1.5, 2.0, 5.0])
+    )
+    assert meetings(here, crossed).tolist() == [[0, 1]]
+    assert meetings(here, close).tolist() == []
 
 
 def test_projection_is_given_up_where_modes_mix_or_disks_move_in(ramp):

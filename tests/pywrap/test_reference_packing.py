@@ -7,7 +7,7 @@ import pytest
 
 from faultgouge.analysis import find_onset, spectrum, stiffness_matrix
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate
-from faultgouge.pywrap.quasistatic import _largest, _solve, rounding_floor
+from faultgouge.pywrap.quasistatic import _largest, newton_step, rounding_floor
 from faultgouge.pywrap.stages import EquilibriumPath, next_equilibrium
 
 FX = 0.01
@@ -87,7 +87,7 @@ def test_newton_is_quadratic(reference_packing):
         for _ in range(5):
             trial = engine.displace(packing, displacement)
             residuals.append(_largest(engine.net_force, trial))
-            displacement += _solve(trial, engine.net_force)
+            displacement += newton_step(trial, engine.net_force)
     falling = [r for r in residuals if r > 1e-9]
     assert len(falling) == 3
     assert all(after < before**1.5 for before, after in pairwise(falling))

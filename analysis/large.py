@@ -1,0 +1,167 @@
+r"""The first window of complex eigenvalues of a large packing, without all of its eigenvalues.
+
+A dense decomposition takes a second at 300 disks and grows with the cube. But modes mix with their neighbours only: in
+a fixed basis, the eigenvectors of the symmetric part at one load, the operator is nearly diagonal, and clusters of
+neighbouring modes have its eigenvalues up to the third order of the coupling (see
+:mod:`~faultgouge.analysis.projection`). Their windows say where to look. What appears there is confirmed with the
+operator itself, whose pair is continued to the edges by inverse iteration (:mod:`~faultgouge.analysis.tracking`).
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
+
+from .edges import Edge, State, locate
+from .modes import Modes, Operator, Pair
+from .packing import Floats
+from .projection import Cluster, Projection
+from .tracking import Block
+from .windows import Place, Window, complex_windows, increasing, window_between
+
+REACH = 0.1
+"""Share of an increment by which the clusters are extrapolated: a pair that they have turn complex a little late is
+found in time."""
+
+FINEST = 1e-3
+"""Narrowest windows of clusters that are looked for, in increments: their own error is larger."""
+
+
+def first_window(
+    operator: Callable[[float], Operator], forces: ArrayLike, *, narrowest: float | None = None
+) -> Window | None:
+    """The first window of complex eigenvalues of a family of large matrices, without all their eigenvalues.
+
+    The clusters of a :class:`~faultgouge.analysis.projection.Projection` are searched as `complex_windows` does, with
+    the projected operators interpolated linearly between two loads; what appears there is confirmed with the operator
+    itself, whose pair is continued to the edges. So the window that is returned is as certain, and its edges have the
+    same digits, as those of `complex_windows`. That it is the first rests on the clusters, whose onsets were within a
+    tenth of an increment of the confirmed ones (packings of 1,000 disks, increments of 1e-3): a pair that is
+    complex by less than their error, or for less than `FINEST` of an increment, may be missed before it.
+
+    Parameters
+    ----------
+    operator, forces
+        As in :func:`~faultgouge.analysis.complex_windows`. Loads beyond the one above the onset are not asked for.
+    narrowest
+        As in :func:`~faultgouge.analysis.find_onset`; no less than a thousandth of an increment.
+
+    Returns
+    -------
+    Window or None
+        None if all eigenvalues are real. fx_end is None if the pair is complex at the load above the onset.
+    """
+    loads = increasing(forces)
+    here = Place(float(loads[0]), csr_array(operator(float(loads[0]))))
+    search = _Search(operator, narrowest or 0.0)
+    for load in loads[1:]:
+        there = Place(float(load), csr_array(operator(float(load))))
+        window = search.walk(here, there)
+        if window is not None:
+            return window
+        here = there
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """The planes of a pair that turns complex in its cluster, and a load at which it may be so in the operator."""
+
+    inside: float
+    right: Floats
+    left: Floats
+
+
+def _nearest_pair(modes: Modes, eigenvalue: float) -> Pair:
+    """The complex pair, or failing that the two modes, closest to a real eigenvalue."""
+    first, second = np.argsort(np.abs(modes.values.real - eigenvalue))[:2]
+    pairs = modes.complex_pairs or [(int(first), int(second))]
+    return min(pairs, key=lambda pair: abs(modes.values[pair[0]].real - eigenvalue))
+
+
+class _Search:
+    """The first window of large operators, from load to load."""
+
+    def __init__(self, operator: Callable[[float], Operator], narrowest: float) -> None:
+        self.operator, self.narrowest = operator, narrowest
+        self.passed: list[Place] = []
+        self.projection: Projection | None = None
+        self.blocks: list[Floats] = []
+
+    def walk(self, here: Place, there: Place) -> Window | None:
+        """The first window that begins between two loads."""
+        self.passed.append(here)
+        if self.projection is None or not self.projection.fits(here[1], self.blocks):
+            self.projection = Projection.of(here[1])
+            self.blocks = self.projection.onto(here[1])
+        before, self.blocks = self.blocks, self.projection.onto(there[1])
+        candidates = [
+            candidate
+            for cluster, a, b in zip(self.projection.clusters, before, self.blocks, strict=True)
+            for candidate in self.candidates(self.projection, cluster, (here[0], a), (there[0], b))
+        ]
+        first: Window | None = None
+        for candidate in candidates:
+            window = self.confirmed(candidate, there)
+            if window is not None and (first is None or window.fx_onset < first.fx_onset):
+                first = window
+        return first
+
+    def candidates(
+        self, projection: Projection, cluster: Cluster, here: tuple[float, Floats], there: tuple[float, Floats]
+    ) -> Iterator[_Candidate]:
+        """The windows of one cluster, with its blocks interpolated between two loads."""
+        span = there[0] - here[0]
+
+        def block(fx: float) -> Floats:
+            share = (fx - here[0]) / span
+            return (1 - share) * here[1] + share * there[1]
+
+        reach = there[0] + REACH * span
+        for window in complex_windows(block, [here[0], reach], narrowest=max(self.narrowest, FINEST * span)):
+            end = reach if window.fx_end is None else window.fx_end
+            inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
+            modes = Modes.of(inside, block(inside))
+            plane = modes.block(_nearest_pair(modes, window.eigenvalue))
+            if cluster.owns(plane.right):
+                right, left = projection.lifted(cluster, plane.right), projection.lifted(cluster, plane.left)
+                yield _Candidate(min(inside, there[0]), right, left)
+
+    def confirmed(self, candidate: _Candidate, there: Place) -> Window | None:
+        """The window of the operator itself in place of that of a cluster; None if the pair stays real."""
+        inside = self.complex_state(candidate, there)
+        if inside is None:
+            return None
+        above = inside if inside.fx == there[0] else inside.at(*there)
+        end = locate(self.operator, inside, above)[0] if above.discriminant > 0 else None
+        for place in reversed(self.passed):
+            below = inside if inside.fx == place[0] else inside.at(*place)
+            if below.discriminant > 0:
+                return window_between(locate(self.operator, below, inside)[0], end)
+            inside = below
+        return window_between(Edge(inside.fx, 0.0, inside.block.mean, inside.block.overlap, "start"), end)
+
+    def complex_state(self, candidate: _Candidate, there: Place) -> State | None:
+        """The pair at a load where it is complex, if there is one near the candidate's window."""
+        fx = candidate.inside
+        matrix = there[1] if fx == there[0] else csr_array(self.operator(fx))
+        start = State(fx, matrix, Block.of(matrix, candidate.right, candidate.left)).at(fx, matrix)
+        if start.discriminant < 0:
+            return start
+        # A parabola through D at the ends of the increment and here has its minimum where D is least.
+        places = [self.passed[-1], there] if fx < there[0] else [self.passed[-1]]
+        others = [start.at(*place) for place in places]
+        for other in others:
+            if other.discriminant < 0:
+                return other
+        if len(others) < 2:
+            return None
+        states = sorted([start, *others], key=lambda state: state.fx)
+        curve = np.polyfit([state.fx for state in states], [state.discriminant for state in states], 2)
+        lowest = float(-0.5 * curve[1] / curve[0])
+        if curve[0] <= 0 or not states[0].fx < lowest < states[-1].fx:
+            return None
+        state = start.at(lowest, self.operator(lowest))
+        return state if state.discriminant < 0 else None

@@ -1,0 +1,261 @@
+"""Error against run time: the pieces that a study is made of, the report's contract, and the quick report."""
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+
+from faultgouge.analysis import discrete_frequency, spectrum, stiffness_matrix
+from faultgouge.pywrap import Engine, Scene, ramp
+from faultgouge.studies import report as page
+from faultgouge.studies.work_precision import dumps, relaxation, trajectory
+from faultgouge.studies.work_precision.extended import refined
+from faultgouge.studies.work_precision.fire import fire
+from faultgouge.studies.work_precision.forces import central_differences, complex_step, net_force
+from faultgouge.studies.work_precision.frequency import corrected
+from faultgouge.studies.work_precision.mode import Mode
+from faultgouge.studies.work_precision.precision import compensated
+from faultgouge.studies.work_precision.study import Point, Settings, fit_order
+from faultgouge.studies.work_precision.timing import timed
+from faultgouge.studies.work_precision.verlet import Verlet
+
+BIN = Path(sys.executable).parent
+POINT = {"method", "parameter", "error", "seconds", "evaluations"}
+
+
+@pytest.fixture(scope="module")
+def settings():
+    scene = Scene.from_toml(page.SCENE)
+    return Settings(scene, tuple(ramp(scene)), quick=True, repeats=1)
+
+
+def test_the_shipped_packing_is_the_reference(settings, reference):
+    packing = settings.scene.packing.file
+    stored = json.loads(packing.read_text())
+    assert all(stored[name] == reference[name] for name in stored)
+    assert settings.scene.law.mus[0] == reference["cases"][0]["mu"]
+
+
+@pytest.fixture(scope="module")
+def sheared(settings):
+    """The packing at F_x = 0.02, some of its contacts brought to sliding, and one disk turned."""
+    packing = settings.at(0.02).packing
+    limit = packing.law.slip_limit(packing.geometry.overlap)
+    slip = np.where(np.arange(len(limit)) % 7 == 0, np.sign(packing.contacts.slip) * 2 * limit, packing.contacts.slip)
+    return replace(packing, contacts=replace(packing.contacts, slip=slip))
+
+
+@pytest.fixture(scope="module")
+def exact_end():
+    """Where the three disks are in the end: LAMMPS with 51,200 steps errs by 2e-9."""
+    packing = trajectory.three_disks()
+    with Engine(packing) as engine:
+        return trajectory.in_lammps(engine, packing, 51_200)
+
+
+@pytest.mark.parametrize(("tangent", "order"), [("midpoint", 2), ("end", 1)])
+def test_order_of_the_tangent(exact_end, tangent, order):
+    packing = trajectory.three_disks()
+    points = []
+    for steps in (200, 400, 800, 1600):
+        end = Verlet(packing, tangent).run(trajectory.TIME / steps, steps)
+        points.append(Point(tangent, trajectory.TIME / steps, np.abs(end - exact_end).max(), 1.0, steps))
+    fitted = fit_order(points, tangent, order)
+    assert fitted.order == pytest.approx(order, abs=0.05)
+    assert fitted.error < 0.05
+
+
+def test_numpy_integrates_what_lammps_integrates():
+    packing = trajectory.three_disks()
+    with Engine(packing) as engine:
+        in_lammps = trajectory.in_lammps(engine, packing, 400)
+    np.testing.assert_allclose(Verlet(packing).run(trajectory.TIME / 400, 400), in_lammps, atol=1e-14)
+
+
+def test_the_three_disks_slide_stick_and_turn():
+    packing = trajectory.three_disks()
+    most, normals = np.zeros(4), []
+    with Engine(packing) as engine, engine.undamped(2.5e-3):
+        for _ in range(40):
+            engine.advance(20)
+            now = engine.packing
+            share = np.abs(now.contacts.slip) / now.law.slip_limit(now.geometry.overlap)
+            most = np.maximum(most, share)
+            normals.append(now.geometry.normal[:2])
+    assert len(share) == 4  # no contact opened or formed
+    np.testing.assert_allclose(most, 1, rtol=1e-12)
+    assert np.sum(share < 0.9) == 2
+    assert np.sum(normals[0] * normals[-1], axis=1).max() < np.cos(np.radians(15))
+
+
+def test_order_is_the_slope_and_its_standard_error():
+    noise = np.array([1.1, 0.9, 1.05, 0.95])
+    points = [Point("m", 0.1 * 2.0**-k, 3 * 4.0**-k * noise[k], 1.0, k) for k in range(4)]
+    fitted = fit_order([*points, Point("other", 1.0, 1.0, 1.0, 1)], "m", 2)
+    x, y = np.log([point.parameter for point in points]), np.log([point.error for point in points])
+    (slope, _), covariance = np.polyfit(x, y, 1, cov="unscaled")
+    scatter = y - np.polyval(np.polyfit(x, y, 1), x)
+    assert fitted.order == pytest.approx(slope)
+    assert fitted.error == pytest.approx(math.sqrt(covariance[0, 0] * (scatter @ scatter) / 2))
+    with pytest.raises(ValueError, match="an order needs 3"):
+        fit_order(points, "m", 2, least=0.5)
+
+
+def test_times_are_medians_of_rounds():
+    calls = []
+    results = timed([lambda: calls.append("a") or "A", lambda: calls.append("b") or "B"], 3)
+    assert calls == ["a", "b"] * 3
+    assert [result for result, _ in results] == ["A", "B"]
+    assert all(seconds > 0 for _, seconds in results)
+
+
+def test_forces_in_other_arithmetic_are_the_packings(sheared):
+    forces = net_force(sheared, np.zeros((3 * len(sheared), 1)))[:, 0]
+    unloaded = replace(sheared, fx=0.0, fy=0.0)
+    np.testing.assert_allclose(forces, unloaded.net_force, atol=1e-10)
+    assert net_force(sheared, np.zeros((3 * len(sheared), 1), np.longdouble)).dtype == np.longdouble
+
+
+def test_complex_steps_and_differences_give_the_jacobian(sheared):
+    analytic = stiffness_matrix(sheared).toarray()
+    scale = np.abs(analytic).max()
+    # the rounding of the smallest overlap, 5e-6, in units of the largest element
+    assert np.abs(complex_step(sheared) - analytic).max() < 5e-12 * scale
+    assert np.abs(complex_step(sheared, np.clongdouble) - analytic).max() < 5e-12 * scale
+    # the smallest of truncation and rounding; at the bound the second derivative jumps, an error of first order
+    assert np.abs(central_differences(sheared, 1e-8) - analytic).max() < 1e-5 * scale
+    assert np.abs(stiffness_matrix(sheared, "paper").toarray() - analytic).max() > 1e-7 * scale
+
+
+def test_refined_eigenvalue_has_the_digits_it_says():
+    matrix = np.random.default_rng(3).standard_normal((8, 8))
+    values, vectors = np.linalg.eig(matrix)
+    with mpmath.workdps(40):
+        exact = mpmath.eig(mpmath.matrix(matrix.tolist()))[0]
+        for value, vector in zip(values, vectors.T, strict=True):
+            found = refined(matrix, complex(value), vector.astype(complex), condition=3.0)
+            number = mpmath.mpc(*(mpmath.mpf(_exact(part)) for part in (found.value.real, found.value.imag)))
+            assert min(abs(number - each) for each in exact) < found.error
+            assert found.error < 1e3 * np.finfo(np.longdouble).eps
+
+
+def _exact(number):
+    """A longdouble as a sum of two doubles, as text with all its digits."""
+    high = float(number)
+    return mpmath.mpf(high) + mpmath.mpf(float(number - np.longdouble(high)))
+
+
+def test_fire_finds_the_root_of_forces_without_energy():
+    rng = np.random.default_rng(5)
+    slope = rng.standard_normal((6, 6))
+    slope = slope @ slope.T + np.eye(6) + 0.1 * rng.standard_normal((6, 6))
+    root = rng.standard_normal(6)
+    longest = 1.8 / np.sqrt(np.abs(np.linalg.eigvals(slope)).max())
+    found, evaluations = fire(lambda q: slope @ (root - q), np.zeros(6), longest, 1e-12)
+    np.testing.assert_allclose(found, root, atol=1e-11)
+    assert 10 < evaluations < 2000
+
+
+@pytest.fixture
+def increment(settings):
+    start = settings.at(relaxation.FROM)
+    with Engine(start.packing) as engine:
+        end = settings.at(relaxation.TO).packing
+        yield relaxation.Increment(engine, start, end)
+
+
+def test_all_ways_lead_to_one_equilibrium(increment):
+    step = 0.9 * 2 / spectrum(increment.end).omega_max
+    for way, least in (
+        (lambda: increment.verlet(step, 10.0, 1000), 1e-12),
+        (lambda: increment.fire(step, 1e-6), 1e-7),
+        (lambda: increment.newton(None), 1e-12),
+        (lambda: increment.overdamped(None, 1e-8), 1e-9),
+    ):
+        packing, evaluations = way()
+        assert increment.distance(packing) < least < increment.distance(increment.start.packing)
+        assert evaluations > 0
+
+
+def test_a_relaxations_time_step_is_its_own(increment):
+    steps = [increment.overdamped(time_step, 1e-4)[1] for time_step in (None, 4e-5, None)]
+    assert steps[0] == steps[2] > steps[1]
+
+
+@pytest.mark.parametrize(("fx", "growing", "least"), [(0.01, False, 1e-9), (0.024, True, 1e-6)])
+def test_runs_show_velocity_verlets_frequency(settings, fx, growing, least):
+    mode = Mode.of(compensated(settings.at(fx)).packing, growing)
+    dt = 0.4 * mode.limit
+    with Engine(mode.packing) as engine:
+        found = mode.measured(engine, dt, 3.0)
+    predicted = mode.quantity(complex(discrete_frequency(mode.eigenvalue, dt)))
+    assert mode.quantity(found) == pytest.approx(predicted, rel=least)
+    assert abs(mode.quantity(found) / mode.exact - 1) > 10 * least
+    assert mode.quantity(corrected(found, dt)) == pytest.approx(mode.exact, rel=least)
+
+
+def test_files_lose_what_they_are_said_to_lose(settings):
+    study = dumps.dumps(settings)
+    errors = {(point.method, point.parameter): point.error for point in study.points}
+    assert errors[dumps.HDF5, None] == errors[dumps.TEXT, 17] == 0
+    assert errors[dumps.TEXT, 6] > 1e-4
+    assert 1e-6 < errors[dumps.SINGLE, None] < 1e-2
+    assert errors[dumps.NO_SLIPS, None] > 1e-5
+
+
+def test_a_study_that_fails_does_not_take_the_others_along(tmp_path):
+    def broken(_):
+        raise ValueError("the reason")
+
+    said = []
+    with pytest.raises(page.ReportError, match=r"1 of 2 studies failed \(broken\)"):
+        page.report(tmp_path, True, said.append, studies={"broken": broken, "files": dumps.dumps})
+    result = json.loads((tmp_path / "report.json").read_text())
+    assert result["failed"] == [{"name": "broken", "says": "ValueError: the reason"}]
+    (study,) = result["studies"]
+    assert study["name"] == "files"
+    assert study["reference_error"] > 0
+    assert all(set(point) == POINT for point in study["points"])
+    assert {"cpu", "cores", "load", "versions"} <= set(result["machine"])
+    text = (tmp_path / "report.md").read_text()
+    assert "the reason" in text
+    assert "(files.png)" in text
+    assert (tmp_path / "files.png").stat().st_size > 10_000
+    assert len(said) == 2
+
+
+@pytest.mark.slow
+def test_quick_report(tmp_path):
+    command = [BIN / "faultgouge", "report", "--quick", "-o", "report"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "report" / "report.json").read_text())
+    assert [study["name"] for study in result["studies"]] == list(page.STUDIES)
+    orders = [order for study in result["studies"] for order in study["orders"]]
+    assert len(orders) == 5
+    for order in orders:
+        assert order["order"] == pytest.approx(order["expected"], abs=0.05)
+    for study in result["studies"]:
+        assert study["reference_error"] > 0
+        assert all(point["error"] >= 0 and point["seconds"] > 0 for point in study["points"])
+        assert (tmp_path / "report" / f"{page.stem(study['name'])}.png").stat().st_size > 10_000
+    best = {
+        study["name"]: {
+            method: min(point["error"] for point in study["points"] if point["method"] == method)
+            for method in {point["method"] for point in study["points"]}
+        }
+        for study in result["studies"]
+    }
+    assert best["onset"]["root of the discriminant"] < 1e-8 < best["onset"]["scan, Newton"]
+    # that of an independent code
+    question = next(study["question"] for study in result["studies"] if study["name"] == "onset")
+    assert "F_x^c = 0.02183305641" in question
+    assert best["relaxation"]["Newton, compensated"] < 1e-18
+    assert best["relaxation"]["Newton"] < 1e-12
+    assert best["Jacobian"]["analytic"] < 1e-11 < best["Jacobian"]["central differences"]
