@@ -182,7 +182,7 @@ def _page(done: Sequence[tuple[Case, Outcome]]) -> str:
     lines = [
         "# Stiff and extreme cases",
         "",
-        f"{len(done)} cases: {count['holds']} hold, {count['refused']} are refused in one sentence, as they should be, "
+        f"{len(done)} cases: {count['holds']} hold, {count['refused']} refused in one sentence, as they should be, "
         f"{count['fails']} fail. A case holds if its figure does not exceed its bound. The same numbers come out on "
         "any number of ranks.",
         "",

@@ -54,10 +54,12 @@ class Case:
     quick: bool = False
 
     def outcome(self) -> Outcome:
-        """Run it; whatever goes wrong is a failure of this case alone."""
+        """Run it; whatever goes wrong is a failure of this case alone, unless the ranks have lost each other."""
         try:
             return self.run()
         except Exception as error:
+            if getattr(error, "one_rank", False):
+                raise
             lines = str(error).strip().splitlines()
             return Outcome("fails", None, None, f"{type(error).__name__}: {lines[0] if lines else 'no reason given'}")
 

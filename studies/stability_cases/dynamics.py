@@ -23,8 +23,8 @@ from scipy.linalg import eigh
 from ...analysis import Contacts, Packing, spectrum, stable_timestep, stiffness_matrix, touching
 from ...pywrap import Engine, SceneError
 from ...pywrap.stages import time_step
+from .alone import refused_by_lammps
 from .case import Case, Outcome, measured, refused
-from .lammps_alone import refused_by_lammps
 from .packings import crystal, law, sheared
 
 GROUP = "time stepping"

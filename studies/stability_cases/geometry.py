@@ -9,14 +9,14 @@ import numpy as np
 
 from ...analysis import Contacts, MindlinLaw, Packing, spectrum, stiffness_matrix, touching
 from ...pywrap import Engine, Scene, SceneError
+from .alone import refused_by_lammps
 from .case import Case, Outcome, measured, refused
 from .checks import balance
-from .lammps_alone import refused_by_lammps
 from .packings import KN, at_rest, bed, crystal, law, sheared
 
 GROUP = "geometry"
 
-NONE = Contacts(*np.zeros((2, 0), int), np.zeros(0))
+NONE = Contacts(np.zeros(0, int), np.zeros(0, int), np.zeros(0))
 
 
 def _contact(slip: float) -> Contacts:

@@ -7,6 +7,7 @@ from functools import partial
 
 from ...analysis import Packing
 from ...pywrap import Engine, NoEquilibriumError, equilibrate
+from .alone import refused_by_command
 from .case import Case, Outcome, refused
 from .checks import balance, derivative
 from .packings import arches, at_rest, bed, crystal, law, sheared
@@ -14,6 +15,12 @@ from .packings import arches, at_rest, bed, crystal, law, sheared
 GROUP = "stiffness and load"
 
 Make = Callable[[], Packing]
+
+LOOSE = """
+packing = { disks = 24, top = 5, width = 5.95, seed = 2 }
+law = { kn = 2e5 }
+load = { fy = 2e4 }
+"""
 
 
 def _balance(make: Make) -> Outcome:
@@ -30,6 +37,17 @@ def _flows() -> Outcome:
     packing = start.packing
     with Engine(packing) as engine:
         return refused(lambda: equilibrate(engine, start, 1e-3 * packing.fy), NoEquilibriumError, "flows")
+
+
+def _tolerance_below_the_floor() -> Outcome:
+    """The paper's f_min in doubles: the iteration ends at the floor, and the residual that is reported is measured."""
+    packing = bed()
+    start = at_rest(packing)
+    with Engine(packing) as engine:
+        found = equilibrate(engine, start, 3e-3 * packing.fy, force_tolerance=1e-15)
+    if found.residual <= 1e-15:
+        return Outcome("fails", found.residual, 1e-15, "a balance is reported that doubles do not have")
+    return balance(found)
 
 
 def _both(name: str, make: Make, quick: bool = False) -> list[Case]:
@@ -64,5 +82,12 @@ CASES = [
         for case in _both(f"k_t = {share:g} k_n", partial(bed, law(kt_share=share)), share == 10)
     ),
     *(case for ratio in (10, 50) for case in _both(f"sizes 1 : {ratio}", partial(arches, ratio), ratio == 50)),
+    Case(GROUP, "f_min = 1e-15 in doubles", _tolerance_below_the_floor, True),
     Case(GROUP, "F_x without friction", _flows, True),
+    Case(
+        GROUP,
+        "load 0.1 k_n from a loose start",
+        partial(refused_by_command, "settle", LOOSE, "contact law does not hold"),
+        True,
+    ),
 ]
