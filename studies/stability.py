@@ -143,7 +143,11 @@ def stability_figure(done: Sequence[tuple[Case, Outcome]]) -> Figure:
 
 
 def _typeset(name: str) -> str:
-    return re.sub("([kFf])_([a-z]+)", r"$\1_{\2}$", name).replace("mu =", r"$\mu$ =").replace("eps =", r"$\epsilon$ =")
+    return (
+        re.sub(r"([kFf])_([a-z]+)(\^c)?", r"$\1_{\2}\3$", name)
+        .replace("mu =", r"$\mu$ =")
+        .replace("eps =", r"$\epsilon$ =")
+    )
 
 
 def _draw(axes: Any, place: float, outcome: Outcome) -> None:
