@@ -3,7 +3,7 @@
 # make check       format, lint and types
 # make benchmark   time per step beside LAMMPS's own granular styles; what each part of a scene costs; the onset, solved and
 #                  scanned; error against run time; growth with size
-# make pictures    the report that the documentation shows, in docs/report
+# make pictures    the report and the stiff cases that the documentation shows, in docs/report and docs/stability
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
 # make clean       removes what the others made
 
@@ -46,6 +46,7 @@ benchmark: $(VENV)/.installed
 
 pictures: $(VENV)/.installed
 	$(BIN)/faultgouge report -o docs/report
+	$(BIN)/faultgouge stability -o docs/stability
 
 docs: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet -r docs/requirements.txt

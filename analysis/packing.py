@@ -241,7 +241,8 @@ class Packing:
         height = exact_sum(self.radius[i[floor]], -distance[floor])
         overlap[0][floor], overlap[1][floor] = normalized(height[0], height[1] - branch[1][floor, 1])
         if np.any(distance[~floor] == 0):
-            raise ValueError("Two disks in contact have the same centre.")
+            k = np.flatnonzero(~floor & (distance == 0))[0]
+            raise ValueError(f"Disks {i[k]} and {j[k]} have the same centre, so that their contact has no direction.")
         normal = np.empty_like(branch[0])
         normal[~floor] = branch[0][~floor] / distance[~floor, None]
         normal[floor] = (0.0, 1.0)

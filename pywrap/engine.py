@@ -8,6 +8,7 @@ collective over the ranks of the communicator, and every rank sees the whole pac
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -36,8 +37,20 @@ FLOOR_SLIP, FLOOR_OVERLAP, FLOOR_SLIP_LOW = 2, 6, 7
 LOW_COLUMNS = 5
 
 
+DECORATION = re.compile(r"^'?ERROR( on proc \d+)?: | \([^ ()]+:\d+\)'?$")
+"""What surrounds the sentence of an error of LAMMPS: who says it, and where in the source."""
+
+
 class EngineError(RuntimeError):
-    """LAMMPS could not do what was asked: one sentence with its reason."""
+    """LAMMPS could not do what was asked: one sentence with its reason.
+
+    Attributes
+    ----------
+    one_rank : bool
+        Whether one rank alone knows of it. The others wait for it then, and only MPI's Abort ends them.
+    """
+
+    one_rank = False
 
 
 @dataclass(frozen=True)
@@ -330,7 +343,7 @@ class Engine:
 
     def _load(self, packing: Packing) -> None:
         law = packing.law
-        with _shared_folder(self.communicator) as folder:
+        with shared_folder(self.communicator) as folder:
             data = folder / "packing.data"
             if self.communicator.rank == 0:
                 data.write_text(data_file(packing))
@@ -493,9 +506,10 @@ class Engine:
     def _command(self, command: str) -> None:
         try:
             self._lammps.command(command)
-        except Exception as error:  # the LAMMPS module raises plain Exception
-            reason = str(error).removeprefix("ERROR: ").split(" (src/")[0].splitlines()[0]
-            raise EngineError(f"LAMMPS stopped: {reason}.") from error
+        except Exception as error:  # the LAMMPS module raises plain Exception, or MPIAbortException on one rank alone
+            failure = EngineError(f"LAMMPS stopped: {DECORATION.sub('', str(error).splitlines()[0])}.")
+            failure.one_rank = type(error).__name__ == "MPIAbortException"
+            raise failure from error
 
 
 def data_file(packing: Packing) -> str:
@@ -524,12 +538,12 @@ def data_file(packing: Packing) -> str:
 
 
 @contextmanager
-def _shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
+def shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
     """A temporary folder of rank 0 that all ranks know."""
     keeper = tempfile.TemporaryDirectory(prefix="faultgouge-") if communicator.rank == 0 else None
     try:
         yield Path(communicator.bcast(keeper.name if keeper else None))
+        communicator.barrier()  # not after an error, which one rank may be alone with
     finally:
-        communicator.barrier()
         if keeper:
             keeper.cleanup()

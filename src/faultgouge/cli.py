@@ -269,6 +269,25 @@ def report(
     _say(f"written: {output}/report.md")
 
 
+@app.command(epilog="Example: [bold]mpiexec -n 2 faultgouge stability -o stability[/bold]")
+def stability(
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for table, picture and numbers.")] = Path(
+        "stability"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="The small part of the cases.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
+    from faultgouge.studies.stability import check
+    from faultgouge.studies.stability import stability as try_cases
+
+    result = try_cases(output, quick, _say, lambda cases: _progress(cases, "cases", len(cases)))
+    _say(f"{len(result['cases'])} cases tried; written: {output}/stability.md")
+    if as_json:
+        _print_json(result)
+    check(result)
+
+
 def main() -> None:
     """Run the command; what goes wrong is said in one sentence."""
     # one thread for BLAS: its threads cost more than they bring at these sizes, and change the last digits of a solve
@@ -279,7 +298,12 @@ def main() -> None:
     except KeyboardInterrupt:
         _stop("interrupted: what was written is kept, and the same command goes on from there", 130)
     except Exception as error:
-        _stop(_sentence(error), _exit_code(error))
+        _stop(_sentence(error), _exit_code(error), alone=_is_parallel() and _of_one_rank(error))
+
+
+def _of_one_rank(error: Exception) -> bool:
+    """Whether the other ranks do not know of it, and wait: for LAMMPS, or for rank 0, which alone writes files."""
+    return isinstance(error, OSError) or getattr(error, "one_rank", False)
 
 
 def _exit_code(error: Exception) -> int:
@@ -301,6 +325,7 @@ def _sentence(error: Exception) -> str:
         "EngineError",
         "OnsetError",
         "ReportError",
+        "StabilityError",
         "OSError",
     }
     if {base.__name__ for base in type(error).__mro__} & expected:
@@ -312,15 +337,23 @@ def _sentence(error: Exception) -> str:
     return f"this should not have happened ({type(error).__name__} at {where}: {error}): please report it"
 
 
-def _stop(sentence: str, code: int) -> None:
-    if sentence and _is_root():
+def _stop(sentence: str, code: int, alone: bool = False) -> None:
+    if sentence and (alone or _is_root()):
         Console(stderr=True, soft_wrap=True, highlight=False).print("[bold red]Error:[/bold red] ", end="")
-        print(sentence, file=sys.stderr)
+        print(sentence, file=sys.stderr, flush=True)
+    if alone:
+        from mpi4py import MPI
+
+        MPI.COMM_WORLD.Abort(code)
     sys.exit(code)
 
 
 def _is_root() -> bool:
     return int(os.environ.get("PMI_RANK", "0")) == 0
+
+
+def _is_parallel() -> bool:
+    return int(os.environ.get("PMI_SIZE", "1")) > 1
 
 
 def _scene(path: Path) -> Scene:

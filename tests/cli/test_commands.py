@@ -187,7 +187,7 @@ def test_bad_file_is_refused(faultgouge, arguments, says):
 
 
 def test_every_command_has_help_with_an_example(faultgouge):
-    commands = ["settle", "ramp", "perturb", "onset", "spectrum", "explain", "reproduce"]
+    commands = ["settle", "ramp", "perturb", "onset", "spectrum", "explain", "report", "stability", "reproduce"]
     overview = faultgouge("--help").stdout
     for command in commands:
         assert command in overview

@@ -1,0 +1,116 @@
+"""The stability study: its small part, its files, and a case that fails among others."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from faultgouge.studies.stability import CASES, StabilityError, check, stability
+from faultgouge.studies.stability_cases.case import Case, Outcome, measured, refusal, refused
+
+BIN = Path(sys.executable).parent
+QUICK = [case for case in CASES if case.quick]
+
+
+@pytest.mark.parametrize("case", QUICK, ids=lambda case: f"{case.group}: {case.name}")
+def test_case(case):
+    outcome = case.outcome()
+    assert outcome.status in ("holds", "refused"), outcome.says
+    assert outcome.says
+    if outcome.status == "holds":
+        assert outcome.figure <= outcome.bound
+    else:
+        assert outcome.figure is None
+        assert "\n" not in outcome.says
+
+
+def test_names_are_unique():
+    names = [(case.group, case.name) for case in CASES]
+    assert len(set(names)) == len(names)
+
+
+def crash():
+    raise ZeroDivisionError("in the middle of it\nand more")
+
+
+TROUBLE = [
+    Case("a", "good", lambda: measured(0.5, 1.0, "half of it")),
+    Case("a", "too large", lambda: measured(2.0, 1.0, "twice")),
+    Case("a", "no number", lambda: measured(float("nan"), 1.0, "what should hold")),
+    Case("b", "crash", crash),
+    Case("b", "refused", lambda: refused(lambda: int("x"), ValueError, "invalid literal")),
+    Case("b", "not refused", lambda: refused(lambda: int("1"), ValueError, "invalid literal")),
+    Case("b", "last", lambda: measured(0.0, 0.0, "nothing at all")),
+]
+
+
+def test_failures_are_told_and_the_others_go_on(tmp_path):
+    told = []
+    result = stability(tmp_path / "out", say=told.append, cases=TROUBLE)
+    status = {case["name"]: case["status"] for case in result["cases"]}
+    assert status == {
+        "good": "holds",
+        "too large": "fails",
+        "no number": "fails",
+        "crash": "fails",
+        "refused": "refused",
+        "not refused": "fails",
+        "last": "holds",
+    }
+    assert told[2] == "b, crash: ZeroDivisionError: in the middle of it"
+    assert json.loads((tmp_path / "out" / "stability.json").read_text()) == result
+    page = (tmp_path / "out" / "stability.md").read_text()
+    assert "7 cases: 2 hold, 1 refused" in page
+    assert "| too large | fails | 2 | 1 | twice |" in page
+    assert (tmp_path / "out" / "stability.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(StabilityError, match=r"4 of 7 cases failed: too large; no number; crash; not refused"):
+        check(result)
+
+
+def test_results_are_written_as_they_come(tmp_path):
+    def killed():
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stability(tmp_path, cases=[TROUBLE[0], Case("a", "killed", killed)])
+    cases = json.loads((tmp_path / "stability.json").read_text())["cases"]
+    assert [case["name"] for case in cases] == ["good"]
+    assert cases[0].keys() >= {"name", "status", "figure", "says"}
+
+
+@pytest.mark.parametrize("sentence", ["", "two\nlines", "Traceback (most recent call last)", "something else"])
+def test_what_is_no_refusal(sentence):
+    assert refusal(sentence, "wrong").status == "fails"
+
+
+def test_outcome_of_a_refusal():
+    assert refusal(" kn is wrong: correct it\n", "wrong") == Outcome("refused", None, None, "kn is wrong: correct it")
+
+
+def faultgouge(folder, *arguments, ranks=1):
+    command = [BIN / "mpiexec", "-n", str(ranks), BIN / "faultgouge", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+
+
+@pytest.mark.slow
+def test_same_table_on_two_ranks(tmp_path):
+    one = faultgouge(tmp_path, "stability", "--quick", "-o", "one", "--json")
+    two = faultgouge(tmp_path, "stability", "--quick", "-o", "two", ranks=2)
+    assert one.returncode == 0, one.stderr
+    assert two.returncode == 0, two.stderr
+    assert (tmp_path / "one" / "stability.json").read_text() == (tmp_path / "two" / "stability.json").read_text()
+    assert json.loads(one.stdout) == json.loads((tmp_path / "one" / "stability.json").read_text())
+    assert len(json.loads(one.stdout)["cases"]) == len(QUICK)
+
+
+def test_error_of_one_rank_ends_the_others(tmp_path):
+    """A contact that the law does not cover is found by the rank that owns it; the other one waits for its forces."""
+    (tmp_path / "scene.toml").write_text(
+        "packing = { disks = 24, top = 5, width = 5.95, seed = 2 }\nlaw = { kn = 2e5 }\nload = { fy = 2e4 }\n"
+    )
+    done = faultgouge(tmp_path, "settle", "scene.toml", ranks=2)
+    assert done.returncode != 0
+    assert "where the contact law does not hold: lower the load" in done.stderr
+    assert ".cpp" not in done.stderr
