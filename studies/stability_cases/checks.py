@@ -76,5 +76,5 @@ def derivative(packing: Packing) -> Outcome:
         worst / scale,
         1e-8 + rounding,
         f"largest difference of -dF/dq and K q, in units of max |K|, {DIRECTIONS} directions q, h = {width:.0e}; "
-        "the bound is their rounding over h, and 1e-8 of curvature",
+        "the bound is the rounding of forces over h, and 1e-8 of curvature",
     )

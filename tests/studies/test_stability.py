@@ -3,12 +3,18 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from faultgouge.analysis import stiffness_matrix
+from faultgouge.pywrap import Equilibrium
+from faultgouge.pywrap.quasistatic import rounding_floor
 from faultgouge.studies.stability import CASES, StabilityError, check, stability
+from faultgouge.studies.stability_cases import checks
 from faultgouge.studies.stability_cases.case import Case, Outcome, measured, refusal, refused
+from faultgouge.studies.stability_cases.packings import crystal, sheared
 
 BIN = Path(sys.executable).parent
 QUICK = [case for case in CASES if case.quick]
@@ -78,6 +84,23 @@ def test_results_are_written_as_they_come(tmp_path):
     cases = json.loads((tmp_path / "stability.json").read_text())["cases"]
     assert [case["name"] for case in cases] == ["good"]
     assert cases[0].keys() >= {"name", "status", "figure", "says"}
+
+
+def test_derivative_tells_a_wrong_operator(monkeypatch):
+    """The paper's form lacks the turning of the tangent, a thousandth of K here."""
+    packing = crystal(3)
+    assert checks.derivative(packing).status == "holds"
+    monkeypatch.setattr(checks, "stiffness_matrix", lambda each: stiffness_matrix(each, "paper"))
+    wrong = checks.derivative(packing)
+    assert wrong.status == "fails"
+    assert 1e-5 < wrong.figure < 1e-2
+
+
+def test_balance_tells_a_force():
+    packing = sheared(crystal(3)).packing
+    pushed = replace(packing, fx=packing.fx + 1e-9)
+    found = Equilibrium(pushed, pushed.residual, rounding_floor(pushed), 0)
+    assert checks.balance(found).status == "fails"
 
 
 @pytest.mark.parametrize("sentence", ["", "two\nlines", "Traceback (most recent call last)", "something else"])
