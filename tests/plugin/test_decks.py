@@ -92,6 +92,10 @@ def test_model_of_the_refusals_runs(lmp):
             {"fix": "fix 1 all nve/disc 1.0\ncreate_atoms 1 single 1.2 0.499 0\nset group all diameter 1.0"},
             "only 0.19999999999999996 apart, the centre of one inside of the other",
         ),
+        (
+            {"fix": "fix 1 all nve/disc 1.0\nfix 2 all wall/mindlin/smooth 2e5 5e4 1.0 ylo 0.6"},
+            "has its centre at 0.499, below the floor",
+        ),
         ({"run": "velocity all set 1e3 0 0\nrun 1000"}, "in one step, farther than its radius 0.501"),
     ],
     ids=lambda value: str(next(iter(value.values())))[:40] if isinstance(value, dict) else "",
