@@ -54,7 +54,7 @@ public:
   std::vector<PairForce> force;
   std::vector<PairForceLow> force_low;    // only if compensated
   std::vector<double> slip, slip_low;     // only with_slips
-  std::vector<char> touching;             // only with_slips
+  std::vector<int> touching;              // only with_slips
 };
 
 }    // namespace faultgouge

@@ -87,7 +87,7 @@ void FixDiscIntegrator::complete_forces()
   for (int i = 0; i < atom->nlocal; i++) complete_force<true>(i);
 }
 
-template <bool COMPENSATED> void FixDiscIntegrator::complete_force(int i)
+template <bool COMPENSATED> FAULTGOUGE_INLINE void FixDiscIntegrator::complete_force(int i)
 {
   if constexpr (COMPENSATED) low_parts->complete_force(i);
 }
@@ -97,14 +97,10 @@ void FixDiscIntegrator::reset_dt()
   dt = update->dt;
 }
 
-template <bool ROTATION, bool COMPENSATED> void FixDiscIntegrator::move(int i)
+template <bool ROTATION, bool COMPENSATED> FAULTGOUGE_INLINE void FixDiscIntegrator::move(int i)
 {
   const double dx = dt * atom->v[i][0], dy = dt * atom->v[i][1];
-  if (!(dx * dx + dy * dy <= atom->radius[i] * atom->radius[i]))
-    error->one(FLERR,
-               "fix {}: disk {} would move by ({}, {}) in one step, farther than its radius {}: the time step is too "
-               "long, or a force too large",
-               style, atom->tag[i], dx, dy, atom->radius[i]);
+  if (!(dx * dx + dy * dy <= atom->radius[i] * atom->radius[i])) refuse(i, dx, dy);
   if constexpr (COMPENSATED) {
     low_parts->move(i, dx, dy);
   } else {
@@ -113,6 +109,15 @@ template <bool ROTATION, bool COMPENSATED> void FixDiscIntegrator::move(int i)
   }
   if constexpr (ROTATION)
     if (angle >= 0) atom->dvector[angle][i] += dt * atom->omega[i][2];
+}
+
+void FixDiscIntegrator::refuse(int i, double dx, double dy) const
+{
+  error->one(
+      FLERR,
+      "fix {}: disk {} would move by ({}, {}) in one step, farther than its radius {}: the time step is too long, "
+      "or a force too large",
+      style, atom->tag[i], dx, dy, atom->radius[i]);
 }
 
 FixNVEDisc::FixNVEDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg, 1)
@@ -125,7 +130,7 @@ int FixNVEDisc::setmask()
   return INITIAL_INTEGRATE | FINAL_INTEGRATE;
 }
 
-template <bool ROTATION> void FixNVEDisc::kick(int i)
+template <bool ROTATION> FAULTGOUGE_INLINE void FixNVEDisc::kick(int i)
 {
   const double per_mass = 0.5 * dt / atom->rmass[i];
   atom->v[i][0] += per_mass * atom->f[i][0];

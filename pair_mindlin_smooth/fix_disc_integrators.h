@@ -38,6 +38,7 @@ protected:
   template <bool ROTATION, bool COMPENSATED> void move(int i);    // by v dt and omega dt
   template <bool COMPENSATED> void complete_force(int i);
   void complete_forces();
+  void refuse(int i, double dx, double dy) const;    // disk i cannot move so far
 
   // work(rotates, compensates) with both known at compile time
   template <class Work> void choose(Work work) const

@@ -200,10 +200,11 @@ template <class NUMBER, bool FRICTION> void FixWallMindlinSmooth::contact_forces
       continue;
     }
     if (!(leading(overlap) <= radius))
-      error->one(FLERR,
-                 "fix wall/mindlin/smooth: disk {} has its centre at {}, below the floor, where the contact law does not "
-                 "hold: lower the load or the time step, or raise KN",
-                 atom->tag[i], atom->x[i][1]);
+      error->one(
+          FLERR,
+          "fix wall/mindlin/smooth: disk {} has its centre at {}, below the floor, where the contact law does not "
+          "hold: lower the load or the time step, or raise KN",
+          atom->tag[i], atom->x[i][1]);
     energy += law.normal_energy(value(overlap));
 
     const bool known = contact[OVERLAP] > 0.0;    // a new contact begins without slip
