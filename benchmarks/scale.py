@@ -9,9 +9,13 @@ with one thread, so that its peak of memory is its own.
     K dq = F   one linear solve in it
     onset      the first window of complex eigenvalues, found without all eigenvalues, the ramp to it included
 
-    python benchmarks/scale.py [--disks 1000 3000] [--no-onset] [--output scale.json]
+Beside these, square crystals of disks, whose equilibria are known and need no settling, for what a linear solve and
+the assembly of K cost at 100,000 disks.
 
-The exponent is that of the cost between the smallest and the largest size. 10,000 disks take minutes, 100,000 hours.
+    python benchmarks/scale.py [--disks 1000 3000] [--crystals 10000 100000] [--no-onset] [--output scale.json]
+
+The exponent is that of the cost between the smallest and the largest size. To settle 10,000 disks takes some ten
+minutes; 100,000 were not tried to the end.
 """
 
 import os
@@ -30,10 +34,13 @@ from pathlib import Path
 
 import numpy as np
 
-from faultgouge.analysis import OnsetError, find_onset
+from faultgouge.analysis import OnsetError, find_onset, stiffness_matrix
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate, settle
-from faultgouge.pywrap.quasistatic import newton_step
+from faultgouge.pywrap.quasistatic import newton_step, rounding_floor
 from faultgouge.pywrap.stages import EquilibriumPath
+from faultgouge.studies.stability_cases.packings import crystal
+
+Row = dict[str, float | int | None]
 
 STEP, UNTIL = 1e-3, 0.05
 MEAN_DIAMETER = 1.2
@@ -50,39 +57,55 @@ def scene(disks: int, seed: int) -> Scene:
     )
 
 
-def measured(disks: int, seed: int, with_onset: bool) -> dict[str, float | int | None]:
+def measured(disks: int, seed: int, with_onset: bool) -> Row:
     """All stages of one size; seconds, and memory in GB."""
     wanted = scene(disks, seed)
     begin = time.perf_counter()
     start = settle(wanted)
-    row: dict[str, float | int | None] = {
-        "disks": disks,
-        "settle": time.perf_counter() - begin,
-        "residual": start.residual,
-        "floor": start.floor,
-        "newton": None,
-        "solve": None,
-        "onset": None,
-        "fx_c": None,
-    }
+    row: Row = {"disks": disks, "settle": time.perf_counter() - begin, "onset": None, "fx_c": None}
     with Engine(start.packing) as engine:
-        here, times = start, []
-        for k in range(1, 4):
-            begin = time.perf_counter()
-            try:
-                here = equilibrate(engine, here, k * STEP)
-            except NoEquilibriumError:
-                break
-            times.append(time.perf_counter() - begin)
-        row["newton"] = statistics.median(times) if times else None
-        row["evaluations"] = here.evaluations
-        begin = time.perf_counter()
-        newton_step(here.packing, here.packing.net_force)
-        row["solve"] = time.perf_counter() - begin
+        row |= increments(engine, start)
         if with_onset:
             row |= onset(engine, start, wanted)
     row["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     return row
+
+
+def measured_crystal(disks: int) -> Row:
+    """The same without settling and onset, of a square crystal."""
+    columns = round(math.sqrt(disks))
+    packing = crystal(columns, columns)
+    with Engine(packing) as engine:
+        start = equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), 0.0)
+        row: Row = {"disks": len(packing), "settle": None, "onset": None, "fx_c": None} | increments(engine, start)
+    row["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    return row
+
+
+def increments(engine: Engine, start: Equilibrium) -> Row:
+    """Times of increments of F_x, of one linear solve and of one assembly of K."""
+    here, times = start, []
+    for k in range(1, 4):
+        begin = time.perf_counter()
+        try:
+            here = equilibrate(engine, here, k * STEP)
+        except NoEquilibriumError:
+            break
+        times.append(time.perf_counter() - begin)
+    packing = here.packing
+    _ = packing.geometry, packing.net_force  # computed once, and not part of what follows
+    begin = time.perf_counter()
+    stiffness_matrix(packing)
+    assembled = time.perf_counter()
+    newton_step(packing, packing.net_force)
+    return {
+        "residual": here.residual,
+        "floor": here.floor,
+        "evaluations": here.evaluations,
+        "newton": statistics.median(times) if times else None,
+        "assembly": assembled - begin,
+        "solve": time.perf_counter() - assembled,
+    }
 
 
 def onset(engine: Engine, start: Equilibrium, wanted: Scene) -> dict[str, float | None]:
@@ -106,37 +129,59 @@ def main() -> None:
     """Print the table, and write it as JSON if asked to."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--disks", type=int, nargs="+", default=[1000, 3000])
+    parser.add_argument("--crystals", type=int, nargs="*", default=[10_000, 100_000])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--no-onset", action="store_true", help="settle and ramp alone")
     parser.add_argument("--output", type=Path, help="also write the numbers to this file")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
-        print(json.dumps(measured(options.disks[0], options.seed, not options.no_onset)))
+        disks = options.disks[0]
+        row = measured_crystal(disks) if options.crystals else measured(disks, options.seed, not options.no_onset)
+        print(json.dumps(row))
         return
 
-    columns = {"settle": "9.1f", "newton": "9.2f", "solve": "9.2f", "onset": "9.1f", "memory": "9.2f"}
-    print(f"{'disks':>8s}{'settle':>9s}{'newton':>9s}{'K dq = F':>9s}{'onset':>9s}{'memory':>9s}{'F_x^c':>16s}")
-    print(f"{'':8s}{'s':>9s}{'s':>9s}{'s':>9s}{'s':>9s}{'GB':>9s}")
-    rows = []
-    for disks in options.disks:
-        command = [sys.executable, __file__, "--one", "--disks", str(disks), "--seed", str(options.seed)]
-        done = subprocess.run(command + ["--no-onset"] * options.no_onset, capture_output=True, text=True, check=False)
+    extra = ["--seed", str(options.seed), *["--no-onset"] * options.no_onset]
+    rows = {
+        "settled": table("settled packings", options.disks, ["--crystals", *extra]),
+        "crystals": table("crystals", options.crystals, ["--crystals", "1"]),
+    }
+    if options.output:
+        options.output.write_text(json.dumps(rows, indent=1) + "\n")
+
+
+COLUMNS = {
+    "settle": "9.1f",
+    "newton": "9.2f",
+    "assembly": "9.3f",
+    "solve": "9.2f",
+    "onset": "9.1f",
+    "memory": "9.2f",
+}
+
+
+def table(title: str, sizes: list[int], arguments: list[str]) -> list[Row]:
+    """Measure packings of several sizes, each in a process of its own, and print them."""
+    print(f"\n{title:18s}" + "".join(f"{name:>9s}" for name in COLUMNS) + f"{'F_x^c':>16s}")
+    print(f"{'':18s}" + "".join(f"{'GB' if name == 'memory' else 's':>9s}" for name in COLUMNS))
+    rows: list[Row] = []
+    for disks in sizes:
+        command = [sys.executable, __file__, "--one", "--disks", str(disks), *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
             sys.exit(f"{disks} disks: {done.stderr.strip().splitlines()[-1]}")
         row = json.loads(done.stdout.splitlines()[-1])
         rows.append(row)
-        cells = "".join(text(row[name], format_) for name, format_ in columns.items())
-        print(f"{disks:8d}{cells}{text(row['fx_c'], '16.10f')}", flush=True)
-    small, large = rows[0], rows[-1]
-    if large["disks"] > small["disks"]:
+        cells = "".join(text(row[name], format_) for name, format_ in COLUMNS.items())
+        print(f"{row['disks']:18d}{cells}{text(row['fx_c'], '16.10f')}", flush=True)
+    if len(rows) > 1:
+        small, large = rows[0], rows[-1]
         span = math.log(large["disks"] / small["disks"])
         exponents = {
-            name: math.log(large[name] / small[name]) / span for name in columns if small[name] and large[name]
+            name: math.log(large[name] / small[name]) / span for name in COLUMNS if small[name] and large[name]
         }
-        print(f"{'exponent':8s}" + "".join(text(exponents.get(name), "9.2f") for name in columns))
-    if options.output:
-        options.output.write_text(json.dumps(rows, indent=1) + "\n")
+        print(f"{'exponent':18s}" + "".join(text(exponents.get(name), "9.2f") for name in COLUMNS))
+    return rows
 
 
 if __name__ == "__main__":

@@ -139,7 +139,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--disks", type=int, nargs="+", default=[100, 10_000])
-    parser.add_argument("--packing", nargs="+", choices=["hexagonal", "disordered"], default=["hexagonal"])
+    parser.add_argument(
+        "--packing", nargs="+", choices=["hexagonal", "disordered"], default=["hexagonal", "disordered"]
+    )
     parser.add_argument("--turns", type=int, default=5)
     parser.add_argument("--output", type=Path, help="also write the numbers to this file")
     options = parser.parse_args()

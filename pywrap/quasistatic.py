@@ -36,6 +36,7 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 from ..analysis import Packing, nearest_image, stiffness_matrix
+from .elimination import elimination_order
 from .engine import Engine
 
 Floats = NDArray[np.float64]
@@ -285,15 +286,17 @@ def _factored(packing: Packing) -> Callable[[Floats], Floats | None] | None:
     share = np.where(np.tile(_idle(packing), 3), CREEP, 1e-13)
     diagonal = (1 + share) * matrix.diagonal()
     active = np.flatnonzero(diagonal)
+    if len(active) > DENSE:
+        active = active[elimination_order(packing, active)]
     block = matrix[active][:, active]
     block.setdiag(diagonal[active])
     if len(active) <= DENSE:
         inverse = partial(np.linalg.solve, block.toarray())
     else:
         try:
-            # nearly symmetric: the fill-reducing order of a symmetric matrix, pivots on the diagonal where good
+            # nearly symmetric: pivots on the diagonal where good
             inverse = splu(
-                csc_array(block), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options={"SymmetricMode": True}
+                csc_array(block), permc_spec="NATURAL", diag_pivot_thresh=0.01, options={"SymmetricMode": True}
             ).solve
         except RuntimeError:
             return None
