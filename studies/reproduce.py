@@ -286,8 +286,9 @@ def _report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, more: list[st
         f"Then F_x was raised to {runs[0].equilibria[-1].fx:g} in steps of {ramp.step:g}, from equilibrium to "
         f"equilibrium ({ramp.method}).",
         f"The largest force left on a disk is {max(e.residual for run in runs for e in run.equilibria):.1e}; the "
-        f"rounding of the coordinates alone leaves about {runs[0].equilibria[-1].floor:.1e}, so that the paper's 1e-15",
-        "cannot be reached in double precision in these units.",
+        f"rounding of the coordinates alone leaves about {runs[0].equilibria[-1].floor:.1e}"
+        + ("." if packing.compensated else ", so that the paper's 1e-15"),
+        *([] if packing.compensated else ['needs `precision = "compensated"` in the scene.']),
         "",
         "![the packing](figure1.png)",
         "",
