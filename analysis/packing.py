@@ -159,6 +159,7 @@ class Packing:
     radius: Floats
     contacts: Contacts
     law: MindlinLaw
+    # None stands for the defaults that __post_init__ puts in its place: the attributes are arrays
     angle: Floats = None  # type: ignore[assignment]
     mass: Floats = None  # type: ignore[assignment]
     inertia_factor: float = 1.0

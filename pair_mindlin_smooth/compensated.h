@@ -44,14 +44,6 @@ FAULTGOUGE_INLINE double leading(Compensated a)
 {
   return a.high;
 }
-FAULTGOUGE_INLINE double remainder(double)
-{
-  return 0.0;
-}
-FAULTGOUGE_INLINE double remainder(Compensated a)
-{
-  return a.low;
-}
 
 // a + b, exactly
 FAULTGOUGE_INLINE Compensated exact_sum(double a, double b)

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <type_traits>
 
-// Fused multiply-add makes exact products fast, and vectors of four do the rest.
+// Fused multiply-add makes exact products fast, and vectors of four or eight do the rest.
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__)
 #define FAULTGOUGE_DISPATCH __attribute__((target_clones("avx512f", "fma", "default")))
 #else

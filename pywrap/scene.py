@@ -161,6 +161,7 @@ class Law(_Section):
     """
 
     kn: Positive
+    # the default is of the form that a scene gives, and becomes a number in the validator
     kt: NotNegative = Field("2/7 kn")  # type: ignore[assignment]
     mu: float | tuple[float, ...] = 1.0
 

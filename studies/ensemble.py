@@ -47,7 +47,7 @@ from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor, MPIPoolExecutor
 from numpy.typing import NDArray
 from scipy.stats import CensoredData, binomtest, ecdf
-from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+from threadpoolctl import threadpool_limits
 
 from ..analysis import OnsetError, Packing, find_onset, spectrum
 from ..pywrap import Engine, Equilibrium, Sample, Scene, SceneError

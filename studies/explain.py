@@ -328,7 +328,7 @@ def time_ranks(job: str) -> None:
 
 def _threads(packing: Packing) -> Part:
     """A dense solve of Newton's method, with one thread and with two."""
-    from threadpoolctl import threadpool_info, threadpool_limits  # type: ignore[import-untyped]
+    from threadpoolctl import threadpool_info, threadpool_limits
 
     here = max((pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"), default=1)
     matrix = dynamical_matrix(packing)[0][:DENSE, :DENSE].toarray()

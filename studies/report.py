@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_info  # type: ignore[import-untyped]
+from threadpoolctl import threadpool_info
 
 from ..pywrap import Scene, ramp
 from .figures import save
@@ -154,14 +154,15 @@ def _named(progress: Callable[[Sequence[int], str], Iterable[int]], name: str, i
 
 def _written(output: Path, quick: bool, done: list[Study], failed: dict[str, str]) -> dict[str, Any]:
     """report.json and report.md with what there is."""
+    where = machine()
     result = {
-        "machine": machine(),
+        "machine": where,
         "quick": quick,
         "studies": [study.as_dict() for study in done],
         "failed": [{"name": name, "says": says} for name, says in failed.items()],
     }
     (output / "report.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n")
-    (output / "report.md").write_text(_page(result["machine"], quick, done, failed))  # type: ignore[arg-type]
+    (output / "report.md").write_text(_page(where, quick, done, failed))
     return result
 
 

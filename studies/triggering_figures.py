@@ -331,7 +331,7 @@ def damping_figure(curves: Sequence[DampingCurve]) -> Figure:
     handles = axes.get_legend_handles_labels()[0][:2]
     key = axes.legend(handles, [r"$\tau = \tau_d = 1/(\delta\sqrt{\varepsilon})$", "half of the undamped amplitude"])
     for handle in key.legend_handles:
-        handle.set_color(INK)  # type: ignore[union-attr]
+        handle.set_color(INK)  # type: ignore[union-attr]  # matplotlib types it as any artist; these are lines
     return figure
 
 
