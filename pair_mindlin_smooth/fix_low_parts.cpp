@@ -1,7 +1,6 @@
 #include "fix_low_parts.h"
 
 #include "domain.h"
-#include "memory.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,25 +8,9 @@
 using namespace LAMMPS_NS;
 using namespace FixConst;
 
-FixLowParts::FixLowParts(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg)
+FixLowParts::FixLowParts(LAMMPS *lmp, int narg, char **arg) : FixDiskColumns(lmp, narg, arg)
 {
-  restart_peratom = 1;
-  create_attribute = 1;
-  peratom_flag = 1;
-  peratom_freq = 1;
-  size_peratom_cols = COLUMNS;
-  maxexchange = COLUMNS;
-  grow_arrays(atom->nmax);
-  atom->add_callback(Atom::GROW);
-  atom->add_callback(Atom::RESTART);
-  for (int i = 0; i < atom->nlocal; i++) set_arrays(i);
-}
-
-FixLowParts::~FixLowParts()
-{
-  atom->delete_callback(id, Atom::GROW);
-  atom->delete_callback(id, Atom::RESTART);
-  memory->destroy(array_atom);
+  make_columns(COLUMNS);
 }
 
 int FixLowParts::setmask()
@@ -80,63 +63,4 @@ void FixLowParts::wrap(int i, int dimension)
     const imageint mask = static_cast<imageint>(IMGMASK), times = ((atom->image[i] >> place) - back) & mask;
     atom->image[i] = (atom->image[i] & ~(mask << place)) | (times << place);
   }
-}
-
-void FixLowParts::grow_arrays(int n)
-{
-  memory->grow(array_atom, n, COLUMNS, "low/parts:array");
-  for (int i = nmax; i < n; i++) set_arrays(i);
-  nmax = n;
-}
-
-void FixLowParts::copy_arrays(int i, int j, int /*delflag*/)
-{
-  std::copy(array_atom[i], array_atom[i] + COLUMNS, array_atom[j]);
-}
-
-void FixLowParts::set_arrays(int i)
-{
-  std::fill(array_atom[i], array_atom[i] + COLUMNS, 0.0);
-}
-
-int FixLowParts::pack_exchange(int i, double *buf)
-{
-  std::copy(array_atom[i], array_atom[i] + COLUMNS, buf);
-  return COLUMNS;
-}
-
-int FixLowParts::unpack_exchange(int nlocal, double *buf)
-{
-  std::copy(buf, buf + COLUMNS, array_atom[nlocal]);
-  return COLUMNS;
-}
-
-// LAMMPS finds a fix's data in a restart file by the length that starts each record
-int FixLowParts::pack_restart(int i, double *buf)
-{
-  buf[0] = COLUMNS + 1;
-  return 1 + pack_exchange(i, buf + 1);
-}
-
-void FixLowParts::unpack_restart(int nlocal, int nth)
-{
-  double *extra = atom->extra[nlocal];
-  int m = 0;
-  for (int i = 0; i < nth; i++) m += static_cast<int>(extra[m]);
-  unpack_exchange(nlocal, extra + m + 1);
-}
-
-int FixLowParts::size_restart(int /*nlocal*/)
-{
-  return COLUMNS + 1;
-}
-
-int FixLowParts::maxsize_restart()
-{
-  return COLUMNS + 1;
-}
-
-double FixLowParts::memory_usage()
-{
-  return static_cast<double>(nmax) * COLUMNS * sizeof(double);
 }

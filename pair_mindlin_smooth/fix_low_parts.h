@@ -10,17 +10,16 @@
 
 #include "atom.h"
 #include "compensated.h"
-#include "fix.h"
+#include "fix_disk_columns.h"
 
 namespace LAMMPS_NS {
 
-class FixLowParts : public Fix {
+class FixLowParts : public FixDiskColumns {
 public:
   static constexpr const char *ID = "low";
   enum Column { X, Y, FX, FY, TORQUE, COLUMNS };
 
   FixLowParts(class LAMMPS *, int, char **);
-  ~FixLowParts() override;
 
   int setmask() override;
   void setup_pre_exchange() override;
@@ -48,20 +47,8 @@ public:
     low[FX] = low[FY] = low[TORQUE] = 0.0;
   }
 
-  void grow_arrays(int) override;
-  void copy_arrays(int, int, int) override;
-  void set_arrays(int) override;
-  int pack_exchange(int, double *) override;
-  int unpack_exchange(int, double *) override;
-  int pack_restart(int, double *) override;
-  void unpack_restart(int, int) override;
-  int size_restart(int) override;
-  int maxsize_restart() override;
-  double memory_usage() override;
-
 private:
   faultgouge::FixedPointGrid spacing;
-  int nmax = 0;
 
   void wrap(int i, int dimension);
 };

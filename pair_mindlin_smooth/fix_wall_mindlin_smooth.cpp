@@ -7,7 +7,6 @@
 #include "fix_low_parts.h"
 #include "force.h"
 #include "input.h"
-#include "memory.h"
 #include "modify.h"
 #include "update.h"
 #include "variable.h"
@@ -24,10 +23,9 @@ using faultgouge::leading;
 using faultgouge::MindlinLaw;
 using faultgouge::value;
 
-FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg)
+FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : FixDiskColumns(lmp, narg, arg)
 {
   compensated = narg == 9 && strcmp(arg[8], "compensated") == 0;
-  columns = compensated ? SLIP_LOW + 1 : OVERLAP + 1;
   if (narg != (compensated ? 9 : 8))
     error->all(FLERR,
                "fix wall/mindlin/smooth takes KN KT MU ylo COORD and optionally compensated, but got {} arguments",
@@ -46,27 +44,11 @@ FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : 
   if (!atom->radius_flag || !atom->omega_flag || !atom->torque_flag)
     error->all(FLERR, "fix wall/mindlin/smooth needs disks with radius and spin: use atom_style sphere");
 
-  restart_peratom = 1;
-  create_attribute = 1;
-  peratom_flag = 1;
-  peratom_freq = 1;
-  size_peratom_cols = columns;
-  maxexchange = columns;
   scalar_flag = 1;
   global_freq = 1;
   extscalar = 1;
   energy_global_flag = 1;
-  grow_arrays(atom->nmax);
-  atom->add_callback(Atom::GROW);
-  atom->add_callback(Atom::RESTART);
-  for (int i = 0; i < atom->nlocal; i++) set_arrays(i);
-}
-
-FixWallMindlinSmooth::~FixWallMindlinSmooth()
-{
-  atom->delete_callback(id, Atom::GROW);
-  atom->delete_callback(id, Atom::RESTART);
-  memory->destroy(array_atom);
+  make_columns(compensated ? SLIP_LOW + 1 : OVERLAP + 1);
 }
 
 int FixWallMindlinSmooth::setmask()
@@ -241,63 +223,4 @@ void *FixWallMindlinSmooth::extract(const char *name, int &dim)
   if (strcmp(name, "kt") == 0) return &law.kt;
   if (strcmp(name, "mu") == 0) return &law.mu;
   return nullptr;
-}
-
-void FixWallMindlinSmooth::grow_arrays(int n)
-{
-  memory->grow(array_atom, n, columns, "wall/mindlin/smooth:array");
-  for (int i = nmax; i < n; i++) set_arrays(i);
-  nmax = n;
-}
-
-void FixWallMindlinSmooth::copy_arrays(int i, int j, int /*delflag*/)
-{
-  std::copy(array_atom[i], array_atom[i] + columns, array_atom[j]);
-}
-
-void FixWallMindlinSmooth::set_arrays(int i)
-{
-  std::fill(array_atom[i], array_atom[i] + columns, 0.0);
-}
-
-int FixWallMindlinSmooth::pack_exchange(int i, double *buf)
-{
-  std::copy(array_atom[i], array_atom[i] + columns, buf);
-  return columns;
-}
-
-int FixWallMindlinSmooth::unpack_exchange(int nlocal, double *buf)
-{
-  std::copy(buf, buf + columns, array_atom[nlocal]);
-  return columns;
-}
-
-// LAMMPS finds a fix's data in a restart file by the length that starts each record
-int FixWallMindlinSmooth::pack_restart(int i, double *buf)
-{
-  buf[0] = columns + 1;
-  return 1 + pack_exchange(i, buf + 1);
-}
-
-void FixWallMindlinSmooth::unpack_restart(int nlocal, int nth)
-{
-  double *extra = atom->extra[nlocal];
-  int m = 0;
-  for (int i = 0; i < nth; i++) m += static_cast<int>(extra[m]);
-  unpack_exchange(nlocal, extra + m + 1);
-}
-
-int FixWallMindlinSmooth::size_restart(int /*nlocal*/)
-{
-  return columns + 1;
-}
-
-int FixWallMindlinSmooth::maxsize_restart()
-{
-  return columns + 1;
-}
-
-double FixWallMindlinSmooth::memory_usage()
-{
-  return static_cast<double>(nmax) * columns * sizeof(double);
 }

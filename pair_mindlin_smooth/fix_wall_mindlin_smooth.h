@@ -9,15 +9,14 @@
 #ifndef LMP_FIX_WALL_MINDLIN_SMOOTH_H
 #define LMP_FIX_WALL_MINDLIN_SMOOTH_H
 
-#include "fix.h"
+#include "fix_disk_columns.h"
 #include "mindlin_law.h"
 
 namespace LAMMPS_NS {
 
-class FixWallMindlinSmooth : public Fix {
+class FixWallMindlinSmooth : public FixDiskColumns {
 public:
   FixWallMindlinSmooth(class LAMMPS *, int, char **);
-  ~FixWallMindlinSmooth() override;
 
   int setmask() override;
   void init() override;
@@ -29,17 +28,6 @@ public:
   int modify_param(int, char **) override;
   void *extract(const char *, int &) override;
 
-  void grow_arrays(int) override;
-  void copy_arrays(int, int, int) override;
-  void set_arrays(int) override;
-  int pack_exchange(int, double *) override;
-  int unpack_exchange(int, double *) override;
-  int pack_restart(int, double *) override;
-  void unpack_restart(int, int) override;
-  int size_restart(int) override;
-  int maxsize_restart() override;
-  double memory_usage() override;
-
 private:
   enum Column { NORMAL, TANGENTIAL, SLIP, SLIP_RATIO, NX, NY, OVERLAP, SLIP_LOW };
 
@@ -49,10 +37,8 @@ private:
   bool has_friction = false;
   bool compensated = false;
   class FixLowParts *low_parts = nullptr;
-  int columns;
   std::string mu_variable;    // empty where mu is a number
   int mu_index = -1;          // of that variable
-  int nmax = 0;
 
   void set_mu(const char *);
   void update_mu();
