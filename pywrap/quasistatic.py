@@ -23,6 +23,9 @@ From one equilibrium to another q is nearly proportional to the increment: where
 starts from the displacement of that one, in proportion. The ramp of an onset takes the equilibrium before the last,
 which saves one of four evaluations; a ramp that is stored does not, so that it goes on to the bit where it was cut off.
 
+A rattler that a neighbour runs into on the way is moved to the middle of its cage: it carries nothing, and where it
+lies is no matter (:mod:`~faultgouge.pywrap.rattlers`).
+
 Where Newton fails the increment is halved, since the path matters: friction remembers.
 """
 
@@ -38,21 +41,22 @@ from scipy.sparse.linalg import splu
 from ..analysis import Packing, nearest_image, stiffness_matrix
 from .elimination import elimination_order
 from .engine import Engine
+from .rattlers import middle_of_cage
 
 Floats = NDArray[np.float64]
 
 ITERATIONS = 40
-"""Newton iterations before an increment is halved. Four or five do, but where a rattler in a narrow cage has been hit:
-its contact opens as delta^(3/2) -> 0, on which Newton's method gains a factor of 3 an iteration, and 20 reach the
-floor."""
+"""Newton iterations before an increment is halved. Four or five do, but where a rattler has been hit in a cage that
+closes on it: its contact opens as delta^(3/2) -> 0, on which Newton's method gains a factor of 3 an iteration, and 20
+reach the floor."""
 
 FRUITLESS = 8
 """Iterations that gain nothing before an increment is halved."""
 
 FREEING = 3
-"""Iterations in which a rattler that was hit gets one and a half times Newton's step: its force goes as delta^(3/2), a
-root of that order, and the factor makes the convergence quadratic again. Later ones take Newton's own step, since a
-rattler in a narrow cage would be thrown to and fro."""
+"""Iterations in which a rattler that is hit, though it is in the middle of its cage, gets one and a half times Newton's
+step: its force goes as delta^(3/2), a root of that order, and the factor makes the convergence quadratic again. Later
+ones take Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
 
 IDLE = 1e-7
 """Share of the largest contact force up to which a contact carries nothing that matters."""
@@ -200,9 +204,16 @@ def _newton(
     best: Equilibrium | None = None
     solve = None
     worse = 0  # iterations that gained nothing; changes of contacts cost some
+    moved = np.zeros(len(base), dtype=np.bool_)  # rattlers that have been moved out of the way
     earlier = last = np.inf  # residuals of the two iterations before
     for evaluation in range(1, ITERATIONS + 1):
         trial = engine.displace(base, displacement)
+        hit = _hit(trial, base)
+        if np.any(hit & ~moved):
+            displacement = _out_of_the_way(trial, hit & ~moved, displacement)
+            moved |= hit
+            trial = engine.displace(base, displacement)
+            hit = _hit(trial, base)
         force = engine.net_force
         residual = _largest(force, trial)
         floor = rounding_floor(trial)
@@ -228,19 +239,30 @@ def _newton(
         if step is None or np.abs(step).max() > 0.1 * base.radius.min():
             return None, evaluation  # a floating part: the linear response is no small displacement
         if evaluation <= FREEING:
-            step.reshape(3, -1)[:, _hit(trial)] *= 1.5
+            step.reshape(3, -1)[:, hit] *= 1.5
         if base.compensated and residual < 10 * rounding_floor(trial, np.abs(displacement).max()):
             base, displacement = trial, np.zeros_like(displacement)
         displacement = displacement + step
     return None, ITERATIONS
 
 
-def _hit(packing: Packing) -> NDArray[np.bool_]:
-    """Disks with one contact that carries something: rattlers that a neighbour ran into, shape (N,)."""
-    contacts = packing.loaded(rounding_floor(packing)).contacts
-    count = np.bincount(contacts.i, minlength=len(packing))
-    count += np.bincount(contacts.j[~contacts.floor], minlength=len(packing))
-    return (count == 1) & ~packing.top
+def _hit(trial: Packing, base: Packing) -> NDArray[np.bool_]:
+    """Rattlers that a neighbour ran into, and disks with one contact left, which become rattlers, shape (N,)."""
+    least = rounding_floor(base)
+    touched = trial.loaded(least).contacts
+    count = np.bincount(touched.i, minlength=len(trial))
+    count += np.bincount(touched.j[~touched.floor], minlength=len(trial))
+    was_idle = np.zeros(len(base), dtype=np.bool_)
+    was_idle[base.loaded(least).rattlers] = True
+    return ((count == 1) | (was_idle & (count > 0))) & ~base.top
+
+
+def _out_of_the_way(trial: Packing, hit: NDArray[np.bool_], displacement: Floats) -> Floats:
+    """The displacement with which disks end up in the middle of their cages."""
+    disks = np.flatnonzero(hit)
+    changed = displacement.copy()
+    changed.reshape(3, -1)[:2, disks] += (middle_of_cage(trial, disks) - trial.position[disks]).T
+    return changed
 
 
 def _idle(packing: Packing) -> NDArray[np.bool_]:
