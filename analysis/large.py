@@ -1,13 +1,19 @@
-r"""The first window of complex eigenvalues of a large packing, without all of its eigenvalues.
+r"""The first window of complex eigenvalues of a large packing, without a dense decomposition.
 
-A dense decomposition takes a second at 300 disks and grows with the cube. But modes mix with their neighbours only: in
-a fixed basis, the eigenvectors of the symmetric part at one load, the operator is nearly diagonal, and clusters of
-neighbouring modes have its eigenvalues up to the third order of the coupling (see
-:mod:`~faultgouge.analysis.projection`). Their windows say where to look. What appears there is confirmed with the
-operator itself, whose pair is continued to the edges by inverse iteration (:mod:`~faultgouge.analysis.tracking`).
+A dense decomposition takes a second at 300 disks and grows with the cube. But modes mix with their neighbours only. In
+a fixed basis, the eigenvectors of the symmetric part at one load, the operator is nearly diagonal. This basis is found
+slice by slice of the spectrum (:mod:`~faultgouge.analysis.slices`), each as a projection of its own
+(:mod:`~faultgouge.analysis.projection`). In each,
+
+1. a test names the pairs of modes that may meet (:mod:`~faultgouge.analysis.meetings`), few of thousands;
+2. the cluster of neighbouring modes about each of these has its eigenvalues up to the third order of the coupling, and
+   its windows of complex eigenvalues say where to look;
+3. what appears there is confirmed with the operator itself, whose pair is continued to the edges by inverse iteration
+   (:mod:`~faultgouge.analysis.tracking`).
 """
 
-from collections.abc import Callable, Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +21,10 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from .edges import Edge, State, locate
+from .meetings import meetings
 from .modes import Modes, Operator, Pair
 from .packing import Floats
-from .projection import Cluster, Projection
+from .projection import MIXING, Cluster, Levels, Projection
 from .tracking import Block
 from .windows import Place, Window, complex_windows, increasing, window_between
 
@@ -29,17 +36,22 @@ FINEST = 1e-3
 """Narrowest windows of clusters that are looked for, in increments: their own error is larger."""
 
 
+KEPT = 9000
+"""Coordinates up to which the basis is kept from increment to increment, which takes a gigabyte there; of a larger
+operator it is made anew, and never exists as a whole."""
+
+
 def first_window(
     operator: Callable[[float], Operator], forces: ArrayLike, *, narrowest: float | None = None
 ) -> Window | None:
     """The first window of complex eigenvalues of a family of large matrices, without all their eigenvalues.
 
-    The clusters of a :class:`~faultgouge.analysis.projection.Projection` are searched as `complex_windows` does, with
-    the projected operators interpolated linearly between two loads; what appears there is confirmed with the operator
-    itself, whose pair is continued to the edges. So the window that is returned is as certain, and its edges have the
-    same digits, as those of `complex_windows`. That it is the first rests on the clusters, whose onsets were within a
-    tenth of an increment of the confirmed ones (packings of 1,000 disks, increments of 1e-3): a pair that is
-    complex by less than their error, or for less than `FINEST` of an increment, may be missed before it.
+    Clusters of modes are searched as `complex_windows` does, with the projected operators interpolated linearly between
+    two loads; what appears there is confirmed with the operator itself, whose pair is continued to the edges. So the
+    window that is returned is as certain, and its edges have the same digits, as those of `complex_windows`. That it is
+    the first rests on two things. No mode is missing, which the inertia tells. And the clusters are right: their onsets
+    were within a tenth of an increment of the confirmed ones (packings of 1,000 disks, increments of 1e-3). A pair that
+    is complex by less than their error, or for less than `FINEST` of an increment, may be missed before it.
 
     Parameters
     ----------
@@ -87,21 +99,12 @@ class _Search:
     def __init__(self, operator: Callable[[float], Operator], narrowest: float) -> None:
         self.operator, self.narrowest = operator, narrowest
         self.passed: list[Place] = []
-        self.projection: Projection | None = None
-        self.blocks: list[Floats] = []
+        self.kept: list[Projection] = []
 
     def walk(self, here: Place, there: Place) -> Window | None:
         """The first window that begins between two loads."""
         self.passed.append(here)
-        if self.projection is None or not self.projection.fits(here[1], self.blocks):
-            self.projection = Projection.of(here[1])
-            self.blocks = self.projection.onto(here[1])
-        before, self.blocks = self.blocks, self.projection.onto(there[1])
-        candidates = [
-            candidate
-            for cluster, a, b in zip(self.projection.clusters, before, self.blocks, strict=True)
-            for candidate in self.candidates(self.projection, cluster, (here[0], a), (there[0], b))
-        ]
+        candidates = [candidate for part in self.parts(here.matrix) for candidate in self.candidates(part, here, there)]
         first: Window | None = None
         for candidate in candidates:
             window = self.confirmed(candidate, there)
@@ -109,15 +112,37 @@ class _Search:
                 first = window
         return first
 
-    def candidates(
-        self, projection: Projection, cluster: Cluster, here: tuple[float, Floats], there: tuple[float, Floats]
+    def parts(self, matrix: csr_array) -> Iterable[Projection]:
+        """Projections of all modes, those of an earlier load as long as they serve."""
+        if self.kept and all(part.covers(matrix) for part in self.kept):
+            mixing = [each for part in self.kept for each in part.mixing(part.onto(matrix))]
+            if np.median(mixing) < MIXING:
+                return self.kept
+        parts = Projection.parts(matrix, workers=len(os.sched_getaffinity(0)))
+        if matrix.shape[0] > KEPT:
+            return parts
+        self.kept = list(parts)
+        return self.kept
+
+    def candidates(self, part: Projection, here: Place, there: Place) -> Iterator[_Candidate]:
+        """The pairs of a projection that turn complex in their clusters."""
+        before, after = part.levels(here.matrix), part.levels(there.matrix)
+        named = meetings(before, before.beyond(after, 1 + REACH))
+        for cluster in part.clusters:
+            first, last = (cluster.modes.start + end for end in cluster.core)
+            if np.any((named >= first) & (named <= last)):
+                yield from self.searched(part, cluster, (here.fx, before), (there.fx, after))
+
+    def searched(
+        self, part: Projection, cluster: Cluster, here: tuple[float, Levels], there: tuple[float, Levels]
     ) -> Iterator[_Candidate]:
         """The windows of one cluster, with its blocks interpolated between two loads."""
         span = there[0] - here[0]
+        before, after = here[1].block(cluster), there[1].block(cluster)
 
         def block(fx: float) -> Floats:
             share = (fx - here[0]) / span
-            return (1 - share) * here[1] + share * there[1]
+            return (1 - share) * before + share * after
 
         reach = there[0] + REACH * span
         for window in complex_windows(block, [here[0], reach], narrowest=max(self.narrowest, FINEST * span)):
@@ -126,7 +151,7 @@ class _Search:
             modes = Modes.of(inside, block(inside))
             plane = modes.block(_nearest_pair(modes, window.eigenvalue))
             if cluster.owns(plane.right):
-                right, left = projection.lifted(cluster, plane.right), projection.lifted(cluster, plane.left)
+                right, left = part.lifted(cluster, plane.right), part.lifted(cluster, plane.left)
                 yield _Candidate(min(inside, there[0]), right, left)
 
     def confirmed(self, candidate: _Candidate, there: Place) -> Window | None:

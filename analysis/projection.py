@@ -11,26 +11,34 @@ contributions of all other modes k in second order,
 
     H_{ij} + \tfrac12 \sum_k H_{ik} H_{kj} \left(\frac1{H_{ii} - H_{kk}} + \frac1{H_{jj} - H_{kk}}\right) ,
 
-has the eigenvalues of A up to the third order of the
-typical coupling over the distance of the modes outside. Clusters say where to look; what is found there has yet to be
-confirmed with A itself.
+has the eigenvalues of A up to the third order of the typical coupling over the distance of the modes outside. Clusters
+say where to look; what is found there has yet to be confirmed with A itself.
+
+**Parts.** Neighbours are all that a cluster needs. A large operator is projected onto one slice of its spectrum after
+the other (:mod:`~faultgouge.analysis.slices`), with a margin on either side, and never onto all.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array
 
 from .packing import Floats, Indices
+from .slices import slices
 
 CORE, MARGIN = 20, 20
 """Modes of a cluster that are its own, and further ones on either side that are coupled to these in all orders."""
 
-SMALL = 2000
-"""Coordinates up to which memory is no matter: 32 E^2 bytes are 128 MB."""
+BEYOND = 10
+"""Modes of a part on either side beyond those of its clusters: they count in second order, as those of `MARGIN` do in
+all orders. What is farther away changes levels by less than (coupling / spacing)^2 / 30 of their spacing."""
+
+SMALL = 1000
+"""Coordinates up to which all modes are one part, from a dense decomposition: less than a second there."""
 
 CHUNK = 512
 """Columns that are projected at a time, for memory."""
@@ -54,6 +62,25 @@ class Levels:
 
     diagonal: Floats
     coupling: NDArray[np.float32]
+
+    def block(self, cluster: "Cluster") -> Floats:
+        """The operator in a cluster, with the second order of the modes outside; 1 / time^2."""
+        diagonal = self.diagonal[cluster.modes]
+        # Modes of the margin may lie close to modes outside: what these do is right for the core.
+        core = np.sort(diagonal[cluster.core[0] : cluster.core[1] + 1])
+        distance = np.clip(diagonal, core[0], core[-1])[:, None] - self.diagonal
+        weight = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance != 0)
+        weight[:, cluster.modes] = 0.0
+        rows, columns = self.coupling[cluster.modes], self.coupling[:, cluster.modes]
+        second = 0.5 * ((rows * weight) @ columns + rows @ (columns * weight.T))
+        return np.diag(diagonal) + self.coupling[cluster.modes, cluster.modes] + second
+
+    def beyond(self, there: "Levels", share: float) -> "Levels":
+        """The levels at a share of the way to others and on, beyond 1, along a straight line."""
+        return Levels(
+            (1 - share) * self.diagonal + share * there.diagonal,
+            np.float32(1 - share) * self.coupling + np.float32(share) * there.coupling,
+        )
 
     @cached_property
     def largest(self) -> NDArray[np.float32]:
@@ -92,7 +119,7 @@ class Cluster:
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """The eigenvectors of the symmetric part of an operator, as a basis for its neighbours.
+    """Eigenvectors of the symmetric part of an operator, all or neighbouring ones, as a basis for its neighbours.
 
     Attributes
     ----------
@@ -100,16 +127,19 @@ class Projection:
         Coordinates of the operator.
     active : ndarray of int, shape (E,)
         Those whose rows are not zero.
-    values : ndarray, shape (E,)
+    values : ndarray, shape (M,)
         Eigenvalues of the symmetric part, increasing; 1 / time^2.
-    basis : ndarray, shape (E, E)
+    basis : ndarray, shape (E, M)
         Orthonormal eigenvectors in columns.
+    own : slice
+        The modes that belong to this projection, and to no other part; the rest are margins.
     """
 
     size: int
     active: Indices
     values: Floats
     basis: Floats
+    own: slice
 
     @classmethod
     def of(cls, matrix: csr_array) -> "Projection":
@@ -118,38 +148,42 @@ class Projection:
         dense = matrix[active][:, active].toarray()
         dense += dense.T.copy()
         dense *= 0.5
-        # Divide and conquer is the faster one, but needs twice the memory of MRRR, which matters where E is large.
-        driver = "evd" if len(active) <= SMALL else "evr"
-        values, basis = eigh(dense, driver=driver, overwrite_a=True, check_finite=False)
-        return cls(matrix.shape[0], active, values, basis)
+        values, basis = eigh(dense, driver="evd", overwrite_a=True, check_finite=False)
+        return cls(matrix.shape[0], active, values, basis, slice(0, len(values)))
+
+    @classmethod
+    def parts(cls, matrix: csr_array, workers: int) -> "Iterator[Projection]":
+        """Projections whose own modes are, together, those of the symmetric part.
+
+        Parameters
+        ----------
+        matrix : scipy.sparse.csr_array, shape (n, n)
+            The operator, 1 / time^2.
+        workers : int
+            Threads.
+        """
+        active = np.flatnonzero(np.diff(matrix.indptr))
+        if len(active) <= SMALL:
+            yield cls.of(matrix)
+            return
+        inner = matrix[active][:, active]
+        for part in slices(csc_array(0.5 * (inner + inner.T)), MARGIN + BEYOND, workers):
+            yield cls(matrix.shape[0], active, part.values, part.vectors, part.own)
 
     @property
     def clusters(self) -> list[Cluster]:
-        """Overlapping clusters whose cores cover all modes."""
+        """Overlapping clusters whose cores cover all modes of its own."""
         count = len(self.values)
         found = []
-        for first in range(0, count, CORE):
+        for first in range(self.own.start, self.own.stop, CORE):
             start, stop = max(0, first - MARGIN), min(count, first + CORE + MARGIN)
-            found.append(Cluster(slice(start, stop), (first - start, min(first + CORE, count) - 1 - start)))
+            found.append(Cluster(slice(start, stop), (first - start, min(first + CORE, self.own.stop) - 1 - start)))
         return found
 
     def onto(self, matrix: csr_array) -> list[Floats]:
-        """Every cluster of an operator, with the second order of the modes outside; 1 / time^2."""
-        inner = matrix[self.active][:, self.active]
-        levels = self._levels(inner)
-        clusters = []
-        for cluster in self.clusters:
-            part = self.basis[:, cluster.modes]
-            diagonal = levels.diagonal[cluster.modes]
-            # Modes of the margin may lie close to modes outside: what these do is right for the core.
-            core = np.sort(diagonal[cluster.core[0] : cluster.core[1] + 1])
-            distance = np.clip(diagonal, core[0], core[-1])[:, None] - levels.diagonal
-            weight = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance != 0)
-            weight[:, cluster.modes] = 0.0
-            rows, columns = levels.coupling[cluster.modes], levels.coupling[:, cluster.modes]
-            second = 0.5 * ((rows * weight) @ columns + rows @ (columns * weight.T))
-            clusters.append(part.T @ (inner @ part) + second)
-        return clusters
+        """Every cluster of an operator; 1 / time^2."""
+        levels = self.levels(matrix)
+        return [levels.block(cluster) for cluster in self.clusters]
 
     def covers(self, matrix: csr_array) -> bool:
         """Whether an operator acts on the same coordinates."""
@@ -202,11 +236,14 @@ class Projection:
         """Whether the projection is good enough for an operator with these cluster blocks."""
         if not self.covers(matrix):
             return False
-        mixing = []
+        return bool(np.median(self.mixing(blocks)) < MIXING)
+
+    def mixing(self, blocks: list[Floats]) -> list[float]:
+        """The typical coupling over the spacing in each cluster: |off-diagonal|_F over the cluster's width."""
+        found = []
         for cluster, block in zip(self.clusters, blocks, strict=True):
             levels = self.values[cluster.modes]
             off_diagonal = block - np.diag(np.diag(block))
             width = max(levels[-1] - levels[0], np.finfo(np.float64).tiny)
-            mixing.append(np.linalg.norm(off_diagonal) / width)
-        # |off-diagonal|_F over the width of the cluster is the typical coupling over the spacing.
-        return bool(np.median(mixing) < MIXING)
+            found.append(float(np.linalg.norm(off_diagonal) / width))
+        return found
