@@ -32,7 +32,18 @@ JUMP = 1e-9
 """Width to which a jump of the equilibrium is bracketed, in increments: the place depends on the path, and with it on
 the increment, by far more."""
 
+ALL_MODES = 2000
+"""Coordinates up to which a pair that cannot be continued is looked for among all modes, which takes half a minute
+there."""
+
+SHORTEST = 2.0**-6
+"""Shortest steps, in shares of the way from one operator to the other, in which a pair of a larger one is followed."""
+
 Kind = Literal["coalescence", "contact change", "start", "scan"]
+
+
+class LostPairError(RuntimeError):
+    """A pair that can be followed no further: one sentence."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +76,36 @@ class State:
         return believable(split, self.block.overlap, unit_rounding(self.matrix.data))
 
     def at(self, fx: float, operator: Operator) -> "State":
-        """The same pair at another load: continued, or found among all modes if need be."""
+        """The same pair at another load: continued, or found among all modes if need be.
+
+        Raises
+        ------
+        LostPairError
+            If it cannot be continued, and there are more modes than `ALL_MODES`.
+        """
         matrix = csr_array(operator)
         block = continued(matrix, self.block)
-        if block is None:
+        if block is None and matrix.shape[0] <= ALL_MODES:
             modes = Modes.of(fx, matrix)
             block = modes.block(modes.nearest(self.block))
-        return State(fx, matrix, block)
+        return State(fx, matrix, block or self._in_steps(fx, matrix))
+
+    def _in_steps(self, fx: float, matrix: csr_array) -> Block:
+        """The pair at the end of a straight line of operators."""
+        block, done, step = self.block, 0.0, 0.5
+        while done < 1:
+            share = min(1.0, done + step)
+            found = continued(csr_array((1 - share) * self.matrix + share * matrix), block)
+            if found is not None:
+                block, done = found, share
+            elif step > SHORTEST:
+                step *= 0.5
+            else:
+                raise LostPairError(
+                    f"the pair of eigenvalues about {self.block.mean:.6g} cannot be told from its neighbours between "
+                    f"F_x = {self.fx:.10g} and {fx:.10g}: take smaller increments"
+                )
+        return block
 
 
 def locate(operator: Callable[[float], Operator], here: State, there: State) -> tuple[Edge, State, State]:

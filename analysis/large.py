@@ -79,8 +79,9 @@ def first_window(
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """The planes of a pair that turns complex in its cluster, and a load at which it may be so in the operator."""
+    """The planes of a pair that turns complex in its cluster: from where on, and a load at which it still is."""
 
+    onset: float
     inside: float
     right: Floats
     left: Floats
@@ -106,7 +107,10 @@ class _Search:
         self.passed.append(here)
         candidates = [candidate for part in self.parts(here.matrix) for candidate in self.candidates(part, here, there)]
         first: Window | None = None
-        for candidate in candidates:
+        for candidate in sorted(candidates, key=lambda candidate: candidate.onset):
+            # Clusters are off by a share of the way from here: one that is far beyond cannot be first.
+            if first is not None and candidate.onset - here.fx > (1 + 2 * REACH) * (first.fx_onset - here.fx):
+                break
             window = self.confirmed(candidate, there)
             if window is not None and (first is None or window.fx_onset < first.fx_onset):
                 first = window
@@ -126,7 +130,8 @@ class _Search:
 
     def candidates(self, part: Projection, here: Place, there: Place) -> Iterator[_Candidate]:
         """The pairs of a projection that turn complex in their clusters."""
-        before, after = part.levels(here.matrix), part.levels(there.matrix)
+        before = part.levels(here.matrix)
+        after = part.change(before, there.matrix - here.matrix)
         named = meetings(before, before.beyond(after, 1 + REACH))
         for cluster in part.clusters:
             first, last = (cluster.modes.start + end for end in cluster.core)
@@ -152,7 +157,7 @@ class _Search:
             plane = modes.block(_nearest_pair(modes, window.eigenvalue))
             if cluster.owns(plane.right):
                 right, left = part.lifted(cluster, plane.right), part.lifted(cluster, plane.left)
-                yield _Candidate(min(inside, there[0]), right, left)
+                yield _Candidate(window.fx_onset, min(inside, there[0]), right, left)
 
     def confirmed(self, candidate: _Candidate, there: Place) -> Window | None:
         """The window of the operator itself in place of that of a cluster; None if the pair stays real."""

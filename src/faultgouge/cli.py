@@ -324,6 +324,8 @@ def _sentence(error: Exception) -> str:
         "NoEquilibriumError",
         "EngineError",
         "OnsetError",
+        "LostPairError",
+        "SliceError",
         "ReportError",
         "StabilityError",
         "OSError",
