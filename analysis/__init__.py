@@ -3,8 +3,8 @@
 Everything takes a :class:`Packing` and nothing else. The physics is in the docstrings of the modules: `law`
 (the contact law), `packing` (geometry and forces), `stiffness` (the stability operator), `spectrum` (its
 eigenvalues), `onset` (where they become complex; `windows`, `edges`, `modes`, `tracking`, `meetings`,
-`projection` and `large` are its parts), `growth` (what a run shows of it). `runfile`, `dumps` and `files` read and
-write packings.
+`projection`, `slices` and `large` are its parts), `growth` (what a run shows of it). `runfile`, `dumps` and
+`files` read and write packings.
 """
 
 from .dumps import read_dump
