@@ -118,10 +118,24 @@ FAULTGOUGE_INLINE Compensated operator/(Compensated a, Compensated b)
   return {quotient, rest * inverse};
 }
 
-FAULTGOUGE_INLINE Compensated sqrt(Compensated a)
+struct RootAndInverse {
+  Compensated root, inverse;
+};
+
+// the square root of a normalized number and the inverse of the root, with one division
+FAULTGOUGE_INLINE RootAndInverse root_and_inverse(Compensated a)
 {
-  const double root = std::sqrt(a.high);
-  return {root, (__builtin_fma(-root, root, a.high) + a.low) * (0.5 / root)};
+  const double root = std::sqrt(a.high), inverse = 1.0 / root;
+  const double low = (__builtin_fma(-root, root, a.high) + a.low) * (0.5 * inverse);
+  return {{root, low}, {inverse, (__builtin_fma(-inverse, root, 1.0) - inverse * low) * inverse}};
+}
+
+// a^(3/2) of a normalized number: with root^2 = a.high - rest it = a.high root + root (rest/2 + 3/2 a.low) and terms of second order
+FAULTGOUGE_INLINE Compensated three_halves_power(Compensated a)
+{
+  const double root = std::sqrt(a.high), rest = __builtin_fma(-root, root, a.high);
+  const Compensated product = exact_product(a.high, root);
+  return {product.high, __builtin_fma(root, __builtin_fma(1.5, a.low, 0.5 * rest), product.low)};
 }
 
 FAULTGOUGE_INLINE Compensated fabs(Compensated a)

@@ -99,11 +99,11 @@ FAULTGOUGE_INLINE void add(Batch<Number> &batch, const ContactPairs &pairs, int 
 
 // overlaps, directions and normal forces
 template <class Number>
-FAULTGOUGE_INLINE void normal_forces(Batch<Number> &batch, const MindlinLaw law, const FixedPointGrid grid)
+FAULTGOUGE_INLINE void normal_forces(Batch<Number> &batch, const MindlinLaw law)
 {
   for (int k = 0; k < batch.count; k++) {
     const Branch<Number> r{batch.branch_x.load(k), batch.branch_y.load(k)};
-    const Geometry<Number> contact = geometry(r, batch.radius_i[k], batch.radius_j[k], grid);
+    const Geometry<Number> contact = geometry(r, batch.radius_i[k], batch.radius_j[k]);
     const Number normal = law.normal_force(contact.overlap);
     batch.overlap.store(k, contact.overlap);
     batch.normal.store(k, normal);
@@ -145,9 +145,9 @@ template <class Number, bool FRICTION> FAULTGOUGE_INLINE void components(Batch<N
 }
 
 template <class Number, bool FRICTION, bool ADVANCE>
-FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law, const FixedPointGrid grid)
+FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law)
 {
-  normal_forces(batch, law, grid);
+  normal_forces(batch, law);
   if constexpr (FRICTION) tangential_forces<Number, ADVANCE>(batch, law);
   components<Number, FRICTION>(batch);
 }
@@ -197,10 +197,10 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
     }
     add<Number, FRICTION, ADVANCE>(batch, pairs, p, r, disks, dt);
     if (batch.count < BATCH) continue;
-    evaluate<Number, FRICTION, ADVANCE>(batch, law, grid);
+    evaluate<Number, FRICTION, ADVANCE>(batch, law);
     crushed = empty<Number, FRICTION>(batch, pairs, crushed);
   }
-  evaluate<Number, FRICTION, ADVANCE>(batch, law, grid);
+  evaluate<Number, FRICTION, ADVANCE>(batch, law);
   return empty<Number, FRICTION>(batch, pairs, crushed);
 }
 

@@ -37,11 +37,8 @@ struct MindlinLaw {
     return Number(mu) * Number(kn) / Number(kt);
   }
 
-  template <class Number> FAULTGOUGE_INLINE Number normal_force(Number overlap) const
-  {
-    using std::sqrt;
-    return kn * overlap * sqrt(overlap);
-  }
+  FAULTGOUGE_INLINE double normal_force(double overlap) const { return kn * overlap * std::sqrt(overlap); }
+  FAULTGOUGE_INLINE Compensated normal_force(Compensated overlap) const { return kn * three_halves_power(overlap); }
 
   double normal_energy(double overlap) const { return 0.4 * normal_force(overlap) * overlap; }
 

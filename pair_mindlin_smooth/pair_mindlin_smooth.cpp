@@ -18,7 +18,6 @@
 using namespace LAMMPS_NS;
 using faultgouge::Compensated;
 using faultgouge::Disks;
-using faultgouge::FixedPointGrid;
 using faultgouge::leading;
 using faultgouge::MindlinLaw;
 using faultgouge::PairForce;
@@ -296,13 +295,12 @@ void PairMindlinSmooth::refuse(int p) const
 // The energy is the elastic one of the normal force; the tangential force has none.
 template <class NUMBER> void PairMindlinSmooth::tally()
 {
-  const FixedPointGrid grid = compensated ? low_parts->grid() : FixedPointGrid{};
   for (int p = 0; p < pairs.size(); p++) {
     const PairForce &contact = pairs.force[p];
     if (contact.x == 0.0 && contact.y == 0.0) continue;
     const int i = pairs.first[p], j = pairs.second[p];
     const auto r = faultgouge::branch<NUMBER>(pairs, p, disks(), period());
-    const auto where = geometry(r, atom->radius[i], atom->radius[j], grid);
+    const auto where = geometry(r, atom->radius[i], atom->radius[j]);
     ev_tally_xyz(i, j, atom->nlocal, 0, law.normal_energy(value(where.overlap)), 0.0, contact.x, contact.y, 0.0,
                  value(r.x), value(r.y), 0.0);
   }
@@ -352,7 +350,7 @@ template <class NUMBER> double PairMindlinSmooth::measure(int p, int i)
 {
   const auto r = faultgouge::branch<NUMBER>(pairs, p, disks(), period());
   const double radius_i = atom->radius[pairs.first[p]], radius_j = atom->radius[pairs.second[p]];
-  const auto contact = geometry(r, radius_i, radius_j, compensated ? low_parts->grid() : FixedPointGrid{});
+  const auto contact = geometry(r, radius_i, radius_j);
   if (leading(contact.overlap) <= 0.0) return 0.0;
 
   const double overlap = value(contact.overlap);
