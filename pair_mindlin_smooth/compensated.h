@@ -9,6 +9,8 @@
 //   FixedPointGrid   a coordinate as a multiple of g plus a low part within g/2, a multiple of 2^-52 g. As g
 //                    is 2^-26 of the largest reach of a contact, rounded up to a power of two, differences of
 //                    coordinates are exact, and so are the squares of the high parts of a contact's branch.
+//   SummationGrid    numbers as a multiple of G plus a multiple of 2^-48 G: sums of both parts are exact, and so do
+//                    not depend on the order of the summands.
 
 #ifndef FAULTGOUGE_COMPENSATED_H
 #define FAULTGOUGE_COMPENSATED_H
@@ -204,6 +206,25 @@ struct FixedPointGrid {
   {
     const double high = whole(x.high);
     return moved(moved({high, 0.0}, x.high - high), x.low);
+  }
+};
+
+struct SummationGrid {
+  FixedPointGrid high, low;
+
+  // G is 2^-50 of a power of two above the largest summand: sums of high parts are exact up to eight times that power,
+  // those of low parts, each within G/2, for up to 64 summands. What is rounded off is 2^-99 of the power.
+  static SummationGrid for_largest(double summand)
+  {
+    int exponent;
+    std::frexp(summand, &exponent);    // summand < 2^exponent
+    return {{std::ldexp(1.0, exponent - 50)}, {std::ldexp(1.0, exponent - 98)}};
+  }
+
+  FAULTGOUGE_INLINE Compensated rounded(Compensated x) const
+  {
+    const double whole = high.whole(x.high);
+    return {whole, low.whole((x.high - whole) + x.low)};
   }
 };
 

@@ -98,13 +98,19 @@ FAULTGOUGE_INLINE Geometry<Compensated> geometry(const Branch<Compensated> &r, d
   return {normalized({reach.high - distance.high, reach.low - distance.low}), inverse};
 }
 
+// Of compensated coordinates, of the components of forces, and of tangential forces, which a small mu keeps small
+struct Grids {
+  FixedPointGrid coordinate;
+  SummationGrid force, tangential;
+};
+
 // All pairs: their forces, slips and whether they touch. With advance the slips advance by v dt and omega dt. Returns a
 // pair with one centre inside of the other disk, where the law means nothing, or -1. Compiled for several processors,
 // of which the one at hand is chosen at run time; results are the same on all.
 int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law, double dt,
                    bool friction, bool advance);
 int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
-                               double dt, bool friction, bool advance, const FixedPointGrid &grid);
+                               double dt, bool friction, bool advance, const Grids &grids);
 
 // A contact with the floor: n = (0, 1) and tau = (-1, 0)
 template <class Number> struct FloorContact {
@@ -124,7 +130,8 @@ struct Forces {
 
 // Each disk adds up its pairs in the order of the partners' IDs.
 void sum_forces(const ContactPairs &pairs, const Disks &disks, const Forces &forces);
-void sum_compensated_forces(const ContactPairs &pairs, const Disks &disks, const Forces &forces);
+// Sums that the pairs have made already; the next ones begin at zero.
+void take_compensated_forces(ContactPairs &pairs, const Disks &disks, const Forces &forces);
 
 }    // namespace faultgouge
 
