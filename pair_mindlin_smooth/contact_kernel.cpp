@@ -54,17 +54,22 @@ FAULTGOUGE_INLINE double margin(Compensated, const FixedPointGrid &grid)
   return 8.0 * grid.spacing;
 }
 
-// x, y and tangential force of a pair, with compensated arithmetic their low parts too, and the signs for its first and
-// its second disk
+// x, y and tangential force of a pair, and their signs for its first and its second disk
 using Four = double __attribute__((vector_size(32)));
-using Eight = double __attribute__((vector_size(64)));
-alignas(64) constexpr double SIGN[2][8] = {{1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0},
-                                           {-1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0}};
+constexpr Four SIGN[2] = {{1.0, 1.0, 1.0, 1.0}, {-1.0, -1.0, 1.0, 1.0}};
 
-template <class Vector, class Numbers> FAULTGOUGE_INLINE void load(Vector &vector, const Numbers &numbers)
+FAULTGOUGE_INLINE void load(Four &four, const PairForce &numbers)
 {
-  static_assert(sizeof(Vector) <= sizeof(Numbers), "one vector");
-  std::memcpy(&vector, &numbers, sizeof(Vector));
+  static_assert(sizeof(Four) == sizeof(PairForce), "one vector");
+  std::memcpy(&four, &numbers, sizeof(Four));
+}
+
+FAULTGOUGE_INLINE void add(PairForce &sum, const Four &more)
+{
+  Four total;
+  load(total, sum);
+  total += more;
+  std::memcpy(&sum, &total, sizeof(Four));
 }
 
 FAULTGOUGE_INLINE void give_force(ContactPairs &pairs, int p, int, double x, double y, double tangential)
@@ -72,23 +77,16 @@ FAULTGOUGE_INLINE void give_force(ContactPairs &pairs, int p, int, double x, dou
   pairs.force[p] = PairForce{x, y, tangential, 0.0};
 }
 
-FAULTGOUGE_INLINE void add_force(CompensatedForce &sum, const Eight &force)
-{
-  Eight total;
-  load(total, sum);
-  total += force;
-  std::memcpy(&sum, &total, sizeof(sum));
-}
-
 FAULTGOUGE_INLINE void give_force(ContactPairs &pairs, int p, int owned, Compensated x, Compensated y,
                                   Compensated tangential)
 {
-  const Eight force{x.high, y.high, tangential.high, 0.0, x.low, y.low, tangential.low, 0.0};
-  add_force(pairs.disk_force[pairs.first[p]], force);
-  if (pairs.second[p] >= owned) return;
-  Eight sign;
-  load(sign, SIGN[1]);
-  add_force(pairs.disk_force[pairs.second[p]], sign * force);
+  const int i = pairs.first[p], j = pairs.second[p];
+  const Four high{x.high, y.high, tangential.high, 0.0}, low{x.low, y.low, tangential.low, 0.0};
+  add(pairs.disk_force[i].high, high);
+  add(pairs.disk_force[i].low, low);
+  if (j >= owned) return;
+  add(pairs.disk_force[j].high, SIGN[1] * high);
+  add(pairs.disk_force[j].low, SIGN[1] * low);
 }
 
 template <class Number, bool FRICTION> FAULTGOUGE_INLINE void open(ContactPairs &pairs, int p)
@@ -279,11 +277,10 @@ FAULTGOUGE_DISPATCH
 void sum_forces(const ContactPairs &pairs, const Disks &disks, const Forces &forces)
 {
   for (int i = 0; i < disks.owned; i++) {
-    Four sum{}, more{}, sign{};
+    Four sum{}, more;
     for (int k = pairs.start[i]; k < pairs.start[i + 1]; k++) {
       load(more, pairs.force[pairs.row[k] >> 1]);
-      load(sign, SIGN[pairs.row[k] & 1]);
-      sum += sign * more;
+      sum += SIGN[pairs.row[k] & 1] * more;
     }
     forces.f[i][0] += sum[0];
     forces.f[i][1] += sum[1];
