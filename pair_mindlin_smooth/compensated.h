@@ -60,10 +60,10 @@ FAULTGOUGE_INLINE double ordered_sum(double a, double b)
   return a + b;
 }
 
-FAULTGOUGE_INLINE Compensated ordered_sum(Compensated a, Compensated b)
+FAULTGOUGE_INLINE Compensated ordered_sum(double a, Compensated b)
 {
-  const double sum = a.high + b.high;
-  return {sum, (b.high - (sum - a.high)) + (a.low + b.low)};
+  const double sum = a + b.high;
+  return {sum, (b.high - (sum - a)) + b.low};
 }
 
 // a b, exactly
@@ -148,7 +148,7 @@ FAULTGOUGE_INLINE Compensated fabs(Compensated a)
 
 FAULTGOUGE_INLINE bool operator<(Compensated a, Compensated b)
 {
-  return (a.high - b.high) + (a.low - b.low) < 0.0;
+  return a.high - b.high < b.low - a.low;
 }
 
 // a number times 1 or -1
