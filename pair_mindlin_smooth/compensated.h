@@ -101,6 +101,7 @@ FAULTGOUGE_INLINE Compensated operator-(Compensated a, Compensated b)
   return a + -b;
 }
 
+// without the product of the low parts: only one of the two may be far from normalized
 FAULTGOUGE_INLINE Compensated operator*(Compensated a, Compensated b)
 {
   const Compensated product = exact_product(a.high, b.high);

@@ -136,16 +136,6 @@ FAULTGOUGE_INLINE void normal_forces(Batch<Number> &batch, const MindlinLaw law)
   }
 }
 
-// as they are added up
-FAULTGOUGE_INLINE double summand(double force, const SummationGrid &)
-{
-  return force;
-}
-FAULTGOUGE_INLINE Compensated summand(Compensated force, const SummationGrid &grid)
-{
-  return grid.rounded(force);
-}
-
 template <class Number> FAULTGOUGE_INLINE double slip_increment(const Batch<Number> &batch, int k)
 {
   const Vector r{value(batch.branch_x.load(k)), value(batch.branch_y.load(k))};
@@ -154,7 +144,7 @@ template <class Number> FAULTGOUGE_INLINE double slip_increment(const Batch<Numb
 
 // slips, advanced if wanted, and tangential forces
 template <class Number, bool ADVANCE>
-FAULTGOUGE_INLINE void tangential_forces(Batch<Number> &batch, const MindlinLaw law, const SummationGrid grid)
+FAULTGOUGE_INLINE void tangential_forces(Batch<Number> &batch, const MindlinLaw law)
 {
   const Number limit_ratio = law.slip_limit_ratio<Number>();
   // compensated operations wait for each other so long that increments are faster in a loop of their own
@@ -167,12 +157,22 @@ FAULTGOUGE_INLINE void tangential_forces(Batch<Number> &batch, const MindlinLaw 
     Number slip = batch.slip.load(k);
     if constexpr (ADVANCE) slip = advanced_slip(slip, APART ? increment[k] : slip_increment(batch, k), limit);
     batch.slip.store(k, slip);
-    batch.tangential.store(k, summand(law.tangential_force(batch.normal.load(k), slip, limit), grid));
+    batch.tangential.store(k, law.tangential_force(batch.normal.load(k), slip, limit));
   }
 }
 
+// as they are added up
+FAULTGOUGE_INLINE double summand(double force, const SummationGrid &)
+{
+  return force;
+}
+FAULTGOUGE_INLINE Compensated summand(Compensated force, const SummationGrid &grid)
+{
+  return grid.rounded(force);
+}
+
 template <class Number, bool FRICTION>
-FAULTGOUGE_INLINE void components(Batch<Number> &batch, const SummationGrid grid)
+FAULTGOUGE_INLINE void components(Batch<Number> &batch, const Grids grids)
 {
   for (int k = 0; k < batch.count; k++) {
     const Number nx = batch.normal_x.load(k), ny = batch.normal_y.load(k), normal = batch.normal.load(k);
@@ -181,9 +181,10 @@ FAULTGOUGE_INLINE void components(Batch<Number> &batch, const SummationGrid grid
       const Number tangential = batch.tangential.load(k);
       x = x - tangential * ny;
       y = y + tangential * nx;
+      batch.tangential.store(k, summand(tangential, grids.tangential));
     }
-    batch.force_x.store(k, summand(x, grid));
-    batch.force_y.store(k, summand(y, grid));
+    batch.force_x.store(k, summand(x, grids.force));
+    batch.force_y.store(k, summand(y, grids.force));
   }
 }
 
@@ -191,8 +192,8 @@ template <class Number, bool FRICTION, bool ADVANCE>
 FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law, const Grids &grids)
 {
   normal_forces(batch, law);
-  if constexpr (FRICTION) tangential_forces<Number, ADVANCE>(batch, law, grids.tangential);
-  components<Number, FRICTION>(batch, grids.force);
+  if constexpr (FRICTION) tangential_forces<Number, ADVANCE>(batch, law);
+  components<Number, FRICTION>(batch, grids);
 }
 
 // puts the results where they belong; returns a pair with one centre inside of the other disk, or else what it is given
