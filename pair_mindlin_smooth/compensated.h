@@ -9,6 +9,8 @@
 //   FixedPointGrid   a coordinate as a multiple of g plus a low part within g/2, a multiple of 2^-52 g. As g
 //                    is 2^-26 of the largest reach of a contact, rounded up to a power of two, differences of
 //                    coordinates are exact, and so are the squares of the high parts of a contact's branch.
+//   SummationGrid    numbers as a multiple of G plus a multiple of 2^-48 G: sums of both parts are exact, and so do
+//                    not depend on the order of the summands.
 
 #ifndef FAULTGOUGE_COMPENSATED_H
 #define FAULTGOUGE_COMPENSATED_H
@@ -58,10 +60,10 @@ FAULTGOUGE_INLINE double ordered_sum(double a, double b)
   return a + b;
 }
 
-FAULTGOUGE_INLINE Compensated ordered_sum(Compensated a, Compensated b)
+FAULTGOUGE_INLINE Compensated ordered_sum(double a, Compensated b)
 {
-  const double sum = a.high + b.high;
-  return {sum, (b.high - (sum - a.high)) + (a.low + b.low)};
+  const double sum = a + b.high;
+  return {sum, (b.high - (sum - a)) + b.low};
 }
 
 // a b, exactly
@@ -99,6 +101,7 @@ FAULTGOUGE_INLINE Compensated operator-(Compensated a, Compensated b)
   return a + -b;
 }
 
+// without the product of the low parts: only one of the two may be far from normalized
 FAULTGOUGE_INLINE Compensated operator*(Compensated a, Compensated b)
 {
   const Compensated product = exact_product(a.high, b.high);
@@ -118,10 +121,24 @@ FAULTGOUGE_INLINE Compensated operator/(Compensated a, Compensated b)
   return {quotient, rest * inverse};
 }
 
-FAULTGOUGE_INLINE Compensated sqrt(Compensated a)
+struct RootAndInverse {
+  Compensated root, inverse;
+};
+
+// the square root of a normalized number and the inverse of the root, with one division
+FAULTGOUGE_INLINE RootAndInverse root_and_inverse(Compensated a)
 {
-  const double root = std::sqrt(a.high);
-  return {root, (__builtin_fma(-root, root, a.high) + a.low) * (0.5 / root)};
+  const double root = std::sqrt(a.high), inverse = 1.0 / root;
+  const double low = (__builtin_fma(-root, root, a.high) + a.low) * (0.5 * inverse);
+  return {{root, low}, {inverse, (__builtin_fma(-inverse, root, 1.0) - inverse * low) * inverse}};
+}
+
+// a^(3/2) of a normalized number: with root^2 = a.high - rest it = a.high root + root (rest/2 + 3/2 a.low) and terms of second order
+FAULTGOUGE_INLINE Compensated three_halves_power(Compensated a)
+{
+  const double root = std::sqrt(a.high), rest = __builtin_fma(-root, root, a.high);
+  const Compensated product = exact_product(a.high, root);
+  return {product.high, __builtin_fma(root, __builtin_fma(1.5, a.low, 0.5 * rest), product.low)};
 }
 
 FAULTGOUGE_INLINE Compensated fabs(Compensated a)
@@ -132,7 +149,7 @@ FAULTGOUGE_INLINE Compensated fabs(Compensated a)
 
 FAULTGOUGE_INLINE bool operator<(Compensated a, Compensated b)
 {
-  return (a.high - b.high) + (a.low - b.low) < 0.0;
+  return a.high - b.high < b.low - a.low;
 }
 
 // a number times 1 or -1
@@ -190,6 +207,25 @@ struct FixedPointGrid {
   {
     const double high = whole(x.high);
     return moved(moved({high, 0.0}, x.high - high), x.low);
+  }
+};
+
+struct SummationGrid {
+  FixedPointGrid high, low;
+
+  // G is 2^-50 of a power of two above the largest summand: sums of high parts are exact up to eight times that power,
+  // those of low parts, each within G/2, for up to 64 summands. What is rounded off is 2^-99 of the power.
+  static SummationGrid for_largest(double summand)
+  {
+    int exponent;
+    std::frexp(summand, &exponent);    // summand < 2^exponent
+    return {{std::ldexp(1.0, exponent - 50)}, {std::ldexp(1.0, exponent - 98)}};
+  }
+
+  FAULTGOUGE_INLINE Compensated rounded(Compensated x) const
+  {
+    const double whole = high.whole(x.high);
+    return {whole, low.whole((x.high - whole) + x.low)};
   }
 };
 

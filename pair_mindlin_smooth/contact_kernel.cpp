@@ -18,13 +18,14 @@ namespace {
 // so many contacts that their columns stay in the first-level cache
 constexpr int BATCH = 64;
 
-struct DoubleColumn {
+// aligned so that no vector straddles two cache lines
+struct alignas(64) DoubleColumn {
   double value[BATCH];
   FAULTGOUGE_INLINE double load(int k) const { return value[k]; }
   FAULTGOUGE_INLINE void store(int k, double number) { value[k] = number; }
 };
 
-struct CompensatedColumn {
+struct alignas(64) CompensatedColumn {
   double high[BATCH], low[BATCH];
   FAULTGOUGE_INLINE Compensated load(int k) const { return {high[k], low[k]}; }
   FAULTGOUGE_INLINE void store(int k, Compensated number)
@@ -53,21 +54,44 @@ FAULTGOUGE_INLINE double margin(Compensated, const FixedPointGrid &grid)
   return 8.0 * grid.spacing;
 }
 
-FAULTGOUGE_INLINE void set_force(ContactPairs &pairs, int p, double x, double y, double tangential)
+// x, y and tangential force of a pair, and their signs for its first and its second disk
+using Four = double __attribute__((vector_size(32)));
+constexpr Four SIGN[2] = {{1.0, 1.0, 1.0, 1.0}, {-1.0, -1.0, 1.0, 1.0}};
+
+FAULTGOUGE_INLINE void load(Four &four, const PairForce &numbers)
+{
+  static_assert(sizeof(Four) == sizeof(PairForce), "one vector");
+  std::memcpy(&four, &numbers, sizeof(Four));
+}
+
+FAULTGOUGE_INLINE void add(PairForce &sum, const Four &more)
+{
+  Four total;
+  load(total, sum);
+  total += more;
+  std::memcpy(&sum, &total, sizeof(Four));
+}
+
+FAULTGOUGE_INLINE void give_force(ContactPairs &pairs, int p, int, double x, double y, double tangential)
 {
   pairs.force[p] = PairForce{x, y, tangential, 0.0};
 }
 
-FAULTGOUGE_INLINE void set_force(ContactPairs &pairs, int p, Compensated x, Compensated y, Compensated tangential)
+FAULTGOUGE_INLINE void give_force(ContactPairs &pairs, int p, int owned, Compensated x, Compensated y,
+                                  Compensated tangential)
 {
-  pairs.force[p] = PairForce{x.high, y.high, tangential.high, 0.0};
-  pairs.force_low[p] =
-      PairForceLow{static_cast<float>(x.low), static_cast<float>(y.low), static_cast<float>(tangential.low), 0.0f};
+  const int i = pairs.first[p], j = pairs.second[p];
+  const Four high{x.high, y.high, tangential.high, 0.0}, low{x.low, y.low, tangential.low, 0.0};
+  add(pairs.disk_force[i].high, high);
+  add(pairs.disk_force[i].low, low);
+  if (j >= owned) return;
+  add(pairs.disk_force[j].high, SIGN[1] * high);
+  add(pairs.disk_force[j].low, SIGN[1] * low);
 }
 
 template <class Number, bool FRICTION> FAULTGOUGE_INLINE void open(ContactPairs &pairs, int p)
 {
-  set_force(pairs, p, Number(0.0), Number(0.0), Number(0.0));
+  if constexpr (std::is_same_v<Number, double>) pairs.force[p] = PairForce{};
   if constexpr (FRICTION) pairs.touching[p] = 0;
 }
 
@@ -99,11 +123,11 @@ FAULTGOUGE_INLINE void add(Batch<Number> &batch, const ContactPairs &pairs, int 
 
 // overlaps, directions and normal forces
 template <class Number>
-FAULTGOUGE_INLINE void normal_forces(Batch<Number> &batch, const MindlinLaw law, const FixedPointGrid grid)
+FAULTGOUGE_INLINE void normal_forces(Batch<Number> &batch, const MindlinLaw law)
 {
   for (int k = 0; k < batch.count; k++) {
     const Branch<Number> r{batch.branch_x.load(k), batch.branch_y.load(k)};
-    const Geometry<Number> contact = geometry(r, batch.radius_i[k], batch.radius_j[k], grid);
+    const Geometry<Number> contact = geometry(r, batch.radius_i[k], batch.radius_j[k]);
     const Number normal = law.normal_force(contact.overlap);
     batch.overlap.store(k, contact.overlap);
     batch.normal.store(k, normal);
@@ -112,24 +136,43 @@ FAULTGOUGE_INLINE void normal_forces(Batch<Number> &batch, const MindlinLaw law,
   }
 }
 
+template <class Number> FAULTGOUGE_INLINE double slip_increment(const Batch<Number> &batch, int k)
+{
+  const Vector r{value(batch.branch_x.load(k)), value(batch.branch_y.load(k))};
+  return midpoint_slip(r, {batch.moved_x[k], batch.moved_y[k]}) - batch.rolled[k];
+}
+
 // slips, advanced if wanted, and tangential forces
 template <class Number, bool ADVANCE>
 FAULTGOUGE_INLINE void tangential_forces(Batch<Number> &batch, const MindlinLaw law)
 {
   const Number limit_ratio = law.slip_limit_ratio<Number>();
+  // compensated operations wait for each other so long that increments are faster in a loop of their own
+  constexpr bool APART = ADVANCE && std::is_same_v<Number, Compensated>;
+  double increment[BATCH];
+  if constexpr (APART)
+    for (int k = 0; k < batch.count; k++) increment[k] = slip_increment(batch, k);
   for (int k = 0; k < batch.count; k++) {
     const Number limit = limit_ratio * batch.overlap.load(k);
     Number slip = batch.slip.load(k);
-    if constexpr (ADVANCE) {
-      const Vector r{value(batch.branch_x.load(k)), value(batch.branch_y.load(k))};
-      slip = advanced_slip(slip, midpoint_slip(r, {batch.moved_x[k], batch.moved_y[k]}) - batch.rolled[k], limit);
-    }
+    if constexpr (ADVANCE) slip = advanced_slip(slip, APART ? increment[k] : slip_increment(batch, k), limit);
     batch.slip.store(k, slip);
-    batch.tangential.store(k, normalized(law.tangential_force(batch.normal.load(k), slip, limit)));
+    batch.tangential.store(k, law.tangential_force(batch.normal.load(k), slip, limit));
   }
 }
 
-template <class Number, bool FRICTION> FAULTGOUGE_INLINE void components(Batch<Number> &batch)
+// as they are added up
+FAULTGOUGE_INLINE double summand(double force, const SummationGrid &)
+{
+  return force;
+}
+FAULTGOUGE_INLINE Compensated summand(Compensated force, const SummationGrid &grid)
+{
+  return grid.rounded(force);
+}
+
+template <class Number, bool FRICTION>
+FAULTGOUGE_INLINE void components(Batch<Number> &batch, const Grids grids)
 {
   for (int k = 0; k < batch.count; k++) {
     const Number nx = batch.normal_x.load(k), ny = batch.normal_y.load(k), normal = batch.normal.load(k);
@@ -138,23 +181,24 @@ template <class Number, bool FRICTION> FAULTGOUGE_INLINE void components(Batch<N
       const Number tangential = batch.tangential.load(k);
       x = x - tangential * ny;
       y = y + tangential * nx;
+      batch.tangential.store(k, summand(tangential, grids.tangential));
     }
-    batch.force_x.store(k, normalized(x));
-    batch.force_y.store(k, normalized(y));
+    batch.force_x.store(k, summand(x, grids.force));
+    batch.force_y.store(k, summand(y, grids.force));
   }
 }
 
 template <class Number, bool FRICTION, bool ADVANCE>
-FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law, const FixedPointGrid grid)
+FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law, const Grids &grids)
 {
-  normal_forces(batch, law, grid);
+  normal_forces(batch, law);
   if constexpr (FRICTION) tangential_forces<Number, ADVANCE>(batch, law);
-  components<Number, FRICTION>(batch);
+  components<Number, FRICTION>(batch, grids);
 }
 
 // puts the results where they belong; returns a pair with one centre inside of the other disk, or else what it is given
 template <class Number, bool FRICTION>
-FAULTGOUGE_INLINE int empty(Batch<Number> &batch, ContactPairs &pairs, int crushed)
+FAULTGOUGE_INLINE int empty(Batch<Number> &batch, ContactPairs &pairs, int owned, int crushed)
 {
   for (int k = 0; k < batch.count; k++) {
     const int p = batch.pair[k];
@@ -164,7 +208,7 @@ FAULTGOUGE_INLINE int empty(Batch<Number> &batch, ContactPairs &pairs, int crush
       continue;
     }
     const Number tangential = FRICTION ? batch.tangential.load(k) : Number(0.0);
-    set_force(pairs, p, batch.force_x.load(k), batch.force_y.load(k), tangential);
+    give_force(pairs, p, owned, batch.force_x.load(k), batch.force_y.load(k), tangential);
     if constexpr (FRICTION) {
       pairs.touching[p] = 1;
       pairs.slip[p] = leading(batch.slip.load(k));
@@ -177,14 +221,14 @@ FAULTGOUGE_INLINE int empty(Batch<Number> &batch, ContactPairs &pairs, int crush
 
 template <class Number, bool FRICTION, bool ADVANCE>
 FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
-                                 double dt, const FixedPointGrid &grid)
+                                 double dt, const Grids &grids)
 {
   Batch<Number> batch;
   int crushed = -1;
   for (int p = 0, n = pairs.size(); p < n; p++) {
     const Branch<double> high = leading_branch(pairs, p, disks, box);
     const double rsq = high.x * high.x + high.y * high.y;
-    const double reach = disks.radius[pairs.first[p]] + disks.radius[pairs.second[p]] + margin(Number(), grid);
+    const double reach = disks.radius[pairs.first[p]] + disks.radius[pairs.second[p]] + margin(Number(), grids.coordinate);
     if (rsq >= reach * reach) {
       open<Number, FRICTION>(pairs, p);
       continue;
@@ -197,22 +241,11 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
     }
     add<Number, FRICTION, ADVANCE>(batch, pairs, p, r, disks, dt);
     if (batch.count < BATCH) continue;
-    evaluate<Number, FRICTION, ADVANCE>(batch, law, grid);
-    crushed = empty<Number, FRICTION>(batch, pairs, crushed);
+    evaluate<Number, FRICTION, ADVANCE>(batch, law, grids);
+    crushed = empty<Number, FRICTION>(batch, pairs, disks.owned, crushed);
   }
-  evaluate<Number, FRICTION, ADVANCE>(batch, law, grid);
-  return empty<Number, FRICTION>(batch, pairs, crushed);
-}
-
-// x, y and tangential force of a pair, and their signs for its first and its second disk
-using Four = double __attribute__((vector_size(32)));
-using FourLow = float __attribute__((vector_size(16)));
-constexpr double SIGN[2][4] = {{1.0, 1.0, 1.0, 1.0}, {-1.0, -1.0, 1.0, 1.0}};
-
-template <class Vector, class Numbers> FAULTGOUGE_INLINE void load(Vector &vector, const Numbers &numbers)
-{
-  static_assert(sizeof(Vector) == sizeof(Numbers), "one vector");
-  std::memcpy(&vector, &numbers, sizeof(Vector));
+  evaluate<Number, FRICTION, ADVANCE>(batch, law, grids);
+  return empty<Number, FRICTION>(batch, pairs, disks.owned, crushed);
 }
 
 template <class Number>
@@ -233,7 +266,7 @@ FAULTGOUGE_DISPATCH
 int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law, double dt,
                    bool friction, bool advance)
 {
-  const FixedPointGrid none{};
+  const Grids none{};
   if (!friction) return all_forces<double, false, false>(pairs, disks, box, law, dt, none);
   if (advance) return all_forces<double, true, true>(pairs, disks, box, law, dt, none);
   return all_forces<double, true, false>(pairs, disks, box, law, dt, none);
@@ -241,22 +274,21 @@ int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, c
 
 FAULTGOUGE_DISPATCH
 int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
-                               double dt, bool friction, bool advance, const FixedPointGrid &grid)
+                               double dt, bool friction, bool advance, const Grids &grids)
 {
-  if (!friction) return all_forces<Compensated, false, false>(pairs, disks, box, law, dt, grid);
-  if (advance) return all_forces<Compensated, true, true>(pairs, disks, box, law, dt, grid);
-  return all_forces<Compensated, true, false>(pairs, disks, box, law, dt, grid);
+  if (!friction) return all_forces<Compensated, false, false>(pairs, disks, box, law, dt, grids);
+  if (advance) return all_forces<Compensated, true, true>(pairs, disks, box, law, dt, grids);
+  return all_forces<Compensated, true, false>(pairs, disks, box, law, dt, grids);
 }
 
 FAULTGOUGE_DISPATCH
 void sum_forces(const ContactPairs &pairs, const Disks &disks, const Forces &forces)
 {
   for (int i = 0; i < disks.owned; i++) {
-    Four sum{}, more{}, sign{};
+    Four sum{}, more;
     for (int k = pairs.start[i]; k < pairs.start[i + 1]; k++) {
       load(more, pairs.force[pairs.row[k] >> 1]);
-      load(sign, SIGN[pairs.row[k] & 1]);
-      sum += sign * more;
+      sum += SIGN[pairs.row[k] & 1] * more;
     }
     forces.f[i][0] += sum[0];
     forces.f[i][1] += sum[1];
@@ -265,28 +297,18 @@ void sum_forces(const ContactPairs &pairs, const Disks &disks, const Forces &for
 }
 
 FAULTGOUGE_DISPATCH
-void sum_compensated_forces(const ContactPairs &pairs, const Disks &disks, const Forces &forces)
+void take_compensated_forces(ContactPairs &pairs, const Disks &disks, const Forces &forces)
 {
   for (int i = 0; i < disks.owned; i++) {
-    Four sum{}, low{}, more{}, sign{};
-    FourLow more_low{};
-    for (int k = pairs.start[i]; k < pairs.start[i + 1]; k++) {
-      const int p = pairs.row[k] >> 1;
-      load(more, pairs.force[p]);
-      load(more_low, pairs.force_low[p]);
-      load(sign, SIGN[pairs.row[k] & 1]);
-      more *= sign;
-      const Four total = sum + more, part = total - sum;    // exact_sum of compensated.h
-      low += ((sum - (total - part)) + (more - part)) + sign * __builtin_convertvector(more_low, Four);
-      sum = total;
-    }
-    const Compensated torque = -disks.radius[i] * Compensated(sum[2], low[2]);
-    forces.f[i][0] += sum[0];
-    forces.f[i][1] += sum[1];
+    auto &[high, low] = pairs.disk_force[i];
+    const Compensated torque = -disks.radius[i] * Compensated(high.tangential, low.tangential);
+    forces.f[i][0] += high.x;
+    forces.f[i][1] += high.y;
     forces.torque[i][2] += torque.high;
-    forces.low[i][forces.low_fx] = low[0];
-    forces.low[i][forces.low_fy] = low[1];
+    forces.low[i][forces.low_fx] = low.x;
+    forces.low[i][forces.low_fy] = low.y;
     forces.low[i][forces.low_torque] = torque.low;
+    pairs.disk_force[i] = CompensatedForce{};
   }
 }
 

@@ -105,8 +105,10 @@ void ContactPairs::build(const NeighList &list, double skin, Atom &atom, const D
     std::sort(row.begin() + start[i], row.begin() + start[i + 1],
               [&](int a, int b) { return partner(a) < partner(b); });
 
-  force.assign(size(), PairForce{});
-  if (compensated) force_low.assign(size(), PairForceLow{});
+  if (compensated)
+    disk_force.assign(nlocal, CompensatedForce{});
+  else
+    force.assign(size(), PairForce{});
   if (!with_slips) return;
   slip.assign(size(), 0.0);
   if (compensated) slip_low.assign(size(), 0.0);

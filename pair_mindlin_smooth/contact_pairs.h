@@ -3,7 +3,8 @@
 //
 // A pair is evaluated once by each rank that owns one of its disks, a periodic image standing for its
 // original; then each disk adds up its pairs in the order of IDs. The sum is therefore the same to the bit
-// for any number of ranks, any order of the atoms in memory and newton on or off.
+// for any number of ranks, any order of the atoms in memory and newton on or off. In compensated arithmetic sums are
+// exact, and are made as the pairs come.
 
 #ifndef FAULTGOUGE_CONTACT_PAIRS_H
 #define FAULTGOUGE_CONTACT_PAIRS_H
@@ -28,9 +29,9 @@ struct alignas(32) PairForce {
   double unused;
 };
 
-// what it lacks, 1e-16 of it, to seven digits
-struct alignas(16) PairForceLow {
-  float x, y, tangential, unused;
+// the sum over the pairs of a disk, with low parts
+struct alignas(64) CompensatedForce {
+  PairForce high, low;
 };
 
 class ContactPairs {
@@ -51,10 +52,10 @@ public:
   };
   std::vector<Image> image;
   std::vector<LAMMPS_NS::tagint> first_tag, second_tag;    // and their IDs
-  std::vector<PairForce> force;
-  std::vector<PairForceLow> force_low;    // only if compensated
-  std::vector<double> slip, slip_low;     // only with_slips
-  std::vector<int> touching;              // only with_slips
+  std::vector<PairForce> force;                // not if compensated
+  std::vector<CompensatedForce> disk_force;    // of the owned disks, only if compensated
+  std::vector<double> slip, slip_low;          // only with_slips
+  std::vector<int> touching;                   // only with_slips
 };
 
 }    // namespace faultgouge

@@ -37,11 +37,8 @@ struct MindlinLaw {
     return Number(mu) * Number(kn) / Number(kt);
   }
 
-  template <class Number> FAULTGOUGE_INLINE Number normal_force(Number overlap) const
-  {
-    using std::sqrt;
-    return kn * overlap * sqrt(overlap);
-  }
+  FAULTGOUGE_INLINE double normal_force(double overlap) const { return kn * overlap * std::sqrt(overlap); }
+  FAULTGOUGE_INLINE Compensated normal_force(Compensated overlap) const { return kn * three_halves_power(overlap); }
 
   double normal_energy(double overlap) const { return 0.4 * normal_force(overlap) * overlap; }
 
@@ -51,7 +48,7 @@ struct MindlinLaw {
     using std::fabs;
     const Number size = fabs(slip), one = 1.0;
     const Number x = select(size < slip_limit, size / slip_limit, one);
-    const Number smooth = x * ordered_sum(one, x * ordered_sum(one, -x));
+    const Number smooth = x * ordered_sum(1.0, x * ordered_sum(1.0, -x));
     return times_sign(mu * normal * smooth, -std::copysign(1.0, leading(slip)));
   }
 };
@@ -75,8 +72,7 @@ FAULTGOUGE_INLINE Compensated advanced_slip(Compensated slip, double increment, 
 {
   const Compensated sum = exact_sum(slip.high, increment);
   const Compensated moved = normalized({sum.high, sum.low + slip.low});
-  const Compensated bound = normalized(times_sign(limit, std::copysign(1.0, moved.high)));
-  return select(fabs(moved) < limit, moved, bound);
+  return select(fabs(moved) < limit, moved, times_sign(limit, std::copysign(1.0, moved.high)));
 }
 
 }    // namespace faultgouge

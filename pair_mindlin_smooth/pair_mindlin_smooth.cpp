@@ -18,7 +18,6 @@
 using namespace LAMMPS_NS;
 using faultgouge::Compensated;
 using faultgouge::Disks;
-using faultgouge::FixedPointGrid;
 using faultgouge::leading;
 using faultgouge::MindlinLaw;
 using faultgouge::PairForce;
@@ -127,6 +126,16 @@ void PairMindlinSmooth::init_style()
                  "({}), and a disk could touch two images of one neighbour: use a larger box",
                  domain->prd[d], "xy"[d], diameter);
   if (compensated) low_parts->set_reach(diameter);
+  set_force_grids();
+}
+
+// An overlap of more than the smaller radius is refused.
+void PairMindlinSmooth::set_force_grids()
+{
+  const double radius = *std::max_element(largest_radius + 1, largest_radius + atom->ntypes + 1);
+  const double normal = law.normal_force(radius);
+  force_grid = faultgouge::SummationGrid::for_largest(normal * std::hypot(1.0, law.mu));
+  tangential_grid = faultgouge::SummationGrid::for_largest(normal * law.mu);
 }
 
 // made at init and not with the pair style, because data of a restart file reach a fix when it is made
@@ -177,6 +186,7 @@ void PairMindlinSmooth::reinit()
   if (!law.valid()) error->all(FLERR, "pair mindlin/smooth: KN KT MU became {} {} {}", law.kn, law.kt, law.mu);
   if (law.frictional() && !has_friction)
     error->all(FLERR, "pair mindlin/smooth: friction cannot be switched on within a run that began without");
+  set_force_grids();
 }
 
 void PairMindlinSmooth::rebuild_pairs()
@@ -209,7 +219,7 @@ void PairMindlinSmooth::compute(int eflag, int vflag)
   const faultgouge::Forces forces{atom->f,         atom->torque,    compensated ? low_parts->array_atom : nullptr,
                                   FixLowParts::FX, FixLowParts::FY, FixLowParts::TORQUE};
   if (compensated)
-    faultgouge::sum_compensated_forces(pairs, disks(), forces);
+    faultgouge::take_compensated_forces(pairs, disks(), forces);
   else
     faultgouge::sum_forces(pairs, disks(), forces);
   if (!evflag) return;
@@ -277,7 +287,7 @@ int PairMindlinSmooth::contact_forces(bool advance)
   const double dt = update->dt;
   if (!compensated) return faultgouge::contact_forces(pairs, disks(), period(), law, dt, has_friction, advance);
   return faultgouge::compensated_contact_forces(pairs, disks(), period(), law, dt, has_friction, advance,
-                                                low_parts->grid());
+                                                {low_parts->grid(), force_grid, tangential_grid});
 }
 
 void PairMindlinSmooth::refuse(int p) const
@@ -296,15 +306,13 @@ void PairMindlinSmooth::refuse(int p) const
 // The energy is the elastic one of the normal force; the tangential force has none.
 template <class NUMBER> void PairMindlinSmooth::tally()
 {
-  const FixedPointGrid grid = compensated ? low_parts->grid() : FixedPointGrid{};
   for (int p = 0; p < pairs.size(); p++) {
-    const PairForce &contact = pairs.force[p];
-    if (contact.x == 0.0 && contact.y == 0.0) continue;
-    const int i = pairs.first[p], j = pairs.second[p];
+    const double energy = measure<NUMBER>(p, pairs.first[p]);
+    if (energy == 0.0) continue;
+    const double normal = svector[0], tangential = svector[1], nx = svector[4], ny = svector[5];
     const auto r = faultgouge::branch<NUMBER>(pairs, p, disks(), period());
-    const auto where = geometry(r, atom->radius[i], atom->radius[j], grid);
-    ev_tally_xyz(i, j, atom->nlocal, 0, law.normal_energy(value(where.overlap)), 0.0, contact.x, contact.y, 0.0,
-                 value(r.x), value(r.y), 0.0);
+    ev_tally_xyz(pairs.first[p], pairs.second[p], atom->nlocal, 0, energy, 0.0, normal * nx - tangential * ny,
+                 normal * ny + tangential * nx, 0.0, value(r.x), value(r.y), 0.0);
   }
 }
 
@@ -352,7 +360,7 @@ template <class NUMBER> double PairMindlinSmooth::measure(int p, int i)
 {
   const auto r = faultgouge::branch<NUMBER>(pairs, p, disks(), period());
   const double radius_i = atom->radius[pairs.first[p]], radius_j = atom->radius[pairs.second[p]];
-  const auto contact = geometry(r, radius_i, radius_j, compensated ? low_parts->grid() : FixedPointGrid{});
+  const auto contact = geometry(r, radius_i, radius_j);
   if (leading(contact.overlap) <= 0.0) return 0.0;
 
   const double overlap = value(contact.overlap);
@@ -415,8 +423,8 @@ void PairMindlinSmooth::read_restart_settings(FILE *fp)
 
 double PairMindlinSmooth::memory_usage()
 {
-  const double low = compensated ? sizeof(faultgouge::PairForceLow) + sizeof(double) : 0.0;
-  const double numbers = sizeof(PairForce) + sizeof(double) + low;
-  const double per_pair = 2 * sizeof(int) + 2 * sizeof(tagint) + numbers + 1;
-  return Pair::memory_usage() + pairs.size() * per_pair + (pairs.row.size() + pairs.start.size()) * sizeof(int);
+  const double force = compensated ? sizeof(double) : sizeof(PairForce);    // a low part of the slip, or a force
+  const double per_pair = 3 * sizeof(int) + 2 * sizeof(tagint) + 2 + sizeof(double) + force;
+  const double per_disk = sizeof(int) + (compensated ? sizeof(faultgouge::CompensatedForce) : 0);
+  return Pair::memory_usage() + pairs.size() * per_pair + pairs.row.size() * sizeof(int) + pairs.start.size() * per_disk;
 }

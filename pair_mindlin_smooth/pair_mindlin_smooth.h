@@ -48,6 +48,7 @@ private:
   bool has_friction = false;           // as compiled into this run, at init
   bool slips_in_fix = true;            // false while pairs.slip is newer
   double *largest_radius = nullptr;    // of each type
+  faultgouge::SummationGrid force_grid, tangential_grid;
 
   // LAMMPS adds box lengths to the coordinates of ghosts, with a rounding that depends on which of two disks
   // is the ghost; with the original coordinates both owners of a pair find the same to the bit
@@ -56,6 +57,7 @@ private:
   void allocate();
   void make_fixes();
   void check_integrators() const;
+  void set_force_grids();
   void rebuild_pairs();
   void communicate_originals();
   faultgouge::Disks disks() const;
