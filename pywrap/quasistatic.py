@@ -28,16 +28,15 @@ Where Newton fails the increment is halved, since the path matters: friction rem
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
-from ..analysis import Packing, nearest_image, stiffness_matrix
-from .elimination import elimination_order
+from ..analysis import Packing, nearest_image
+from .contact_graph import ContactGraph
 from .engine import Engine
+from .newton_matrix import factored
+from .trial import EPSILON, Trial, rounding
 
 Floats = NDArray[np.float64]
 
@@ -54,14 +53,6 @@ FREEING = 3
 root of that order, and the factor makes the convergence quadratic again. Later ones take Newton's own step, since a
 rattler in a narrow cage would be thrown to and fro."""
 
-IDLE = 1e-7
-"""Share of the largest contact force up to which a contact carries nothing that matters."""
-
-CREEP = 0.1
-"""Share of its stiffness that is added to a disk with none but such contacts. One that is leant upon by a breath has
-next to no stiffness along the contact, and would be thrown through its cage; as it is, its force falls tenfold in an
-iteration, from a value that is small already."""
-
 SPARING = 300
 """Disks beyond which factors of K are used again: a factorisation costs ten force evaluations and more."""
 
@@ -71,9 +62,6 @@ KEPT = 0.1
 GAIN = 1e-2
 """Factor by which the first iteration reduces the residual, where nothing is known yet: 1e-2 is that of an increment of
 1e-3 from no displacement, and smaller ones have smaller factors."""
-
-DENSE = 400
-"""Coordinates up to which a dense solve is the faster one: 1 ms against 3 ms at 285."""
 
 SMALLEST_SHARE = 2.0**-10
 """The share of an increment below which halving ends and the packing is said to flow."""
@@ -122,15 +110,9 @@ def rounding_floor(packing: Packing, displaced: float = 0.0) -> float:
     displaced : float
         Length of the displacement that led to it, a double, whose last place counts as well.
     """
-    contacts, geometry = packing.contacts, packing.geometry
-    if len(contacts) == 0:
-        return 0.0
-    unit = packing.coordinate_rounding + np.finfo(float).eps * displaced
-    error = (packing.law.normal_stiffness(geometry.overlap) * unit) ** 2
-    per_disk = np.bincount(contacts.i, error, len(packing))
-    pair = ~contacts.floor
-    per_disk += np.bincount(contacts.j[pair], error[pair], len(packing))
-    return float(np.sqrt(per_disk.max()))
+    graph = ContactGraph(packing.contacts.i, packing.contacts.j, packing.radius)
+    unit = packing.coordinate_rounding + EPSILON * displaced
+    return rounding(packing.law, graph, packing.geometry.overlap, unit)
 
 
 def equilibrate(
@@ -196,16 +178,24 @@ def _newton(
     engine: Engine, base: Packing, force_tolerance: float | None, guess: Floats | None = None
 ) -> tuple[Equilibrium | None, int]:
     """Newton's method from one base at the engine's fx; None where it does not converge."""
+    with engine.displacing() as displaced:
+        best, evaluations = _iterated(displaced, base, force_tolerance, guess)
+    if best is None:
+        return None, evaluations
+    return Equilibrium(engine.keep(best), best.residual, best.floor(), evaluations), evaluations
+
+
+def _iterated(
+    displaced: Callable[[Packing, Floats], Trial], base: Packing, force_tolerance: float | None, guess: Floats | None
+) -> tuple[Trial | None, int]:
     displacement = np.zeros(3 * len(base)) if guess is None else guess
-    best: Equilibrium | None = None
+    best: Trial | None = None
     solve = None
     worse = 0  # iterations that gained nothing; changes of contacts cost some
     earlier = last = np.inf  # residuals of the two iterations before
     for evaluation in range(1, ITERATIONS + 1):
-        trial = engine.displace(base, displacement)
-        force = engine.net_force
-        residual = _largest(force, trial)
-        floor = rounding_floor(trial)
+        trial = displaced(base, displacement)
+        residual, floor = trial.residual, trial.floor()
         if best is not None and residual > 0.5 * best.residual:
             if best.residual < 10 * floor:
                 return best, evaluation
@@ -214,100 +204,24 @@ def _newton(
                 return None, evaluation
         # What a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved.
         if (guess is None or evaluation > 1) and (best is None or residual < best.residual):
-            best = Equilibrium(trial, residual, floor, evaluation)
+            best = trial
         if best is not None and residual <= (force_tolerance if force_tolerance is not None else 0.1 * floor):
             return best, evaluation
         # What is not rounding falls by no less than it did the time before: it may be far below the floor now.
         factor = last / earlier if np.isfinite(earlier) else GAIN
         if best is not None and residual < floor and factor * last < 0.1 * floor:
             return best, evaluation
-        if solve is None or len(base) <= SPARING or residual > KEPT * last:
-            solve = _factored(trial)
+        good = residual * (residual / last) < 0.1 * floor or (len(base) > SPARING and residual <= KEPT * last)
+        if solve is None or not good:
+            solve = factored(trial, floor)
         earlier, last = last, residual
-        step = None if solve is None else solve(force)
+        step = None if solve is None else solve(trial.force)
         if step is None or np.abs(step).max() > 0.1 * base.radius.min():
             return None, evaluation  # a floating part: the linear response is no small displacement
         if evaluation <= FREEING:
-            step.reshape(3, -1)[:, _hit(trial)] *= 1.5
-        if base.compensated and residual < 10 * rounding_floor(trial, np.abs(displacement).max()):
-            base, displacement = trial, np.zeros_like(displacement)
+            hit = (trial.graph.count(trial.law.normal_force > floor) == 1) & ~base.top
+            step.reshape(3, -1)[:, hit] *= 1.5
+        if base.compensated and residual < 10 * trial.floor(np.abs(displacement).max()):
+            base, displacement = trial.packing, np.zeros_like(displacement)
         displacement = displacement + step
     return None, ITERATIONS
-
-
-def _hit(packing: Packing) -> NDArray[np.bool_]:
-    """Disks with one contact that carries something: rattlers that a neighbour ran into, shape (N,)."""
-    contacts = packing.loaded(rounding_floor(packing)).contacts
-    count = np.bincount(contacts.i, minlength=len(packing))
-    count += np.bincount(contacts.j[~contacts.floor], minlength=len(packing))
-    return (count == 1) & ~packing.top
-
-
-def _idle(packing: Packing) -> NDArray[np.bool_]:
-    """Disks of which no contact carries more than `IDLE`, shape (N,)."""
-    contacts, carried = packing.contacts, packing.normal_force
-    most = np.zeros(len(packing))
-    np.maximum.at(most, contacts.i, carried)
-    pair = ~contacts.floor
-    np.maximum.at(most, contacts.j[pair], carried[pair])
-    return most <= IDLE * carried.max(initial=0.0)
-
-
-def _largest(force: Floats, packing: Packing) -> float:
-    per_disk = np.linalg.norm(force.reshape(3, -1), axis=0)
-    return float(np.delete(per_disk, packing.rattlers).max(initial=0.0))
-
-
-def newton_step(packing: Packing, force: Floats) -> Floats | None:
-    """K^-1 F on the coordinates that K knows, contacts below the floor left out; None if K is singular.
-
-    Parameters
-    ----------
-    packing : Packing
-        Where K is taken.
-    force : ndarray, shape (3N,)
-        F, force.
-
-    Returns
-    -------
-    ndarray, shape (3N,), or None
-        The displacement, length.
-    """
-    solve = _factored(packing)
-    return None if solve is None else solve(force)
-
-
-def _factored(packing: Packing) -> Callable[[Floats], Floats | None] | None:
-    """The solution of K dq = F as a function of F, on the coordinates that K knows; None if K is singular."""
-    packing = packing.loaded(rounding_floor(packing))
-    matrix = stiffness_matrix(packing)
-    # A share of the diagonal of the size of its rounding keeps the solve finite where something floats, such
-    # as the whole packing along a floor without friction; on stiff directions it changes nothing.
-    share = np.where(np.tile(_idle(packing), 3), CREEP, 1e-13)
-    diagonal = (1 + share) * matrix.diagonal()
-    active = np.flatnonzero(diagonal)
-    if len(active) > DENSE:
-        active = active[elimination_order(packing, active)]
-    block = matrix[active][:, active]
-    block.setdiag(diagonal[active])
-    if len(active) <= DENSE:
-        inverse = partial(np.linalg.solve, block.toarray())
-    else:
-        try:
-            # nearly symmetric: pivots on the diagonal where good
-            inverse = splu(
-                csc_array(block), permc_spec="NATURAL", diag_pivot_thresh=0.01, options={"SymmetricMode": True}
-            ).solve
-        except RuntimeError:
-            return None
-
-    def solve(force: Floats) -> Floats | None:
-        try:
-            step = inverse(force[active])
-        except np.linalg.LinAlgError:
-            return None
-        full = np.zeros_like(force)
-        full[active] = step
-        return full if np.all(np.isfinite(step)) else None
-
-    return solve

@@ -1,0 +1,127 @@
+"""Newton's matrix: K of a trial, factored.
+
+Contacts below the rounding floor are left out, since their stiffness is noise, and so are the coordinates that nothing
+holds then. A small matrix is a band and goes to LAPACK, a large one is sparse and goes to SuperLU.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgbtrf, dgbtrs
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
+
+from ..analysis import Packing, stiffness_matrix
+from ..analysis.stiffness import contact_terms
+from .contact_graph import ContactGraph
+from .elimination import elimination_order
+from .trial import Trial
+
+Floats = NDArray[np.float64]
+Solve = Callable[[Floats], Floats | None]
+
+IDLE = 1e-7
+"""Share of the largest contact force up to which a contact carries nothing that matters."""
+
+CREEP = 0.1
+"""Share of its stiffness that is added to a disk with none but such contacts. One that is leant upon by a breath has
+next to no stiffness along the contact, and would be thrown through its cage; as it is, its force falls tenfold in an
+iteration, from a value that is small already."""
+
+AFLOAT = 1e-13
+"""Share that is added to all others. A share of the size of its rounding keeps the solve finite where something floats,
+such as the whole packing along a floor without friction; on stiff directions it changes nothing."""
+
+BANDED = 400
+"""Coordinates up to which a band is the faster one."""
+
+
+def factored(trial: Trial, floor: float) -> Solve | None:
+    """The solution of K dq = F as a function of F, on the coordinates that K knows; None if K is singular.
+
+    Parameters
+    ----------
+    trial : Trial
+        Where K is taken.
+    floor : float
+        Force that a contact has to exceed.
+    """
+    graph, law = trial.graph, trial.law
+    normal, distance, _ = trial.branches
+    terms = contact_terms(law, normal, distance, graph.pairs)
+    loaded = law.normal_force > floor
+    if not np.all(loaded):
+        terms = np.where(loaded, terms, 0.0)
+    active = np.concatenate([graph.per_disk(terms[axis, axis]) for axis in range(3)]) != 0
+    if np.count_nonzero(active) > BANDED:
+        return sparse_factored(trial.packing.loaded(floor))
+    band = graph.band(active)
+    matrix, width = band.matrix(terms), band.width
+    share = _share(graph, law.normal_force, loaded)
+    matrix[2 * width] *= 1 + np.concatenate([share, share, share])[band.coordinates]
+    factors, pivots, singular = dgbtrf(matrix, width, width, overwrite_ab=True)
+    if singular:
+        return None
+
+    def solve(force: Floats) -> Floats | None:
+        solution, _ = dgbtrs(factors, width, width, force[band.coordinates], pivots)
+        step = np.zeros_like(force)
+        step[band.coordinates] = solution
+        return step if np.all(np.isfinite(solution)) else None
+
+    return solve
+
+
+def _share(graph: ContactGraph, carried: Floats, loaded: NDArray[np.bool_]) -> Floats:
+    """Share of its stiffness that is added to each disk, shape (N,)."""
+    matters = loaded & (carried > IDLE * carried.max(initial=0.0))
+    return np.where(graph.count(matters) == 0, CREEP, AFLOAT)
+
+
+def newton_step(packing: Packing, force: Floats, floor: float) -> Floats | None:
+    """K^-1 F on the coordinates that K knows, by SuperLU; None if K is singular.
+
+    Parameters
+    ----------
+    packing : Packing
+        Where K is taken.
+    force : ndarray, shape (3N,)
+        F, force.
+    floor : float
+        Force that a contact has to exceed.
+
+    Returns
+    -------
+    ndarray, shape (3N,), or None
+        The displacement, length.
+    """
+    solve = sparse_factored(packing.loaded(floor))
+    return None if solve is None else solve(force)
+
+
+def sparse_factored(packing: Packing) -> Solve | None:
+    """The same of a packing, by SuperLU."""
+    matrix = stiffness_matrix(packing)
+    contacts = packing.contacts
+    graph = ContactGraph(contacts.i, contacts.j, packing.radius)
+    share = _share(graph, packing.normal_force, np.ones(len(contacts), np.bool_))
+    diagonal = (1 + np.tile(share, 3)) * matrix.diagonal()
+    active = np.flatnonzero(diagonal)
+    active = active[elimination_order(packing, active)]
+    block = matrix[active][:, active]
+    block.setdiag(diagonal[active])
+    try:
+        # nearly symmetric: pivots on the diagonal where good
+        factors = splu(
+            csc_array(block), permc_spec="NATURAL", diag_pivot_thresh=0.01, options={"SymmetricMode": True}
+        )
+    except RuntimeError:
+        return None
+
+    def solve(force: Floats) -> Floats | None:
+        step = np.zeros_like(force)
+        step[active] = factors.solve(force[active])
+        return step if np.all(np.isfinite(step)) else None
+
+    return solve
