@@ -92,6 +92,13 @@ class Contacts:
         """Which contacts are with the floor, shape (C,)."""
         return self.j == FLOOR
 
+    def slipped(self, slip: ArrayLike, slip_low: ArrayLike | None = None) -> "Contacts":
+        """The same contacts with other slips, whose order is the one here; length, shape (C,)."""
+        other = object.__new__(Contacts)
+        low = None if slip_low is None else _frozen(_floats("slip_low", slip_low, self.i.shape))
+        other.__dict__.update(i=self.i, j=self.j, slip=_frozen(_floats("slip", slip, self.i.shape)), slip_low=low)
+        return other
+
 
 class ContactGeometry(NamedTuple):
     """Where each contact is and how it stands; arrays over contacts, read-only.
@@ -327,9 +334,7 @@ class Packing:
             position=_frozen(_floats("position", position, (n, 2))),
             angle=_frozen(_floats("angle", angle, (n,))),
             contacts=contacts,
-            position_low=None
-            if position_low is None
-            else _frozen(_floats("position_low", position_low, (n, 2))),
+            position_low=None if position_low is None else _frozen(_floats("position_low", position_low, (n, 2))),
         )
         if fx is not None:
             other.__dict__["fx"] = fx

@@ -106,9 +106,7 @@ def stiffness_matrix(packing: Packing, form: Form = "consistent") -> csr_array:
     return matrix
 
 
-def contact_terms(
-    law: Derivatives, normal: Floats, distance: Floats, pairs: int, form: Form = "consistent"
-) -> Floats:
+def contact_terms(law: Derivatives, normal: Floats, distance: Floats, pairs: int, form: Form = "consistent") -> Floats:
     """The nine numbers of each contact that K is assembled from: its block of the first partner with itself.
 
     Parameters

@@ -95,7 +95,9 @@ def main() -> None:
         increments(engine, start, solve, lammps)  # the first ones load libraries and caches
         rows = [row for _ in range(ROUNDS) for row in increments(engine, start, solve, lammps)]
 
-    print(f"{platform.processor() or platform.machine()}; {len(rows)} increments of {STEP:g}, {len(start.packing)} disks\n")
+    print(
+        f"{platform.processor() or platform.machine()}; {len(rows)} increments of {STEP:g}, {len(start.packing)} disks\n"
+    )
     print(f"{'':12s}{'median ms':>10s}{'least':>8s}{'90 %':>8s}")
     for name in ("solve", "LAMMPS", "overhead", "all"):
         values = [row[name] for row in rows]

@@ -3,7 +3,6 @@
 
 #include "compute_layer_velocity.h"
 #include "fix_disc_integrators.h"
-#include "fix_disc_state.h"
 #include "fix_low_parts.h"
 #include "fix_slip_history.h"
 #include "fix_wall_mindlin_smooth.h"
@@ -87,7 +86,6 @@ extern "C" __attribute__((visibility("default"))) void lammpsplugin_init(void *l
   add_fix("slip/history", "slips of the contacts of pair mindlin/smooth", &create_fix<FixSlipHistory>);
   add_fix("wall/mindlin/smooth", "flat floor with the law of pair mindlin/smooth", &create_fix<FixWallMindlinSmooth>);
   add_fix("nve/disc", "velocity Verlet of disks in the plane", &create_fix<FixNVEDisc>);
-  add_fix("state/disc", "positions, velocities and forces of disks in one array", &create_fix<FixDiscState>);
   add_fix("low/parts", "low parts of coordinates and forces", &create_fix<FixLowParts>);
   add_fix("displace/disc", "moves disks by their velocities alone", &create_fix<FixDisplaceDisc>);
   add_fix("overdamped/disc", "overdamped relaxation of disks in the plane", &create_fix<FixOverdampedDisc>);

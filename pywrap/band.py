@@ -30,6 +30,8 @@ class Band:
         The coordinates (x.., y.., R theta..) that the matrix has, E of them.
     coordinates : ndarray of int, shape (E,)
         The same in the order of the matrix.
+    disks : ndarray of int, shape (E,)
+        Whose they are.
     width : int
         W, diagonals on either side of the main one.
     places : ndarray of int, shape (36 C,)
@@ -39,6 +41,7 @@ class Band:
 
     active: Booleans
     coordinates: Indices
+    disks: Indices
     width: int
     places: Indices
 
@@ -71,13 +74,14 @@ def band(i: Indices, j: Indices, active: Booleans) -> Band:
     size = len(coordinates)
     nowhere = 3 * size * size + size  # larger than any place, for any width
     number = np.full((3, disks + 1), nowhere)  # of coordinates in the matrix; those of the floor, -1, come last
-    number[coordinates // disks, coordinates % disks] = np.arange(size)
+    axis, disk = np.divmod(coordinates, disks)
+    number[axis, disk] = np.arange(size)
     ends = number[:, [i, j]].transpose(1, 0, 2)
     rows, columns = ends[:, None, :, None], ends[None, :, None, :]
     inside = (rows < nowhere) & (columns < nowhere)
     width = int(np.abs(rows - columns).max(where=inside, initial=0))
     places = np.where(inside, rows + 3 * width * columns + 2 * width, size * (3 * width + 1))
-    return Band(active, coordinates, width, places.ravel())
+    return Band(active, coordinates, disk, width, places.ravel())
 
 
 def _order(i: Indices, j: Indices, disks: int) -> Indices:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis import Contacts
 from ..analysis.packing import FLOOR
 from .band import Band, band
 
@@ -22,15 +23,25 @@ class ContactGraph:
 
     Parameters
     ----------
-    i, j : ndarray of int, shape (C,)
-        Partners, in the canonical order of :class:`~faultgouge.analysis.Contacts`; j = -1 is the floor.
+    contacts : Contacts
+        Of the packing; their slips do not matter.
     radius : ndarray, shape (N,)
         Of the disks, length.
+
+    Attributes
+    ----------
+    contacts : Contacts
+        As given.
+    i, j : ndarray of int, shape (C,)
+        Partners; j = -1 is the floor.
+    pairs : int
+        Contacts of two disks; those with the floor follow.
     """
 
-    def __init__(self, i: Indices, j: Indices, radius: Floats) -> None:
-        self.i, self.j, self.radius = i, j, radius
-        self.pairs = int(np.count_nonzero(j != FLOOR))
+    def __init__(self, contacts: Contacts, radius: Floats) -> None:
+        self.contacts, self.radius = contacts, radius
+        self.i, self.j = contacts.i, contacts.j
+        self.pairs = int(np.count_nonzero(self.j != FLOOR))
         self._band: Band | None = None
 
     @cached_property
@@ -47,18 +58,17 @@ class ContactGraph:
         return np.concatenate([self.i, self.j[: self.pairs]]), np.concatenate([contact, contact[: self.pairs]])
 
     @cached_property
-    def degree(self) -> Indices:
-        """Contacts of each disk, shape (N,)."""
-        return np.bincount(self._ends[0], minlength=len(self.radius))
+    def held(self) -> Booleans:
+        """Disks that have a contact, shape (N,)."""
+        return np.bincount(self._ends[0], minlength=len(self.radius)) > 0
 
     def per_disk(self, values: NDArray) -> Floats:
-        """Sums of numbers over the contacts of each disk, shape (N,)."""
+        """Sums of numbers over the contacts of each disk, shape (..., N) of numbers of shape (..., C)."""
         disk, contact = self._ends
-        return np.bincount(disk, values.take(contact), len(self.radius))
-
-    def count(self, chosen: Booleans) -> Indices:
-        """How many of the chosen contacts each disk has, shape (N,)."""
-        return self.degree if np.all(chosen) else self.per_disk(chosen).astype(np.int64)
+        n = len(self.radius)
+        if values.ndim == 1:
+            return np.bincount(disk, values.take(contact), n)
+        return np.stack([self.per_disk(each) for each in values])
 
     def band(self, active: Booleans) -> Band:
         """Where the stiffnesses of the contacts are in the matrix of some coordinates; the last one if it has the same."""

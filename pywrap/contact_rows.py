@@ -8,7 +8,7 @@ arithmetic each slip has its low part beside it. See fix_slip_history.h and fix_
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis import Packing
+from ..analysis import Contacts, Packing
 from ..analysis.packing import FLOOR
 from .contact_graph import ContactGraph
 
@@ -80,9 +80,9 @@ class ContactRows:
             self._disk = np.flatnonzero(touching)
             self._place = i * slips.shape[1] + 2 + self.width * place
             j = partners[i, place].astype(np.int64) - 1
-            self._graph = ContactGraph(
-                np.concatenate([i, self._disk]), np.concatenate([j, np.full(len(self._disk), FLOOR)]), self._radius
-            )
+            i = np.concatenate([i, self._disk])
+            j = np.concatenate([j, np.full(len(self._disk), FLOOR)])
+            self._graph = ContactGraph(Contacts(i, j, np.zeros(len(i))), self._radius)
         flat = slips.ravel()
         slip = np.concatenate([flat[self._place], floor[self._disk, FLOOR_SLIP]])
         if not self._compensated:

@@ -40,7 +40,7 @@ LOOK = 1000
 LOW_COLUMNS = 5
 STATE_COLUMNS = 10
 GIVEN, POSITION, ANGLE, VELOCITY, FORCE = 0, slice(1, 3), 3, slice(4, 7), slice(7, 10)
-"""Columns of fix state/disc."""
+"""Columns of fix displace/disc."""
 
 DECORATION = re.compile(r"^'?ERROR( on proc \d+)?: | \([^ ()]+:\d+\)'?$")
 """What surrounds the sentence of an error of LAMMPS: who says it, and where in the source."""
@@ -154,6 +154,7 @@ class Engine:
         self._disks = DiskArrays(self._lammps, len(packing))
         self._rows = ContactRows(packing.radius, packing.compensated)
         self._written: Packing | None = None  # the packing of _arrays
+        self._displaces = False
         self._load(packing)
 
     def __enter__(self) -> Engine:
@@ -177,7 +178,7 @@ class Engine:
     @property
     def net_force(self) -> Floats:
         """Forces as LAMMPS has them, (Fx.., Fy.., T/R..), shape (3N,), load included."""
-        return self._force(self._disks.gather("f_state", STATE_COLUMNS))
+        return self._force(self._state())
 
     def _force(self, state: Floats) -> Floats:
         force = state[:, FORCE].T.copy()
@@ -273,7 +274,11 @@ class Engine:
         """A function that does the same and returns a `Trial`, for many displacements in turn."""
         self._command("timestep 1.0")
         with self._displacement():
-            yield self._displaced
+            self._displaces = True
+            try:
+                yield self._displaced
+            finally:
+                self._displaces = False
 
     def _displaced(self, base: Packing, displacement: Floats) -> Trial:
         dx, dy, du = displacement.reshape(3, -1)
@@ -354,7 +359,7 @@ class Engine:
         self._command(f"run {steps} pre no post no")
         law = self._static.law
         friction = self._lammps.extract_variable("friction") if self._weakening else law.mu
-        state = self._disks.gather("f_state", STATE_COLUMNS)
+        state = self._state()
         position, low = state[:, POSITION], None
         if self._static.compensated:
             position, low = normalized(position, self._disks.gather("f_low", LOW_COLUMNS)[:, :2])
@@ -382,7 +387,6 @@ class Engine:
                 precision="compensated" if packing.compensated else "double",
             )
             self._include("system.in")
-            self._command("fix state all state/disc")  # before those that complete what it writes
         self._disks.scatter("rmass", packing.mass)
         if law.frictional or packing.compensated:
             with self._displacement():
@@ -398,10 +402,15 @@ class Engine:
         arrays = self._arrays
         if packing.law.frictional:
             arrays["f_slips"] = self._of_width(arrays["f_slips"], self._disks.columns("slips"))
-        arrays["f_state"][:, GIVEN] = 1.0
-        arrays["f_state"][:, VELOCITY] = velocity
+        state = arrays["f_move"]
+        state[:, GIVEN], state[:, VELOCITY] = 1.0, velocity
         for name, values in arrays.items():
-            self._disks.scatter(name, values)
+            if name != "f_move" or self._displaces:
+                self._disks.scatter(name, values)
+        if not self._displaces:
+            self._disks.scatter("x", np.column_stack([packing.position, np.zeros(len(packing))]))
+            if packing.law.frictional:
+                self._disks.scatter("d_theta", packing.angle)
 
     def _of_width(self, slips: Floats, columns: int) -> Floats:
         """Rows of fix slips as wide as LAMMPS has them, or LAMMPS's as wide as these."""
@@ -414,7 +423,7 @@ class Engine:
         """What LAMMPS is given of a packing, by the names it has there."""
         state = np.zeros((len(packing), STATE_COLUMNS))
         state[:, POSITION], state[:, ANGLE] = packing.position, packing.angle
-        arrays = {"f_state": state}
+        arrays = {"f_move": state}
         if self._static.compensated:
             arrays["f_low"] = np.zeros((len(packing), LOW_COLUMNS))
             arrays["f_low"][:, :2] = 0.0 if packing.position_low is None else packing.position_low
@@ -423,10 +432,23 @@ class Engine:
             arrays["f_floor"] = self._rows.floor(packing)
         return arrays
 
+    def _state(self) -> Floats:
+        """The columns of fix displace/disc, whether there is one or not, shape (N, 10)."""
+        if self._displaces:
+            return self._disks.gather("f_move", STATE_COLUMNS)
+        state = np.zeros((len(self._static), STATE_COLUMNS))
+        state[:, POSITION] = self._disks.gather("x", 3)[:, :2]
+        velocity, force = self._disks.gather("v", 3), self._disks.gather("f", 3)
+        if self._static.law.frictional:
+            state[:, ANGLE] = self._disks.gather("d_theta", 1)[:, 0]
+            velocity[:, 2], force[:, 2] = (self._disks.gather(name, 3)[:, 2] for name in ("omega", "torque"))
+        state[:, VELOCITY], state[:, FORCE] = velocity, force
+        return state
+
     def _trial(self) -> Trial:
         """All that LAMMPS has."""
-        state = self._disks.gather("f_state", STATE_COLUMNS)
-        arrays = {"f_state": state}
+        state = self._state()
+        arrays = {"f_move": state}
         position, low = state[:, POSITION], None
         if self._static.compensated:
             arrays["f_low"] = self._disks.gather("f_low", LOW_COLUMNS)
@@ -438,7 +460,7 @@ class Engine:
             graph, slip, slip_low = self._rows.read(arrays["f_slips"], arrays["f_floor"])
         else:
             angle, contacts = self._angle, touching(position, self._static.radius, self._static.box_length)
-            graph, slip, slip_low = ContactGraph(contacts.i, contacts.j, self._static.radius), contacts.slip, None
+            graph, slip, slip_low = ContactGraph(contacts, self._static.radius), contacts.slip, None
         force = self._force(state)
         return Trial(self._static, self._fx, position, low, angle, graph, slip, slip_low, force, arrays)
 

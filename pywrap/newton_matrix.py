@@ -5,6 +5,7 @@ holds then. A small matrix is a band and goes to LAPACK, a large one is sparse a
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,16 @@ from scipy.sparse.linalg import splu
 
 from ..analysis import Packing, stiffness_matrix
 from ..analysis.stiffness import contact_terms
+from .band import Band
 from .contact_graph import ContactGraph
 from .elimination import elimination_order
 from .trial import Trial
 
 Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
 Solve = Callable[[Floats], Floats | None]
+
+AXES = np.arange(3)
 
 IDLE = 1e-7
 """Share of the largest contact force up to which a contact carries nothing that matters."""
@@ -37,8 +42,23 @@ BANDED = 400
 """Coordinates up to which a band is the faster one."""
 
 
-def factored(trial: Trial, floor: float) -> Solve | None:
-    """The solution of K dq = F as a function of F, on the coordinates that K knows; None if K is singular.
+class Factors(NamedTuple):
+    """The factors of K at a trial.
+
+    Attributes
+    ----------
+    solve : callable
+        The solution of K dq = F as a function of F, on the coordinates that K knows; None if it is not finite.
+    hit : ndarray of bool, shape (N,)
+        Disks with one contact that carries something: rattlers that a neighbour ran into.
+    """
+
+    solve: Solve
+    hit: Booleans
+
+
+def factored(trial: Trial, floor: float) -> Factors | None:
+    """Factor K; None if it is singular.
 
     Parameters
     ----------
@@ -53,13 +73,19 @@ def factored(trial: Trial, floor: float) -> Solve | None:
     loaded = law.normal_force > floor
     if not np.all(loaded):
         terms = np.where(loaded, terms, 0.0)
-    active = np.concatenate([graph.per_disk(terms[axis, axis]) for axis in range(3)]) != 0
+    hit = (graph.per_disk(loaded) == 1) & ~trial.still.top
+    active = graph.per_disk(terms[AXES, AXES]).ravel() != 0
     if np.count_nonzero(active) > BANDED:
-        return sparse_factored(trial.packing.loaded(floor))
-    band = graph.band(active)
+        solve = _sparse(trial.packing.loaded(floor))
+    else:
+        solve = _banded(graph.band(active), terms, _share(graph, law.normal_force, loaded))
+    return None if solve is None else Factors(solve, hit)
+
+
+def _banded(band: Band, terms: Floats, share: Floats) -> Solve | None:
+    """The solution by LAPACK."""
     matrix, width = band.matrix(terms), band.width
-    share = _share(graph, law.normal_force, loaded)
-    matrix[2 * width] *= 1 + np.concatenate([share, share, share])[band.coordinates]
+    matrix[2 * width] *= 1 + share[band.disks]
     factors, pivots, singular = dgbtrf(matrix, width, width, overwrite_ab=True)
     if singular:
         return None
@@ -73,10 +99,10 @@ def factored(trial: Trial, floor: float) -> Solve | None:
     return solve
 
 
-def _share(graph: ContactGraph, carried: Floats, loaded: NDArray[np.bool_]) -> Floats:
+def _share(graph: ContactGraph, carried: Floats, loaded: Booleans) -> Floats:
     """Share of its stiffness that is added to each disk, shape (N,)."""
     matters = loaded & (carried > IDLE * carried.max(initial=0.0))
-    return np.where(graph.count(matters) == 0, CREEP, AFLOAT)
+    return np.where(graph.per_disk(matters) == 0, CREEP, AFLOAT)
 
 
 def newton_step(packing: Packing, force: Floats, floor: float) -> Floats | None:
@@ -96,15 +122,15 @@ def newton_step(packing: Packing, force: Floats, floor: float) -> Floats | None:
     ndarray, shape (3N,), or None
         The displacement, length.
     """
-    solve = sparse_factored(packing.loaded(floor))
+    solve = _sparse(packing.loaded(floor))
     return None if solve is None else solve(force)
 
 
-def sparse_factored(packing: Packing) -> Solve | None:
-    """The same of a packing, by SuperLU."""
+def _sparse(packing: Packing) -> Solve | None:
+    """The solution by SuperLU."""
     matrix = stiffness_matrix(packing)
     contacts = packing.contacts
-    graph = ContactGraph(contacts.i, contacts.j, packing.radius)
+    graph = ContactGraph(contacts, packing.radius)
     share = _share(graph, packing.normal_force, np.ones(len(contacts), np.bool_))
     diagonal = (1 + np.tile(share, 3)) * matrix.diagonal()
     active = np.flatnonzero(diagonal)
@@ -113,9 +139,7 @@ def sparse_factored(packing: Packing) -> Solve | None:
     block.setdiag(diagonal[active])
     try:
         # nearly symmetric: pivots on the diagonal where good
-        factors = splu(
-            csc_array(block), permc_spec="NATURAL", diag_pivot_thresh=0.01, options={"SymmetricMode": True}
-        )
+        factors = splu(csc_array(block), permc_spec="NATURAL", diag_pivot_thresh=0.01, options={"SymmetricMode": True})
     except RuntimeError:
         return None
 

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from ..analysis import Packing, nearest_image
 from .contact_graph import ContactGraph
 from .engine import Engine
-from .newton_matrix import factored
+from .newton_matrix import Factors, factored
 from .trial import EPSILON, Trial, rounding
 
 Floats = NDArray[np.float64]
@@ -110,7 +110,7 @@ def rounding_floor(packing: Packing, displaced: float = 0.0) -> float:
     displaced : float
         Length of the displacement that led to it, a double, whose last place counts as well.
     """
-    graph = ContactGraph(packing.contacts.i, packing.contacts.j, packing.radius)
+    graph = ContactGraph(packing.contacts, packing.radius)
     unit = packing.coordinate_rounding + EPSILON * displaced
     return rounding(packing.law, graph, packing.geometry.overlap, unit)
 
@@ -190,12 +190,14 @@ def _iterated(
 ) -> tuple[Trial | None, int]:
     displacement = np.zeros(3 * len(base)) if guess is None else guess
     best: Trial | None = None
-    solve = None
+    factors: Factors | None = None
     worse = 0  # iterations that gained nothing; changes of contacts cost some
     earlier = last = np.inf  # residuals of the two iterations before
     for evaluation in range(1, ITERATIONS + 1):
         trial = displaced(base, displacement)
-        residual, floor = trial.residual, trial.floor()
+        residual = trial.residual
+        if factors is None:
+            floor = trial.floor()
         if best is not None and residual > 0.5 * best.residual:
             if best.residual < 10 * floor:
                 return best, evaluation
@@ -211,16 +213,16 @@ def _iterated(
         factor = last / earlier if np.isfinite(earlier) else GAIN
         if best is not None and residual < floor and factor * last < 0.1 * floor:
             return best, evaluation
-        good = residual * (residual / last) < 0.1 * floor or (len(base) > SPARING and residual <= KEPT * last)
-        if solve is None or not good:
-            solve = factored(trial, floor)
+        sufficient = residual * (residual / last) < 0.1 * floor  # that is where the same factors would lead
+        if factors is None or not (sufficient or (len(base) > SPARING and residual <= KEPT * last)):
+            floor = trial.floor()
+            factors = factored(trial, floor)
         earlier, last = last, residual
-        step = None if solve is None else solve(trial.force)
-        if step is None or np.abs(step).max() > 0.1 * base.radius.min():
+        step = None if factors is None else factors.solve(trial.force)
+        if factors is None or step is None or np.abs(step).max() > 0.1 * base.radius.min():
             return None, evaluation  # a floating part: the linear response is no small displacement
         if evaluation <= FREEING:
-            hit = (trial.graph.count(trial.law.normal_force > floor) == 1) & ~base.top
-            step.reshape(3, -1)[:, hit] *= 1.5
+            step.reshape(3, -1)[:, factors.hit] *= 1.5
         if base.compensated and residual < 10 * trial.floor(np.abs(displacement).max()):
             base, displacement = trial.packing, np.zeros_like(displacement)
         displacement = displacement + step

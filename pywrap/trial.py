@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis import Contacts, MindlinLaw, Packing
+from ..analysis import MindlinLaw, Packing
 from ..analysis.law import Derivatives
 from .contact_graph import ContactGraph
 
@@ -81,7 +81,7 @@ class Trial:
     @cached_property
     def packing(self) -> Packing:
         """The configuration with its load."""
-        contacts = Contacts(self.graph.i, self.graph.j, self.slip, self.slip_low)
+        contacts = self.graph.contacts.slipped(self.slip, self.slip_low)
         return self.still.moved(self.position, self.angle, contacts, self.position_low, self.fx)
 
     @cached_property
@@ -113,8 +113,7 @@ class Trial:
     def residual(self) -> float:
         """Largest force, with torque over radius, on a disk that has a contact."""
         square = (self.force * self.force).reshape(3, -1).sum(axis=0)
-        held = self.graph.count(self.branches.overlap > 0) > 0
-        return float(np.sqrt(square[held].max(initial=0.0)))
+        return math.sqrt(square[self.graph.held].max(initial=0.0))
 
     @cached_property
     def coordinate_rounding(self) -> float:
