@@ -1,7 +1,7 @@
 """Where the time of one increment of F_x goes, from equilibrium to equilibrium by Newton's method.
 
-The reference packing of 100 disks is ramped from F_x = 0 to 0.02 in increments of 1e-3, ten times over, and each increment
-is split into
+The reference packing of 100 disks is ramped from F_x = 0 to 0.02 in increments of 1e-3, ten times over, and each
+increment is split into
 
     solve       LAPACK: the factors of the stiffness matrix and the solutions with them
     LAMMPS      the command `run 1`: its set-up, neighbour list, forces

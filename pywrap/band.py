@@ -1,9 +1,9 @@
 """Newton's matrix of a small packing as a band about the diagonal.
 
-A packing is a strip of a few disks in height, or in width, and K couples neighbours only. With the disks in the order of
-reverse Cuthill and McKee, and the coordinates of a disk together, all entries lie within a band: at 100 disks 44 next to the
-diagonal on either side, of 285. LAPACK's factorisation of the band takes a quarter of the time of that of the full
-matrix, and leaves Python and LAMMPS in the processor's caches.
+A packing is a few disks wide or high, and K couples neighbours only. With the disks in the order of reverse Cuthill and
+McKee, and the coordinates of a disk together, all entries lie within a band: of 100 disks with 285 coordinates, within
+44 places of the diagonal. LAPACK factors the band in a quarter of the time that it takes for the full matrix, and what
+it touches leaves Python and LAMMPS in the processor's caches.
 """
 
 from dataclasses import dataclass

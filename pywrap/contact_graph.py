@@ -62,16 +62,13 @@ class ContactGraph:
         """Disks that have a contact, shape (N,)."""
         return np.bincount(self._ends[0], minlength=len(self.radius)) > 0
 
-    def per_disk(self, values: NDArray) -> Floats:
-        """Sums of numbers over the contacts of each disk, shape (..., N) of numbers of shape (..., C)."""
+    def per_disk(self, values: Floats | Booleans) -> Floats:
+        """Sums of numbers over the contacts of each disk, shape (N,)."""
         disk, contact = self._ends
-        n = len(self.radius)
-        if values.ndim == 1:
-            return np.bincount(disk, values.take(contact), n)
-        return np.stack([self.per_disk(each) for each in values])
+        return np.bincount(disk, values.take(contact), len(self.radius)).astype(np.float64, copy=False)
 
     def band(self, active: Booleans) -> Band:
-        """Where the stiffnesses of the contacts are in the matrix of some coordinates; the last one if it has the same."""
+        """Where the stiffnesses of the contacts are in the matrix of some coordinates; remembered for the last ones."""
         if self._band is None or not np.array_equal(self._band.active, active):
             self._band = band(self.i, self.j, active)
         return self._band

@@ -1,7 +1,7 @@
 """Numbers of the disks, into LAMMPS and out of it.
 
-Arrays stand in the order of IDs, and every rank has the whole of them. LAMMPS's library reads and writes NumPy's memory;
-by way of LAMMPS's Python module there would be copies in between.
+Arrays stand in the order of IDs, and every rank has the whole of them. LAMMPS's library reads and writes NumPy's
+memory; by way of LAMMPS's Python module there would be copies in between.
 """
 
 from typing import Any

@@ -290,9 +290,9 @@ class Engine:
         return self._trial()
 
     def keep(self, trial: Trial) -> Packing:
-        """The packing of a trial, for displacements that begin there: what LAMMPS knows of it need not be put together
-        again."""
-        self._written, self._arrays = trial.packing, trial.arrays
+        """The packing of a trial, for displacements from there: LAMMPS is then given what it gave."""
+        if not self._static.compensated:  # LAMMPS splits coordinates otherwise than packings do
+            self._written, self._arrays = trial.packing, trial.arrays
         return trial.packing
 
     def dump(self, stem: Path) -> None:

@@ -213,7 +213,8 @@ def _iterated(
         factor = last / earlier if np.isfinite(earlier) else GAIN
         if best is not None and residual < floor and factor * last < 0.1 * floor:
             return best, evaluation
-        sufficient = residual * (residual / last) < 0.1 * floor  # that is where the same factors would lead
+        # the same factors would lead to the floor
+        sufficient = residual * (residual / last) < 0.1 * floor
         if factors is None or not (sufficient or (len(base) > SPARING and residual <= KEPT * last)):
             floor = trial.floor()
             factors = factored(trial, floor)

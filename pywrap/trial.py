@@ -105,7 +105,7 @@ class Trial:
         return Branches(branch / distance, distance, graph.reach - distance)
 
     @cached_property
-    def law(self) -> Derivatives:
+    def derivatives(self) -> Derivatives:
         """Forces and stiffnesses of the contacts."""
         return self.still.law.derivatives(self.branches.overlap, self.slip)
 
