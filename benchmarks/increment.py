@@ -5,7 +5,7 @@ increment is split into
 
     solve       LAPACK: the factors of the stiffness matrix and the solutions with them
     LAMMPS      the command `run 1`: its set-up, neighbour list, forces
-    overhead    everything else: contacts to matrix, state in and out of LAMMPS, other commands, Python itself
+    overhead    everything else that Python does: contacts to matrix, state in and out of LAMMPS, other commands
 
 Times are those of the processor, with one thread, so that others on the machine disturb them little: medians over the
 increments, in milliseconds.
@@ -95,9 +95,7 @@ def main() -> None:
         increments(engine, start, solve, lammps)  # the first ones load libraries and caches
         rows = [row for _ in range(ROUNDS) for row in increments(engine, start, solve, lammps)]
 
-    print(
-        f"{platform.processor() or platform.machine()}; {len(rows)} increments of {STEP:g}, {len(start.packing)} disks\n"
-    )
+    print(f"{platform.processor() or platform.machine()}; {len(rows)} increments of {STEP:g}\n")
     print(f"{'':12s}{'median ms':>10s}{'least':>8s}{'90 %':>8s}")
     for name in ("solve", "LAMMPS", "overhead", "all"):
         values = [row[name] for row in rows]
