@@ -154,6 +154,7 @@ class Engine:
         self._disks = DiskArrays(self._lammps, len(packing))
         self._rows = ContactRows(packing.radius, packing.compensated)
         self._written: Packing | None = None  # the packing of _arrays
+        self._kept: Trial | None = None
         self._displaces = False
         self._load(packing)
 
@@ -291,9 +292,16 @@ class Engine:
 
     def keep(self, trial: Trial) -> Packing:
         """The packing of a trial, for displacements from there: LAMMPS is then given what it gave."""
+        self._kept = trial
         if not self._static.compensated:  # LAMMPS splits coordinates otherwise than packings do
             self._written, self._arrays = trial.packing, trial.arrays
         return trial.packing
+
+    def kept(self, packing: Packing) -> Trial:
+        """The trial that a packing was, or would have been; of its forces nothing is known."""
+        if self._kept is None or self._kept.packing is not packing:
+            self._kept = Trial.of(packing)
+        return self._kept
 
     def dump(self, stem: Path) -> None:
         """Write the configuration as LAMMPS dumps in full precision (deck part write.in): STEM.disks and others."""

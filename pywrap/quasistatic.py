@@ -19,9 +19,10 @@ known to 1e-23, and the next bound is the displacement itself, a double: :math:`
 displacements count from the iterate. What is left, :math:`q'`, is of order :math:`\epsilon |q|`, and that its slips
 start at an iterate changes them by :math:`|q| |q'|`, which is less than they can resolve.
 
-From one equilibrium to another q is nearly proportional to the increment: where a third one is known, the iteration
-starts from the displacement of that one, in proportion. The ramp of an onset takes the equilibrium before the last,
-which saves one of four evaluations; a ramp that is stored does not, so that it goes on to the bit where it was cut off.
+The first step needs no forces: at an equilibrium they are those of the increment on the upper layer, and the linear
+response to these is where the iteration starts. Between equilibria q is nearly proportional to the increment, too: where
+a third one is known, the displacement of that one in proportion saves a factorisation. The ramp of an onset takes the
+equilibrium before the last; a ramp that is stored does not, so that it goes on to the bit where it was cut off.
 
 Where Newton fails the increment is halved, since the path matters: friction remembers.
 """
@@ -41,7 +42,7 @@ from .trial import EPSILON, Trial, rounding
 Floats = NDArray[np.float64]
 
 ITERATIONS = 40
-"""Newton iterations before an increment is halved. Four or five do, but where a rattler in a narrow cage has been hit:
+"""Newton iterations before an increment is halved. Three or four do, but where a rattler in a narrow cage has been hit:
 its contact opens as delta^(3/2) -> 0, on which Newton's method gains a factor of 3 an iteration, and 20 reach the
 floor."""
 
@@ -148,7 +149,7 @@ def equilibrate(
         If halving the increment leads nowhere.
     """
     here, target, evaluations = last, fx, 0
-    guess = None if beside is None else _displacement(last, beside) * ((fx - last.fx) / (beside.fx - last.fx))
+    guess = _response(engine, last, fx) if beside is None else _in_proportion(last, beside, fx)
     while True:
         engine.set_fx(target)
         found, spent = _newton(engine, here.packing, force_tolerance, guess)
@@ -167,11 +168,30 @@ def equilibrate(
             here, target = found, fx
 
 
-def _displacement(start: Equilibrium, end: Equilibrium) -> Floats:
-    """From one equilibrium to another, (dx.., dy.., R dtheta..)."""
-    a, b = start.packing, end.packing
+def _response(engine: Engine, last: Equilibrium, fx: float) -> Floats | None:
+    """The linear response to the increment, which is Newton's first step; None where there is none."""
+    packing = last.packing
+    if fx == packing.fx:
+        return None
+    push = np.zeros(3 * len(packing))
+    push[: len(packing)][packing.top] = fx - packing.fx
+    trial = engine.kept(packing)
+    factors = factored(trial, trial.floor())
+    step = None if factors is None else factors.solve(push)
+    return None if step is None or _too_long(step, packing) else step
+
+
+def _in_proportion(last: Equilibrium, beside: Equilibrium, fx: float) -> Floats:
+    """The displacement from one equilibrium to another, (dx.., dy.., R dtheta..), in proportion to the increment."""
+    a, b = last.packing, beside.packing
     moved = nearest_image(b.position - a.position, a.box_length)
-    return np.concatenate([moved[:, 0], moved[:, 1], b.scaled_angle - a.scaled_angle])
+    displacement = np.concatenate([moved[:, 0], moved[:, 1], b.scaled_angle - a.scaled_angle])
+    return displacement * ((fx - last.fx) / (beside.fx - last.fx))
+
+
+def _too_long(step: Floats, packing: Packing) -> bool:
+    """Whether the linear response is no small displacement: a part floats."""
+    return bool(np.abs(step).max() > 0.1 * packing.radius.min())
 
 
 def _newton(
@@ -220,8 +240,8 @@ def _iterated(
             factors = factored(trial, floor)
         earlier, last = last, residual
         step = None if factors is None else factors.solve(trial.force)
-        if factors is None or step is None or np.abs(step).max() > 0.1 * base.radius.min():
-            return None, evaluation  # a floating part: the linear response is no small displacement
+        if factors is None or step is None or _too_long(step, base):
+            return None, evaluation
         if evaluation <= FREEING:
             step.reshape(3, -1)[:, factors.hit] *= 1.5
         if base.compensated and residual < 10 * trial.floor(np.abs(displacement).max()):

@@ -78,6 +78,25 @@ class Trial:
     force: Floats
     arrays: dict[str, Floats]
 
+    @classmethod
+    def of(cls, packing: Packing) -> "Trial":
+        """A packing as a trial, forces unknown."""
+        contacts = packing.contacts
+        trial = cls(
+            packing,
+            packing.fx,
+            packing.position,
+            packing.position_low,
+            packing.angle,
+            ContactGraph(contacts, packing.radius),
+            contacts.slip,
+            contacts.slip_low,
+            np.full(3 * len(packing), np.nan),
+            {},
+        )
+        trial.__dict__["packing"] = packing
+        return trial
+
     @cached_property
     def packing(self) -> Packing:
         """The configuration with its load."""
