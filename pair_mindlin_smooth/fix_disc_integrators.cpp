@@ -200,8 +200,8 @@ void FixDisplaceDisc::post_run()
   const double *const theta = angles();
   for (int i = 0; i < atom->nlocal; i++) {
     const double *const x = atom->x[i], *const v = atom->v[i], *const f = atom->f[i];
-    const double state[] = {0.0,  x[0], x[1], theta ? theta[i] : 0.0, v[0], v[1], atom->omega[i][2],
-                            f[0], f[1], atom->torque[i][2]};
+    const double state[] = {
+        0.0, x[0], x[1], theta ? theta[i] : 0.0, v[0], v[1], atom->omega[i][2], f[0], f[1], atom->torque[i][2]};
     static_assert(sizeof(state) == COLUMNS * sizeof(double), "a number for each column");
     std::copy(state, state + COLUMNS, array_atom[i]);
   }

@@ -60,7 +60,6 @@ protected:
       work(No(), No());
   }
 
-
 private:
   bool rotation = true;
   bool carries_low_parts = false;

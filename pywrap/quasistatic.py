@@ -19,10 +19,10 @@ known to 1e-23, and the next bound is the displacement itself, a double: :math:`
 displacements count from the iterate. What is left, :math:`q'`, is of order :math:`\epsilon |q|`, and that its slips
 start at an iterate changes them by :math:`|q| |q'|`, which is less than they can resolve.
 
-The first step needs no forces: at an equilibrium they are those of the increment on the upper layer, and the linear
-response to these is where the iteration starts. Between equilibria q is nearly proportional to the increment, too: where
-a third one is known, the displacement of that one in proportion saves a factorisation. The ramp of an onset takes the
-equilibrium before the last; a ramp that is stored does not, so that it goes on to the bit where it was cut off.
+The first step needs no forces: at an equilibrium they are those of the increment on the upper layer, and the iteration
+starts from the linear response to these. Between equilibria q is nearly proportional to the increment, too: where a
+third one is known, its displacement in proportion saves a factorisation. The ramp of an onset takes the equilibrium
+before the last; a ramp that is stored does not, so that it goes on to the bit where it was cut off.
 
 Where Newton fails the increment is halved, since the path matters: friction remembers.
 """

@@ -48,7 +48,7 @@ def test_moved_packing_is_one_made_anew(cluster):
     assert not moved.position.flags.writeable
     assert cluster.moved(position, angle, contacts).fx == cluster.fx
     for wrong in ({"position": position[1:]}, {"angle": np.full(6, np.nan)}, {"contacts": Contacts([6], [-1], [0])}):
-        with pytest.raises(ValueError, match="position|angle|beyond"):
+        with pytest.raises(ValueError, match=r"position|angle|beyond"):
             cluster.moved(**({"position": position, "angle": angle, "contacts": contacts} | wrong))
 
 
