@@ -100,7 +100,7 @@ def increments(engine: Engine, start: Equilibrium) -> Row:
     begin = time.perf_counter()
     stiffness_matrix(packing)
     assembled = time.perf_counter()
-    factors = factored(trial, trial.floor())
+    factors = factored(trial, trial.floor)
     if factors is not None:
         factors.solve(trial.force)
     return {

@@ -58,17 +58,36 @@ class ContactGraph:
         return np.concatenate([self.i, self.j[: self.pairs]]), np.concatenate([contact, contact[: self.pairs]])
 
     @cached_property
+    def _coordinate_ends(self) -> tuple[Indices, Indices]:
+        disk, contact = self._ends
+        return (disk + len(self.radius) * np.arange(3)[:, None]).ravel(), contact
+
+    @cached_property
+    def degree(self) -> Indices:
+        """Contacts of each disk, shape (N,)."""
+        return np.bincount(self._ends[0], minlength=len(self.radius))
+
+    @cached_property
     def held(self) -> Booleans:
         """Disks that have a contact, shape (N,)."""
-        return np.bincount(self._ends[0], minlength=len(self.radius)) > 0
+        return self.degree > 0
 
-    def per_disk(self, values: Floats | Booleans) -> Floats:
+    def per_disk(self, values: Floats | Booleans) -> NDArray:
         """Sums of numbers over the contacts of each disk, shape (N,)."""
         disk, contact = self._ends
-        return np.bincount(disk, values.take(contact), len(self.radius)).astype(np.float64, copy=False)
+        return np.bincount(disk, values.take(contact), len(self.radius))
+
+    def count(self, chosen: Booleans) -> NDArray:
+        """How many of the chosen contacts each disk has, shape (N,)."""
+        return self.degree if chosen.all() else self.per_disk(chosen)
+
+    def per_coordinate(self, values: Floats) -> NDArray:
+        """Three such sums, one after the other, shape (3N,), of numbers of shape (3, C)."""
+        coordinate, contact = self._coordinate_ends
+        return np.bincount(coordinate, values.take(contact, axis=1).ravel(), 3 * len(self.radius))
 
     def band(self, active: Booleans) -> Band:
         """Where the stiffnesses of the contacts are in the matrix of some coordinates; remembered for the last ones."""
-        if self._band is None or not np.array_equal(self._band.active, active):
+        if self._band is None or not (self._band.active == active).all():
             self._band = band(self.i, self.j, active)
         return self._band

@@ -70,11 +70,7 @@ class ContactRows:
         """The contacts in rows of both fixes: the graph, which is the last one if nothing has changed, slips and their
         low parts, shape (C,)."""
         partners, touching = slips[:, 1 :: self.width], floor[:, FLOOR_OVERLAP] > 0
-        if (
-            self._seen is None
-            or not np.array_equal(self._seen[0], partners)
-            or not np.array_equal(self._seen[1], touching)
-        ):
+        if not self._same(partners, touching):
             self._seen = partners.copy(), touching
             i, place = np.nonzero(partners > np.arange(1, len(slips) + 1)[:, None])
             self._disk = np.flatnonzero(touching)
@@ -88,3 +84,9 @@ class ContactRows:
         if not self._compensated:
             return self._graph, slip, None
         return self._graph, slip, np.concatenate([flat[self._place + 1], floor[self._disk, FLOOR_SLIP_LOW]])
+
+    def _same(self, partners: Floats, touching: NDArray[np.bool_]) -> bool:
+        """Whether these are the contacts of the last rows that were read."""
+        if self._seen is None or self._seen[0].shape != partners.shape:
+            return False
+        return bool((self._seen[0] == partners).all() and (self._seen[1] == touching).all())

@@ -282,12 +282,12 @@ class Engine:
                 self._displaces = False
 
     def _displaced(self, base: Packing, displacement: Floats) -> Trial:
-        dx, dy, du = displacement.reshape(3, -1)
-        turn = du / base.radius
-        self._write(base, np.column_stack([dx, dy, turn]))
+        velocity = displacement.reshape(3, -1).T.copy()
+        velocity[:, 2] /= base.radius
+        self._write(base, velocity)
         self._command("run 1 post no")
         if not base.law.frictional:
-            self._angle = base.angle + turn
+            self._angle = base.angle + velocity[:, 2]
         return self._trial()
 
     def keep(self, trial: Trial) -> Packing:

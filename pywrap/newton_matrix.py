@@ -70,10 +70,10 @@ def factored(trial: Trial, floor: float) -> Factors | None:
     normal, distance, _ = trial.branches
     terms = contact_terms(law, normal, distance, graph.pairs)
     loaded = law.normal_force > floor
-    if not np.all(loaded):
+    if not loaded.all():
         terms = np.where(loaded, terms, 0.0)
-    hit = (graph.per_disk(loaded) == 1) & ~trial.still.top
-    active = np.concatenate([graph.per_disk(terms[axis, axis]) for axis in range(3)]) != 0
+    hit = (graph.count(loaded) == 1) & ~trial.still.top
+    active = graph.per_coordinate(terms.reshape(9, -1)[::4]) != 0
     unknowns = np.count_nonzero(active)
     if unknowns == 0:
         return None
@@ -104,7 +104,7 @@ def _banded(band: Band, terms: Floats, share: Floats) -> Solve | None:
 def _share(graph: ContactGraph, carried: Floats, loaded: Booleans) -> Floats:
     """Share of its stiffness that is added to each disk, shape (N,)."""
     matters = loaded & (carried > IDLE * carried.max(initial=0.0))
-    return np.where(graph.per_disk(matters) == 0, CREEP, AFLOAT)
+    return np.where(graph.count(matters) == 0, CREEP, AFLOAT)
 
 
 def sparse_solution(packing: Packing) -> Solve | None:

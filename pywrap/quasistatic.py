@@ -176,7 +176,7 @@ def _response(engine: Engine, last: Equilibrium, fx: float) -> Floats | None:
     push = np.zeros(3 * len(packing))
     push[: len(packing)][packing.top] = fx - packing.fx
     trial = engine.kept(packing)
-    factors = factored(trial, trial.floor())
+    factors = factored(trial, trial.floor)
     step = None if factors is None else factors.solve(push)
     return None if step is None or _too_long(step, packing) else step
 
@@ -202,7 +202,7 @@ def _newton(
         best, evaluations = _iterated(displaced, base, force_tolerance, guess)
     if best is None:
         return None, evaluations
-    return Equilibrium(engine.keep(best), best.residual, best.floor(), evaluations), evaluations
+    return Equilibrium(engine.keep(best), best.residual, best.floor, evaluations), evaluations
 
 
 def _iterated(
@@ -217,7 +217,7 @@ def _iterated(
         trial = displaced(base, displacement)
         residual = trial.residual
         if factors is None:
-            floor = trial.floor()
+            floor = trial.floor
         if best is not None and residual > 0.5 * best.residual:
             if best.residual < 10 * floor:
                 return best, evaluation
@@ -236,7 +236,7 @@ def _iterated(
         # the same factors would lead to the floor
         sufficient = residual * (residual / last) < 0.1 * floor
         if factors is None or not (sufficient or (len(base) > SPARING and residual <= KEPT * last)):
-            floor = trial.floor()
+            floor = trial.floor
             factors = factored(trial, floor)
         earlier, last = last, residual
         step = None if factors is None else factors.solve(trial.force)
@@ -244,7 +244,9 @@ def _iterated(
             return None, evaluation
         if evaluation <= FREEING:
             step.reshape(3, -1)[:, factors.hit] *= 1.5
-        if base.compensated and residual < 10 * trial.floor(np.abs(displacement).max()):
+        if base.compensated and residual < 10 * trial.rounded(
+            trial.coordinate_rounding + EPSILON * np.abs(displacement).max()
+        ):
             base, displacement = trial.packing, np.zeros_like(displacement)
         displacement = displacement + step
     return None, ITERATIONS

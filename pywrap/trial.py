@@ -141,9 +141,13 @@ class Trial:
             return self.packing.coordinate_rounding
         return EPSILON * float(np.abs(self.position).max())
 
-    def floor(self, displaced: float = 0.0) -> float:
+    @cached_property
+    def floor(self) -> float:
         """As `rounding_floor`, force."""
-        unit = self.coordinate_rounding + EPSILON * displaced
+        return self.rounded(self.coordinate_rounding)
+
+    def rounded(self, unit: float) -> float:
+        """As `rounding`, of an error of so much in every overlap."""
         return rounding(self.still.law, self.graph, self.branches.overlap, unit)
 
 

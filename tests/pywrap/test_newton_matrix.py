@@ -97,7 +97,7 @@ def test_nothing_that_holds():
     apart = Packing(position=position, radius=np.ones(7), contacts=Contacts([], [], []), law=MindlinLaw(1, 1, 1))
     assert factored(trial_of(apart), 0.0) is None
     assert trial_of(apart).residual == 0.0
-    assert trial_of(apart).floor() == 0.0
+    assert trial_of(apart).floor == 0.0
 
 
 def test_a_trial_is_its_packing(reference_packing):
@@ -106,7 +106,7 @@ def test_a_trial_is_its_packing(reference_packing):
         trial = displaced(start, 1e-5 * np.random.default_rng(6).standard_normal(300))
     packing = trial.packing
     geometry = packing.geometry
-    assert trial.floor() == pytest.approx(rounding_floor(packing), rel=1e-12)
+    assert trial.floor == pytest.approx(rounding_floor(packing), rel=1e-12)
     assert_allclose(trial.branches.overlap, geometry.overlap, rtol=0, atol=1e-14)
     assert_allclose(trial.branches.normal.T, geometry.normal, rtol=0, atol=1e-14)
     assert_allclose(trial.branches.distance, geometry.distance, rtol=1e-14)

@@ -89,7 +89,7 @@ def test_newton_is_quadratic(reference_packing):
             for _ in range(5):
                 trial = displaced(packing, displacement)
                 residuals.append(trial.residual)
-                displacement += factored(trial, trial.floor()).solve(trial.force)
+                displacement += factored(trial, trial.floor).solve(trial.force)
     falling = [r for r in residuals if r > 1e-9]
     assert len(falling) == 3
     assert all(after < before**1.5 for before, after in pairwise(falling))
