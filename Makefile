@@ -1,8 +1,8 @@
 # make reproduce   sets everything up and runs the paper's protocol into results/
 # make test        sets everything up and runs all tests
 # make check       format, lint and types
-# make benchmark   time per step beside LAMMPS's own granular styles; what each part of a scene costs; the onset, solved and
-#                  scanned; error against run time; growth with size
+# make benchmark   time per step beside LAMMPS's own granular styles; what each part of a scene costs; where an increment's
+#                  time goes; the onset, solved and scanned; error against run time; growth with size
 # make pictures    the report and the stiff cases that the documentation shows, in docs/report and docs/stability
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
 # make clean       removes what the others made
@@ -41,6 +41,7 @@ benchmark: $(VENV)/.installed
 	$(BIN)/python benchmarks/time_per_step.py --disks 100000 --turns 3
 	$(BIN)/faultgouge explain scenes/paper.toml
 	$(BIN)/faultgouge explain scenes/frictionless.toml
+	$(BIN)/python benchmarks/increment.py
 	$(BIN)/python benchmarks/onset_against_scan.py
 	$(BIN)/python benchmarks/scale.py
 	$(BIN)/faultgouge report -o report

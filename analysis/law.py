@@ -29,11 +29,30 @@ bound, so the clamp needs no case of its own in the derivatives.
 
 from dataclasses import dataclass
 from math import isfinite
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
+
+
+class Derivatives(NamedTuple):
+    """Forces of contacts and what the stability operator needs of them; arrays over contacts.
+
+    Attributes
+    ----------
+    normal_force, tangential_force : ndarray
+        f_n and f_t, force.
+    normal_stiffness, slip_derivative, overlap_derivative : ndarray
+        d f_n / d overlap, a = d f_t / d slip, and b = d f_t / d overlap, force / length.
+    """
+
+    normal_force: Floats
+    tangential_force: Floats
+    normal_stiffness: Floats
+    slip_derivative: Floats
+    overlap_derivative: Floats
 
 
 @dataclass(frozen=True)
@@ -135,6 +154,31 @@ class MindlinLaw:
         # f_t/2 and the term of d x/d overlap = -x/overlap, joined: both carry kt s / overlap^(1/2).
         factor = 0.5 * (1 + x - x * x) + (2 * x * x - x)
         return -self.kt * factor * _ratio(slip, np.sqrt(overlap))
+
+    def derivatives(self, overlap: Floats, slip: Floats) -> Derivatives:
+        """All of the above at once, at a fraction of the cost; overlaps that are not positive give zeros."""
+        overlap = np.maximum(overlap, 0.0)
+        root = np.sqrt(overlap)
+        normal_force, normal_stiffness = self.kn * overlap * root, 1.5 * self.kn * root
+        if not self.frictional:
+            zero = np.zeros_like(root)
+            return Derivatives(normal_force, zero, normal_stiffness, zero, zero)
+        limit = overlap * (self.mu * self.kn / self.kt)
+        slip = np.minimum(np.maximum(slip, -limit), limit)
+        if np.all(limit > 0):
+            x, steep = np.abs(slip) / limit, slip / root
+        else:  # an open contact has no slip either
+            x, steep = _ratio(np.abs(slip), limit), _ratio(slip, root)
+        square = x * x
+        bend = 1 + x - square
+        soft = -self.kt * root
+        return Derivatives(
+            normal_force,
+            soft * bend * slip,
+            normal_stiffness,
+            soft * ((1 - x) * (1 + 3 * x)),  # vanishes at the bound to the last bit
+            (0.5 * bend + (2 * square - x)) * (-self.kt * steep),
+        )
 
     def _reduced(self, overlap: Floats, slip: ArrayLike) -> tuple[Floats, Floats]:
         """The slip within its bound and x = |slip| / t*."""

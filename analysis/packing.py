@@ -75,19 +75,14 @@ class Contacts:
             raise ValueError("A contact has a negative disk index; only j may be -1, for the floor.")
         if np.any(i == j):
             raise ValueError(f"Disk {i[i == j][0]} is listed as touching itself.")
-        floor = j == FLOOR
-        first = np.where(floor, i, np.minimum(i, j))
-        second = np.where(floor, FLOOR, np.maximum(i, j))
-        order = np.lexsort((second, first, floor))
-        first, second = first[order], second[order]
-        twice = (np.diff(first) == 0) & (np.diff(second) == 0)
-        if np.any(twice):
-            k = np.flatnonzero(twice)[0]
-            raise ValueError(f"The contact ({first[k]}, {second[k]}) is listed twice.")
-        for name, value in (("i", first), ("j", second), ("slip", slip[order])):
+        low = None if self.slip_low is None else _floats("slip_low", self.slip_low, i.shape)
+        if not _canonical(i, j):
+            i, j, order = _ordered(i, j)
+            slip, low = slip[order], None if low is None else low[order]
+        for name, value in (("i", i), ("j", j), ("slip", slip)):
             object.__setattr__(self, name, _frozen(value))
-        if self.slip_low is not None:
-            object.__setattr__(self, "slip_low", _frozen(_floats("slip_low", self.slip_low, order.shape)[order]))
+        if low is not None:
+            object.__setattr__(self, "slip_low", _frozen(low))
 
     def __len__(self) -> int:
         return len(self.i)
@@ -96,6 +91,13 @@ class Contacts:
     def floor(self) -> NDArray[np.bool_]:
         """Which contacts are with the floor, shape (C,)."""
         return self.j == FLOOR
+
+    def slipped(self, slip: ArrayLike, slip_low: ArrayLike | None = None) -> "Contacts":
+        """The same contacts with other slips, whose order is the one here; length, shape (C,)."""
+        other = object.__new__(Contacts)
+        low = None if slip_low is None else _frozen(_floats("slip_low", slip_low, self.i.shape))
+        other.__dict__.update(i=self.i, j=self.j, slip=_frozen(_floats("slip", slip, self.i.shape)), slip_low=low)
+        return other
 
 
 class ContactGeometry(NamedTuple):
@@ -306,6 +308,38 @@ class Packing:
         normal = between / distance[:, None]
         return self.law.normal_force(delta), self.law.tangential_force(delta, slip), normal
 
+    def moved(
+        self,
+        position: ArrayLike,
+        angle: ArrayLike,
+        contacts: Contacts,
+        position_low: ArrayLike | None = None,
+        fx: float | None = None,
+    ) -> "Packing":
+        """The same disks elsewhere; only what is new is checked.
+
+        Parameters
+        ----------
+        position, angle, contacts, position_low
+            As of the class.
+        fx : float, optional
+            Force along x on each disk of the upper layer; as it was by default.
+        """
+        n = len(self)
+        if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= n:
+            raise ValueError(f"A contact names a disk beyond the last one, {n - 1}.")
+        other = object.__new__(Packing)
+        other.__dict__.update({name: getattr(self, name) for name in self.__dataclass_fields__})
+        other.__dict__.update(
+            position=_frozen(_floats("position", position, (n, 2))),
+            angle=_frozen(_floats("angle", angle, (n,))),
+            contacts=contacts,
+            position_low=None if position_low is None else _frozen(_floats("position_low", position_low, (n, 2))),
+        )
+        if fx is not None:
+            other.__dict__["fx"] = fx
+        return other
+
     def loaded(self, least: float) -> "Packing":
         """The packing without the contacts that carry no more than a given force.
 
@@ -383,6 +417,27 @@ def touching(position: ArrayLike, radius: ArrayLike, box_length: float | None = 
         np.concatenate([j[near], np.full(len(floor), FLOOR)]),
         np.zeros(near.sum() + len(floor)),
     )
+
+
+def _canonical(i: Indices, j: Indices) -> bool:
+    """Whether contacts are in the order in which they are kept, each of them once."""
+    floor, disks = j == FLOOR, int(i.max(initial=0)) + int(j.max(initial=0)) + 2
+    place = np.where(floor, disks * disks, disks * i + j) + np.where(floor, i, 0)
+    return bool(np.all((i < j) | floor) and np.all(place[1:] > place[:-1]))
+
+
+def _ordered(i: Indices, j: Indices) -> tuple[Indices, Indices, Indices]:
+    """Contacts in the order in which they are kept, and where each was."""
+    floor = j == FLOOR
+    first = np.where(floor, i, np.minimum(i, j))
+    second = np.where(floor, FLOOR, np.maximum(i, j))
+    order = np.lexsort((second, first, floor))
+    first, second = first[order], second[order]
+    twice = (np.diff(first) == 0) & (np.diff(second) == 0)
+    if np.any(twice):
+        k = np.flatnonzero(twice)[0]
+        raise ValueError(f"The contact ({first[k]}, {second[k]}) is listed twice.")
+    return first, second, order
 
 
 def _check_box(radius: Floats, box_length: float | None) -> None:

@@ -28,7 +28,6 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array
 
 from .packing import Floats, Indices
-from .slices import slices
 
 CORE, MARGIN = 20, 20
 """Modes of a cluster that are its own, and further ones on either side that are coupled to these in all orders."""
@@ -166,6 +165,8 @@ class Projection:
         if len(active) <= SMALL:
             yield cls.of(matrix)
             return
+        from .slices import slices  # with libraries that nothing else needs
+
         inner = matrix[active][:, active]
         for part in slices(csc_array(0.5 * (inner + inner.T)), MARGIN + BEYOND, workers):
             yield cls(matrix.shape[0], active, part.values, part.vectors, part.own)

@@ -25,6 +25,19 @@ Charan, Pomyalov and Procaccia does: there the slip vector is differentiated wit
 :math:`\partial t/\partial r = 1 - \mathbf n \mathbf n^T` and the turning of the tangent is lost.
 ``form="consistent"`` is the exact derivative of the integrated forces.
 
+The 36 numbers of a contact are nine and their negatives. Translations of the two disks have opposite signs in N, P and
+T, and rotations the same sign:
+
+.. math::
+
+    K_c = \begin{pmatrix} S & a\boldsymbol\tau & -S & a\boldsymbol\tau \\
+    \mathbf h^T & -a & -\mathbf h^T & -a \\ -S & -a\boldsymbol\tau & S & -a\boldsymbol\tau \\
+    \mathbf h^T & -a & -\mathbf h^T & -a \end{pmatrix}, \qquad \mathbf h = a\boldsymbol\tau - b\,\mathbf n
+
+with :math:`S = \tfrac32 k_n \delta^{1/2} \mathbf n \mathbf n^T - (f_n/r + a) \boldsymbol\tau \boldsymbol\tau^T +
+b\, \boldsymbol\tau \mathbf n^T + (f_t/r)\, \mathbf n \boldsymbol\tau^T`. K is assembled from these (`contact_terms`);
+`contact_stiffness` writes out the products above.
+
 Without friction only N and P are left, and K is an operator on the 2N coordinates (x, y): rows and columns of rotations
 are empty.
 """
@@ -34,9 +47,14 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
+from .law import Derivatives
 from .packing import Floats, Packing
 
 Form = Literal["consistent", "paper"]
+
+SIDES = np.array([[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0]])
+SIGNS = np.einsum("pa,qb->pqab", SIDES, SIDES)
+"""Signs of the nine numbers in the blocks of a contact, by partner of the row, of the column, and coordinates."""
 
 
 def stiffness_matrix(packing: Packing, form: Form = "consistent") -> csr_array:
@@ -60,27 +78,76 @@ def stiffness_matrix(packing: Packing, form: Form = "consistent") -> csr_array:
     ValueError
         If the form is neither of the two.
     """
-    n, i, j, pair = len(packing), packing.contacts.i, packing.contacts.j, ~packing.contacts.floor
-    blocks = contact_stiffness(packing, form)
+    _check(form)
+    n, contacts = len(packing), packing.contacts
+    pairs = len(contacts) - np.count_nonzero(contacts.floor)
+    i, j = contacts.i[:pairs], contacts.j[:pairs]
+    normal, _, distance, overlap = packing.geometry
+    law = packing.law.derivatives(overlap, contacts.slip)
+    terms = contact_terms(law, normal.T, distance, pairs, form)
     axes = 3 if packing.law.frictional else 2
+    terms, signs = terms[:axes, :axes], SIGNS[:, :, :axes, :axes, None]
     # Two disks share one contact, so the off-diagonal blocks are final; only the diagonal ones are sums.
-    diagonal = np.empty((n, axes, axes))
+    diagonal = np.empty((axes, axes, n))
     for row in range(axes):
         for column in range(axes):
-            diagonal[:, row, column] = np.bincount(i, blocks[:, row, column], n)
-            diagonal[:, row, column] += np.bincount(j[pair], blocks[pair, row + 3, column + 3], n)
+            term = terms[row, column]
+            diagonal[row, column] = np.bincount(contacts.i, term, n)
+            diagonal[row, column] += signs[1, 1, row, column] * np.bincount(j, term[:pairs], n)
     every, axis = np.arange(n, dtype=np.int32), np.arange(0, axes * n, n, dtype=np.int32)
-    i, j = (
-        i[pair].astype(np.int32),
-        j[pair].astype(np.int32),
-    )  # half the memory of what the sparse format sorts
-    values = np.concatenate([diagonal, blocks[pair, :axes, 3 : 3 + axes], blocks[pair, 3 : 3 + axes, :axes]])
-    rows = np.concatenate([every, i, j])[:, None, None] + axis[:, None]
-    columns = np.concatenate([every, j, i])[:, None, None] + axis
+    i, j = i.astype(np.int32), j.astype(np.int32)  # half the memory of what the sparse format sorts
+    shared = terms[:, :, :pairs]
+    values = np.concatenate([diagonal, signs[0, 1] * shared, signs[1, 0] * shared], axis=2)
+    rows = axis[:, None, None] + np.concatenate([every, i, j])
+    columns = axis[:, None] + np.concatenate([every, j, i])
     where = tuple(np.broadcast_to(index, values.shape).ravel() for index in (rows, columns))
     matrix = coo_array((values.ravel(), where), shape=(3 * n, 3 * n)).tocsr()
     matrix.eliminate_zeros()
     return matrix
+
+
+def contact_terms(law: Derivatives, normal: Floats, distance: Floats, pairs: int, form: Form = "consistent") -> Floats:
+    """The nine numbers of each contact that K is assembled from: its block of the first partner with itself.
+
+    Parameters
+    ----------
+    law : Derivatives
+        Of the contact law, at each contact.
+    normal : ndarray, shape (2, C)
+        Unit vectors n towards i.
+    distance : ndarray, shape (C,)
+        Lengths of the branch vectors.
+    pairs : int
+        Contacts of two disks; those with the floor follow.
+    form : {"consistent", "paper"}
+        As in :func:`stiffness_matrix`.
+
+    Returns
+    -------
+    ndarray, shape (3, 3, C)
+        Force / length, rows and columns (x, y, u).
+    """
+    a, b, stiffness = law.slip_derivative, law.overlap_derivative, law.normal_stiffness
+    # only contacts of finite length turn; the floor's distance is a height and may even be zero
+    across, turn = a.copy(), np.zeros_like(b)
+    across[:pairs] += law.normal_force[:pairs] / distance[:pairs]
+    if form == "consistent":
+        turn[:pairs] = law.tangential_force[:pairs] / distance[:pairs]
+    square, product = normal * normal, normal[0] * normal[1]
+    skew, both = (b + turn) * product, (stiffness + across) * product
+    along = stiffness * square - across * square[::-1]
+    turning = turn * square - b * square[::-1]
+    torque = a * normal
+    terms = np.empty((3, 3, len(a)))
+    np.subtract(along[0], skew, out=terms[0, 0])
+    np.add(both, turning[0], out=terms[0, 1])
+    np.negative(torque[1], out=terms[0, 2])
+    np.subtract(both, turning[1], out=terms[1, 0])
+    np.add(along[1], skew, out=terms[1, 1])
+    terms[1, 2] = torque[0]
+    np.subtract(terms[:2, 2], b * normal, out=terms[2, :2])
+    np.negative(a, out=terms[2, 2])
+    return terms
 
 
 def contact_stiffness(packing: Packing, form: Form = "consistent") -> Floats:
@@ -98,8 +165,7 @@ def contact_stiffness(packing: Packing, form: Form = "consistent") -> Floats:
     ndarray, shape (C, 6, 6)
         Force / length; the rows and columns of j are zero for the floor, those of u without friction.
     """
-    if form not in ("consistent", "paper"):
-        raise ValueError(f'form = "{form}" must be "consistent" or "paper".')
+    _check(form)
     law, slip, floor = packing.law, packing.contacts.slip, packing.contacts.floor
     normal, tangent, distance, overlap = packing.geometry
     zero = np.zeros((len(slip), 1))
@@ -129,3 +195,8 @@ def contact_stiffness(packing: Packing, form: Form = "consistent") -> Floats:
         axis=1,
     )
     return left @ right
+
+
+def _check(form: str) -> None:
+    if form not in ("consistent", "paper"):
+        raise ValueError(f'form = "{form}" must be "consistent" or "paper".')

@@ -36,7 +36,8 @@ import numpy as np
 
 from faultgouge.analysis import OnsetError, find_onset, stiffness_matrix
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate, settle
-from faultgouge.pywrap.quasistatic import newton_step, rounding_floor
+from faultgouge.pywrap.newton_matrix import factored
+from faultgouge.pywrap.quasistatic import rounding_floor
 from faultgouge.pywrap.stages import EquilibriumPath
 from faultgouge.studies.stability_cases.packings import crystal
 
@@ -93,11 +94,15 @@ def increments(engine: Engine, start: Equilibrium) -> Row:
             break
         times.append(time.perf_counter() - begin)
     packing = here.packing
-    _ = packing.geometry, packing.net_force  # computed once, and not part of what follows
+    with engine.displacing() as displaced:
+        trial = displaced(packing, np.zeros(3 * len(packing)))
+    _ = packing.geometry, trial.packing.geometry, trial.branches  # computed once, and not part of what follows
     begin = time.perf_counter()
     stiffness_matrix(packing)
     assembled = time.perf_counter()
-    newton_step(packing, packing.net_force)
+    factors = factored(trial, trial.floor)
+    if factors is not None:
+        factors.solve(trial.force)
     return {
         "residual": here.residual,
         "floor": here.floor,

@@ -7,6 +7,7 @@
 #include "modify.h"
 #include "update.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -14,7 +15,7 @@ using namespace LAMMPS_NS;
 using namespace FixConst;
 
 FixDiscIntegrator::FixDiscIntegrator(LAMMPS *lmp, int narg, char **arg, int numbers) :
-    Fix(lmp, narg, arg),
+    FixDiskColumns(lmp, narg, arg),
     numbers(numbers)
 {
   static const char *const needs[] = {"no number", "one number, I0 = I/(m R^2)",
@@ -111,6 +112,11 @@ template <bool ROTATION, bool COMPENSATED> FAULTGOUGE_INLINE void FixDiscIntegra
     if (angle >= 0) atom->dvector[angle][i] += dt * atom->omega[i][2];
 }
 
+double *FixDiscIntegrator::angles() const
+{
+  return angle >= 0 ? atom->dvector[angle] : nullptr;
+}
+
 void FixDiscIntegrator::refuse(int i, double dx, double dy) const
 {
   error->one(
@@ -164,6 +170,41 @@ void FixNVEDisc::final_integrate()
 
 FixDisplaceDisc::FixDisplaceDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg, 0)
 {
+  make_columns(COLUMNS);
+}
+
+int FixDisplaceDisc::setmask()
+{
+  return FixDiscIntegrator::setmask() | POST_RUN;
+}
+
+void FixDisplaceDisc::init()
+{
+  FixDiscIntegrator::init();
+  double *const theta = angles();
+  for (int i = 0; i < atom->nlocal; i++) {
+    double *const state = array_atom[i];
+    if (state[GIVEN] == 0.0) continue;
+    state[GIVEN] = 0.0;
+    atom->x[i][0] = state[X];
+    atom->x[i][1] = state[Y];
+    atom->v[i][0] = state[VX];
+    atom->v[i][1] = state[VY];
+    atom->omega[i][2] = state[OMEGA];
+    if (theta) theta[i] = state[THETA];
+  }
+}
+
+void FixDisplaceDisc::post_run()
+{
+  const double *const theta = angles();
+  for (int i = 0; i < atom->nlocal; i++) {
+    const double *const x = atom->x[i], *const v = atom->v[i], *const f = atom->f[i];
+    const double state[] = {
+        0.0, x[0], x[1], theta ? theta[i] : 0.0, v[0], v[1], atom->omega[i][2], f[0], f[1], atom->torque[i][2]};
+    static_assert(sizeof(state) == COLUMNS * sizeof(double), "a number for each column");
+    std::copy(state, state + COLUMNS, array_atom[i]);
+  }
 }
 
 void FixDisplaceDisc::initial_integrate(int /*vflag*/)

@@ -8,17 +8,21 @@
 // Keywords: with rotation no they leave spins and angles out, since without friction nothing turns a disk; with
 // compensated they carry the low parts of coordinates, see pair mindlin/smooth.
 // Where the input has a per-atom property d_theta (fix property/atom), it takes up the rotation angle.
+//
+// displace/disc hands out all that a driver wants to know of the disks after a run, in one per-atom array: given, x, y,
+// theta, v_x, v_y, omega, f_x, f_y, torque. Written from outside (library scatter) with given = 1, coordinates, angle
+// and velocities of a disk count from the next run's begin.
 
 #ifndef LMP_FIX_DISC_INTEGRATORS_H
 #define LMP_FIX_DISC_INTEGRATORS_H
 
-#include "fix.h"
+#include "fix_disk_columns.h"
 
 #include <type_traits>
 
 namespace LAMMPS_NS {
 
-class FixDiscIntegrator : public Fix {
+class FixDiscIntegrator : public FixDiskColumns {
 public:
   FixDiscIntegrator(class LAMMPS *, int, char **, int numbers);
   int setmask() override;
@@ -39,6 +43,7 @@ protected:
   template <bool COMPENSATED> void complete_force(int i);
   void complete_forces();
   void refuse(int i, double dx, double dy) const;    // disk i cannot move so far
+  double *angles() const;                            // null: there are none
 
   // work(rotates, compensates) with both known at compile time
   template <class Work> void choose(Work work) const
@@ -76,7 +81,13 @@ private:
 class FixDisplaceDisc : public FixDiscIntegrator {
 public:
   FixDisplaceDisc(class LAMMPS *, int, char **);
+  int setmask() override;
+  void init() override;
   void initial_integrate(int) override;
+  void post_run() override;
+
+private:
+  enum Column { GIVEN, X, Y, THETA, VX, VY, OMEGA, FX, FY, TORQUE, COLUMNS };
 };
 
 class FixOverdampedDisc : public FixDiscIntegrator {

@@ -33,10 +33,10 @@ void FixDiskColumns::make_columns(int columns)
   for (int i = 0; i < atom->nlocal; i++) set_arrays(i);
 }
 
+// room for thousands of disks more, which is not touched: rows of new disks are set or unpacked when they come
 void FixDiskColumns::grow_arrays(int n)
 {
   memory->grow(array_atom, n, size_peratom_cols, "disk/columns:array");
-  for (int i = nmax; i < n; i++) set_arrays(i);
   nmax = n;
 }
 

@@ -9,11 +9,9 @@ collective over the ranks of the communicator, and every rank sees the whole pac
 from __future__ import annotations
 
 import re
-import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from ctypes import POINTER, c_double
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
 from types import TracebackType
@@ -23,9 +21,15 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
-from ..analysis import Contacts, Packing
+from ..analysis import Packing
 from ..analysis.compensated import normalized
-from ..analysis.packing import FLOOR, touching
+from ..analysis.packing import touching
+from .contact_graph import ContactGraph
+from .contact_rows import ContactRows
+from .data_file import data_file
+from .disk_arrays import DiskArrays
+from .shared_folder import shared_folder
+from .trial import Trial
 
 Floats = NDArray[np.float64]
 
@@ -33,9 +37,10 @@ DECKS = Path(str(files("faultgouge.lammps_inputs")))
 LOOK = 1000
 """Time steps between two looks at the forces."""
 
-FLOOR_SLIP, FLOOR_OVERLAP, FLOOR_SLIP_LOW = 2, 6, 7
 LOW_COLUMNS = 5
-
+STATE_COLUMNS = 10
+GIVEN, POSITION, ANGLE, VELOCITY, FORCE = 0, slice(1, 3), 3, slice(4, 7), slice(7, 10)
+"""Columns of fix displace/disc."""
 
 DECORATION = re.compile(r"^'?ERROR( on proc \d+)?: | \([^ ()]+:\d+\)'?$")
 """What surrounds the sentence of an error of LAMMPS: who says it, and where in the source."""
@@ -137,7 +142,7 @@ class Engine:
         from lammps import lammps
 
         self.communicator = communicator or MPI.COMM_WORLD
-        self._static = packing
+        self._static, self._fx = packing, packing.fx
         self._angle = packing.angle
         self._weakening = False
         arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none"]
@@ -146,6 +151,11 @@ class Engine:
             raise EngineError(
                 "LAMMPS does not know pair style mindlin/smooth: its plugin was not loaded, reinstall faultgouge."
             )
+        self._disks = DiskArrays(self._lammps, len(packing))
+        self._rows = ContactRows(packing.radius, packing.compensated)
+        self._written: Packing | None = None  # the packing of _arrays
+        self._kept: Trial | None = None
+        self._displaces = False
         self._load(packing)
 
     def __enter__(self) -> Engine:
@@ -164,26 +174,22 @@ class Engine:
     @property
     def packing(self) -> Packing:
         """The configuration as it stands, with its slips and its load."""
-        position, low = self._positions()
-        if self._static.law.frictional:
-            angle, contacts = self._gather("d_theta", 1)[:, 0], self._contacts()
-        else:
-            angle, contacts = self._angle, self._touching(position)
-        return replace(self._static, position=position, position_low=low, angle=angle, contacts=contacts)
+        return self._trial().packing
 
     @property
     def net_force(self) -> Floats:
         """Forces as LAMMPS has them, (Fx.., Fy.., T/R..), shape (3N,), load included."""
-        force = self._gather("f", 3)
-        frictional = self._static.law.frictional
-        torque = self._gather("torque", 3)[:, 2] if frictional else np.zeros(len(force))
-        return np.concatenate([force[:, 0], force[:, 1], torque / self._static.radius])
+        return self._force(self._state())
+
+    def _force(self, state: Floats) -> Floats:
+        force = state[:, FORCE].T.copy()
+        force[2] = force[2] / self._static.radius if self._static.law.frictional else 0.0
+        return force.ravel()
 
     def set_fx(self, fx: float) -> None:
         """Set the force along x on each disk of the upper layer."""
-        fx = float(fx)
-        self._static = replace(self._static, fx=fx)
-        self._command(f"fix load top addforce {fx!r} {-self._static.fy!r} 0.0")
+        self._fx = float(fx)
+        self._command(f"fix load top addforce {self._fx!r} {-self._static.fy!r} 0.0")
 
     def restore(self, packing: Packing) -> None:
         """Put the disks, slips and load of a packing back, to the bit."""
@@ -261,22 +267,45 @@ class Engine:
         Packing
             The configuration at the end of the path; `net_force` has its forces.
         """
-        dx, dy, du = displacement.reshape(3, -1)
-        zero = np.zeros_like(dx)
-        self._write(base)
-        self._scatter("v", np.column_stack([dx, dy, zero]))
-        if base.law.frictional:
-            self._scatter("omega", np.column_stack([zero, zero, du / base.radius]))
+        with self.displacing() as displaced:
+            return displaced(base, displacement).packing
+
+    @contextmanager
+    def displacing(self) -> Iterator[Callable[[Packing, Floats], Trial]]:
+        """A function that does the same and returns a `Trial`, for many displacements in turn."""
         self._command("timestep 1.0")
-        with self._displacing():
-            self._command("run 1 post no")
+        with self._displacement():
+            self._displaces = True
+            try:
+                yield self._displaced
+            finally:
+                self._displaces = False
+
+    def _displaced(self, base: Packing, displacement: Floats) -> Trial:
+        velocity = displacement.reshape(3, -1).T.copy()
+        velocity[:, 2] /= base.radius
+        self._write(base, velocity)
+        self._command("run 1 post no")
         if not base.law.frictional:
-            self._angle = base.angle + du / base.radius
-        return self.packing
+            self._angle = base.angle + velocity[:, 2]
+        return self._trial()
+
+    def keep(self, trial: Trial) -> Packing:
+        """The packing of a trial, for displacements from there: LAMMPS is then given what it gave."""
+        self._kept = trial
+        if not self._static.compensated:  # LAMMPS splits coordinates otherwise than packings do
+            self._written, self._arrays = trial.packing, trial.arrays
+        return trial.packing
+
+    def kept(self, packing: Packing) -> Trial:
+        """The trial that a packing was, or would have been; of its forces nothing is known."""
+        if self._kept is None or self._kept.packing is not packing:
+            self._kept = Trial.of(packing)
+        return self._kept
 
     def dump(self, stem: Path) -> None:
         """Write the configuration as LAMMPS dumps in full precision (deck part write.in): STEM.disks and others."""
-        self._variables(name=stem, fx=self._static.fx)
+        self._variables(name=stem, fx=self._fx)
         self._include("write.in")
 
     @contextmanager
@@ -338,8 +367,13 @@ class Engine:
         self._command(f"run {steps} pre no post no")
         law = self._static.law
         friction = self._lammps.extract_variable("friction") if self._weakening else law.mu
-        spin = self._gather("omega", 3)[:, 2] if law.frictional else np.zeros(len(self._static))
-        return Motion(*self._positions(), self._gather("v", 3)[:, :2], spin, float(friction))
+        state = self._state()
+        position, low = state[:, POSITION], None
+        if self._static.compensated:
+            position, low = normalized(position, self._disks.gather("f_low", LOW_COLUMNS)[:, :2])
+        velocity = state[:, VELOCITY]
+        spin = velocity[:, 2] if law.frictional else np.zeros(len(self._static))
+        return Motion(position, low, velocity[:, :2], spin, float(friction))
 
     def _load(self, packing: Packing) -> None:
         law = packing.law
@@ -361,116 +395,86 @@ class Engine:
                 precision="compensated" if packing.compensated else "double",
             )
             self._include("system.in")
-        self._scatter("rmass", packing.mass)
-        self._turn_to(packing.angle)
+        self._disks.scatter("rmass", packing.mass)
         if law.frictional or packing.compensated:
-            with self._displacing():
+            with self._displacement():
                 self._command("run 0 post no")  # makes the fixes slips and low
             self._write(packing)
 
-    def _write(self, packing: Packing) -> None:
-        """Positions, angles and slips of a packing into LAMMPS; they take effect at the next run's setup."""
-        self._scatter("x", np.column_stack([packing.position, np.zeros(len(packing))]))
-        self._turn_to(packing.angle)
-        if self._static.compensated:
-            low = np.zeros((len(packing), LOW_COLUMNS))
-            low[:, :2] = 0.0 if packing.position_low is None else packing.position_low
-            self._scatter("f_low", low)
+    def _write(self, packing: Packing, velocity: Floats | float = 0.0) -> None:
+        """Positions, angles and slips of a packing into LAMMPS, and velocities (v_x, v_y, omega), shape (N, 3); they
+        take effect at the next run's setup."""
+        if packing is not self._written:
+            self._arrays, self._written = self._arrays_of(packing), packing
+        self._angle = packing.angle
+        arrays = self._arrays
         if packing.law.frictional:
-            self._scatter("f_slips", self._slip_rows(packing))
-            floor = packing.contacts.floor
-            column = np.zeros((len(packing), self._floor_columns))
-            column[packing.contacts.i[floor], FLOOR_SLIP] = packing.contacts.slip[floor]
-            if self._static.compensated and packing.contacts.slip_low is not None:
-                column[packing.contacts.i[floor], FLOOR_SLIP_LOW] = packing.contacts.slip_low[floor]
-            column[packing.contacts.i[floor], FLOOR_OVERLAP] = packing.geometry.overlap[floor]
-            self._scatter("f_floor", column)
+            arrays["f_slips"] = self._of_width(arrays["f_slips"], self._disks.columns("slips"))
+        state = arrays["f_move"]
+        state[:, GIVEN], state[:, VELOCITY] = 1.0, velocity
+        for name, values in arrays.items():
+            if name != "f_move" or self._displaces:
+                self._disks.scatter(name, values)
+        if not self._displaces:
+            self._disks.scatter("x", np.column_stack([packing.position, np.zeros(len(packing))]))
+            if packing.law.frictional:
+                self._disks.scatter("d_theta", packing.angle)
 
-    def _turn_to(self, angle: Floats) -> None:
-        """Set the angles: in LAMMPS, or here where there is no friction and nothing turns."""
+    def _of_width(self, slips: Floats, columns: int) -> Floats:
+        """Rows of fix slips as wide as LAMMPS has them, or LAMMPS's as wide as these."""
+        missing = columns - slips.shape[1]
+        if missing < 0:
+            self._command(f"fix_modify slips capacity {(slips.shape[1] - 1) // self._rows.width}")
+        return np.pad(slips, ((0, 0), (0, missing))) if missing > 0 else slips
+
+    def _arrays_of(self, packing: Packing) -> dict[str, Floats]:
+        """What LAMMPS is given of a packing, by the names it has there."""
+        state = np.zeros((len(packing), STATE_COLUMNS))
+        state[:, POSITION], state[:, ANGLE] = packing.position, packing.angle
+        arrays = {"f_move": state}
+        if self._static.compensated:
+            arrays["f_low"] = np.zeros((len(packing), LOW_COLUMNS))
+            arrays["f_low"][:, :2] = 0.0 if packing.position_low is None else packing.position_low
+        if packing.law.frictional:
+            arrays["f_slips"] = self._rows.slips(packing)
+            arrays["f_floor"] = self._rows.floor(packing)
+        return arrays
+
+    def _state(self) -> Floats:
+        """The columns of fix displace/disc, whether there is one or not, shape (N, 10)."""
+        if self._displaces:
+            return self._disks.gather("f_move", STATE_COLUMNS)
+        state = np.zeros((len(self._static), STATE_COLUMNS))
+        state[:, POSITION] = self._disks.gather("x", 3)[:, :2]
+        velocity, force = self._disks.gather("v", 3), self._disks.gather("f", 3)
         if self._static.law.frictional:
-            self._scatter("d_theta", angle)
+            state[:, ANGLE] = self._disks.gather("d_theta", 1)[:, 0]
+            velocity[:, 2], force[:, 2] = (self._disks.gather(name, 3)[:, 2] for name in ("omega", "torque"))
+        state[:, VELOCITY], state[:, FORCE] = velocity, force
+        return state
+
+    def _trial(self) -> Trial:
+        """All that LAMMPS has."""
+        state = self._state()
+        arrays = {"f_move": state}
+        position, low = state[:, POSITION], None
+        if self._static.compensated:
+            arrays["f_low"] = self._disks.gather("f_low", LOW_COLUMNS)
+            position, low = normalized(position, arrays["f_low"][:, :2])
+        if self._static.law.frictional:
+            angle = state[:, ANGLE]
+            arrays["f_slips"] = self._disks.gather("f_slips", self._disks.columns("slips"))
+            arrays["f_floor"] = self._disks.gather("f_floor", self._rows.floor_columns)
+            graph, slip, slip_low = self._rows.read(arrays["f_slips"], arrays["f_floor"])
         else:
-            self._angle = angle
+            angle, contacts = self._angle, touching(position, self._static.radius, self._static.box_length)
+            graph, slip, slip_low = ContactGraph(contacts, self._static.radius), contacts.slip, None
+        force = self._force(state)
+        return Trial(self._static, self._fx, position, low, angle, graph, slip, slip_low, force, arrays)
 
-    def _slip_rows(self, packing: Packing) -> Floats:
-        """Rows [own ID, partner ID, slip, ...] of fix slip/history, see fix_slip_history.h."""
-        width, pair = self._slip_width, ~packing.contacts.floor
-        owner = np.concatenate([packing.contacts.i[pair], packing.contacts.j[pair]])
-        partner = np.concatenate([packing.contacts.j[pair], packing.contacts.i[pair]])
-        slip = np.tile(packing.contacts.slip[pair], 2)
-        order = np.lexsort((partner, owner))
-        owner, partner, slip = owner[order], partner[order], slip[order]
-        place = np.arange(len(owner)) - np.searchsorted(owner, owner)
-        most = int(place.max(initial=-1)) + 1
-        if 1 + width * most > self._slip_columns:
-            self._command(f"fix_modify slips capacity {most}")
-        rows = np.zeros((len(packing), self._slip_columns))
-        rows[owner, 0] = owner + 1
-        rows[owner, 1 + width * place] = partner + 1
-        rows[owner, 2 + width * place] = slip
-        if self._static.compensated and packing.contacts.slip_low is not None:
-            rows[owner, 3 + width * place] = np.tile(packing.contacts.slip_low[pair], 2)[order]
-        return rows
-
-    @property
-    def _slip_width(self) -> int:
-        """Numbers of a contact in a row of fix slip/history."""
-        return 3 if self._static.compensated else 2
-
-    @property
-    def _floor_columns(self) -> int:
-        return FLOOR_SLIP_LOW + 1 if self._static.compensated else FLOOR_OVERLAP + 1
-
-    def _positions(self) -> tuple[Floats, Floats | None]:
-        """Coordinates as doubles and, in compensated arithmetic, what these lack."""
-        position = self._gather("x", 3)[:, :2]
-        return (
-            normalized(position, self._gather("f_low", LOW_COLUMNS)[:, :2])
-            if self._static.compensated
-            else (position, None)
-        )
-
-    def _displacing(self) -> AbstractContextManager[None]:
+    def _displacement(self) -> AbstractContextManager[None]:
         keywords = f"rotation {'yes' if self._static.law.frictional else 'no'}"
         return self._fix("move", f"all displace/disc {keywords}" + " compensated" * self._static.compensated)
-
-    @property
-    def _slip_columns(self) -> int:
-        from lammps import LMP_SIZE_COLS, LMP_STYLE_ATOM
-
-        return int(self._lammps.extract_fix("slips", LMP_STYLE_ATOM, LMP_SIZE_COLS))
-
-    def _contacts(self) -> Contacts:
-        rows, width = self._gather("f_slips", self._slip_columns), self._slip_width
-        partner = rows[:, 1::width].astype(np.int64) - 1
-        i, place = np.nonzero(partner > np.arange(len(rows))[:, None])
-        column = self._gather("f_floor", self._floor_columns)
-        floor = np.flatnonzero(column[:, FLOOR_OVERLAP] > 0)
-        low = None
-        if self._static.compensated:
-            low = np.concatenate([rows[i, 3 + width * place], column[floor, FLOOR_SLIP_LOW]])
-        return Contacts(
-            i=np.concatenate([i, floor]),
-            j=np.concatenate([partner[i, place], np.full(len(floor), FLOOR)]),
-            slip=np.concatenate([rows[i, 2 + width * place], column[floor, FLOOR_SLIP]]),
-            slip_low=low,
-        )
-
-    def _touching(self, position: Floats) -> Contacts:
-        return touching(position, self._static.radius, self._static.box_length)
-
-    def _gather(self, name: str, columns: int) -> Floats:
-        per_atom = name.startswith(("f_", "d_"))
-        gather = self._lammps.gather if per_atom else self._lammps.gather_atoms
-        return np.ctypeslib.as_array(gather(name, 1, columns)).reshape(-1, columns).copy()
-
-    def _scatter(self, name: str, values: Floats) -> None:
-        values = np.ascontiguousarray(values, dtype=np.float64)
-        columns = 1 if values.ndim == 1 else values.shape[1]
-        per_atom = name.startswith(("f_", "d_"))
-        scatter = self._lammps.scatter if per_atom else self._lammps.scatter_atoms
-        scatter(name, 1, columns, values.ctypes.data_as(POINTER(c_double)))
 
     def _variables(self, **values: object) -> None:
         for name, value in values.items():
@@ -510,40 +514,3 @@ class Engine:
             failure = EngineError(f"LAMMPS stopped: {DECORATION.sub('', str(error).splitlines()[0])}.")
             failure.one_rank = type(error).__name__ == "MPIAbortException"
             raise failure from error
-
-
-def data_file(packing: Packing) -> str:
-    """A LAMMPS data file of the disks, type 2 the upper layer; lengths to the bit, masses left to the decks."""
-    x, y = packing.position.T
-    period = packing.box_length
-    margin = 4 * packing.radius.max()
-    left, right = (0.0, period) if period is not None else (x.min() - margin, x.max() + margin)
-    # open above: a layer that erupts has room for its own height twice more
-    top = 3 * (y.max() + margin)
-    lines = [
-        "faultgouge packing",
-        "",
-        f"{len(packing)} atoms",
-        "2 atom types",
-        f"{float(left)!r} {float(right)!r} xlo xhi",
-        f"{-float(margin)!r} {float(top)!r} ylo yhi",
-        "-0.5 0.5 zlo zhi",
-        "",
-        "Atoms # sphere",
-        "",
-    ]
-    columns = zip(packing.top.tolist(), (2 * packing.radius).tolist(), x.tolist(), y.tolist(), strict=True)
-    lines += [f"{n} {1 + top} {d!r} 1.0 {a!r} {b!r} 0.0" for n, (top, d, a, b) in enumerate(columns, 1)]
-    return "\n".join(lines) + "\n"
-
-
-@contextmanager
-def shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
-    """A temporary folder of rank 0 that all ranks know."""
-    keeper = tempfile.TemporaryDirectory(prefix="faultgouge-") if communicator.rank == 0 else None
-    try:
-        yield Path(communicator.bcast(keeper.name if keeper else None))
-        communicator.barrier()  # not after an error, which one rank may be alone with
-    finally:
-        if keeper:
-            keeper.cleanup()

@@ -19,9 +19,10 @@ known to 1e-23, and the next bound is the displacement itself, a double: :math:`
 displacements count from the iterate. What is left, :math:`q'`, is of order :math:`\epsilon |q|`, and that its slips
 start at an iterate changes them by :math:`|q| |q'|`, which is less than they can resolve.
 
-From one equilibrium to another q is nearly proportional to the increment: where a third one is known, the iteration
-starts from the displacement of that one, in proportion. The ramp of an onset takes the equilibrium before the last,
-which saves one of four evaluations; a ramp that is stored does not, so that it goes on to the bit where it was cut off.
+The first step needs no forces: at an equilibrium they are those of the increment on the upper layer, and the iteration
+starts from the linear response to these. Between equilibria q is nearly proportional to the increment, too: where a
+third one is known, its displacement in proportion saves a factorisation. The ramp of an onset takes the equilibrium
+before the last; a ramp that is stored does not, so that it goes on to the bit where it was cut off.
 
 A rattler that a neighbour runs into on the way is moved to the middle of its cage: it carries nothing, and where it
 lies is no matter (:mod:`~faultgouge.pywrap.rattlers`).
@@ -31,22 +32,22 @@ Where Newton fails the increment is halved, since the path matters: friction rem
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
-from ..analysis import Packing, nearest_image, stiffness_matrix
-from .elimination import elimination_order
+from ..analysis import Packing, nearest_image
+from .contact_graph import ContactGraph
 from .engine import Engine
+from .newton_matrix import Factors, factored
 from .rattlers import middle_of_cage
+from .trial import EPSILON, Trial, rounding
 
 Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
 
 ITERATIONS = 40
-"""Newton iterations before an increment is halved. Four or five do, but where a rattler has been hit in a cage that
+"""Newton iterations before an increment is halved. Three or four do, but where a rattler has been hit in a cage that
 closes on it: its contact opens as delta^(3/2) -> 0, on which Newton's method gains a factor of 3 an iteration, and 20
 reach the floor."""
 
@@ -58,14 +59,6 @@ FREEING = 3
 step: its force goes as delta^(3/2), a root of that order, and the factor makes the convergence quadratic again. Later
 ones take Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
 
-IDLE = 1e-7
-"""Share of the largest contact force up to which a contact carries nothing that matters."""
-
-CREEP = 0.1
-"""Share of its stiffness that is added to a disk with none but such contacts. One that is leant upon by a breath has
-next to no stiffness along the contact, and would be thrown through its cage; as it is, its force falls tenfold in an
-iteration, from a value that is small already."""
-
 SPARING = 300
 """Disks beyond which factors of K are used again: a factorisation costs ten force evaluations and more."""
 
@@ -75,9 +68,6 @@ KEPT = 0.1
 GAIN = 1e-2
 """Factor by which the first iteration reduces the residual, where nothing is known yet: 1e-2 is that of an increment of
 1e-3 from no displacement, and smaller ones have smaller factors."""
-
-DENSE = 400
-"""Coordinates up to which a dense solve is the faster one: 1 ms against 3 ms at 285."""
 
 SMALLEST_SHARE = 2.0**-10
 """The share of an increment below which halving ends and the packing is said to flow."""
@@ -126,15 +116,9 @@ def rounding_floor(packing: Packing, displaced: float = 0.0) -> float:
     displaced : float
         Length of the displacement that led to it, a double, whose last place counts as well.
     """
-    contacts, geometry = packing.contacts, packing.geometry
-    if len(contacts) == 0:
-        return 0.0
-    unit = packing.coordinate_rounding + np.finfo(float).eps * displaced
-    error = (packing.law.normal_stiffness(geometry.overlap) * unit) ** 2
-    per_disk = np.bincount(contacts.i, error, len(packing))
-    pair = ~contacts.floor
-    per_disk += np.bincount(contacts.j[pair], error[pair], len(packing))
-    return float(np.sqrt(per_disk.max()))
+    graph = ContactGraph(packing.contacts, packing.radius)
+    unit = packing.coordinate_rounding + EPSILON * displaced
+    return rounding(packing.law, graph, packing.geometry.overlap, unit)
 
 
 def equilibrate(
@@ -170,7 +154,7 @@ def equilibrate(
         If halving the increment leads nowhere.
     """
     here, target, evaluations = last, fx, 0
-    guess = None if beside is None else _displacement(last, beside) * ((fx - last.fx) / (beside.fx - last.fx))
+    guess = _response(engine, last, fx) if beside is None else _in_proportion(last, beside, fx)
     while True:
         engine.set_fx(target)
         found, spent = _newton(engine, here.packing, force_tolerance, guess)
@@ -189,147 +173,119 @@ def equilibrate(
             here, target = found, fx
 
 
-def _displacement(start: Equilibrium, end: Equilibrium) -> Floats:
-    """From one equilibrium to another, (dx.., dy.., R dtheta..)."""
-    a, b = start.packing, end.packing
+def _response(engine: Engine, last: Equilibrium, fx: float) -> Floats | None:
+    """The linear response to the increment, which is Newton's first step; None where there is none."""
+    packing = last.packing
+    if fx == packing.fx:
+        return None
+    push = np.zeros(3 * len(packing))
+    push[: len(packing)][packing.top] = fx - packing.fx
+    trial = engine.kept(packing)
+    factors = factored(trial, trial.floor)
+    step = None if factors is None else factors.solve(push)
+    return None if step is None or _too_long(step, packing) else step
+
+
+def _in_proportion(last: Equilibrium, beside: Equilibrium, fx: float) -> Floats:
+    """The displacement from one equilibrium to another, (dx.., dy.., R dtheta..), in proportion to the increment."""
+    a, b = last.packing, beside.packing
     moved = nearest_image(b.position - a.position, a.box_length)
-    return np.concatenate([moved[:, 0], moved[:, 1], b.scaled_angle - a.scaled_angle])
+    displacement = np.concatenate([moved[:, 0], moved[:, 1], b.scaled_angle - a.scaled_angle])
+    return displacement * ((fx - last.fx) / (beside.fx - last.fx))
+
+
+def _too_long(step: Floats, packing: Packing) -> bool:
+    """Whether the linear response is no small displacement: a part floats."""
+    return bool(np.abs(step).max() > 0.1 * packing.radius.min())
 
 
 def _newton(
     engine: Engine, base: Packing, force_tolerance: float | None, guess: Floats | None = None
 ) -> tuple[Equilibrium | None, int]:
     """Newton's method from one base at the engine's fx; None where it does not converge."""
+    with engine.displacing() as displaced:
+        best, evaluations = _iterated(displaced, engine.kept(base), force_tolerance, guess)
+    if best is None:
+        return None, evaluations
+    return Equilibrium(engine.keep(best), best.residual, best.floor, evaluations), evaluations
+
+
+def _iterated(
+    displaced: Callable[[Packing, Floats], Trial],
+    start: Trial,
+    force_tolerance: float | None,
+    guess: Floats | None,
+) -> tuple[Trial | None, int]:
+    base, loose = start.packing, _loose(start)
     displacement = np.zeros(3 * len(base)) if guess is None else guess
-    best: Equilibrium | None = None
-    solve = None
+    best: Trial | None = None
+    factors: Factors | None = None
     worse = 0  # iterations that gained nothing; changes of contacts cost some
-    moved = np.zeros(len(base), dtype=np.bool_)  # rattlers that have been moved out of the way
+    moved, moves = np.zeros(len(base), dtype=np.bool_), 0  # rattlers that are out of the way
     earlier = last = np.inf  # residuals of the two iterations before
     for evaluation in range(1, ITERATIONS + 1):
-        trial = engine.displace(base, displacement)
-        hit = _hit(trial, base)
-        if np.any(hit & ~moved):
-            displacement = _out_of_the_way(trial, hit & ~moved, displacement)
-            moved |= hit
-            trial = engine.displace(base, displacement)
-            hit = _hit(trial, base)
-        force = engine.net_force
-        residual = _largest(force, trial)
-        floor = rounding_floor(trial)
+        trial = displaced(base, displacement)
+        residual = trial.residual
+        if factors is None:
+            floor = trial.floor
         if best is not None and residual > 0.5 * best.residual:
             if best.residual < 10 * floor:
-                return best, evaluation
+                return best, evaluation + moves
             worse += 1
             if worse > FRUITLESS:
-                return None, evaluation
+                return None, evaluation + moves
         # What a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved.
         if (guess is None or evaluation > 1) and (best is None or residual < best.residual):
-            best = Equilibrium(trial, residual, floor, evaluation)
+            best = trial
         if best is not None and residual <= (force_tolerance if force_tolerance is not None else 0.1 * floor):
-            return best, evaluation
+            return best, evaluation + moves
         # What is not rounding falls by no less than it did the time before: it may be far below the floor now.
         factor = last / earlier if np.isfinite(earlier) else GAIN
         if best is not None and residual < floor and factor * last < 0.1 * floor:
-            return best, evaluation
-        if solve is None or len(base) <= SPARING or residual > KEPT * last:
-            solve = _factored(trial)
+            return best, evaluation + moves
+        # the same factors would lead to the floor
+        sufficient = residual * (residual / last) < 0.1 * floor
+        if factors is None or not (sufficient or (len(base) > SPARING and residual <= KEPT * last)):
+            floor = trial.floor
+            hit = _hit(trial, loose) & ~moved
+            if np.any(hit):
+                displacement = _out_of_the_way(trial.packing, np.flatnonzero(hit), displacement)
+                trial = displaced(base, displacement)
+                residual = trial.residual
+                moved, moves = moved | hit, moves + 1
+            factors = factored(trial, floor)
         earlier, last = last, residual
-        step = None if solve is None else solve(force)
-        if step is None or np.abs(step).max() > 0.1 * base.radius.min():
-            return None, evaluation  # a floating part: the linear response is no small displacement
+        step = None if factors is None else factors.solve(trial.force)
+        if factors is None or step is None or _too_long(step, base):
+            return None, evaluation + moves
         if evaluation <= FREEING:
-            step.reshape(3, -1)[:, hit] *= 1.5
-        if base.compensated and residual < 10 * rounding_floor(trial, np.abs(displacement).max()):
-            base, displacement = trial, np.zeros_like(displacement)
+            step.reshape(3, -1)[:, factors.hit] *= 1.5
+        if base.compensated and residual < 10 * trial.rounded(
+            trial.coordinate_rounding + EPSILON * np.abs(displacement).max()
+        ):
+            base, displacement = trial.packing, np.zeros_like(displacement)
         displacement = displacement + step
-    return None, ITERATIONS
+    return None, ITERATIONS + moves
 
 
-def _hit(trial: Packing, base: Packing) -> NDArray[np.bool_]:
+def _carrying(trial: Trial) -> Floats:
+    """Number of contacts of each disk that carry something, shape (N,)."""
+    return trial.graph.per_disk(trial.derivatives.normal_force > trial.floor)
+
+
+def _loose(trial: Trial) -> Booleans:
+    """Rattlers, shape (N,)."""
+    return (_carrying(trial) == 0) & ~trial.still.top
+
+
+def _hit(trial: Trial, loose: Booleans) -> Booleans:
     """Rattlers that a neighbour ran into, and disks with one contact left, which become rattlers, shape (N,)."""
-    least = rounding_floor(base)
-    touched = trial.loaded(least).contacts
-    count = np.bincount(touched.i, minlength=len(trial))
-    count += np.bincount(touched.j[~touched.floor], minlength=len(trial))
-    was_idle = np.zeros(len(base), dtype=np.bool_)
-    was_idle[base.loaded(least).rattlers] = True
-    return ((count == 1) | (was_idle & (count > 0))) & ~base.top
+    count = _carrying(trial)
+    return ((count == 1) & ~trial.still.top) | (loose & (count > 0))
 
 
-def _out_of_the_way(trial: Packing, hit: NDArray[np.bool_], displacement: Floats) -> Floats:
-    """The displacement with which disks end up in the middle of their cages."""
-    disks = np.flatnonzero(hit)
+def _out_of_the_way(trial: Packing, disks: NDArray[np.int64], displacement: Floats) -> Floats:
+    """The displacement with which these disks end up in the middle of their cages."""
     changed = displacement.copy()
     changed.reshape(3, -1)[:2, disks] += (middle_of_cage(trial, disks) - trial.position[disks]).T
     return changed
-
-
-def _idle(packing: Packing) -> NDArray[np.bool_]:
-    """Disks of which no contact carries more than `IDLE`, shape (N,)."""
-    contacts, carried = packing.contacts, packing.normal_force
-    most = np.zeros(len(packing))
-    np.maximum.at(most, contacts.i, carried)
-    pair = ~contacts.floor
-    np.maximum.at(most, contacts.j[pair], carried[pair])
-    return most <= IDLE * carried.max(initial=0.0)
-
-
-def _largest(force: Floats, packing: Packing) -> float:
-    per_disk = np.linalg.norm(force.reshape(3, -1), axis=0)
-    return float(np.delete(per_disk, packing.rattlers).max(initial=0.0))
-
-
-def newton_step(packing: Packing, force: Floats) -> Floats | None:
-    """K^-1 F on the coordinates that K knows, contacts below the floor left out; None if K is singular.
-
-    Parameters
-    ----------
-    packing : Packing
-        Where K is taken.
-    force : ndarray, shape (3N,)
-        F, force.
-
-    Returns
-    -------
-    ndarray, shape (3N,), or None
-        The displacement, length.
-    """
-    solve = _factored(packing)
-    return None if solve is None else solve(force)
-
-
-def _factored(packing: Packing) -> Callable[[Floats], Floats | None] | None:
-    """The solution of K dq = F as a function of F, on the coordinates that K knows; None if K is singular."""
-    packing = packing.loaded(rounding_floor(packing))
-    matrix = stiffness_matrix(packing)
-    # A share of the diagonal of the size of its rounding keeps the solve finite where something floats, such
-    # as the whole packing along a floor without friction; on stiff directions it changes nothing.
-    share = np.where(np.tile(_idle(packing), 3), CREEP, 1e-13)
-    diagonal = (1 + share) * matrix.diagonal()
-    active = np.flatnonzero(diagonal)
-    if len(active) > DENSE:
-        active = active[elimination_order(packing, active)]
-    block = matrix[active][:, active]
-    block.setdiag(diagonal[active])
-    if len(active) <= DENSE:
-        inverse = partial(np.linalg.solve, block.toarray())
-    else:
-        try:
-            # nearly symmetric: pivots on the diagonal where good
-            inverse = splu(
-                csc_array(block), permc_spec="NATURAL", diag_pivot_thresh=0.01, options={"SymmetricMode": True}
-            ).solve
-        except RuntimeError:
-            return None
-
-    def solve(force: Floats) -> Floats | None:
-        try:
-            step = inverse(force[active])
-        except np.linalg.LinAlgError:
-            return None
-        full = np.zeros_like(force)
-        full[active] = step
-        return full if np.all(np.isfinite(step)) else None
-
-    return solve

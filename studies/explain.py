@@ -31,7 +31,6 @@ from ..analysis.packing import Floats
 from ..analysis.spectrum import dynamical_matrix
 from ..pywrap import Engine, Equilibrium, Record, Scene
 from ..pywrap.engine import Motion, Weakening
-from ..pywrap.quasistatic import DENSE
 from ..pywrap.scene import GeneratedPacking, Ramp
 from ..pywrap.stages import next_equilibrium, settle
 from .costs import SHARE, TURNS, Cost, in_turns
@@ -40,6 +39,9 @@ from .switches import UNREACHED, Feature, Loaded, Push, Run, features, where
 LARGEST = 400
 """Disks up to which a packing is settled to be explained: half a second. Of a larger one a strip of as many is, of the
 same depth."""
+
+DENSE = 400
+"""Equations of the linear solve that threads are tried on, at the most."""
 
 FEW = 5
 """Turns of what may take long."""
@@ -327,7 +329,7 @@ def time_ranks(job: str) -> None:
 
 
 def _threads(packing: Packing) -> Part:
-    """A dense solve of Newton's method, with one thread and with two."""
+    """A dense solve, such as eigenvalues are made of, with one thread and with two."""
     from threadpoolctl import threadpool_info, threadpool_limits
 
     here = max((pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"), default=1)

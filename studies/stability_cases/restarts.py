@@ -15,7 +15,8 @@ from mpi4py import MPI
 
 from ...analysis import spectrum, stable_timestep
 from ...pywrap import Engine
-from ...pywrap.engine import DECKS, shared_folder
+from ...pywrap.engine import DECKS
+from ...pywrap.shared_folder import shared_folder
 from .case import Case, Outcome, measured
 from .loads import Make
 from .packings import arches, bed, crystal, law, with_low_parts

@@ -57,6 +57,26 @@ def test_derivatives_have_all_digits(law, overlap, share):
     )
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_all_at_once(law):
+    overlap, share = (grid.ravel() for grid in np.meshgrid((*OVERLAPS, 0.0, -0.1), SHARES))
+    slip = share * np.where(overlap > 0, law.slip_limit(overlap), 1e-3)
+    found = law.derivatives(overlap, slip)
+    singly = (
+        law.normal_force(overlap),
+        law.tangential_force(overlap, slip),
+        law.normal_stiffness(overlap),
+        law.tangential_slip_derivative(overlap, slip),
+        law.tangential_overlap_derivative(overlap, slip) * law.frictional,
+    )
+    scale = law.kt * np.sqrt(np.maximum(overlap, 0.0))
+    for together, alone in zip(found, singly, strict=True):
+        # the same formulas, rounded in another order
+        assert np.all(
+            np.abs(together - alone) <= 4e-15 * (np.abs(alone) + scale * (1 + law.mu * law.kn / max(law.kt, 1e-300)))
+        )
+
+
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_derivatives_are_continuous_at_the_bound(sign):
     law, overlap = MindlinLaw(2e5, 6e4, 0.8), 1e-3

@@ -21,6 +21,37 @@ def test_contacts_have_one_order():
     np.testing.assert_array_equal(contacts.floor, [False, False, False, True, True])
 
 
+def test_contacts_with_other_slips():
+    contacts = Contacts([3, 0, 2], [1, -1, 0], [0.1, 0.2, 0.3])
+    other = contacts.slipped([1.0, 2.0, 3.0], [1e-17, 2e-17, 3e-17])
+    assert other.i is contacts.i
+    np.testing.assert_array_equal(other.slip, [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(other.slip_low, [1e-17, 2e-17, 3e-17])
+    np.testing.assert_array_equal(contacts.slip, [0.3, 0.1, 0.2])
+    assert not other.slip.flags.writeable
+    for slips in ([1.0], [1.0, 2.0, np.inf]):
+        with pytest.raises(ValueError, match="slip"):
+            contacts.slipped(slips)
+
+
+def test_moved_packing_is_one_made_anew(cluster):
+    position, angle = cluster.position + 1e-3, cluster.angle - 0.1
+    contacts = cluster.contacts.slipped(np.zeros(12))
+    _ = cluster.geometry, cluster.rattlers  # of the old place
+    moved = cluster.moved(position, angle, contacts, 1e-18 * position, 0.3)
+    anew = replace(cluster, position=position, angle=angle, contacts=contacts, position_low=1e-18 * position, fx=0.3)
+    for name in cluster.__dataclass_fields__:
+        np.testing.assert_array_equal(getattr(moved, name), getattr(anew, name))
+    np.testing.assert_array_equal(moved.geometry.overlap, anew.geometry.overlap)
+    np.testing.assert_array_equal(moved.net_force, anew.net_force)
+    assert moved.position is not position
+    assert not moved.position.flags.writeable
+    assert cluster.moved(position, angle, contacts).fx == cluster.fx
+    for wrong in ({"position": position[1:]}, {"angle": np.full(6, np.nan)}, {"contacts": Contacts([6], [-1], [0])}):
+        with pytest.raises(ValueError, match=r"position|angle|beyond"):
+            cluster.moved(**({"position": position, "angle": angle, "contacts": contacts} | wrong))
+
+
 @pytest.mark.parametrize(
     ("i", "j", "slip", "says"),
     [

@@ -51,6 +51,20 @@ def test_derivative_of_one_contact(cluster, k):
     assert np.abs(matrix - expected).max() < 1e-8 * np.abs(matrix).max()
 
 
+@pytest.mark.parametrize("form", ["consistent", "paper"])
+@pytest.mark.parametrize("mu", [0.7, 0.0])
+def test_sum_of_the_products_of_each_contact(cluster, form, mu):
+    """K is assembled from nine numbers a contact; here from the 6 x 6 products of the formula."""
+    n, packing = len(cluster), replace(cluster, law=replace(cluster.law, mu=mu))
+    expected = np.zeros((3 * n, 3 * n))
+    for i, j, block in zip(packing.contacts.i, packing.contacts.j, contact_stiffness(packing, form), strict=True):
+        ends = 2 if j >= 0 else 1
+        where = np.concatenate([disk + n * np.arange(3) for disk in (i, j)[:ends]])
+        expected[np.ix_(where, where)] += block[: 3 * ends, : 3 * ends]
+    matrix = stiffness_matrix(packing, form).toarray()
+    np.testing.assert_allclose(matrix, expected, rtol=0, atol=1e-15 * np.abs(expected).max())
+
+
 def test_cluster_has_every_state(cluster):
     x = cluster.contacts.slip / cluster.law.slip_limit(cluster.geometry.overlap)
     assert len(cluster.contacts) == 12

@@ -1,0 +1,138 @@
+"""Newton's matrix, small packings: the same as the sparse one, in a band, with and without what carries nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix
+from faultgouge.analysis.stiffness import contact_terms
+from faultgouge.pywrap import Engine
+from faultgouge.pywrap.contact_graph import ContactGraph
+from faultgouge.pywrap.contact_rows import ContactRows
+from faultgouge.pywrap.newton_matrix import AFLOAT, factored
+from faultgouge.pywrap.quasistatic import rounding_floor
+from faultgouge.pywrap.trial import Trial
+
+
+def trial_of(packing, force=None):
+    """A packing as if LAMMPS had handed it out."""
+    c, graph = packing.contacts, ContactGraph(packing.contacts, packing.radius)
+    force = packing.net_force if force is None else force
+    low = packing.position_low
+    return Trial(packing, packing.fx, packing.position, low, packing.angle, graph, c.slip, c.slip_low, force, {})
+
+
+@pytest.fixture(params=["friction", "smooth", "compensated", "open"])
+def packing(reference_packing, request):
+    packing = reference_packing(1.0)
+    rng = np.random.default_rng(3)
+    limit = packing.law.slip_limit(packing.geometry.overlap)
+    slip = 1.2 * limit * rng.uniform(-1, 1, len(limit))  # some beyond the bound
+    slipped = replace(packing, contacts=packing.contacts.slipped(slip))
+    changes = {
+        "friction": {},
+        "smooth": {"law": MindlinLaw(2e5, 0.0, 0.0)},
+        "compensated": {"position_low": 1e-18 * rng.standard_normal((100, 2))},
+        "open": {"box_length": None},
+    }
+    changed = replace(slipped, **changes[request.param])
+    if request.param == "open":  # without those that met across the box
+        return replace(changed, contacts=_near(changed))
+    return changed
+
+
+def _near(packing):
+    c = packing.contacts
+    kept = packing.geometry.overlap > 0
+    return Contacts(c.i[kept], c.j[kept], c.slip[kept])
+
+
+def test_band_is_the_stiffness_matrix(packing):
+    trial = trial_of(packing)
+    law, (normal, distance, _) = trial.derivatives, trial.branches
+    expected = stiffness_matrix(packing).toarray()
+    active = np.diag(expected) != 0
+    band = trial.graph.band(active)
+    matrix = band.matrix(contact_terms(law, normal, distance, trial.graph.pairs))
+    size, width = len(band.coordinates), band.width
+    full = np.zeros((size, size))
+    for k in range(-width, width + 1):
+        rows = np.arange(max(0, k), min(size, size + k))
+        full[rows, rows - k] = matrix[2 * width + k, rows - k]
+    assert not matrix[:width].any()  # room for what pivots fill in
+    where = np.ix_(band.coordinates, band.coordinates)
+    # plain differences of coordinates leave 1e-16 of a length, 1e-13 of an overlap
+    assert_allclose(full, expected[where], rtol=0, atol=1e-11 * np.abs(expected).max())
+    assert width < size / 4
+
+
+def test_solution(packing):
+    force = np.random.default_rng(4).standard_normal(3 * len(packing))
+    step = factored(trial_of(packing), 0.0).solve(force)
+    matrix = stiffness_matrix(packing).toarray()
+    active = np.diag(matrix) != 0
+    matrix[np.diag_indices(len(matrix))] *= 1 + AFLOAT
+    assert not step[~active].any()
+    left = (matrix @ step - force)[active]
+    assert np.abs(left).max() < 1e-10 * np.abs(matrix).max() * np.abs(step).max()
+
+
+def test_contacts_below_the_floor_are_left_out(reference_packing):
+    packing = reference_packing(1.0)
+    least = float(np.sort(packing.normal_force)[2])
+    force = np.random.default_rng(5).standard_normal(300)
+    step = factored(trial_of(packing), least).solve(force)
+    fewer = packing.loaded(least)
+    assert_allclose(step, factored(trial_of(fewer), 0.0).solve(force), rtol=1e-6, atol=1e-9 * np.abs(step).max())
+    assert np.array_equal(
+        factored(trial_of(packing), least).hit,
+        (ContactGraph(fewer.contacts, fewer.radius).per_disk(np.ones(len(fewer.contacts))) == 1) & ~packing.top,
+    )
+
+
+def test_nothing_that_holds():
+    position = np.column_stack([3.0 * np.arange(7), np.full(7, 5.0)])
+    apart = Packing(position=position, radius=np.ones(7), contacts=Contacts([], [], []), law=MindlinLaw(1, 1, 1))
+    assert factored(trial_of(apart), 0.0) is None
+    assert trial_of(apart).residual == 0.0
+    assert trial_of(apart).floor == 0.0
+
+
+def test_a_trial_is_its_packing(reference_packing):
+    start = reference_packing(1.0)
+    with Engine(start) as engine, engine.displacing() as displaced:
+        trial = displaced(start, 1e-5 * np.random.default_rng(6).standard_normal(300))
+    packing = trial.packing
+    geometry = packing.geometry
+    assert trial.floor == pytest.approx(rounding_floor(packing), rel=1e-12)
+    assert_allclose(trial.branches.overlap, geometry.overlap, rtol=0, atol=1e-14)
+    assert_allclose(trial.branches.normal.T, geometry.normal, rtol=0, atol=1e-14)
+    assert_allclose(trial.branches.distance, geometry.distance, rtol=1e-14)
+    assert np.array_equal(trial.branches.overlap > 0, geometry.overlap > 0)
+    assert trial.residual == pytest.approx(packing.residual, rel=1e-6)
+
+
+@pytest.mark.parametrize("compensated", [False, True])
+def test_contacts_through_rows(reference_packing, compensated):
+    packing = reference_packing(1.0)
+    rng = np.random.default_rng(7)
+    slip, low = rng.standard_normal((2, len(packing.contacts)))
+    contacts = packing.contacts.slipped(slip, low if compensated else None)
+    packing = replace(packing, contacts=contacts)
+    rows = ContactRows(packing.radius, compensated)
+    graph, again, again_low = rows.read(rows.slips(packing), rows.floor(packing))
+    assert np.array_equal(graph.i, contacts.i)
+    assert np.array_equal(graph.j, contacts.j)
+    assert np.array_equal(again, slip)
+    assert (np.array_equal(again_low, low)) if compensated else again_low is None
+    # the same graph as long as the contacts are the same, and another one when they are not
+    other = replace(packing, contacts=contacts.slipped(-slip, low if compensated else None))
+    assert rows.read(rows.slips(other), rows.floor(other))[0] is graph
+    fewer = Contacts(contacts.i[1:], contacts.j[1:], slip[1:], low[1:] if compensated else None)
+    fewer = replace(packing, contacts=fewer)
+    changed = rows.read(rows.slips(fewer), rows.floor(fewer))
+    assert changed[0] is not graph
+    assert np.array_equal(changed[0].i, contacts.i[1:])
+    assert np.array_equal(changed[1], slip[1:])
