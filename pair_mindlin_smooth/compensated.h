@@ -222,9 +222,10 @@ struct SummationGrid {
     return {{std::ldexp(1.0, exponent - 50)}, {std::ldexp(1.0, exponent - 98)}};
   }
 
+  // however the number was divided into high and low part before
   FAULTGOUGE_INLINE Compensated rounded(Compensated x) const
   {
-    const double whole = high.whole(x.high);
+    const double whole = high.whole(x.high + x.low);
     return {whole, low.whole((x.high - whole) + x.low)};
   }
 };
