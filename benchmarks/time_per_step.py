@@ -131,6 +131,8 @@ def table(title: str, turns: list[dict[tuple[str, int], float]], all_ranks: list
             rows.append(
                 {"packing": title, "ranks": ranks, "style": style, "microseconds": times, "ratio": ratio, "gain": gain}
             )
+        cost = sorted(turn["mindlin/smooth, compensated", ranks] / turn["mindlin/smooth", ranks] for turn in turns)
+        print(f"  compensated of double {statistics.median(cost):.2f} [{cost[0]:.2f}, {cost[-1]:.2f}]")
     return rows
 
 

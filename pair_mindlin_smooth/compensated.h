@@ -73,11 +73,6 @@ FAULTGOUGE_INLINE Compensated exact_product(double a, double b)
   return {product, __builtin_fma(a, b, -product)};
 }
 
-FAULTGOUGE_INLINE double normalized(double a)
-{
-  return a;
-}
-
 // the same number with the high part the closest double
 FAULTGOUGE_INLINE Compensated normalized(Compensated a)
 {
@@ -133,7 +128,8 @@ FAULTGOUGE_INLINE RootAndInverse root_and_inverse(Compensated a)
   return {{root, low}, {inverse, (__builtin_fma(-inverse, root, 1.0) - inverse * low) * inverse}};
 }
 
-// a^(3/2) of a normalized number: with root^2 = a.high - rest it = a.high root + root (rest/2 + 3/2 a.low) and terms of second order
+// a^(3/2) of a normalized number: with root^2 = a.high - rest it is a.high root + root (rest/2 + 3/2 a.low), up to
+// terms of second order
 FAULTGOUGE_INLINE Compensated three_halves_power(Compensated a)
 {
   const double root = std::sqrt(a.high), rest = __builtin_fma(-root, root, a.high);
@@ -222,9 +218,10 @@ struct SummationGrid {
     return {{std::ldexp(1.0, exponent - 50)}, {std::ldexp(1.0, exponent - 98)}};
   }
 
+  // however the number was divided into high and low part before
   FAULTGOUGE_INLINE Compensated rounded(Compensated x) const
   {
-    const double whole = high.whole(x.high);
+    const double whole = high.whole(x.high + x.low);
     return {whole, low.whole((x.high - whole) + x.low)};
   }
 };

@@ -122,8 +122,7 @@ FAULTGOUGE_INLINE void add(Batch<Number> &batch, const ContactPairs &pairs, int 
 }
 
 // overlaps, directions and normal forces
-template <class Number>
-FAULTGOUGE_INLINE void normal_forces(Batch<Number> &batch, const MindlinLaw law)
+template <class Number> FAULTGOUGE_INLINE void normal_forces(Batch<Number> &batch, const MindlinLaw law)
 {
   for (int k = 0; k < batch.count; k++) {
     const Branch<Number> r{batch.branch_x.load(k), batch.branch_y.load(k)};
@@ -171,8 +170,7 @@ FAULTGOUGE_INLINE Compensated summand(Compensated force, const SummationGrid &gr
   return grid.rounded(force);
 }
 
-template <class Number, bool FRICTION>
-FAULTGOUGE_INLINE void components(Batch<Number> &batch, const Grids grids)
+template <class Number, bool FRICTION> FAULTGOUGE_INLINE void components(Batch<Number> &batch, const Grids grids)
 {
   for (int k = 0; k < batch.count; k++) {
     const Number nx = batch.normal_x.load(k), ny = batch.normal_y.load(k), normal = batch.normal.load(k);
@@ -228,7 +226,8 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
   for (int p = 0, n = pairs.size(); p < n; p++) {
     const Branch<double> high = leading_branch(pairs, p, disks, box);
     const double rsq = high.x * high.x + high.y * high.y;
-    const double reach = disks.radius[pairs.first[p]] + disks.radius[pairs.second[p]] + margin(Number(), grids.coordinate);
+    const double reach =
+        disks.radius[pairs.first[p]] + disks.radius[pairs.second[p]] + margin(Number(), grids.coordinate);
     if (rsq >= reach * reach) {
       open<Number, FRICTION>(pairs, p);
       continue;

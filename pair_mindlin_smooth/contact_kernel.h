@@ -92,8 +92,8 @@ FAULTGOUGE_INLINE Geometry<Compensated> geometry(const Branch<Compensated> &r, d
 {
   const Compensated reach = exact_sum(radius_i, radius_j);
   const double rsq = r.x.high * r.x.high + r.y.high * r.y.high;
-  const double rsq_low = __builtin_fma(__builtin_fma(2.0, r.x.high, r.x.low), r.x.low,
-                                       __builtin_fma(2.0, r.y.high, r.y.low) * r.y.low);
+  const double rsq_low =
+      __builtin_fma(__builtin_fma(2.0, r.x.high, r.x.low), r.x.low, __builtin_fma(2.0, r.y.high, r.y.low) * r.y.low);
   const auto [distance, inverse] = root_and_inverse(normalized({rsq, rsq_low}));
   return {normalized({reach.high - distance.high, reach.low - distance.low}), inverse};
 }

@@ -52,10 +52,10 @@ public:
   };
   std::vector<Image> image;
   std::vector<LAMMPS_NS::tagint> first_tag, second_tag;    // and their IDs
-  std::vector<PairForce> force;                // not if compensated
-  std::vector<CompensatedForce> disk_force;    // of the owned disks, only if compensated
-  std::vector<double> slip, slip_low;          // only with_slips
-  std::vector<int> touching;                   // only with_slips
+  std::vector<PairForce> force;                            // not if compensated
+  std::vector<CompensatedForce> disk_force;                // of the owned disks, only if compensated
+  std::vector<double> slip, slip_low;                      // only with_slips
+  std::vector<int> touching;                               // only with_slips
 };
 
 }    // namespace faultgouge

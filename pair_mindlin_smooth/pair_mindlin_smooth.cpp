@@ -426,5 +426,6 @@ double PairMindlinSmooth::memory_usage()
   const double force = compensated ? sizeof(double) : sizeof(PairForce);    // a low part of the slip, or a force
   const double per_pair = 3 * sizeof(int) + 2 * sizeof(tagint) + 2 + sizeof(double) + force;
   const double per_disk = sizeof(int) + (compensated ? sizeof(faultgouge::CompensatedForce) : 0);
-  return Pair::memory_usage() + pairs.size() * per_pair + pairs.row.size() * sizeof(int) + pairs.start.size() * per_disk;
+  return Pair::memory_usage() + pairs.size() * per_pair + pairs.row.size() * sizeof(int) +
+         pairs.start.size() * per_disk;
 }
