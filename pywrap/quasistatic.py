@@ -58,9 +58,9 @@ IDLE = 1e-7
 """Share of the largest contact force up to which a contact carries nothing that matters."""
 
 CREEP = 0.1
-"""Share of its stiffness that is added to a disk with none but such contacts. One that is leant upon by a breath has
-next to no stiffness along the contact, and would be thrown through its cage; as it is, its force falls tenfold in an
-iteration, from a value that is small already."""
+"""Share of its largest stiffness that is added to a disk with none but such contacts, in all directions. One that is
+leant upon by a breath has next to no stiffness along the contact, and none across where that slides: it would be thrown
+through its cage. As it is, its force falls tenfold in an iteration, from a value that is small already."""
 
 SPARING = 300
 """Disks beyond which factors of K are used again: a factorisation costs ten force evaluations and more."""
@@ -283,9 +283,10 @@ def _factored(packing: Packing) -> Callable[[Floats], Floats | None] | None:
     matrix = stiffness_matrix(packing)
     # A share of the diagonal of the size of its rounding keeps the solve finite where something floats, such
     # as the whole packing along a floor without friction; on stiff directions it changes nothing.
-    share = np.where(np.tile(_idle(packing), 3), CREEP, 1e-13)
-    diagonal = (1 + share) * matrix.diagonal()
+    diagonal = matrix.diagonal()
     active = np.flatnonzero(diagonal)
+    stiffest = np.tile(diagonal.reshape(3, -1).max(axis=0), 3)
+    diagonal = np.where(np.tile(_idle(packing), 3), diagonal + CREEP * stiffest, (1 + 1e-13) * diagonal)
     if len(active) > DENSE:
         active = active[elimination_order(packing, active)]
     block = matrix[active][:, active]
