@@ -22,6 +22,7 @@ from .spectrum import (
     dynamical_matrix,
     eigenpairs,
     growth_rate,
+    largest_frequency,
     spectrum,
     stable_timestep,
 )
@@ -53,6 +54,7 @@ __all__ = [
     "fit_oscillation",
     "follow",
     "growth_rate",
+    "largest_frequency",
     "mean_square_displacement",
     "nearest_image",
     "read_dump",

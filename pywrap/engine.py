@@ -196,7 +196,9 @@ class Engine:
         self._write(packing)
         self.set_fx(packing.fx)
 
-    def settle(self, force_tolerance: float, gather: float = 1.0, steps: int = 10_000_000) -> None:
+    def settle(
+        self, force_tolerance: float, gather: float = 1.0, viscosity: float | None = None, steps: int = 10_000_000
+    ) -> None:
         """Let a loose start settle under the load (deck parts gather.in, bed.in).
 
         Parameters
@@ -205,10 +207,14 @@ class Engine:
             Largest force on a disk.
         gather : float
             Share of its height to which the start is brought down evenly at first; 1 for not at all.
+        viscosity : float, optional
+            Of the damping, mass / time; by default that of the decks.
         steps : int
             Time steps of each stage, at the most.
         """
         self._variables(force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
+        if viscosity is not None:
+            self._variables(viscosity=viscosity)
         if gather < 1:
             self._variables(gather=gather)
             self._include("gather.in")

@@ -7,6 +7,13 @@ largest disk, each at a random place inside its own cell. So no two disks overla
 grows as their number. The paper says only "loosely packed disks". A layer as open as this one, of which a third is
 filled, does not carry: without weight of their own the disks give way, and an upper layer that is loaded alone sinks
 to the floor. A settling from here has to lay a bed first.
+
+Even on a bed a loaded layer may sink, as a heavy liquid does through a light one. Without friction a bed bears shear
+stresses of a tenth of its pressure at the most, and that pressure is the weight of the layer above. Where the layer is
+thinner than elsewhere the bed is pressed up, the layer slides off the bulge, and gets thinner there; a layer of one or
+two disks differs by more than a tenth from place to place, since it is made of disks, and a wide one will find its weak
+spot. A layer of several disks comes to rest. A tenth of all disks, the paper's 10 of 100 if those are its layer, keeps
+the geometry the same for packings of all sizes.
 """
 
 from dataclasses import dataclass
@@ -16,6 +23,10 @@ from numpy.typing import NDArray
 
 CELL = 1.25
 """Smallest side of a cell, in largest diameters: a quarter is the room for placing a largest disk."""
+
+
+LAYER = 0.1
+"""Share of the disks that are the upper layer, where a scene does not say."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +52,22 @@ class Start:
 
     def __len__(self) -> int:
         return len(self.radius)
+
+
+def layer_size(disks: int, radii: tuple[float, ...], width: float) -> int:
+    """Number of disks of an upper layer that comes to rest: a tenth of all, and enough to close the box.
+
+    Parameters
+    ----------
+    disks : int
+        Number of disks, the upper layer included.
+    radii : tuple of float
+        Radii, length, each of an equal share of the disks.
+    width : float
+        Width of the box, length.
+    """
+    side_by_side = width / (2 * float(np.mean(radii)))
+    return min(disks, max(1, round(max(LAYER * disks, side_by_side))))
 
 
 def loose_start(

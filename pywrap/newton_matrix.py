@@ -22,15 +22,16 @@ from .trial import Trial
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
+Indices = NDArray[np.int64]
 Solve = Callable[[Floats], Floats | None]
 
 IDLE = 1e-7
 """Share of the largest contact force up to which a contact carries nothing that matters."""
 
 CREEP = 0.1
-"""Share of its stiffness that is added to a disk with none but such contacts. One that is leant upon by a breath has
-next to no stiffness along the contact, and would be thrown through its cage; as it is, its force falls tenfold in an
-iteration, from a value that is small already."""
+"""Share of its largest stiffness that is added to a disk with none but such contacts, in all directions. One that is
+leant upon by a breath has next to no stiffness along the contact, and none across where that slides: it would be thrown
+through its cage. As it is, its force falls tenfold in an iteration, from a value that is small already."""
 
 AFLOAT = 1e-13
 """Share that is added to all others. A share of the size of its rounding keeps the solve finite where something floats,
@@ -80,14 +81,14 @@ def factored(trial: Trial, floor: float) -> Factors | None:
     if unknowns > BANDED:
         solve = sparse_solution(trial.packing.loaded(floor))
     else:
-        solve = _banded(graph.band(active), terms, _share(graph, law.normal_force, loaded))
+        solve = _banded(graph.band(active), terms, _idle(graph, law.normal_force, loaded))
     return None if solve is None else Factors(solve, hit)
 
 
-def _banded(band: Band, terms: Floats, share: Floats) -> Solve | None:
+def _banded(band: Band, terms: Floats, idle: Booleans) -> Solve | None:
     """The solution by LAPACK."""
     matrix, width = band.matrix(terms), band.width
-    matrix[2 * width] *= 1 + share[band.disks]
+    matrix[2 * width] = _held(matrix[2 * width], band.disks, idle)
     factors, pivots, singular = dgbtrf(matrix, width, width, overwrite_ab=True)
     if singular:
         return None
@@ -101,10 +102,21 @@ def _banded(band: Band, terms: Floats, share: Floats) -> Solve | None:
     return solve
 
 
-def _share(graph: ContactGraph, carried: Floats, loaded: Booleans) -> Floats:
-    """Share of its stiffness that is added to each disk, shape (N,)."""
+def _idle(graph: ContactGraph, carried: Floats, loaded: Booleans) -> Booleans:
+    """Disks with none but contacts that carry nothing that matters, shape (N,)."""
     matters = loaded & (carried > IDLE * carried.max(initial=0.0))
-    return np.where(graph.count(matters) == 0, CREEP, AFLOAT)
+    return graph.per_disk(matters) == 0
+
+
+def _held(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:
+    """The diagonal of K with a little more stiffness for idle disks, and next to nothing more for all others."""
+    held = (1 + AFLOAT) * diagonal
+    creeping = idle[disk]
+    if np.any(creeping):
+        stiffest = np.zeros(len(idle))
+        np.maximum.at(stiffest, disk, diagonal)
+        held[creeping] = diagonal[creeping] + CREEP * stiffest[disk[creeping]]
+    return held
 
 
 def sparse_solution(packing: Packing) -> Solve | None:
@@ -118,12 +130,12 @@ def sparse_solution(packing: Packing) -> Solve | None:
     matrix = stiffness_matrix(packing)
     contacts = packing.contacts
     graph = ContactGraph(contacts, packing.radius)
-    share = _share(graph, packing.normal_force, np.ones(len(contacts), np.bool_))
-    diagonal = (1 + np.tile(share, 3)) * matrix.diagonal()
+    idle = _idle(graph, packing.normal_force, np.ones(len(contacts), np.bool_))
+    diagonal = matrix.diagonal()
     active = np.flatnonzero(diagonal)
     active = active[elimination_order(packing, active)]
     block = matrix[active][:, active]
-    block.setdiag(diagonal[active])
+    block.setdiag(_held(diagonal[active], active % len(packing), idle))
     try:
         # nearly symmetric: pivots on the diagonal where good
         factors = splu(csc_array(block), permc_spec="NATURAL", diag_pivot_thresh=0.01, options={"SymmetricMode": True})

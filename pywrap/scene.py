@@ -38,7 +38,7 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ..analysis import MindlinLaw, PackingFileError, read_packing
-from .loose import Start, loose_start
+from .loose import Start, layer_size, loose_start
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -69,11 +69,11 @@ class GeneratedPacking(_Section):
         Number of disks N, the upper layer included; at most ten millions, a slip of the pen beyond.
     radii : tuple of float
         Radii, length, each for an equal share of the disks, upper layer included.
-    top : int
-        Number of disks in the upper layer: free disks, above all others at the start, the load on each. The paper
-        gives no number.
     width : float
         Width of the box, length. The paper gives none; this one makes 100 disks about square.
+    top : int
+        Number of disks in the upper layer: free disks, above all others at the start, the load on each. By default a
+        tenth of the disks, and at least as many as fit side by side (`loose.layer_size`). The paper gives no number.
     seed : int
         Seed of the loose start.
     periodic : bool
@@ -87,11 +87,20 @@ class GeneratedPacking(_Section):
 
     disks: int = Field(100, gt=0, le=10_000_000)
     radii: Annotated[tuple[Positive, ...], Field(min_length=1, strict=False)] = (0.5, 0.7)
-    top: int = Field(10, gt=0)
     width: Positive = 11.9
+    # the default becomes a number in the validator, which knows disks, radii and width
+    top: int = Field(None, gt=0)  # type: ignore[assignment]
     seed: int = Field(7, ge=0)
     periodic: bool = True
     settle_friction: bool = False
+
+    @field_validator("top", mode="before")
+    @classmethod
+    def _layer(cls, top: object, info: ValidationInfo) -> object:
+        if top is not None:
+            return top
+        known = {"disks", "radii", "width"} <= info.data.keys()  # else one of them is refused, and that gets reported
+        return layer_size(info.data["disks"], info.data["radii"], info.data["width"]) if known else 1
 
     @model_validator(mode="after")
     def _fits(self) -> "GeneratedPacking":

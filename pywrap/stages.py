@@ -22,9 +22,9 @@ from ..analysis import (
     Packing,
     PackingFileError,
     RunFile,
+    largest_frequency,
     mean_square_displacement,
     read_packing,
-    spectrum,
     stable_timestep,
     touching,
 )
@@ -32,7 +32,7 @@ from .engine import Engine, Motion, Weakening
 from .quasistatic import Equilibrium, NoEquilibriumError, equilibrate, rounding_floor
 from .rattlers import clear_rattlers
 from .scene import Friction, GeneratedPacking, Perturb, Ramp, Scene, SceneError
-from .settling import settled
+from .settling import Watch, settled
 
 ACCURATE_SHARE = 0.05
 """Time step of undamped runs in units of the stability limit 2/omega_max: the fastest mode is then resolved
@@ -43,7 +43,12 @@ OUT_OF_BALANCE = 1e-3
 rearrange rather than relax."""
 
 
-def settle(scene: Scene, mu: float | None = None, communicator: MPI.Comm | None = None) -> Equilibrium:
+def settle(
+    scene: Scene,
+    mu: float | None = None,
+    communicator: MPI.Comm | None = None,
+    watch: Watch = lambda says: None,
+) -> Equilibrium:
     """The packing of a scene in equilibrium at F_x = 0.
 
     A generated packing settles without friction, and friction begins with zero slips (or settles with
@@ -57,6 +62,8 @@ def settle(scene: Scene, mu: float | None = None, communicator: MPI.Comm | None 
         Friction coefficient; by default the scene's first.
     communicator : mpi4py.MPI.Comm, optional
         The ranks that share the packing; all by default.
+    watch : callable, optional
+        Told in words what begins, for a packing of more than 300 disks, which takes a while.
 
     Returns
     -------
@@ -70,14 +77,15 @@ def settle(scene: Scene, mu: float | None = None, communicator: MPI.Comm | None 
         If the packing does not come to rest.
     """
     law = MindlinLaw(scene.law.kn, scene.law.kt, scene.law.mus[0] if mu is None else mu)
-    packing = _settled(scene, law, communicator) if isinstance(scene.packing, GeneratedPacking) else _stored(scene, law)
+    generated = isinstance(scene.packing, GeneratedPacking)
+    packing = _settled(scene, law, communicator, watch) if generated else _stored(scene, law)
     with Engine(packing, communicator) as engine:
         try:
             return equilibrate(engine, _unpolished(packing), packing.fx)
         except NoEquilibriumError as error:
             raise NoEquilibriumError(
-                f"the packing does not come to rest (a disk feels {packing.residual:.2g}): try another seed, or more "
-                "disks in the upper layer"
+                f"the packing does not come to rest (a disk feels {packing.residual:.2g}): put more disks into the "
+                "upper layer (leave packing.top out for as many as it takes), or try another seed"
             ) from error
 
 
@@ -245,7 +253,7 @@ def time_step(packing: Packing, wanted: float | None = None) -> float:
     SceneError
         If the step wanted is not below the limit: velocity Verlet would blow up.
     """
-    limit = stable_timestep(spectrum(packing).omega_max)
+    limit = stable_timestep(largest_frequency(packing))
     if wanted is None:
         return ACCURATE_SHARE * limit
     if wanted >= limit:
@@ -455,7 +463,7 @@ class Record:
             self._file.close()
 
 
-def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None) -> Packing:
+def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None, watch: Watch) -> Packing:
     assert isinstance(scene.packing, GeneratedPacking)
     start = scene.packing.start()
     settling = law if scene.packing.settle_friction else replace(law, mu=0.0)
@@ -471,13 +479,13 @@ def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None) -> Pa
         position_low=np.zeros_like(start.position) if scene.precision == "compensated" else None,
     )
     with Engine(loose, communicator) as engine:
-        packing = settled(engine, loose)
+        packing = settled(engine, loose, watch)
     idle = len(packing.loaded(rounding_floor(packing)).rattlers)
     if idle > 0.5 * len(packing):
         raise NoEquilibriumError(
             f"the upper layer sank through the bed, and {idle} of {len(packing)} disks carry nothing: without friction "
-            "only a layer that closes the box stays on top, so put more disks into it (packing.top), their diameters "
-            "adding up to a tenth more than the width, or try another seed"
+            "only a layer that closes the box stays on top, so put more disks into it (leave packing.top out for as "
+            "many as it takes), or try another seed"
         )
     if scene.packing.settle_friction:
         return packing

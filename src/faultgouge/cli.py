@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -19,7 +19,7 @@ import typer
 from rich.console import Console
 
 if TYPE_CHECKING:
-    from faultgouge.pywrap import Scene
+    from faultgouge.pywrap import Equilibrium, Record, Scene
 
 T = TypeVar("T")
 
@@ -41,15 +41,11 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON."
 def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
-    from faultgouge.pywrap import settle as settle_packing
 
     wanted = _scene(scene)
     with Record(output, wanted) as record:
-        if record.last is None:
-            with _status("settling"):
-                record.append(settle_packing(wanted))
+        packing = _settled(wanted, record).packing
     assert record.last is not None
-    packing = record.last.packing
     _say(
         f"{len(packing)} disks, {len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers; "
         f"residual {record.last.residual:.2g} (rounding floor {record.last.floor:.2g}); written to {output}"
@@ -59,16 +55,18 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
 @app.command(epilog="Example: [bold]mpiexec -n 2 faultgouge ramp paper.toml -o run.h5[/bold]")
 def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False) -> None:
     """Raise F_x from equilibrium to equilibrium, each stored as it is reached."""
-    from faultgouge.pywrap import Record
+    from faultgouge.pywrap import Record, SceneError
     from faultgouge.pywrap import ramp as ramp_up
     from faultgouge.pywrap.stages import loads
 
     wanted = _scene(scene)
+    if wanted.ramp is None:
+        raise SceneError(f"{scene}: the scene has no section [ramp]: add it, with step and until")
     with Record(output, wanted) as record:
-        total = len(loads(wanted.ramp)) if wanted.ramp else None
-        done = 0 if record.last is None or wanted.ramp is None else round(record.last.fx / wanted.ramp.step) + 1
+        start = _settled(wanted, record)
+        total, done = len(loads(wanted.ramp)), round(start.fx / wanted.ramp.step) + 1
         dumps = output.with_suffix("") if wanted.output is not None and wanted.output.dumps else None
-        for equilibrium in _progress(ramp_up(wanted, record.last, dumps=dumps), "equilibria", total, done):
+        for equilibrium in _progress(ramp_up(wanted, start, dumps=dumps), "equilibria", total, done):
             record.append(equilibrium)
     assert record.last is not None
     _say(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")
@@ -386,14 +384,26 @@ def _say(message: str) -> None:
         print(message, file=sys.stderr)
 
 
+def _settled(scene: Scene, record: Record) -> Equilibrium:
+    """The last equilibrium of a file; in a new one the settled packing, which is then in it."""
+    from faultgouge.pywrap import settle
+
+    if record.last is None:
+        with _status("settling") as say:
+            record.append(settle(scene, watch=lambda what: say(f"settling: {what}")))
+    assert record.last is not None
+    return record.last
+
+
 @contextmanager
-def _status(what: str) -> Iterator[None]:
+def _status(what: str) -> Iterator[Callable[[str], None]]:
+    """A line on a terminal while something is under way; what is yielded replaces its text."""
     console = Console(stderr=True)
     if not (_is_root() and console.is_terminal):
-        yield
+        yield lambda what: None
         return
-    with console.status(what):
-        yield
+    with console.status(what) as status:
+        yield status.update
 
 
 def _progress(items: Iterable[T], what: str, total: int | None = None, done: int = 0) -> Iterator[T]:

@@ -149,6 +149,25 @@ def test_a_file_holds_one_set_of_disks(tmp_path, states):
         assert len(run) == 1
 
 
+def test_frames_with_more_and_more_contacts_stay_compact(tmp_path):
+    """A contact more makes the table of contacts wider, which must not store it twice; zeros and indices are packed."""
+    n, frames = 2000, 10
+    slip = np.random.default_rng(0).normal(0, 1e-6, n)
+    row = Packing(
+        position=np.column_stack([np.arange(n), np.full(n, 0.4999)]),
+        radius=np.full(n, 0.5),
+        contacts=Contacts([], [], []),
+        law=MindlinLaw(2e5, 2e5, 1.0),
+    )
+    path = tmp_path / "run.h5"
+    with RunFile.create(path, row) as file:
+        for frame in range(frames):
+            some = np.arange(n - frames + frame)
+            file.append(replace(row, contacts=Contacts(some, np.full(len(some), -1), slip[some])))
+    plain = 8 * (3 + 1 + 3) * n * frames  # positions, angles, contacts
+    assert path.stat().st_size < 0.6 * plain
+
+
 def test_datasets_depend_on_the_frames_alone(tmp_path, states):
     for name in ("a.h5", "b.h5"):
         with RunFile.create(tmp_path / name, states[0], {"host": name}) as run:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from faultgouge.pywrap.loose import Start, loose_start
+from faultgouge.pywrap.loose import Start, layer_size, loose_start
 
 
 def smallest_gap(start: Start) -> float:
@@ -70,6 +70,20 @@ def test_radii_are_shuffled():
     changes = np.count_nonzero(np.diff(radius))
     # 40 small and 50 large disks in random order have 44 +- 5 changes of size; in two blocks there is one.
     assert 24 < changes < 64
+
+
+@pytest.mark.parametrize(
+    ("disks", "width", "layer"),
+    [
+        (100, 11.9, 10),  # the paper's packing: a tenth, and side by side
+        (1000, 37.7, 100),  # a tenth is three deep
+        (100, 40.0, 33),  # flat: as many as close the box, at a mean diameter of 1.2
+        (5, 12.0, 5),
+        (3, 1.4, 1),
+    ],
+)
+def test_layer_is_a_tenth_and_closes_the_box(disks, width, layer):
+    assert layer_size(disks, (0.5, 0.7), width) == layer
 
 
 def test_many_disks():

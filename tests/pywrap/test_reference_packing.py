@@ -1,15 +1,17 @@
 """The reference packing against the numbers of an independent code."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from faultgouge.analysis import find_onset, spectrum, stiffness_matrix
+from faultgouge.analysis import Contacts, find_onset, spectrum, stiffness_matrix
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate
 from faultgouge.pywrap.newton_matrix import factored
 from faultgouge.pywrap.quasistatic import rounding_floor
 from faultgouge.pywrap.stages import EquilibriumPath, next_equilibrium
+from faultgouge.pywrap.trial import Trial
 
 FX = 0.01
 
@@ -133,3 +135,21 @@ def test_state_put_back_is_the_state_that_was_saved(reference_packing):
         assert np.array_equal(state.position, packing.position)
         assert np.array_equal(state.contacts.slip, packing.contacts.slip)
         assert np.array_equal(state.angle, packing.angle)
+
+
+def test_rattler_on_which_a_contact_slides_is_not_thrown(reference_packing):
+    """Nothing holds it across the contact, along which friction drags it: Newton's own step is hundreds of lengths."""
+    bed = reference_packing(1.0)
+    rattler, near = bed.rattlers[0], 0
+    place = bed.position.copy()
+    overlap = 5e-10  # of a contact that carries little more than the rounding of coordinates
+    place[rattler] = place[near] + np.array([0.0, bed.radius[rattler] + bed.radius[near] - overlap])
+    contacts = bed.contacts
+    i, j = sorted((rattler, near))
+    slip = np.append(np.zeros(len(contacts)), bed.law.slip_limit(overlap))
+    packing = replace(bed, position=place, contacts=Contacts(np.append(contacts.i, i), np.append(contacts.j, j), slip))
+    force = np.zeros(3 * len(packing))
+    force[np.flatnonzero(packing.top)] = 1e-3
+    step = factored(Trial.of(packing), rounding_floor(packing)).solve(force).reshape(3, -1)
+    # what moves the rattler is its neighbour
+    assert np.abs(step[:, rattler]).max() < 10 * np.abs(step[:, near]).max()

@@ -105,6 +105,12 @@ def test_velocity_scale_is_a_number_or_a_multiple_of_the_threshold(v_ss, scale):
     assert friction.velocity_scale(2e-11) == pytest.approx(scale, rel=1e-15)  # one product: one rounding
 
 
+def test_upper_layer_that_is_left_out_is_a_number_in_the_resolved_scene():
+    scene = Scene.from_mapping(merged({"packing": {"disks": 1000, "width": 37.7}}))
+    assert scene.resolved()["packing"]["top"] == 100
+    assert Scene.from_mapping(scene.resolved()) == scene
+
+
 @pytest.mark.parametrize("path", sorted((ROOT / "scenes").glob("*.toml")), ids=lambda path: path.stem)
 def test_shipped_scenes_are_scenes(path):
     scene = Scene.from_toml(path)

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
 
-from faultgouge.analysis import MindlinLaw, Packing, stiffness_matrix, touching
-from faultgouge.pywrap import Scene, settle
+from faultgouge.analysis import MindlinLaw, Packing, spectrum, stiffness_matrix, touching
+from faultgouge.pywrap import NoEquilibriumError, Scene, settle, settling
 from faultgouge.pywrap.quasistatic import rounding_floor
 from faultgouge.pywrap.settling import minimized
+from faultgouge.pywrap.stages import ACCURATE_SHARE, time_step
 
 BIN = Path(sys.executable).parent
-SCENE = {"packing": {"disks": 400, "top": 26, "width": 24.0, "seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+SCENE = {"packing": {"disks": 400, "width": 24.0, "seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
 
 
 @pytest.fixture
@@ -82,6 +83,28 @@ def test_larger_packing_settles_to_the_floor(settled):
     assert settled.residual < 1.5 * settled.floor < 3e-10
     assert np.abs(settled.packing.contacts.slip).max() < 1e-9
     assert not settled.packing.top[settled.packing.rattlers].any()
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4, 5])
+def test_layer_of_a_tenth_comes_to_rest(seed):
+    packing = settle(Scene.from_mapping(SCENE | {"packing": SCENE["packing"] | {"seed": seed}})).packing
+    assert packing.top.sum() == 40
+    # it lies on the bed: of 17 disks in height it fills the upper two
+    assert packing.position[packing.top, 1].min() > 0.7 * packing.position[:, 1].max()
+
+
+def test_layer_that_still_sinks_when_steps_run_out_is_refused(monkeypatch):
+    monkeypatch.setattr(settling, "STEPS", 5000)
+    scene = Scene.from_mapping(SCENE | {"packing": SCENE["packing"] | {"top": 8}})
+    with pytest.raises(NoEquilibriumError, match=r"leave packing\.top out"):
+        settle(scene)
+
+
+def test_time_step_of_a_large_packing_is_that_of_all_eigenvalues(settled):
+    # ARPACK against LAPACK, both to the rounding of doubles
+    assert time_step(settled.packing) == pytest.approx(
+        ACCURATE_SHARE * 2 / spectrum(settled.packing).omega_max, rel=1e-10
+    )
 
 
 def test_same_packing_on_two_ranks(settled, tmp_path):
