@@ -191,38 +191,43 @@ class _Spectrum:
         return Slice(
             first=first + kept.start,
             values=values[kept],
-            vectors=(krylov.basis[:, : len(inverse)] @ vectors[:, order[kept]])[self.place],
+            vectors=np.ascontiguousarray((vectors[:, order[kept]].T @ krylov.basis[: len(inverse)])[:, self.place].T),
             own=slice(start, start + own[1] - own[0]),
         )
 
 
 class _Krylov:
-    """An orthonormal basis Q of the block Krylov space of an operator, and the operator in it, H = Q^T A Q."""
+    """An orthonormal basis Q of the block Krylov space of an operator, and the operator in it, H = Q^T A Q.
+
+    The vectors are rows: so the products of many with a few take a third of the time.
+    """
 
     def __init__(self, operator: Callable[[Floats], Floats], size: int) -> None:
         self.operator = operator
         most = min(LAST_LOOK * BLOCK, size)
-        self.basis = np.empty((size, most), order="F")  # memory is taken as it is written to
+        self.basis = np.empty((most, size))  # memory is taken as it is written to
         self.projection = np.zeros((most, most))
-        self.basis[:, :BLOCK] = qr(np.random.default_rng(0).standard_normal((size, BLOCK)), mode="economic")[0]
+        start = np.random.default_rng(0).standard_normal((BLOCK, size))
+        self.basis[:BLOCK] = qr(start.T, mode="economic")[0].T
         self.used, self.next = BLOCK, np.zeros((BLOCK, BLOCK))
 
     def extend(self, blocks: int) -> None:
         """So many blocks more, each made orthogonal to all before it."""
         for _ in range(blocks):
             used = self.used
-            if used + BLOCK > self.basis.shape[1]:
+            if used + BLOCK > len(self.basis):
                 raise SliceError(f"a Krylov space of {used} vectors does not hold the eigenvalues about its shift")
-            known, last = self.basis[:, :used], slice(used - BLOCK, used)
-            image = self.operator(self.basis[:, last])
-            inside = known.T @ image
-            image -= known @ inside
+            known, last = self.basis[:used], slice(used - BLOCK, used)
+            image = np.ascontiguousarray(self.operator(self.basis[last].T).T)
+            inside = image @ known.T
+            image -= inside @ known
             # What one pass leaves grows from block to block. Twice is enough, and every other block is enough, too.
             if used // BLOCK % 2 == 0:
-                image -= known @ (known.T @ image)
-            self.projection[:used, last] = inside
-            self.projection[last, :used] = inside.T
-            self.basis[:, used : used + BLOCK], self.next = qr(image, mode="economic", overwrite_a=True)
+                image -= (image @ known.T) @ known
+            self.projection[last, :used] = inside
+            self.projection[:used, last] = inside.T
+            vectors, self.next = qr(image.T, mode="economic", overwrite_a=True)
+            self.basis[used : used + BLOCK] = vectors.T
             self.used += BLOCK
 
     def ritz(self) -> tuple[Floats, Floats, Floats]:
