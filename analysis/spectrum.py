@@ -57,6 +57,10 @@ itself noise is uncertain by a factor of two or so.
 DENSE = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
 
+LIMIT = 1e-4
+"""Relative error of the largest eigenvalue of more coordinates. It bounds time steps, that are far below the bound; to
+resolve the fastest modes of a crystal, which lie close together, takes ten times as long."""
+
 
 @dataclass(frozen=True)
 class ComplexPair:
@@ -327,7 +331,7 @@ def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
 
 
 def largest_frequency(packing: Packing, form: Form = "consistent") -> float:
-    """omega_max = max sqrt|lambda|, by Arnoldi's iteration (ARPACK) for a packing of more than 300 disks.
+    """omega_max = max sqrt|lambda|; to `LIMIT`, by Arnoldi's iteration (ARPACK), beyond `DENSE` coordinates.
 
     Parameters
     ----------
@@ -352,7 +356,8 @@ def largest_frequency(packing: Packing, form: Form = "consistent") -> float:
         return spectrum(packing, form).omega_max
     # always the same one, for a result that is reproducible; without the symmetry that a crystal's fastest mode lacks
     start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
-    return float(np.sqrt(np.abs(eigs(matrix, 1, which="LM", v0=start, return_eigenvectors=False)).max()))
+    largest = eigs(matrix, 1, which="LM", v0=start, tol=LIMIT, return_eigenvectors=False)
+    return float(np.sqrt(np.abs(largest).max()))
 
 
 def stable_timestep(omega_max: float) -> float:

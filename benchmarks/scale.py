@@ -1,21 +1,23 @@
-"""Settle, ramp and tracked onset of packings of growing size: time, memory, and how they grow.
+"""Settle, ramp, undamped run and tracked onset of packings of growing size: time, memory, and how they grow.
 
-Square packings of disks of two radii, width 1.192 sqrt(N). The upper layers are such as come to rest: others may sink
-into the bed for long, so that times of settling are those of favourable cases. Each size runs in a process of its own,
-with one thread, so that its peak of memory is its own.
+Square packings of disks of two radii, width 1.192 sqrt(N), with the upper layer of a scene that does not say `top`.
+Each size runs in a process of its own, so that its peak of memory is its own, and with one thread, but for the onset,
+which takes as many as there are cores.
 
     settle     from the loose start to the rounding floor, at F_x = 0
     newton     one increment of F_x by 1e-3 from there, median of three
-    K dq = F   one linear solve in it
-    onset      the first window of complex eigenvalues, found without all eigenvalues, the ramp to it included
+    assembly   of K
+    solve      of K dq = F, factorisation included
+    largest    eigenvalue of K, for the time step of an undamped run
+    undamped   1000 steps of such a run
+    onset      the first window of complex eigenvalues, the ramp to it included
+    file       run.h5, for each equilibrium
 
-Beside these, square crystals of disks, whose equilibria are known and need no settling, for what a linear solve and
-the assembly of K cost at 100,000 disks.
+Beside these, square crystals of disks, whose equilibria are known and need no settling.
 
-    python benchmarks/scale.py [--disks 1000 3000] [--crystals 10000 100000] [--no-onset] [--output scale.json]
+    python benchmarks/scale.py [--disks 1000 3000 10000] [--crystals 10000 100000] [--no-onset] [--output scale.json]
 
-The exponent is that of the cost between the smallest and the largest size. To settle 10,000 disks takes some ten
-minutes; 100,000 were not tried to the end.
+The exponent is that of the cost between the smallest and the largest size. To settle 10,000 disks takes half a minute.
 """
 
 import os
@@ -31,28 +33,25 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from faultgouge.analysis import OnsetError, find_onset, stiffness_matrix
+from faultgouge.analysis import OnsetError, Packing, RunFile, find_onset, stiffness_matrix
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate, settle
 from faultgouge.pywrap.newton_matrix import factored
 from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.pywrap.stages import EquilibriumPath
+from faultgouge.pywrap.stages import EquilibriumPath, time_step
 from faultgouge.studies.stability_cases.packings import crystal
 
 Row = dict[str, float | int | None]
 
 STEP, UNTIL = 1e-3, 0.05
-MEAN_DIAMETER = 1.2
-LAYER = {1000: 41, 3000: 74, 10_000: 129}  # layers that settle with seed 1; others may sink for long
 
 
 def scene(disks: int, seed: int) -> Scene:
     """A square packing of so many disks."""
-    width = round(1.192 * math.sqrt(disks), 1)
-    top = LAYER.get(disks, round(1.3 * width / MEAN_DIAMETER))
-    packing = {"disks": disks, "width": width, "top": top, "seed": seed}
+    packing = {"disks": disks, "width": round(1.192 * math.sqrt(disks), 1), "seed": seed}
     return Scene.from_mapping(
         {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": STEP, "until": UNTIL}}
     )
@@ -65,7 +64,7 @@ def measured(disks: int, seed: int, with_onset: bool) -> Row:
     start = settle(wanted)
     row: Row = {"disks": disks, "settle": time.perf_counter() - begin, "onset": None, "fx_c": None}
     with Engine(start.packing) as engine:
-        row |= increments(engine, start)
+        row |= increments(engine, start) | undamped(engine, start)
         if with_onset:
             row |= onset(engine, start, wanted)
     row["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
@@ -78,13 +77,14 @@ def measured_crystal(disks: int) -> Row:
     packing = crystal(columns, columns)
     with Engine(packing) as engine:
         start = equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), 0.0)
-        row: Row = {"disks": len(packing), "settle": None, "onset": None, "fx_c": None} | increments(engine, start)
+        row: Row = {"disks": len(packing), "settle": None, "onset": None, "fx_c": None}
+        row |= increments(engine, start) | undamped(engine, start)
     row["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     return row
 
 
 def increments(engine: Engine, start: Equilibrium) -> Row:
-    """Times of increments of F_x, of one linear solve and of one assembly of K."""
+    """Times of increments of F_x, of one linear solve and of one assembly of K; size of an equilibrium in a file."""
     here, times = start, []
     for k in range(1, 4):
         begin = time.perf_counter()
@@ -110,7 +110,31 @@ def increments(engine: Engine, start: Equilibrium) -> Row:
         "newton": statistics.median(times) if times else None,
         "assembly": assembled - begin,
         "solve": time.perf_counter() - assembled,
+        "file": size_in_file(packing),
     }
+
+
+def size_in_file(packing: Packing) -> float:
+    """Of one equilibrium in run.h5, MB."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "run.h5"
+        with RunFile.create(path, packing) as file:
+            empty = path.stat().st_size
+            file.append(packing)
+        return (path.stat().st_size - empty) / 2**20
+
+
+def undamped(engine: Engine, start: Equilibrium) -> dict[str, float]:
+    """Times of the largest eigenvalue and of 1000 steps of an undamped run."""
+    begin = time.perf_counter()
+    step = time_step(start.packing)
+    known = time.perf_counter()
+    engine.restore(start.packing)
+    with engine.undamped(step):
+        engine.advance(100)
+        ready = time.perf_counter()
+        engine.advance(1000)
+        return {"largest": known - begin, "undamped": time.perf_counter() - ready}
 
 
 def onset(engine: Engine, start: Equilibrium, wanted: Scene) -> dict[str, float | None]:
@@ -133,7 +157,7 @@ def text(value: float | int | None, format_: str) -> str:
 def main() -> None:
     """Print the table, and write it as JSON if asked to."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--disks", type=int, nargs="+", default=[1000, 3000])
+    parser.add_argument("--disks", type=int, nargs="+", default=[1000, 3000, 10_000])
     parser.add_argument("--crystals", type=int, nargs="*", default=[10_000, 100_000])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--no-onset", action="store_true", help="settle and ramp alone")
@@ -160,15 +184,19 @@ COLUMNS = {
     "newton": "9.2f",
     "assembly": "9.3f",
     "solve": "9.2f",
+    "largest": "9.3f",
+    "undamped": "9.2f",
     "onset": "9.1f",
     "memory": "9.2f",
+    "file": "9.3f",
 }
+UNITS = {"memory": "GB", "file": "MB"}
 
 
 def table(title: str, sizes: list[int], arguments: list[str]) -> list[Row]:
     """Measure packings of several sizes, each in a process of its own, and print them."""
     print(f"\n{title:18s}" + "".join(f"{name:>9s}" for name in COLUMNS) + f"{'F_x^c':>16s}")
-    print(f"{'':18s}" + "".join(f"{'GB' if name == 'memory' else 's':>9s}" for name in COLUMNS))
+    print(f"{'':18s}" + "".join(f"{UNITS.get(name, 's'):>9s}" for name in COLUMNS))
     rows: list[Row] = []
     for disks in sizes:
         command = [sys.executable, __file__, "--one", "--disks", str(disks), *arguments]

@@ -101,9 +101,9 @@ def test_layer_that_still_sinks_when_steps_run_out_is_refused(monkeypatch):
 
 
 def test_time_step_of_a_large_packing_is_that_of_all_eigenvalues(settled):
-    # ARPACK against LAPACK, both to the rounding of doubles
+    # the root of an eigenvalue that is known to 1e-4
     assert time_step(settled.packing) == pytest.approx(
-        ACCURATE_SHARE * 2 / spectrum(settled.packing).omega_max, rel=1e-10
+        ACCURATE_SHARE * 2 / spectrum(settled.packing).omega_max, rel=5e-5
     )
 
 
