@@ -15,17 +15,20 @@ slice by slice of the spectrum (:mod:`~faultgouge.analysis.slices`), each as a p
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array, eye_array
+from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from .edges import Edge, State, locate
 from .meetings import meetings
-from .modes import Modes, Operator, Pair
+from .modes import Modes, Operator, Pair, span
 from .packing import Floats
 from .projection import MIXING, Cluster, Levels, Projection
-from .tracking import Block
+from .tracking import Block, continued
 from .windows import Place, Window, complex_windows, increasing, window_between
 
 REACH = 0.1
@@ -36,9 +39,15 @@ FINEST = 1e-3
 """Narrowest windows of clusters that are looked for, in increments: their own error is larger."""
 
 
+NEAR = 12
+"""Modes among which a pair is looked for that the clusters announce where the operator has another one."""
+
 KEPT = 9000
 """Coordinates up to which the basis is kept from increment to increment, which takes a gigabyte there; of a larger
-operator it is made anew, and never exists as a whole."""
+operator it never exists as a whole."""
+
+AHEAD = 4
+"""Increments that are looked at while the basis of a larger operator passes by: each costs a twentieth of it."""
 
 
 def first_window(
@@ -56,7 +65,8 @@ def first_window(
     Parameters
     ----------
     operator, forces
-        As in :func:`~faultgouge.analysis.complex_windows`. Loads beyond the one above the onset are not asked for.
+        As in :func:`~faultgouge.analysis.complex_windows`. Loads beyond the one above the onset are not asked for, but for
+        those of `AHEAD` increments.
     narrowest
         As in :func:`~faultgouge.analysis.find_onset`; no less than a thousandth of an increment.
 
@@ -68,13 +78,27 @@ def first_window(
     loads = increasing(forces)
     here = Place(float(loads[0]), csr_array(operator(float(loads[0]))))
     search = _Search(operator, narrowest or 0.0)
-    for load in loads[1:]:
-        there = Place(float(load), csr_array(operator(float(load))))
-        window = search.walk(here, there)
+    ahead = 1 if here.matrix.shape[0] <= KEPT else AHEAD
+    for start in range(1, len(loads), ahead):
+        places = [here, *_reached(operator, loads[start : start + ahead])]
+        window = search.walk(places)
         if window is not None:
             return window
-        here = there
+        here = places[-1]
     return None
+
+
+def _reached(operator: Callable[[float], Operator], loads: Floats) -> list[Place]:
+    """The operator at loads as far as there are equilibria; at the first at any rate."""
+    places: list[Place] = []
+    for load in loads:
+        try:
+            places.append(Place(float(load), csr_array(operator(float(load)))))
+        except RuntimeError:
+            if not places:
+                raise
+            break
+    return places
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +118,26 @@ def _nearest_pair(modes: Modes, eigenvalue: float) -> Pair:
     return min(pairs, key=lambda pair: abs(modes.values[pair[0]].real - eigenvalue))
 
 
+def _complex_pair_near(matrix: csr_array, guess: Block) -> Block | None:
+    """A complex pair among the modes about a guess that is no good, as where a contact opened; None if all are real.
+
+    By ARPACK with shift and inversion.
+    """
+    shift = guess.mean + 0.1 * guess.spread
+    factors = splu(csc_array(matrix - shift * eye_array(matrix.shape[0])))
+    found = []
+    for trans, operator in (("N", matrix), ("T", matrix.T)):
+        inverse = LinearOperator(matrix.shape, matvec=partial(factors.solve, trans=trans), dtype=np.float64)
+        start = np.random.default_rng(0).standard_normal(matrix.shape[0])
+        found.append(eigs(operator, NEAR, sigma=shift, OPinv=inverse, v0=start))
+    (values, right), (others, left) = found
+    for k in np.argsort(np.abs(values - guess.mean)):
+        if values[k].imag > 0:
+            same = int(np.argmin(np.abs(others - values[k])))
+            return continued(matrix, Block.of(matrix, span(right[:, [k]]), span(left[:, [same]])))
+    return None
+
+
 class _Search:
     """The first window of large operators, from load to load."""
 
@@ -102,10 +146,25 @@ class _Search:
         self.passed: list[Place] = []
         self.kept: list[Projection] = []
 
-    def walk(self, here: Place, there: Place) -> Window | None:
-        """The first window that begins between two loads."""
-        self.passed.append(here)
-        candidates = [candidate for part in self.parts(here.matrix) for candidate in self.candidates(part, here, there)]
+    def walk(self, places: list[Place]) -> Window | None:
+        """The first window that begins between the first and the last of several loads."""
+        found: list[list[_Candidate]] = [[] for _ in places[1:]]
+        for part in self.parts(places[0].matrix):
+            before = part.levels(places[0].matrix)
+            for candidates, (here, there) in zip(found, pairwise(places), strict=True):
+                after = part.change(before, there.matrix - here.matrix)
+                candidates.extend(self.candidates(part, (here.fx, before), (there.fx, after)))
+                before = after
+        for candidates, (here, there) in zip(found, pairwise(places), strict=True):
+            self.passed.append(here)
+            window = self.earliest(candidates, there)
+            if window is not None:
+                return window
+        return None
+
+    def earliest(self, candidates: list[_Candidate], there: Place) -> Window | None:
+        """The first window of the operator itself that one of the candidates has become."""
+        here = self.passed[-1]
         first: Window | None = None
         for candidate in sorted(candidates, key=lambda candidate: candidate.onset):
             # Clusters are off by a share of the way from here: one that is far beyond cannot be first.
@@ -128,15 +187,15 @@ class _Search:
         self.kept = list(parts)
         return self.kept
 
-    def candidates(self, part: Projection, here: Place, there: Place) -> Iterator[_Candidate]:
+    def candidates(
+        self, part: Projection, here: tuple[float, Levels], there: tuple[float, Levels]
+    ) -> Iterator[_Candidate]:
         """The pairs of a projection that turn complex in their clusters."""
-        before = part.levels(here.matrix)
-        after = part.change(before, there.matrix - here.matrix)
-        named = meetings(before, before.beyond(after, 1 + REACH))
+        named = meetings(here[1], here[1].beyond(there[1], 1 + REACH))
         for cluster in part.clusters:
             first, last = (cluster.modes.start + end for end in cluster.core)
             if np.any((named >= first) & (named <= last)):
-                yield from self.searched(part, cluster, (here.fx, before), (there.fx, after))
+                yield from self.searched(part, cluster, here, there)
 
     def searched(
         self, part: Projection, cluster: Cluster, here: tuple[float, Levels], there: tuple[float, Levels]
@@ -177,7 +236,11 @@ class _Search:
         """The pair at a load where it is complex, if there is one near the candidate's window."""
         fx = candidate.inside
         matrix = there[1] if fx == there[0] else csr_array(self.operator(fx))
-        start = State(fx, matrix, Block.of(matrix, candidate.right, candidate.left)).at(fx, matrix)
+        guess = Block.of(matrix, candidate.right, candidate.left)
+        block = continued(matrix, guess) or _complex_pair_near(matrix, guess)
+        if block is None:
+            return None
+        start = State(fx, matrix, block)
         if start.discriminant < 0:
             return start
         # A parabola through D at the ends of the increment and here has its minimum where D is least.
