@@ -65,8 +65,8 @@ def first_window(
     Parameters
     ----------
     operator, forces
-        As in :func:`~faultgouge.analysis.complex_windows`. Loads beyond the one above the onset are not asked for, but for
-        those of `AHEAD` increments.
+        As in :func:`~faultgouge.analysis.complex_windows`. Loads beyond the one above the onset are not asked for, but
+        for those of `AHEAD` increments.
     narrowest
         As in :func:`~faultgouge.analysis.find_onset`; no less than a thousandth of an increment.
 
