@@ -170,7 +170,7 @@ class _Search:
             # Clusters are off by a share of the way from here: one that is far beyond cannot be first.
             if first is not None and candidate.onset - here.fx > (1 + 2 * REACH) * (first.fx_onset - here.fx):
                 break
-            window = self.confirmed(candidate, there)
+            window = self.confirmed(candidate, there, first)
             if window is not None and (first is None or window.fx_onset < first.fx_onset):
                 first = window
         return first
@@ -218,10 +218,10 @@ class _Search:
                 right, left = part.lifted(cluster, plane.right), part.lifted(cluster, plane.left)
                 yield _Candidate(window.fx_onset, min(inside, there[0]), right, left)
 
-    def confirmed(self, candidate: _Candidate, there: Place) -> Window | None:
-        """The window of the operator itself in place of that of a cluster; None if the pair stays real."""
+    def confirmed(self, candidate: _Candidate, there: Place, first: Window | None) -> Window | None:
+        """The window of the operator itself in place of that of a cluster; None if it is none, or not the first."""
         inside = self.complex_state(candidate, there)
-        if inside is None:
+        if inside is None or (first is not None and self.later(inside, first)):
             return None
         above = inside if inside.fx == there[0] else inside.at(*there)
         end = locate(self.operator, inside, above)[0] if above.discriminant > 0 else None
@@ -231,6 +231,11 @@ class _Search:
                 return window_between(locate(self.operator, below, inside)[0], end)
             inside = below
         return window_between(Edge(inside.fx, 0.0, inside.block.mean, inside.block.overlap, "start"), end)
+
+    def later(self, inside: State, first: Window) -> bool:
+        """Whether a pair is still real where the first one so far turns complex."""
+        onset = first.fx_onset
+        return inside.fx > onset and inside.at(onset, self.operator(onset)).discriminant > 0
 
     def complex_state(self, candidate: _Candidate, there: Place) -> State | None:
         """The pair at a load where it is complex, if there is one near the candidate's window."""

@@ -1,4 +1,4 @@
-r"""The eigenvectors of a large sparse symmetric matrix, all of them, a hundred at a time.
+r"""The eigenvectors of a large sparse symmetric matrix, all of them, two hundred at a time.
 
 The dense decomposition of E coordinates takes some :math:`10 E^3` operations and :math:`16 E^2` bytes: hours and
 15 GB for 10,000 disks. But what is asked of it in :mod:`~faultgouge.analysis.projection` is local in the spectrum: a
@@ -30,16 +30,16 @@ from threadpoolctl import threadpool_limits
 
 from .packing import Floats, Indices
 
-OWN = 120
+OWN = 200
 """Eigenvalues from one shift to the next. Fewer cost more factorisations, more cost more orthogonalisation."""
 
-COARSE = 8 * OWN
+COARSE = 4 * OWN
 """Eigenvalues between two places at which they are counted; shifts are interpolated."""
 
 BLOCK = 8
 """Vectors that are solved for at a time: 2 ms each at 30,000 coordinates, against 6 ms one by one."""
 
-FIRST_LOOK, LOOKS, LAST_LOOK = 40, 2, 200
+FIRST_LOOK, LOOKS, LAST_LOOK = 56, 4, 240
 """Blocks of a Krylov space before its eigenvalues are looked at, between two looks, and at the most."""
 
 DRIFT = 1e-14

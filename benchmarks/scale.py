@@ -5,7 +5,7 @@ Each size runs in a process of its own, so that its peak of memory is its own, a
 which takes as many as there are cores.
 
     settle     from the loose start to the rounding floor, at F_x = 0
-    newton     one increment of F_x by 1e-3 from there, median of three
+    newton     one increment of F_x by 1/N from there, median of three
     assembly   of K
     solve      of K dq = F, factorisation included
     largest    eigenvalue of K, for the time step of an undamped run
@@ -46,14 +46,20 @@ from faultgouge.studies.stability_cases.packings import crystal
 
 Row = dict[str, float | int | None]
 
-STEP, UNTIL = 1e-3, 0.05
+INCREMENTS = 50
+"""Of 1/N each: the first onset falls somewhat faster than that with N, and contacts change as often in an increment."""
 
 
 def scene(disks: int, seed: int) -> Scene:
     """A square packing of so many disks."""
     packing = {"disks": disks, "width": round(1.192 * math.sqrt(disks), 1), "seed": seed}
     return Scene.from_mapping(
-        {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": STEP, "until": UNTIL}}
+        {
+            "packing": packing,
+            "law": {"kn": 2e5},
+            "load": {"fy": 3.0},
+            "ramp": {"step": 1 / disks, "until": INCREMENTS / disks},
+        }
     )
 
 
@@ -89,7 +95,7 @@ def increments(engine: Engine, start: Equilibrium) -> Row:
     for k in range(1, 4):
         begin = time.perf_counter()
         try:
-            here = equilibrate(engine, here, k * STEP)
+            here = equilibrate(engine, here, k / len(start.packing))
         except NoEquilibriumError:
             break
         times.append(time.perf_counter() - begin)
@@ -142,7 +148,7 @@ def onset(engine: Engine, start: Equilibrium, wanted: Scene) -> dict[str, float 
     begin = time.perf_counter()
     path = EquilibriumPath(engine, start, wanted)
     try:
-        fx_c = find_onset(path, STEP * np.arange(round(UNTIL / STEP) + 1)).fx_c
+        fx_c = find_onset(path, np.arange(INCREMENTS + 1) / len(start.packing)).fx_c
     except (NoEquilibriumError, OnsetError):
         fx_c = None
     return {"onset": time.perf_counter() - begin, "fx_c": fx_c}
