@@ -46,7 +46,7 @@ KEPT = 9000
 """Coordinates up to which the basis is kept from increment to increment, which takes a gigabyte there; of a larger
 operator it never exists as a whole."""
 
-AHEAD = 4
+AHEAD = 2
 """Increments that are looked at while the basis of a larger operator passes by: each costs a twentieth of it."""
 
 

@@ -1,4 +1,4 @@
-r"""The eigenvectors of a large sparse symmetric matrix, all of them, two hundred at a time.
+r"""The eigenvectors of a large sparse symmetric matrix, all of them, a hundred at a time.
 
 The dense decomposition of E coordinates takes some :math:`10 E^3` operations and :math:`16 E^2` bytes: hours and
 15 GB for 10,000 disks. But what is asked of it in :mod:`~faultgouge.analysis.projection` is local in the spectrum: a
@@ -30,16 +30,16 @@ from threadpoolctl import threadpool_limits
 
 from .packing import Floats, Indices
 
-OWN = 200
+OWN = 120
 """Eigenvalues from one shift to the next. Fewer cost more factorisations, more cost more orthogonalisation."""
 
-COARSE = 4 * OWN
+COARSE = 8 * OWN
 """Eigenvalues between two places at which they are counted; shifts are interpolated."""
 
 BLOCK = 8
 """Vectors that are solved for at a time: 2 ms each at 30,000 coordinates, against 6 ms one by one."""
 
-FIRST_LOOK, LOOKS, LAST_LOOK = 56, 4, 240
+FIRST_LOOK, LOOKS, LAST_LOOK = 38, 2, 200
 """Blocks of a Krylov space before its eigenvalues are looked at, between two looks, and at the most."""
 
 DRIFT = 1e-14
@@ -47,10 +47,9 @@ DRIFT = 1e-14
 rounding at first, 1e-16, and grows from block to block once an eigenvector has been found to all digits; the product
 with that one is larger by the root of their number. Up to here all of them are below 1e-11."""
 
-ACCURATE = 1e-3
-"""Residual of the eigenvectors of a slice, in mean distances of eigenvalues. It enters an eigenvalue as its square, and
-the couplings that decide whether two modes meet are a hundredth of their distance and more."""
-
+ACCURATE = 1e-2
+"""Residual of the eigenvectors of a slice, in mean distances of eigenvalues. It enters an eigenvalue as its square over
+the distance of modes outside the slice, which are ten such distances away and more: 1e-5."""
 
 ORDERED: dict[str, Any] = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 """SuperLU without pivoting: the factors stay sparse, and the signs of the pivots tell the inertia. What stability that

@@ -5,7 +5,7 @@ Each size runs in a process of its own, so that its peak of memory is its own, a
 which takes as many as there are cores.
 
     settle     from the loose start to the rounding floor, at F_x = 0
-    newton     one increment of F_x by 1/N from there, median of three
+    newton     one increment of F_x by 2/N from there, median of three
     assembly   of K
     solve      of K dq = F, factorisation included
     largest    eigenvalue of K, for the time step of an undamped run
@@ -47,7 +47,7 @@ from faultgouge.studies.stability_cases.packings import crystal
 Row = dict[str, float | int | None]
 
 INCREMENTS = 50
-"""Of 1/N each: the first onset falls somewhat faster than that with N, and contacts change as often in an increment."""
+"""Of 2/N each: the first onset falls somewhat faster than that with N, and contacts change as often in an increment."""
 
 
 def scene(disks: int, seed: int) -> Scene:
@@ -58,7 +58,7 @@ def scene(disks: int, seed: int) -> Scene:
             "packing": packing,
             "law": {"kn": 2e5},
             "load": {"fy": 3.0},
-            "ramp": {"step": 1 / disks, "until": INCREMENTS / disks},
+            "ramp": {"step": 2 / disks, "until": 2 * INCREMENTS / disks},
         }
     )
 
@@ -95,7 +95,7 @@ def increments(engine: Engine, start: Equilibrium) -> Row:
     for k in range(1, 4):
         begin = time.perf_counter()
         try:
-            here = equilibrate(engine, here, k / len(start.packing))
+            here = equilibrate(engine, here, 2 * k / len(start.packing))
         except NoEquilibriumError:
             break
         times.append(time.perf_counter() - begin)
@@ -148,7 +148,7 @@ def onset(engine: Engine, start: Equilibrium, wanted: Scene) -> dict[str, float 
     begin = time.perf_counter()
     path = EquilibriumPath(engine, start, wanted)
     try:
-        fx_c = find_onset(path, np.arange(INCREMENTS + 1) / len(start.packing)).fx_c
+        fx_c = find_onset(path, 2 * np.arange(INCREMENTS + 1) / len(start.packing)).fx_c
     except (NoEquilibriumError, OnsetError):
         fx_c = None
     return {"onset": time.perf_counter() - begin, "fx_c": fx_c}
