@@ -48,7 +48,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from .law import Derivatives
-from .packing import Floats, Packing
+from .packing import Floats, Indices, Packing
 
 Form = Literal["consistent", "paper"]
 
@@ -79,29 +79,49 @@ def stiffness_matrix(packing: Packing, form: Form = "consistent") -> csr_array:
         If the form is neither of the two.
     """
     _check(form)
-    n, contacts = len(packing), packing.contacts
+    contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
-    i, j = contacts.i[:pairs], contacts.j[:pairs]
     normal, _, distance, overlap = packing.geometry
     law = packing.law.derivatives(overlap, contacts.slip)
-    terms = contact_terms(law, normal.T, distance, pairs, form)
-    axes = 3 if packing.law.frictional else 2
+    return assembled(contact_terms(law, normal.T, distance, pairs, form), contacts.i, contacts.j[:pairs], len(packing))
+
+
+def assembled(terms: Floats, i: Indices, j: Indices, disks: int) -> csr_array:
+    """K from the numbers of each contact.
+
+    Parameters
+    ----------
+    terms : ndarray, shape (3, 3, C)
+        See `contact_terms`.
+    i : ndarray of int, shape (C,)
+        First partners.
+    j : ndarray of int, shape (P,)
+        Second partners of the contacts of two disks, which come first.
+    disks : int
+        N.
+
+    Returns
+    -------
+    scipy.sparse.csr_array, shape (3N, 3N)
+        As `stiffness_matrix`.
+    """
+    axes, pairs = 3 if terms[2].any() else 2, len(j)
     terms, signs = terms[:axes, :axes], SIGNS[:, :, :axes, :axes, None]
     # Two disks share one contact, so the off-diagonal blocks are final; only the diagonal ones are sums.
-    diagonal = np.empty((axes, axes, n))
+    diagonal = np.empty((axes, axes, disks))
     for row in range(axes):
         for column in range(axes):
             term = terms[row, column]
-            diagonal[row, column] = np.bincount(contacts.i, term, n)
-            diagonal[row, column] += signs[1, 1, row, column] * np.bincount(j, term[:pairs], n)
-    every, axis = np.arange(n, dtype=np.int32), np.arange(0, axes * n, n, dtype=np.int32)
-    i, j = i.astype(np.int32), j.astype(np.int32)  # half the memory of what the sparse format sorts
+            diagonal[row, column] = np.bincount(i, term, disks)
+            diagonal[row, column] += signs[1, 1, row, column] * np.bincount(j, term[:pairs], disks)
+    every, axis = np.arange(disks, dtype=np.int32), np.arange(0, axes * disks, disks, dtype=np.int32)
+    i, j = i[:pairs].astype(np.int32), j.astype(np.int32)  # half the memory of what the sparse format sorts
     shared = terms[:, :, :pairs]
     values = np.concatenate([diagonal, signs[0, 1] * shared, signs[1, 0] * shared], axis=2)
     rows = axis[:, None, None] + np.concatenate([every, i, j])
     columns = axis[:, None] + np.concatenate([every, j, i])
     where = tuple(np.broadcast_to(index, values.shape).ravel() for index in (rows, columns))
-    matrix = coo_array((values.ravel(), where), shape=(3 * n, 3 * n)).tocsr()
+    matrix = coo_array((values.ravel(), where), shape=(3 * disks, 3 * disks)).tocsr()
     matrix.eliminate_zeros()
     return matrix
 

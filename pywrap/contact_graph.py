@@ -72,6 +72,14 @@ class ContactGraph:
         """Disks that have a contact, shape (N,)."""
         return self.degree > 0
 
+    def old(self, earlier: "ContactGraph") -> Booleans | None:
+        """Which contacts there were earlier, too, shape (C,); None if all were."""
+        if earlier is self:
+            return None
+        number = len(self.radius) + 1  # the floor, -1, is none of the disks before
+        old = np.isin(number * self.i + self.j, number * earlier.i + earlier.j, assume_unique=True)
+        return None if old.all() else old
+
     def per_disk(self, values: Floats | Booleans) -> NDArray:
         """Sums of numbers over the contacts of each disk, shape (N,)."""
         disk, contact = self._ends

@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
 
-from ..analysis import Packing
-
 Indices = NDArray[np.int64]
 
 
-def elimination_order(packing: Packing, coordinates: Indices) -> Indices:
+def elimination_order(i: Indices, j: Indices, disks: int, coordinates: Indices) -> Indices:
     """A fill-reducing order of coordinates.
 
     Parameters
     ----------
-    packing : Packing
-        Whose contacts couple the disks.
+    i, j : ndarray of int, shape (P,)
+        The pairs of disks whose coordinates are coupled.
+    disks : int
+        N.
     coordinates : ndarray of int, shape (E,)
         Which of the 3N coordinates (x.., y.., R theta..) are unknown.
 
@@ -30,15 +30,14 @@ def elimination_order(packing: Packing, coordinates: Indices) -> Indices:
     ndarray of int, shape (E,)
         A permutation of range(E).
     """
-    n, pair = len(packing), ~packing.contacts.floor
-    i, j, every = packing.contacts.i[pair], packing.contacts.j[pair], np.arange(n)
+    every = np.arange(disks)
     ones = np.ones(len(i))
-    degree = np.bincount(i, minlength=n) + np.bincount(j, minlength=n)
+    degree = np.bincount(i, minlength=disks) + np.bincount(j, minlength=disks)
     # diagonally dominant, so that SuperLU, which orders only what it factors, has nothing to pivot
     graph = coo_array(
         (np.concatenate([-ones, -ones, degree + 1.0]), (np.concatenate([i, j, every]), np.concatenate([j, i, every]))),
-        shape=(n, n),
+        shape=(disks, disks),
     )
     factors = splu(csc_array(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    axis, disk = np.divmod(coordinates, n)
+    axis, disk = np.divmod(coordinates, disks)
     return np.lexsort((axis, factors.perm_c[disk]))

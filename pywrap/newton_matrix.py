@@ -1,7 +1,9 @@
 """Newton's matrix: K of a trial, factored.
 
 Contacts below the rounding floor are left out, since their stiffness is noise, and so are the coordinates that nothing
-holds then. A small matrix is a band and goes to LAPACK, a large one is sparse and goes to SuperLU.
+holds then. A contact that has closed since the displacement began has no slip, however long the displacement: its
+tangential force is no function of it, and has no part in K. A small matrix is a band and goes to LAPACK, a large one is
+sparse and goes to SuperLU.
 """
 
 from collections.abc import Callable
@@ -10,14 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgbtrf, dgbtrs
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
-from ..analysis import Packing, stiffness_matrix
-from ..analysis.stiffness import contact_terms
+from ..analysis.stiffness import assembled, contact_terms
 from .band import Band
 from .contact_graph import ContactGraph
-from .elimination import elimination_order
+from .sparse_solver import SparseSolver
 from .trial import Trial
 
 Floats = NDArray[np.float64]
@@ -37,6 +36,10 @@ AFLOAT = 1e-13
 """Share that is added to all others. A share of the size of its rounding keeps the solve finite where something floats,
 such as the whole packing along a floor without friction; on stiff directions it changes nothing."""
 
+SLIPLESS = 1e-2
+"""Share of its tangential stiffness that a contact keeps which has no slip, so that a disk with no other contact is
+held. It reduces the error of an iteration to a hundredth at best."""
+
 BANDED = 3000
 """Coordinates up to which a band is the faster one: 0.3 ms against 2 ms at 294 (100 disks), 11 ms against 23 ms at 2886
 (1000 disks in a square)."""
@@ -49,15 +52,20 @@ class Factors(NamedTuple):
     ----------
     solve : callable
         The solution of K dq = F as a function of F, on the coordinates that K knows; None if it is not finite.
-    hit : ndarray of bool, shape (N,)
-        Disks with one contact that carries something: rattlers that a neighbour ran into.
+    expelled : ndarray of bool, shape (N,)
+        Disks that a neighbour or two ran into and nothing else holds.
+    sparse : SparseSolver, or None
+        What solves it in a large packing.
     """
 
     solve: Solve
-    hit: Booleans
+    expelled: Booleans
+    sparse: SparseSolver | None = None
 
 
-def factored(trial: Trial, floor: float) -> Factors | None:
+def factored(
+    trial: Trial, floor: float, since: ContactGraph | None = None, nearby: Factors | None = None
+) -> Factors | None:
     """Factor K; None if it is singular, or nothing is held.
 
     Parameters
@@ -66,23 +74,39 @@ def factored(trial: Trial, floor: float) -> Factors | None:
         Where K is taken.
     floor : float
         Force that a contact has to exceed.
+    since : ContactGraph, optional
+        The contacts where the displacement began; by default they are those of the trial.
+    nearby : Factors, optional
+        Those of another trial nearby, which a large packing is solved with.
     """
     graph, law = trial.graph, trial.derivatives
+    loaded, old = law.normal_force > floor, None if since is None else graph.old(since)
+    if old is not None:
+        slip_derivative = np.where(old, law.slip_derivative, SLIPLESS * law.slip_derivative)
+        law = law._replace(slip_derivative=slip_derivative)
     normal, distance, _ = trial.branches
     terms = contact_terms(law, normal, distance, graph.pairs)
-    loaded = law.normal_force > floor
     if not loaded.all():
         terms = np.where(loaded, terms, 0.0)
-    hit = (graph.count(loaded) == 1) & ~trial.still.top
     active = graph.per_coordinate(terms.reshape(9, -1)[::4]) != 0
     unknowns = np.count_nonzero(active)
     if unknowns == 0:
         return None
+    idle = _idle(graph, law.normal_force, loaded)
+    expelled = _expelled(graph, loaded, old) & ~trial.still.top
     if unknowns > BANDED:
-        solve = sparse_solution(trial.packing.loaded(floor))
-    else:
-        solve = _banded(graph.band(active), terms, _idle(graph, law.normal_force, loaded))
-    return None if solve is None else Factors(solve, hit)
+        sparse = _sparse(graph, loaded, terms, idle, None if nearby is None else nearby.sparse)
+        return Factors(sparse.solve, expelled, sparse)
+    solve = _banded(graph.band(active), terms, idle)
+    return None if solve is None else Factors(solve, expelled)
+
+
+def _expelled(graph: ContactGraph, loaded: Booleans, old: Booleans | None) -> Booleans:
+    """Disks with one loaded contact, or with two that are both new, shape (N,)."""
+    count = graph.count(loaded)
+    if old is None:
+        return count == 1
+    return (count == 1) | ((count == 2) & (graph.per_disk(loaded & old) == 0))
 
 
 def _banded(band: Band, terms: Floats, idle: Booleans) -> Solve | None:
@@ -119,32 +143,13 @@ def _held(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:
     return held
 
 
-def sparse_solution(packing: Packing) -> Solve | None:
-    """The solution of K dq = F by SuperLU, all contacts counted; None if K is singular.
-
-    Parameters
-    ----------
-    packing : Packing
-        Where K is taken.
-    """
-    matrix = stiffness_matrix(packing)
-    contacts = packing.contacts
-    graph = ContactGraph(contacts, packing.radius)
-    idle = _idle(graph, packing.normal_force, np.ones(len(contacts), np.bool_))
-    diagonal = matrix.diagonal()
-    active = np.flatnonzero(diagonal)
-    active = active[elimination_order(packing, active)]
-    block = matrix[active][:, active]
-    block.setdiag(_held(diagonal[active], active % len(packing), idle))
-    try:
-        # nearly symmetric: pivots on the diagonal where good
-        factors = splu(csc_array(block), permc_spec="NATURAL", diag_pivot_thresh=0.01, options={"SymmetricMode": True})
-    except RuntimeError:
-        return None
-
-    def solve(force: Floats) -> Floats | None:
-        step = np.zeros_like(force)
-        step[active] = factors.solve(force[active])
-        return step if np.all(np.isfinite(step)) else None
-
-    return solve
+def _sparse(
+    graph: ContactGraph, loaded: Booleans, terms: Floats, idle: Booleans, nearby: SparseSolver | None
+) -> SparseSolver:
+    """The solution by SuperLU and GMRES."""
+    i, j, disks = graph.i, graph.j[: graph.pairs], len(graph.radius)
+    matrix = assembled(terms, i, j, disks)
+    matrix.setdiag(_held(matrix.diagonal(), np.tile(np.arange(disks), 3), idle))
+    matrix.eliminate_zeros()
+    coupled = np.flatnonzero(loaded[: graph.pairs])
+    return SparseSolver(matrix, i[coupled], j[coupled], nearby)

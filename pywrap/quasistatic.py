@@ -47,17 +47,23 @@ Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 
 ITERATIONS = 40
-"""Newton iterations before an increment is halved. Three or four do, but where a rattler has been hit in a cage that
-closes on it: its contact opens as delta^(3/2) -> 0, on which Newton's method gains a factor of 3 an iteration, and 20
-reach the floor."""
+"""Newton iterations before an increment is halved. Three or four do, but where a disk is pushed out between two others:
+their contacts open as delta^(3/2) -> 0, on which Newton's method gains a factor of 5 an iteration, and 12 reach the
+floor."""
 
 FRUITLESS = 8
 """Iterations that gain nothing before an increment is halved."""
 
 FREEING = 3
-"""Iterations in which a rattler that is hit, though it is in the middle of its cage, gets one and a half times Newton's
-step: its force goes as delta^(3/2), a root of that order, and the factor makes the convergence quadratic again. Later
-ones take Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
+"""Iterations in which a disk that is pushed out, and yet was not moved out of the way, gets one and a half times
+Newton's step: its force goes as delta^(3/2), a root of that order, and the factor makes the convergence quadratic
+again. Later ones take Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
+
+MOVES = 3
+"""Times that a rattler is moved in an increment: what it lies against may be another one that is moved later."""
+
+NOISE = 10
+"""Rounding floors up to which a residual that no longer falls is one."""
 
 SPARING = 300
 """Disks beyond which factors of K are used again: a factorisation costs ten force evaluations and more."""
@@ -154,10 +160,13 @@ def equilibrate(
         If halving the increment leads nowhere.
     """
     here, target, evaluations = last, fx, 0
-    guess = _response(engine, last, fx) if beside is None else _in_proportion(last, beside, fx)
+    if beside is None:
+        guess, factors = _response(engine, last, fx)
+    else:
+        guess, factors = _in_proportion(last, beside, fx), None
     while True:
         engine.set_fx(target)
-        found, spent = _newton(engine, here.packing, force_tolerance, guess)
+        found, spent = _newton(engine, here.packing, force_tolerance, guess, factors)
         evaluations += spent
         if found is None and guess is not None:
             guess = None
@@ -173,17 +182,17 @@ def equilibrate(
             here, target = found, fx
 
 
-def _response(engine: Engine, last: Equilibrium, fx: float) -> Floats | None:
-    """The linear response to the increment, which is Newton's first step; None where there is none."""
+def _response(engine: Engine, last: Equilibrium, fx: float) -> tuple[Floats | None, Factors | None]:
+    """The linear response to the increment, which is Newton's first step, and the factors of K; None for what fails."""
     packing = last.packing
     if fx == packing.fx:
-        return None
+        return None, None
     push = np.zeros(3 * len(packing))
     push[: len(packing)][packing.top] = fx - packing.fx
     trial = engine.kept(packing)
     factors = factored(trial, trial.floor)
     step = None if factors is None else factors.solve(push)
-    return None if step is None or _too_long(step, packing) else step
+    return None if step is None or _too_long(step, packing) else step, factors
 
 
 def _in_proportion(last: Equilibrium, beside: Equilibrium, fx: float) -> Floats:
@@ -200,11 +209,11 @@ def _too_long(step: Floats, packing: Packing) -> bool:
 
 
 def _newton(
-    engine: Engine, base: Packing, force_tolerance: float | None, guess: Floats | None = None
+    engine: Engine, base: Packing, force_tolerance: float | None, guess: Floats | None, nearby: Factors | None
 ) -> tuple[Equilibrium | None, int]:
     """Newton's method from one base at the engine's fx; None where it does not converge."""
     with engine.displacing() as displaced:
-        best, evaluations = _iterated(displaced, engine.kept(base), force_tolerance, guess)
+        best, evaluations = _iterated(displaced, engine.kept(base), force_tolerance, guess, nearby)
     if best is None:
         return None, evaluations
     return Equilibrium(engine.keep(best), best.residual, best.floor, evaluations), evaluations
@@ -215,13 +224,14 @@ def _iterated(
     start: Trial,
     force_tolerance: float | None,
     guess: Floats | None,
+    nearby: Factors | None,
 ) -> tuple[Trial | None, int]:
-    base, loose = start.packing, _loose(start)
+    base, since, loose = start.packing, start.graph, _loose(start)
     displacement = np.zeros(3 * len(base)) if guess is None else guess
     best: Trial | None = None
     factors: Factors | None = None
     worse = 0  # iterations that gained nothing; changes of contacts cost some
-    moved, moves = np.zeros(len(base), dtype=np.bool_), 0  # rattlers that are out of the way
+    moved, moves = np.zeros(len(base), dtype=np.int64), 0  # how often rattlers were moved out of the way
     earlier = last = np.inf  # residuals of the two iterations before
     for evaluation in range(1, ITERATIONS + 1):
         trial = displaced(base, displacement)
@@ -229,7 +239,7 @@ def _iterated(
         if factors is None:
             floor = trial.floor
         if best is not None and residual > 0.5 * best.residual:
-            if best.residual < 10 * floor:
+            if best.residual < NOISE * floor:
                 return best, evaluation + moves
             worse += 1
             if worse > FRUITLESS:
@@ -247,40 +257,40 @@ def _iterated(
         sufficient = residual * (residual / last) < 0.1 * floor
         if factors is None or not (sufficient or (len(base) > SPARING and residual <= KEPT * last)):
             floor = trial.floor
-            hit = _hit(trial, loose) & ~moved
+            hit = _hit(trial, loose) & (moved < MOVES)
             if np.any(hit):
                 displacement = _out_of_the_way(trial.packing, np.flatnonzero(hit), displacement)
                 trial = displaced(base, displacement)
                 residual = trial.residual
-                moved, moves = moved | hit, moves + 1
-            factors = factored(trial, floor)
+                moved, moves = moved + hit, moves + 1
+            factors = factored(trial, floor, since, factors or nearby)
         earlier, last = last, residual
         step = None if factors is None else factors.solve(trial.force)
         if factors is None or step is None or _too_long(step, base):
             return None, evaluation + moves
         if evaluation <= FREEING:
-            step.reshape(3, -1)[:, factors.hit] *= 1.5
+            step.reshape(3, -1)[:, factors.expelled] *= 1.5
         if base.compensated and residual < 10 * trial.rounded(
             trial.coordinate_rounding + EPSILON * np.abs(displacement).max()
         ):
-            base, displacement = trial.packing, np.zeros_like(displacement)
+            base, since, displacement = trial.packing, trial.graph, np.zeros_like(displacement)
         displacement = displacement + step
     return None, ITERATIONS + moves
 
 
-def _carrying(trial: Trial) -> Floats:
-    """Number of contacts of each disk that carry something, shape (N,)."""
-    return trial.graph.per_disk(trial.derivatives.normal_force > trial.floor)
+def _carrying(trial: Trial, least: float) -> Floats:
+    """Number of contacts of each disk that carry more than a given force, shape (N,)."""
+    return trial.graph.per_disk(trial.derivatives.normal_force > least)
 
 
 def _loose(trial: Trial) -> Booleans:
-    """Rattlers, shape (N,)."""
-    return (_carrying(trial) == 0) & ~trial.still.top
+    """Rattlers, shape (N,): disks whose contacts carry no more than an equilibrium may leave."""
+    return (_carrying(trial, NOISE * trial.floor) == 0) & ~trial.still.top
 
 
 def _hit(trial: Trial, loose: Booleans) -> Booleans:
     """Rattlers that a neighbour ran into, and disks with one contact left, which become rattlers, shape (N,)."""
-    count = _carrying(trial)
+    count = _carrying(trial, trial.floor)
     return ((count == 1) & ~trial.still.top) | (loose & (count > 0))
 
 

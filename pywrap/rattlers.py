@@ -1,26 +1,40 @@
-"""Rattlers out of the way: disks that carry nothing, moved to the middle of their cages.
+r"""Rattlers out of the way: disks that carry nothing, moved to the middle of their cages.
 
 A settled packing leaves a disk that nothing holds just about touching one of its neighbours. Where it lies is of no
 consequence to anything but Newton's method: as the packing is sheared the neighbour runs into it, and a contact opens
 as delta^(3/2) -> 0, to which Newton's method converges slowly, one such disk at a time. In a packing of 10,000 disks,
 with its hundreds of rattlers, ten of them are hit in an increment of 1e-4 of the load. Such a disk may as well lie
 where it touches nothing: its position is no property of the equilibrium.
+
+The middle of a cage is where the narrowest gap is widest. A gap :math:`g_j = |x - x_j| - R - R_j` is a convex function
+of the disk's position, so that its linearisation is a lower bound. The linear program
+
+.. math:: \max_{d, t} t \quad\text{with}\quad t \le g_j + n_j \cdot d
+
+over a move d of the disk therefore leaves the narrowest gap t no smaller than it finds it, and a few of them in turn
+reach the maximum, however narrow the cage.
 """
 
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linprog
 from scipy.spatial import cKDTree
 
 from ..analysis import Packing, nearest_image, touching
 
-FIRST, SHRINK = 0.03, 0.85
-"""The first of the moves, in radii, and the factor from one to the next: together they reach 0.2 radii, a cage is a few
-tenths wide."""
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
-MOVES = 80
-"""Moves of a disk: the last is of 1e-7 radii, far less than what the cages change from load to load."""
+TRAVEL = 0.3
+"""How far a disk may move along x and along y, in radii: cages are a few tenths wide."""
+
+ROUNDS = 20
+"""Linear programs for a disk at the most; two or three do."""
+
+GAIN = 0.05
+"""Share by which a linear program has to widen the narrowest gap for another one to follow."""
 
 
 def clear_rattlers(packing: Packing, least: float) -> Packing:
@@ -44,8 +58,8 @@ def clear_rattlers(packing: Packing, least: float) -> Packing:
     return replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
 
 
-def middle_of_cage(packing: Packing, disks: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Where disks are far from all of their neighbours: each moves away from the nearest one, ever less.
+def middle_of_cage(packing: Packing, disks: Indices) -> Floats:
+    """Where the narrowest gap between a disk and its neighbours is widest, one disk after the other.
 
     Parameters
     ----------
@@ -57,7 +71,7 @@ def middle_of_cage(packing: Packing, disks: NDArray[np.int64]) -> NDArray[np.flo
     Returns
     -------
     ndarray, shape (D, 2)
-        Their places, length; where there is none with a wider gap, the old one.
+        Their places, length.
     """
     radius, box = packing.radius, packing.box_length
     position = packing.position.copy()
@@ -65,16 +79,30 @@ def middle_of_cage(packing: Packing, disks: NDArray[np.int64]) -> NDArray[np.flo
     if box is not None:
         wrapped[:, 0] %= box
     tree = cKDTree(wrapped, boxsize=None if box is None else [box, 0.0])
-    for disk in disks:
-        near = np.setdiff1d(tree.query_ball_point(wrapped[disk], radius[disk] + 2 * radius.max()), [disk])
-        place, widest = position[disk].copy(), -np.inf
-        for move in FIRST * radius[disk] * SHRINK ** np.arange(MOVES):
-            branch = nearest_image(place - position[near], box)
-            distance = np.hypot(branch[:, 0], branch[:, 1])
-            gaps = np.append(distance - radius[near] - radius[disk], place[1] - radius[disk])
-            closest = int(np.argmin(gaps))
-            if gaps[closest] > widest:
-                position[disk], widest = place, gaps[closest]
-            away = np.array([0.0, 1.0]) if closest == len(near) else branch[closest] / distance[closest]
-            place = place + move * away
+    # both may move, by sqrt(2) TRAVEL
+    reach = radius[disks] + (1 + 4 * TRAVEL) * radius.max()
+    for disk, near in zip(disks, tree.query_ball_point(wrapped[disks], reach), strict=True):
+        cage = np.setdiff1d(near, [disk])
+        branch = nearest_image(position[disk] - position[cage], box)
+        position[disk] += _to_the_middle(branch, radius[cage] + radius[disk], position[disk, 1], radius[disk])
     return position[disks]
+
+
+def _to_the_middle(branch: Floats, contact: Floats, height: float, radius: float) -> Floats:
+    """The move of a disk with these branch vectors to its neighbours, of these lengths at contact, shape (2,)."""
+    move, room = np.zeros(2), TRAVEL * radius
+    for _ in range(ROUNDS):
+        distance = np.hypot(branch[:, 0] + move[0], branch[:, 1] + move[1])
+        normal = np.vstack([(branch + move) / distance[:, None], [0.0, 1.0]])  # the floor is the last one
+        gap = np.append(distance - contact, height + move[1] - radius)
+        narrowest = min(float(gap.min()), radius)  # no gap needs to be wider
+        step = linprog(
+            [0.0, 0.0, -1.0],
+            np.column_stack([-normal, np.ones(len(gap))]),
+            gap,
+            bounds=[*zip(-room - move, room - move, strict=True), (narrowest, radius)],
+        ).x
+        move += step[:2]
+        if step[2] - narrowest <= GAIN * abs(narrowest):
+            break
+    return move

@@ -87,7 +87,7 @@ def test_contacts_below_the_floor_are_left_out(reference_packing):
     fewer = packing.loaded(least)
     assert_allclose(step, factored(trial_of(fewer), 0.0).solve(force), rtol=1e-6, atol=1e-9 * np.abs(step).max())
     assert np.array_equal(
-        factored(trial_of(packing), least).hit,
+        factored(trial_of(packing), least).expelled,
         (ContactGraph(fewer.contacts, fewer.radius).per_disk(np.ones(len(fewer.contacts))) == 1) & ~packing.top,
     )
 

@@ -1,0 +1,104 @@
+"""Newton's matrix of large packings: the order of elimination, its fill, and solutions with factors from nearby."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.sparse import coo_array, csc_array
+from scipy.sparse.linalg import splu
+
+from faultgouge.analysis import stiffness_matrix
+from faultgouge.pywrap.elimination import elimination_order
+from faultgouge.pywrap.sparse_solver import ACCURATE, SparseSolver
+from faultgouge.studies.stability_cases.packings import crystal
+
+
+@pytest.fixture(scope="module")
+def packing():
+    return crystal(60, 60)
+
+
+@pytest.fixture(scope="module")
+def matrix(packing):
+    return stiffness_matrix(packing)
+
+
+@pytest.fixture(scope="module")
+def pairs(packing):
+    c = packing.contacts
+    return c.i[~c.floor], c.j[~c.floor]
+
+
+@pytest.fixture(scope="module")
+def solver(matrix, pairs):
+    return SparseSolver(matrix, *pairs)
+
+
+def fill(matrix, order):
+    options = {"permc_spec": order, "diag_pivot_thresh": 0.01, "options": {"SymmetricMode": True}}
+    return splu(csc_array(matrix), **options).nnz
+
+
+def test_order_is_a_permutation_that_keeps_disks_together(packing, pairs):
+    coordinates = np.flatnonzero(np.arange(3 * len(packing)) % 7)  # some are no unknowns
+    order = elimination_order(*pairs, len(packing), coordinates)
+    assert np.array_equal(np.sort(order), np.arange(len(coordinates)))
+    disks = coordinates[order] % len(packing)
+    assert np.count_nonzero(np.diff(disks)) == len(packing) - 1
+
+
+def test_fill_is_no_more_than_that_of_minimum_degree_on_the_matrix(packing, matrix, pairs):
+    order = elimination_order(*pairs, len(packing), np.arange(3 * len(packing)))
+    # on a crystal, where entries vanish by symmetry, it is little more than half
+    assert fill(matrix[order][:, order], "NATURAL") < 0.7 * fill(matrix, "MMD_AT_PLUS_A")
+
+
+def test_factors_solve(matrix, solver):
+    force = np.random.default_rng(2).standard_normal(matrix.shape[0])
+    # K has a condition number of some 1e4
+    assert_allclose(matrix @ solver.solve(force), force, atol=1e-10)
+
+
+def changed(matrix, disks):
+    """K with other stiffnesses of some disks, and without that of the first one."""
+    scale = np.ones(matrix.shape[0])
+    coordinates = np.add.outer([0, matrix.shape[0] // 3, 2 * matrix.shape[0] // 3], disks)
+    scale[coordinates[:, 1:]] = 3.0
+    scale[coordinates[:, 0]] = 0.0
+    other = (matrix * scale).T.tocsr() * scale
+    other.eliminate_zeros()
+    return other.tocsr(), coordinates[:, 0]
+
+
+def test_factors_of_a_matrix_nearby_solve(matrix, pairs, solver, monkeypatch):
+    other, gone = changed(matrix, [1234, 17, 2100])
+    nearby = SparseSolver(other, *pairs, solver)
+    monkeypatch.setattr(SparseSolver, "_factored", lambda _: pytest.fail("factored anew"))
+    force = np.random.default_rng(3).standard_normal(matrix.shape[0])
+    step = nearby.solve(force)
+    force[gone] = 0.0
+    assert not step[gone].any()
+    assert np.linalg.norm(other @ step - force) <= ACCURATE * np.linalg.norm(force)
+
+
+def test_factors_of_a_matrix_with_fewer_coordinates_solve(matrix, pairs, monkeypatch):
+    other, _ = changed(matrix, [1234, 17, 2100])
+    fewer, force = SparseSolver(other, *pairs), np.random.default_rng(3).standard_normal(matrix.shape[0])
+    fewer.solve(force)
+    monkeypatch.setattr(SparseSolver, "_factored", lambda _: pytest.fail("factored anew"))
+    step = SparseSolver(matrix, *pairs, fewer).solve(force)
+    assert np.linalg.norm(matrix @ step - force) <= ACCURATE * np.linalg.norm(force)
+
+
+def test_factors_that_do_not_serve_are_replaced(matrix, pairs, solver):
+    # half of the disks softer by far: GMRES is not done in time
+    rng = np.random.default_rng(4)
+    scale = np.tile(10.0 ** rng.uniform(-3, 0, matrix.shape[0] // 3), 3)
+    other = ((matrix * scale).T.tocsr() * scale).T.tocsr()
+    force = rng.standard_normal(matrix.shape[0])
+    step = SparseSolver(other, *pairs, solver).solve(force)
+    assert np.linalg.norm(other @ step - force) < 1e-6 * np.linalg.norm(force)
+
+
+def test_singular_matrix_has_no_solution():
+    floating = coo_array(([1.0, -1.0, -1.0, 1.0], ([0, 0, 1, 1], [0, 1, 0, 1])), shape=(6, 6)).tocsr()
+    assert SparseSolver(floating, np.array([0]), np.array([1])).solve(np.ones(6)) is None
