@@ -7,7 +7,7 @@ import pytest
 
 from faultgouge.analysis import Contacts, OnsetError, complex_windows, find_onset, follow, scan_windows, spectrum
 from faultgouge.analysis import onset as onset_module
-from faultgouge.analysis.large import first_window
+from faultgouge.analysis.large import FirstWindow, first_window
 from faultgouge.analysis.meetings import Outlook
 from faultgouge.analysis.modes import Modes, assign, full_operator, loaded
 from faultgouge.analysis.windows import deepest_dip
@@ -355,13 +355,13 @@ def test_large_packings_are_searched_for_the_first_window(ramp, monkeypatch):
 
 @pytest.mark.parametrize("half_width", [0.2, 0.03])
 def test_first_window_that_ends_within_its_increment(half_width):
-    window = first_window(crossing(0.47, -(half_width**2)), [0.0, 1.0, 2.0])
+    window = first_window(crossing(0.47, -(half_width**2)), [0.0, 1.0, 2.0]).window
     assert window.kind == "coalescence"
     assert window.fx_onset == pytest.approx(0.47 - half_width, abs=DIGITS)
     assert window.fx_end == pytest.approx(0.47 + half_width, abs=DIGITS)
 
 
 def test_first_window_of_real_eigenvalues_or_from_the_start():
-    assert first_window(crossing(0.37, 1e-3), np.linspace(0, 1, 4)) is None
-    window = first_window(normal_form(0.1), [0.2, 0.3])
+    assert first_window(crossing(0.37, 1e-3), np.linspace(0, 1, 4)) == FirstWindow(None)
+    window = first_window(normal_form(0.1), [0.2, 0.3]).window
     assert (window.kind, window.fx_onset, window.fx_end) == ("start", 0.2, None)
