@@ -294,7 +294,9 @@ class _Search:
     ) -> Iterator[_Candidate]:
         """The windows of one cluster, with its blocks interpolated between two loads."""
         increment = there[0] - here[0]
-        before, after = (_exceeding(levels.block(cluster)) for _, levels in (here, there))
+        before, after = (levels.block(cluster) for _, levels in (here, there))
+        if len(before) < len(part.active):
+            before, after = _exceeding(before), _exceeding(after)
 
         def block(fx: float) -> Floats:
             share = (fx - here[0]) / increment
