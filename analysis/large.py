@@ -10,6 +10,11 @@ slice by slice of the spectrum (:mod:`~faultgouge.analysis.slices`), each as a p
    its windows of complex eigenvalues say where to look;
 3. what appears there is confirmed with the operator itself, whose pair is continued to the edges by inverse iteration
    (:mod:`~faultgouge.analysis.tracking`).
+
+**Where the clusters are wrong.** Between two loads the projected operator is taken to be a straight line, which it is
+not where contacts open, close or slide. What the operator has instead shows it: the pair that is announced is not
+there, cannot be followed, or turns complex elsewhere. Such an increment is walked again in `PARTS` shorter ones, and
+these again, `DEPTH` times. What is in doubt even then is handed out with the result.
 """
 
 import os
@@ -23,21 +28,37 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
-from .edges import Edge, State, locate
+from .edges import Edge, LostPairError, State, locate
 from .meetings import meetings
 from .modes import Modes, Operator, Pair, span
 from .packing import Floats
 from .projection import MIXING, Cluster, Levels, Projection
+from .spectrum import believable, unit_rounding
 from .tracking import Block, continued
-from .windows import Place, Window, complex_windows, increasing, window_between
+from .windows import Place, Window, complex_windows, dip_between, increasing, window_between
 
 REACH = 0.1
 """Share of an increment by which the clusters are extrapolated: a pair that they have turn complex a little late is
-found in time."""
+found in time. Clusters are trusted as long as they are right to twice that."""
 
 FINEST = 1e-3
 """Narrowest windows of clusters that are looked for, in increments: their own error is larger."""
 
+EXCESS = 0.2
+"""What is added to the antisymmetric couplings of a cluster, in units of mixing^2 times the spacing of its levels.
+
+Whether two modes turn complex is decided by the difference of their symmetric and their antisymmetric coupling, which
+may be far smaller than both. Modes beyond a slice, and the third order, change it by about a tenth of that unit
+(360 disks, mixing of 0.17: 0.02 where the unit is 0.37), so pairs are announced from a little before, and the operator
+decides."""
+
+LOOKS = 12
+"""Loads at which the discriminant of a pair that is announced is looked at before its sign is in doubt. One or two tell
+of an avoided crossing."""
+
+PARTS, DEPTH = 4, 2
+"""Parts of an increment on which clusters have been wrong, and how often these are divided again: four cost little more
+than two while a basis passes by, and the finest are a sixteenth."""
 
 NEAR = 12
 """Modes among which a pair is looked for that the clusters announce where the operator has another one."""
@@ -50,46 +71,73 @@ AHEAD = 2
 """Increments that are looked at while the basis of a larger operator passes by: each costs a twentieth of it."""
 
 
+@dataclass(frozen=True)
+class FirstWindow:
+    """What is found of the first window.
+
+    Attributes
+    ----------
+    window : Window or None
+        None if all eigenvalues are real. Its fx_end is None if the pair is complex at the load above the onset.
+    doubtful : tuple of (float, float)
+        Increments, the finest that were made, on which clusters announce a pair that the operator was not seen to have:
+        an earlier window may hide there.
+    """
+
+    window: Window | None
+    doubtful: tuple[tuple[float, float], ...] = ()
+
+
 def first_window(
     operator: Callable[[float], Operator], forces: ArrayLike, *, narrowest: float | None = None
-) -> Window | None:
+) -> FirstWindow:
     """The first window of complex eigenvalues of a family of large matrices, without all their eigenvalues.
 
     Clusters of modes are searched as `complex_windows` does, with the projected operators interpolated linearly between
     two loads; what appears there is confirmed with the operator itself, whose pair is continued to the edges. So the
     window that is returned is as certain, and its edges have the same digits, as those of `complex_windows`. That it is
     the first rests on two things. No mode is missing, which the inertia tells. And the clusters are right: their onsets
-    were within a tenth of an increment of the confirmed ones (packings of 1,000 disks, increments of 1e-3). A pair that
-    is complex by less than their error, or for less than `FINEST` of an increment, may be missed before it.
+    were within a tenth of an increment of the confirmed ones (packings of 1,000 disks, increments of 1e-3), and where
+    they are seen to be wrong the increment is divided. A pair that is complex by less than their error, or for less
+    than `FINEST` of an increment, may be missed before it.
 
     Parameters
     ----------
     operator, forces
         As in :func:`~faultgouge.analysis.complex_windows`. Loads beyond the one above the onset are not asked for, but
-        for those of `AHEAD` increments.
+        for those of `AHEAD` increments. A RuntimeError of the operator at one of the loads is raised once no window has
+        been found before it.
     narrowest
         As in :func:`~faultgouge.analysis.find_onset`; no less than a thousandth of an increment.
 
     Returns
     -------
-    Window or None
-        None if all eigenvalues are real. fx_end is None if the pair is complex at the load above the onset.
+    FirstWindow
+
+    Raises
+    ------
+    LostPairError
+        If a pair that is complex cannot be followed to its onset, not even in the shortest increments.
+    SliceError
+        If a part of the spectrum is not found.
     """
     loads = increasing(forces)
     here = Place(float(loads[0]), csr_array(operator(float(loads[0]))))
     search = _Search(operator, narrowest or 0.0)
     ahead = 1 if here.matrix.shape[0] <= KEPT else AHEAD
-    for start in range(1, len(loads), ahead):
-        places = [here, *_reached(operator, loads[start : start + ahead])]
+    done = 1
+    while done < len(loads):
+        places = [here, *_reached(operator, loads[done : done + ahead])]
         window = search.walk(places)
         if window is not None:
-            return window
+            return FirstWindow(window, tuple(each for each in search.doubtful if each[0] < window.fx_onset))
         here = places[-1]
-    return None
+        done += len(places) - 1
+    return FirstWindow(None, tuple(search.doubtful))
 
 
 def _reached(operator: Callable[[float], Operator], loads: Floats) -> list[Place]:
-    """The operator at loads as far as there are equilibria; at the first at any rate."""
+    """The operator at loads as far as there are equilibria; the error if there is none at the first."""
     places: list[Place] = []
     for load in loads:
         try:
@@ -118,6 +166,10 @@ def _nearest_pair(modes: Modes, eigenvalue: float) -> Pair:
     return min(pairs, key=lambda pair: abs(modes.values[pair[0]].real - eigenvalue))
 
 
+class _DoubtError(RuntimeError):
+    """The clusters announce what the operator does not have."""
+
+
 def _complex_pair_near(matrix: csr_array, guess: Block) -> Block | None:
     """A complex pair among the modes about a guess that is no good, as where a contact opened; None if all are real.
 
@@ -131,10 +183,18 @@ def _complex_pair_near(matrix: csr_array, guess: Block) -> Block | None:
         start = np.random.default_rng(0).standard_normal(matrix.shape[0])
         found.append(eigs(operator, NEAR, sigma=shift, OPinv=inverse, v0=start))
     (values, right), (others, left) = found
+    rounding = unit_rounding(matrix.data)
     for k in np.argsort(np.abs(values - guess.mean)):
-        if values[k].imag > 0:
-            same = int(np.argmin(np.abs(others - values[k])))
-            return continued(matrix, Block.of(matrix, span(right[:, [k]]), span(left[:, [same]])))
+        same = int(np.argmin(np.abs(others - values[k].conj())))  # y^H A = lambda y^H is A^T y = conj(lambda) y
+        overlap = abs(np.vdot(left[:, same], right[:, k]))
+        if values[k].imag > 0 and believable(values[k], overlap, rounding):
+            block = continued(matrix, Block.of(matrix, span(right[:, [k]]), span(left[:, [same]])))
+            if block is None:
+                raise LostPairError(
+                    f"the complex pair of eigenvalues about {values[k].real:.6g} cannot be told from its neighbours: "
+                    "take smaller increments"
+                )
+            return block
     return None
 
 
@@ -145,8 +205,9 @@ class _Search:
         self.operator, self.narrowest = operator, narrowest
         self.passed: list[Place] = []
         self.kept: list[Projection] = []
+        self.doubtful: list[tuple[float, float]] = []
 
-    def walk(self, places: list[Place]) -> Window | None:
+    def walk(self, places: list[Place], depth: int = DEPTH) -> Window | None:
         """The first window that begins between the first and the last of several loads."""
         found: list[list[_Candidate]] = [[] for _ in places[1:]]
         for part in self.parts(places[0].matrix):
@@ -157,23 +218,54 @@ class _Search:
                 before = after
         for candidates, (here, there) in zip(found, pairwise(places), strict=True):
             self.passed.append(here)
-            window = self.earliest(candidates, there)
+            window, doubt = self.earliest(candidates, there, finest=depth == 0)
+            if doubt and depth > 0:
+                window = self.divided(here, there, window, depth - 1)
+            elif doubt:
+                self.doubtful.append((here.fx, there.fx))
             if window is not None:
                 return window
         return None
 
-    def earliest(self, candidates: list[_Candidate], there: Place) -> Window | None:
-        """The first window of the operator itself that one of the candidates has become."""
+    def divided(self, here: Place, there: Place, known: Window | None, depth: int) -> Window | None:
+        """The first window of an increment, from shorter ones; the one that is known already if none is before it."""
+        loads = here.fx + (there.fx - here.fx) * np.arange(1, PARTS) / PARTS
+        try:
+            between = [Place(float(load), csr_array(self.operator(float(load)))) for load in loads]
+        except RuntimeError:  # there is no equilibrium
+            self.doubtful.append((here.fx, there.fx))
+            return known
+        self.passed.pop()
+        window = self.walk([here, *between, there], depth)
+        return min((each for each in (window, known) if each), key=lambda each: each.fx_onset, default=None)
+
+    def earliest(self, candidates: list[_Candidate], there: Place, finest: bool) -> tuple[Window | None, bool]:
+        """The first window of the operator itself that one of the candidates has become, and whether that is in doubt.
+
+        At the first doubt the search ends, but for the finest increments.
+        """
         here = self.passed[-1]
+        increment = there.fx - here.fx
         first: Window | None = None
+        doubt = False
         for candidate in sorted(candidates, key=lambda candidate: candidate.onset):
             # Clusters are off by a share of the way from here: one that is far beyond cannot be first.
             if first is not None and candidate.onset - here.fx > (1 + 2 * REACH) * (first.fx_onset - here.fx):
                 break
-            window = self.confirmed(candidate, there, first)
-            if window is not None and (first is None or window.fx_onset < first.fx_onset):
-                first = window
-        return first
+            try:
+                window = self.confirmed(candidate, there, first)
+            except RuntimeError as error:
+                if finest and not isinstance(error, _DoubtError):
+                    raise
+                window, doubt = None, True
+            if window is not None:
+                late = abs(window.fx_onset - candidate.onset) > 2 * REACH * increment
+                doubt = doubt or (late and window.fx_onset > here.fx)
+                if first is None or window.fx_onset < first.fx_onset:
+                    first = window
+            if doubt and not finest:
+                break
+        return first, doubt
 
     def parts(self, matrix: csr_array) -> Iterable[Projection]:
         """Projections of all modes, those of an earlier load as long as they serve."""
@@ -181,7 +273,7 @@ class _Search:
             mixing = [each for part in self.kept for each in part.mixing(part.onto(matrix))]
             if np.median(mixing) < MIXING:
                 return self.kept
-        parts = Projection.parts(matrix, workers=len(os.sched_getaffinity(0)))
+        parts = Projection.parts(matrix, workers=_cores())
         if matrix.shape[0] > KEPT:
             return parts
         self.kept = list(parts)
@@ -201,15 +293,17 @@ class _Search:
         self, part: Projection, cluster: Cluster, here: tuple[float, Levels], there: tuple[float, Levels]
     ) -> Iterator[_Candidate]:
         """The windows of one cluster, with its blocks interpolated between two loads."""
-        span = there[0] - here[0]
-        before, after = here[1].block(cluster), there[1].block(cluster)
+        increment = there[0] - here[0]
+        before, after = (levels.block(cluster) for _, levels in (here, there))
+        if len(before) < len(part.active):
+            before, after = _exceeding(before), _exceeding(after)
 
         def block(fx: float) -> Floats:
-            share = (fx - here[0]) / span
+            share = (fx - here[0]) / increment
             return (1 - share) * before + share * after
 
-        reach = there[0] + REACH * span
-        for window in complex_windows(block, [here[0], reach], narrowest=max(self.narrowest, FINEST * span)):
+        reach = there[0] + REACH * increment
+        for window in complex_windows(block, [here[0], reach], narrowest=max(self.narrowest, FINEST * increment)):
             end = reach if window.fx_end is None else window.fx_end
             inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
             modes = Modes.of(inside, block(inside))
@@ -223,10 +317,10 @@ class _Search:
         inside = self.complex_state(candidate, there)
         if inside is None or (first is not None and self.later(inside, first)):
             return None
-        above = inside if inside.fx == there[0] else inside.at(*there)
+        above = inside if inside.fx == there.fx else inside.at(*there)
         end = locate(self.operator, inside, above)[0] if above.discriminant > 0 else None
         for place in reversed(self.passed):
-            below = inside if inside.fx == place[0] else inside.at(*place)
+            below = inside if inside.fx == place.fx else inside.at(*place)
             if below.discriminant > 0:
                 return window_between(locate(self.operator, below, inside)[0], end)
             inside = below
@@ -238,28 +332,48 @@ class _Search:
         return inside.fx > onset and inside.at(onset, self.operator(onset)).discriminant > 0
 
     def complex_state(self, candidate: _Candidate, there: Place) -> State | None:
-        """The pair at a load where it is complex, if there is one near the candidate's window."""
+        """The pair at a load where it is complex; None if it is surely real, or not before these loads are passed."""
         fx = candidate.inside
-        matrix = there[1] if fx == there[0] else csr_array(self.operator(fx))
+        matrix = there.matrix if fx == there.fx else csr_array(self.operator(fx))
         guess = Block.of(matrix, candidate.right, candidate.left)
         block = continued(matrix, guess) or _complex_pair_near(matrix, guess)
+        if block is not None and block.discriminant < 0:
+            return State(fx, matrix, block)
+        if candidate.onset > there.fx:
+            return None  # it is looked for on the next increment
         if block is None:
-            return None
-        start = State(fx, matrix, block)
-        if start.discriminant < 0:
-            return start
-        # A parabola through D at the ends of the increment and here has its minimum where D is least.
-        places = [self.passed[-1], there] if fx < there[0] else [self.passed[-1]]
-        others = [start.at(*place) for place in places]
-        for other in others:
-            if other.discriminant < 0:
-                return other
-        if len(others) < 2:
-            return None
-        states = sorted([start, *others], key=lambda state: state.fx)
-        curve = np.polyfit([state.fx for state in states], [state.discriminant for state in states], 2)
-        lowest = float(-0.5 * curve[1] / curve[0])
-        if curve[0] <= 0 or not states[0].fx < lowest < states[-1].fx:
-            return None
-        state = start.at(lowest, self.operator(lowest))
-        return state if state.discriminant < 0 else None
+            raise _DoubtError
+        try:
+            return self.dipping(State(fx, matrix, block), there)
+        except LostPairError as error:
+            raise _DoubtError from error
+
+    def dipping(self, start: State, there: Place) -> State | None:
+        """A pair where it is complex, from a load where it is real; None if it surely is so on all of the increment."""
+        here = self.passed[-1]
+        narrowest = max(self.narrowest, FINEST * (there.fx - here.fx))
+        states = [start, *(start.at(*place) for place in (here, there) if place.fx != start.fx)]
+        for _ in range(LOOKS):
+            complex_ones = [state for state in states if state.discriminant < 0]
+            if complex_ones:
+                return complex_ones[0]
+            states.sort(key=lambda state: state.fx)
+            width, fx = max(dip_between(below, above) for below, above in pairwise(states))
+            if width <= narrowest:
+                return None
+            nearest = min(states, key=lambda state: abs(state.fx - fx))
+            states.append(nearest.at(fx, self.operator(fx)))
+        raise _DoubtError
+
+
+def _exceeding(block: Floats) -> Floats:
+    """The operator in a cluster with its antisymmetric couplings enlarged by what they may be in error."""
+    levels = np.diag(block)
+    width = max(float(np.ptp(levels)), np.finfo(np.float64).tiny)
+    mixing = float(np.linalg.norm(block - np.diag(levels))) / width
+    return block + EXCESS * mixing**2 * width / len(levels) * np.sign(block - block.T)
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

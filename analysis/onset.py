@@ -61,10 +61,14 @@ class Onset:
         By increasing onset; at least one.
     complete : bool
         Whether these are all up to the largest load. Of a large packing only the first is sought.
+    doubtful : tuple of (float, float)
+        Of a large packing, increments before the onset in which a pair was expected and not found: an earlier window
+        may hide there, which smaller increments would tell.
     """
 
     windows: tuple[Window, ...]
     complete: bool = True
+    doubtful: tuple[tuple[float, float], ...] = ()
 
     @property
     def fx_c(self) -> float:
@@ -77,11 +81,12 @@ class Onset:
         return self.windows[0].error
 
     def as_dict(self) -> dict[str, Any]:
-        """{"fx_c", "error", "windows": [...]} of plain numbers, for JSON."""
+        """{"fx_c", "error", "windows": [...], "doubtful": [[from, to], ...]} of plain numbers, for JSON."""
         return {
             "fx_c": self.fx_c,
             "error": self.error,
             "windows": [window.as_dict() for window in self.windows],
+            "doubtful": [list(increment) for increment in self.doubtful],
         }
 
 
@@ -120,6 +125,8 @@ def find_onset(
     ------
     OnsetError
         If all eigenvalues are real at every load.
+    LostPairError, SliceError
+        Of a large packing, see :func:`first_window`.
     ValueError
         If the loads are not at least two increasing numbers.
     """
@@ -137,11 +144,19 @@ def find_onset(
         return unbalanced[min(unbalanced, key=lambda known: abs(known - fx))]
 
     complete = len(start) <= ALL_WINDOWS
+    doubtful: tuple[tuple[float, float], ...] = ()
     if complete:
         found = complex_windows(operator, loads, narrowest=narrowest)
     else:
         first = first_window(operator, loads, narrowest=narrowest)
-        found = () if first is None else (first,)
+        found = () if first.window is None else (first.window,)
+        doubtful = first.doubtful
+    if doubtful and not found:
+        below, above = doubtful[0]
+        raise OnsetError(
+            f"No pair of eigenvalues was found to become complex up to fx = {loads[-1]:.17g}, but one was expected "
+            f"between {below:.10g} and {above:.10g}: take smaller increments, or raise the largest load."
+        )
     if not found:
         raise OnsetError(f"No pair of eigenvalues becomes complex up to fx = {loads[-1]:.17g}: raise the largest load.")
     windows = tuple(
@@ -152,7 +167,7 @@ def find_onset(
         )
         for window in found
     )
-    return Onset(windows, complete)
+    return Onset(windows, complete, doubtful)
 
 
 def scan_windows(packings: Sequence[Packing], form: Form = "consistent") -> tuple[Window, ...]:

@@ -333,12 +333,7 @@ def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
 def largest_frequency(packing: Packing, form: Form = "consistent") -> float:
     """omega_max = max sqrt|lambda|; to `LIMIT`, by Arnoldi's iteration (ARPACK), beyond `DENSE` coordinates.
 
-    Parameters
-    ----------
-    packing : Packing
-        The configuration.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
+    Its arguments are those of :func:`~faultgouge.analysis.dynamical_matrix`.
 
     Returns
     -------

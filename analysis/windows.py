@@ -267,6 +267,22 @@ def deepest_dip(d0: Floats, s0: Floats, d1: Floats, s1: Floats) -> tuple[Floats,
     return np.minimum(width, 1.0), t[deepest]
 
 
+def dip_between(here: State, there: State) -> tuple[float, float]:
+    """Where the discriminant of a pair may change its sign and back between two loads at which it has the same one.
+
+    Returns
+    -------
+    width : float
+        Of the widest stretch on which it may have the other sign, force; zero if it surely keeps its own.
+    fx : float
+        The load at which it is closest to zero, or deepest beyond.
+    """
+    sign, change, increment = np.sign(here.discriminant), there.matrix - here.matrix, there.fx - here.fx
+    ends = ((state.discriminant, state.block.slope(change)) for state in (here, there))
+    width, at = deepest_dip(*(sign * np.array([number]) for end in ends for number in end))
+    return float(width[0]) * increment, here.fx + float(at[0]) * increment
+
+
 class OpenWindows:
     """The windows that are open at the load reached so far, by the blocks of their pairs there; and the closed ones."""
 
@@ -410,10 +426,7 @@ class _Search:
         """Whether the discriminant of a pair surely has one sign between two loads."""
         if here.discriminant * there.discriminant <= 0:
             return False
-        sign, change = np.sign(here.discriminant), there.matrix - here.matrix
-        ends = ((state.discriminant, state.block.slope(change)) for state in (here, there))
-        width, _ = deepest_dip(*(sign * np.array([number]) for end in ends for number in end))
-        return bool(width[0] * (there.fx - here.fx) <= self.narrowest)
+        return dip_between(here, there)[0] <= self.narrowest
 
     def walk(self, here: Modes, there: Modes) -> None:
         """Go from one load to the next."""

@@ -183,6 +183,11 @@ def onset(
             run = onset_run(wanted, mu)
         found.append({"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond})
         _say(f"mu = {mu:g}: F_x^c = {run.onset.fx_c:.12g} +- {run.onset.error:.1g}")
+        for below, above in run.onset.doubtful:
+            _say(
+                f"a pair was expected to become complex between F_x = {below:.6g} and {above:.6g}, and was not found: "
+                "an earlier onset may hide there; take smaller increments to be sure"
+            )
     result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
     if output and _is_root():
         output.write_text(json.dumps(result, indent=1) + "\n")

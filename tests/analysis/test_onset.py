@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Contacts, OnsetError, complex_windows, find_onset, follow, scan_windows, spectrum
+from faultgouge.analysis import large as large_module
 from faultgouge.analysis import onset as onset_module
-from faultgouge.analysis.large import first_window
+from faultgouge.analysis.edges import LostPairError
+from faultgouge.analysis.large import FirstWindow, first_window
 from faultgouge.analysis.meetings import Outlook
 from faultgouge.analysis.modes import Modes, assign, full_operator, loaded
 from faultgouge.analysis.windows import deepest_dip
@@ -355,13 +357,80 @@ def test_large_packings_are_searched_for_the_first_window(ramp, monkeypatch):
 
 @pytest.mark.parametrize("half_width", [0.2, 0.03])
 def test_first_window_that_ends_within_its_increment(half_width):
-    window = first_window(crossing(0.47, -(half_width**2)), [0.0, 1.0, 2.0])
+    window = first_window(crossing(0.47, -(half_width**2)), [0.0, 1.0, 2.0]).window
     assert window.kind == "coalescence"
     assert window.fx_onset == pytest.approx(0.47 - half_width, abs=DIGITS)
     assert window.fx_end == pytest.approx(0.47 + half_width, abs=DIGITS)
 
 
 def test_first_window_of_real_eigenvalues_or_from_the_start():
-    assert first_window(crossing(0.37, 1e-3), np.linspace(0, 1, 4)) is None
-    window = first_window(normal_form(0.1), [0.2, 0.3])
+    assert first_window(crossing(0.37, 1e-3), np.linspace(0, 1, 4)) == FirstWindow(None)
+    window = first_window(normal_form(0.1), [0.2, 0.3]).window
     assert (window.kind, window.fx_onset, window.fx_end) == ("start", 0.2, None)
+
+
+def test_first_window_where_the_operator_is_no_straight_line():
+    """Levels that cross at 0.906 of an increment, and at 0.5 of the straight line between its ends."""
+    found = first_window(lambda f: crossing(0.0, -0.0025)(2 * f**7 - 1), [0.0, 1.0])
+    window = found.window
+    assert window.fx_onset == pytest.approx((0.5 - 0.025) ** (1 / 7), abs=DIGITS)
+    assert window.fx_end == pytest.approx((0.5 + 0.025) ** (1 / 7), abs=DIGITS)
+    assert found.doubtful == ()
+
+
+@pytest.mark.parametrize("ahead", [1, 2, 3])
+def test_load_without_equilibrium_ends_the_search_for_the_first_window(ahead, monkeypatch):
+    """As it does where all eigenvalues are computed, and not before what lies below it has been looked at."""
+    monkeypatch.setattr(large_module, "KEPT", 0)
+    monkeypatch.setattr(large_module, "AHEAD", ahead)
+
+    def ending(operator):
+        def until(f):
+            if f > 1.5:
+                raise RuntimeError("no equilibrium")
+            return operator(f)
+
+        return until
+
+    for search in (complex_windows, first_window):
+        with pytest.raises(RuntimeError, match="no equilibrium"):
+            search(ending(crossing(0.37, 1e-3)), [0.0, 1.0, 2.0])
+    window = first_window(ending(crossing(0.5, -0.04)), [0.0, 1.0, 2.0]).window
+    assert window.fx_onset == pytest.approx(0.3, abs=DIGITS)
+
+
+def test_pair_that_cannot_be_followed_is_not_lost_silently(monkeypatch):
+    """A pair that ARPACK has complex, and whose plane inverse iteration does not find."""
+    monkeypatch.setattr(large_module, "continued", lambda *_: None)
+    with pytest.raises(LostPairError, match="take smaller increments"):
+        first_window(crossing(0.47, -0.04), [0.0, 1.0])
+
+
+def test_pair_that_is_announced_and_not_found_is_told_of(monkeypatch):
+    """Clusters that announce a pair of which the operator knows nothing: the shortest increments about it are named."""
+    monkeypatch.setattr(large_module, "continued", lambda *_: None)
+    monkeypatch.setattr(large_module, "_complex_pair_near", lambda *_: None)
+    found = first_window(crossing(0.47, -0.04), [0.0, 1.0])
+    assert found.window is None
+    widths = np.diff(found.doubtful, axis=1)
+    np.testing.assert_allclose(widths, 1 / 16)
+    assert found.doubtful[0][0] < 0.27 < 0.67 < found.doubtful[-1][1]
+
+
+@pytest.mark.parametrize("opens", [True, False])
+def test_doubtful_increments_come_with_the_onset(ramp, opens, monkeypatch):
+    path = ramp(1.0, 1e-3, 22)
+    (window,) = find_onset(path, path.grid[20:]).windows
+    found = FirstWindow(window if opens else None, ((0.0125, 0.01275),))
+
+    def search(operator, loads, **_):
+        operator(loads[-1])
+        return found
+
+    monkeypatch.setattr(onset_module, "first_window", search)
+    monkeypatch.setattr(onset_module, "ALL_WINDOWS", 50)
+    if opens:
+        assert find_onset(path, path.grid[20:]).as_dict()["doubtful"] == [[0.0125, 0.01275]]
+    else:
+        with pytest.raises(OnsetError, match=r"expected between 0\.0125 and 0\.01275: take smaller increments"):
+            find_onset(path, path.grid[20:])

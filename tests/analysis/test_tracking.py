@@ -154,7 +154,7 @@ def test_projection_is_given_up_where_modes_mix_or_disks_move_in(ramp):
 @pytest.mark.parametrize("mu", [1.0, 0.8])
 def test_first_window_of_the_reference(ramp, mu):
     path = ramp(mu, 1e-3, 22)
-    window = first_window(lambda fx: full_operator(path(fx)), path.grid[12:21] if mu == 0.8 else path.grid[12:])
+    window = first_window(lambda fx: full_operator(path(fx)), path.grid[12:21] if mu == 0.8 else path.grid[12:]).window
     assert window.kind == "coalescence"
     assert window.fx_onset == pytest.approx({1.0: 0.0218330564080, 0.8: 0.0191432059561}[mu], rel=1e-9)
 
@@ -190,7 +190,7 @@ def test_first_window_of_a_thousand_disks(ramp):
     def operator(fx):
         return full_operator(tiled(path(fx), 10))
 
-    window = first_window(operator, path.grid)
+    window = first_window(operator, path.grid).window
     assert window.kind == "coalescence"
     assert window.error < 1e-9
     distance = 1e-6

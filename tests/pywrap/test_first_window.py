@@ -1,0 +1,35 @@
+"""The first window of complex eigenvalues of settled packings of hundreds of disks, against LAPACK."""
+
+import numpy as np
+import pytest
+from scipy.linalg import eigvals
+
+from faultgouge.analysis import find_onset
+from faultgouge.analysis.modes import full_operator
+from faultgouge.analysis.spectrum import unit_rounding
+from faultgouge.pywrap import Engine, Scene, settle
+from faultgouge.pywrap.stages import EquilibriumPath
+
+
+@pytest.mark.slow
+def test_no_pair_is_complex_below_the_first_window():
+    """360 disks, whose first pair is complex by 3e-5 of itself: by less than clusters of modes may be in error."""
+    disks, seed = 360, 5
+    packing = {"disks": disks, "width": 22.6, "seed": seed}
+    ramp = {"step": 2 / disks, "until": 6 / disks}
+    scene = Scene.from_mapping({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": ramp})
+    start = settle(scene)
+    with Engine(start.packing) as engine:
+        path = EquilibriumPath(engine, start, scene)
+        onset = find_onset(path, ramp["step"] * np.arange(4))
+        assert not onset.complete
+        assert onset.doubtful == ()
+        distance = 1e-3 * ramp["step"]
+        below = np.linspace(0, onset.fx_c - distance, 5)
+        imaginary = []
+        for fx in [*below, onset.fx_c + distance]:
+            matrix = full_operator(path(float(fx)))
+            imaginary.append(np.abs(eigvals(matrix.toarray(), check_finite=False).imag).max())
+    # A double eigenvalue is uncertain by the root of u |A| times its coupling, which is of order 1.
+    noise = 10 * np.sqrt(unit_rounding(matrix.data))
+    assert max(imaginary[:-1]) < noise < imaginary[-1]
