@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -155,7 +155,7 @@ class Engine:
         self._rows = ContactRows(packing.radius, packing.compensated)
         self._written: Packing | None = None  # the packing of _arrays
         self._kept: Trial | None = None
-        self._displaces = False
+        self._displaces = False  # whether fix displace/disc is there
         self._load(packing)
 
     def __enter__(self) -> Engine:
@@ -169,6 +169,7 @@ class Engine:
     @property
     def lammps(self) -> Any:
         """The LAMMPS instance, for what it holds and for commands that the driver does not cover."""
+        self._end_displacing()
         return self._lammps
 
     @property
@@ -189,10 +190,14 @@ class Engine:
     def set_fx(self, fx: float) -> None:
         """Set the force along x on each disk of the upper layer."""
         self._fx = float(fx)
-        self._command(f"fix load top addforce {self._fx!r} {-self._static.fy!r} 0.0")
+        if self._displaces:
+            self._lammps.set_internal_variable("load", self._fx)
+        else:
+            self._load_top(repr(self._fx))
 
     def restore(self, packing: Packing) -> None:
         """Put the disks, slips and load of a packing back, to the bit."""
+        self._end_displacing()
         self._write(packing)
         self.set_fx(packing.fx)
 
@@ -276,18 +281,15 @@ class Engine:
         with self.displacing() as displaced:
             return displaced(base, displacement).packing
 
-    @contextmanager
-    def displacing(self) -> Iterator[Callable[[Packing, Floats], Trial]]:
-        """A function that does the same and returns a `Trial`, for many displacements in turn."""
-        self._command("timestep 1.0")
-        with self._displacement():
-            self._displaces = True
-            try:
-                yield self._displaced
-            finally:
-                self._displaces = False
+    def displacing(self) -> AbstractContextManager[Callable[[Packing, Floats], Trial]]:
+        """A function that does the same and returns a `Trial`, for many displacements in turn.
+
+        What LAMMPS needs for it stays from one increment to the next, and goes when something else is asked for.
+        """
+        return nullcontext(self._displaced)
 
     def _displaced(self, base: Packing, displacement: Floats) -> Trial:
+        self._begin_displacing()
         velocity = displacement.reshape(3, -1).T.copy()
         velocity[:, 2] /= base.radius
         self._write(base, velocity)
@@ -295,6 +297,25 @@ class Engine:
         if not base.law.frictional:
             self._angle = base.angle + velocity[:, 2]
         return self._trial()
+
+    def _begin_displacing(self) -> None:
+        if self._displaces:
+            return
+        self._command("timestep 1.0")
+        self._command(f"variable load internal {self._fx!r}")
+        self._load_top("v_load")
+        rotation = "yes" if self._static.law.frictional else "no"
+        self._command(f"fix move all displace/disc rotation {rotation}" + " compensated" * self._static.compensated)
+        self._displaces = True
+
+    def _end_displacing(self) -> None:
+        if self._displaces:
+            self._displaces = False
+            self._command("unfix move")
+            self.set_fx(self._fx)
+
+    def _load_top(self, fx: str) -> None:
+        self._command(f"fix load top addforce {fx} {-self._static.fy!r} 0.0")
 
     def keep(self, trial: Trial) -> Packing:
         """The packing of a trial, for displacements from there: LAMMPS is then given what it gave."""
@@ -403,9 +424,9 @@ class Engine:
             self._include("system.in")
         self._disks.scatter("rmass", packing.mass)
         if law.frictional or packing.compensated:
-            with self._displacement():
-                self._command("run 0 post no")  # makes the fixes slips and low
-            self._write(packing)
+            self._begin_displacing()
+            self._command("run 0 post no")  # makes the fixes slips and low
+            self.restore(packing)
 
     def _write(self, packing: Packing, velocity: Floats | float = 0.0) -> None:
         """Positions, angles and slips of a packing into LAMMPS, and velocities (v_x, v_y, omega), shape (N, 3); they
@@ -478,10 +499,6 @@ class Engine:
         force = self._force(state)
         return Trial(self._static, self._fx, position, low, angle, graph, slip, slip_low, force, arrays)
 
-    def _displacement(self) -> AbstractContextManager[None]:
-        keywords = f"rotation {'yes' if self._static.law.frictional else 'no'}"
-        return self._fix("move", f"all displace/disc {keywords}" + " compensated" * self._static.compensated)
-
     def _variables(self, **values: object) -> None:
         for name, value in values.items():
             text = repr(float(value)) if isinstance(value, float) else str(value)
@@ -511,6 +528,7 @@ class Engine:
         self._command(f"unfix {name}")
 
     def _include(self, deck: str) -> None:
+        self._end_displacing()
         self._command(f'include "{DECKS / deck}"')
 
     def _command(self, command: str) -> None:
