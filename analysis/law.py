@@ -165,7 +165,7 @@ class MindlinLaw:
             return Derivatives(normal_force, zero, normal_stiffness, zero, zero)
         limit = overlap * (self.mu * self.kn / self.kt)
         slip = np.minimum(np.maximum(slip, -limit), limit)
-        if np.all(limit > 0):
+        if limit.all():
             x, steep = np.abs(slip) / limit, slip / root
         else:  # an open contact has no slip either
             x, steep = _ratio(np.abs(slip), limit), _ratio(slip, root)

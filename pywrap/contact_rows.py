@@ -73,17 +73,18 @@ class ContactRows:
         if not self._same(partners, touching):
             self._seen = partners.copy(), touching
             i, place = np.nonzero(partners > np.arange(1, len(slips) + 1)[:, None])
-            self._disk = np.flatnonzero(touching)
+            disk = np.flatnonzero(touching)
             self._place = i * slips.shape[1] + 2 + self.width * place
+            self._floor_place = disk * floor.shape[1] + FLOOR_SLIP
             j = partners[i, place].astype(np.int64) - 1
-            i = np.concatenate([i, self._disk])
-            j = np.concatenate([j, np.full(len(self._disk), FLOOR)])
+            i = np.concatenate([i, disk])
+            j = np.concatenate([j, np.full(len(disk), FLOOR)])
             self._graph = ContactGraph(Contacts(i, j, np.zeros(len(i))), self._radius)
-        flat = slips.ravel()
-        slip = np.concatenate([flat[self._place], floor[self._disk, FLOOR_SLIP]])
+        slip = np.concatenate([slips.take(self._place), floor.take(self._floor_place)])
         if not self._compensated:
             return self._graph, slip, None
-        return self._graph, slip, np.concatenate([flat[self._place + 1], floor[self._disk, FLOOR_SLIP_LOW]])
+        low = slips.take(self._place + 1), floor.take(self._floor_place + FLOOR_SLIP_LOW - FLOOR_SLIP)
+        return self._graph, slip, np.concatenate(low)
 
     def _same(self, partners: Floats, touching: NDArray[np.bool_]) -> bool:
         """Whether these are the contacts of the last rows that were read."""

@@ -143,6 +143,8 @@ class Engine:
 
         self.communicator = communicator or MPI.COMM_WORLD
         self._static, self._fx = packing, packing.fx
+        ones = np.ones(len(packing))
+        self._levers = np.stack([ones, ones, packing.radius])  # of forces and torques, and of displacements and turns
         self._angle = packing.angle
         self._weakening = False
         arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none"]
@@ -156,6 +158,7 @@ class Engine:
         self._written: Packing | None = None  # the packing of _arrays
         self._kept: Trial | None = None
         self._displaces = False  # whether fix displace/disc is there
+        self._set_up = False  # whether LAMMPS is, for the next displacement
         self._load(packing)
 
     def __enter__(self) -> Engine:
@@ -183,9 +186,7 @@ class Engine:
         return self._force(self._state())
 
     def _force(self, state: Floats) -> Floats:
-        force = state[:, FORCE].T.copy()
-        force[2] = force[2] / self._static.radius if self._static.law.frictional else 0.0
-        return force.ravel()
+        return np.divide(state[:, FORCE].T, self._levers, order="C").ravel()
 
     def set_fx(self, fx: float) -> None:
         """Set the force along x on each disk of the upper layer."""
@@ -290,10 +291,11 @@ class Engine:
 
     def _displaced(self, base: Packing, displacement: Floats) -> Trial:
         self._begin_displacing()
-        velocity = displacement.reshape(3, -1).T.copy()
-        velocity[:, 2] /= base.radius
+        velocity = (displacement.reshape(3, -1) / self._levers).T
         self._write(base, velocity)
-        self._command("run 1 post no")
+        setup, self._set_up = "pre no " if self._set_up else "", False
+        self._command(f"run 1 {setup}post no")
+        self._set_up = True
         if not base.law.frictional:
             self._angle = base.angle + velocity[:, 2]
         return self._trial()
@@ -306,7 +308,7 @@ class Engine:
         self._load_top("v_load")
         rotation = "yes" if self._static.law.frictional else "no"
         self._command(f"fix move all displace/disc rotation {rotation}" + " compensated" * self._static.compensated)
-        self._displaces = True
+        self._displaces, self._set_up = True, False
 
     def _end_displacing(self) -> None:
         if self._displaces:

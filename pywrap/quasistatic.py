@@ -240,7 +240,7 @@ def _iterated(
         if best is not None and residual <= (force_tolerance if force_tolerance is not None else 0.1 * floor):
             return best, evaluation + moves
         # What is not rounding falls by no less than it did the time before: it may be far below the floor now.
-        factor = last / earlier if np.isfinite(earlier) else GAIN
+        factor = last / earlier if earlier < np.inf else GAIN
         if best is not None and residual < floor and factor * last < 0.1 * floor:
             return best, evaluation + moves
         # the same factors would lead to the floor
@@ -248,7 +248,7 @@ def _iterated(
         if factors is None or not (sufficient or (len(base) > SPARING and residual <= KEPT * last)):
             floor = trial.floor
             hit = _hit(trial, loose) & ~moved
-            if np.any(hit):
+            if hit.any():
                 displacement = _out_of_the_way(trial.packing, np.flatnonzero(hit), displacement)
                 trial = displaced(base, displacement)
                 residual = trial.residual
@@ -258,7 +258,7 @@ def _iterated(
         step = None if factors is None else factors.solve(trial.force)
         if factors is None or step is None or _too_long(step, base):
             return None, evaluation + moves
-        if evaluation <= FREEING:
+        if evaluation <= FREEING and factors.hit.any():
             step.reshape(3, -1)[:, factors.hit] *= 1.5
         if base.compensated and residual < 10 * trial.rounded(
             trial.coordinate_rounding + EPSILON * np.abs(displacement).max()
@@ -270,7 +270,7 @@ def _iterated(
 
 def _carrying(trial: Trial) -> Floats:
     """Number of contacts of each disk that carry something, shape (N,)."""
-    return trial.graph.per_disk(trial.derivatives.normal_force > trial.floor)
+    return trial.graph.count(trial.derivatives.normal_force > trial.floor)
 
 
 def _loose(trial: Trial) -> Booleans:
