@@ -315,6 +315,7 @@ class Engine:
             self._displaces = False
             self._command("unfix move")
             self.set_fx(self._fx)
+            self._command("variable load delete")
 
     def _load_top(self, fx: str) -> None:
         self._command(f"fix load top addforce {fx} {-self._static.fy!r} 0.0")

@@ -20,9 +20,10 @@ displacements count from the iterate. What is left, :math:`q'`, is of order :mat
 start at an iterate changes them by :math:`|q| |q'|`, which is less than they can resolve.
 
 The first step needs no forces: at an equilibrium they are those of the increment on the upper layer, and the iteration
-starts from the linear response to these. Between equilibria q is nearly proportional to the increment, too: where a
-third one is known, its displacement in proportion saves a factorisation. The ramp of an onset takes the equilibrium
-before the last; a ramp that is stored does not, so that it goes on to the bit where it was cut off.
+starts from the linear response to these. Its factors of K serve the next iterations, too, as long as these converge
+fast: a small increment takes no others. Between equilibria q is nearly proportional to the increment: where a third one
+is known, its displacement in proportion is a better start. The ramp of an onset takes the equilibrium before the last;
+a ramp that is stored does not, so that it goes on to the bit where it was cut off.
 
 A rattler that a neighbour runs into on the way is moved to the middle of its cage: it carries nothing, and where it
 lies is no matter (:mod:`~faultgouge.pywrap.rattlers`).
@@ -32,6 +33,7 @@ Where Newton fails the increment is halved, since the path matters: friction rem
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,8 +61,12 @@ FREEING = 3
 step: its force goes as delta^(3/2), a root of that order, and the factor makes the convergence quadratic again. Later
 ones take Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
 
+SPARED = 3
+"""Iterations that are made with the factors of K at hand if these suffice to reach the floor. New ones cost as much as
+two iterations at 100 disks, and one or two more follow."""
+
 SPARING = 300
-"""Disks beyond which factors of K are used again: a factorisation costs ten force evaluations and more."""
+"""Disks beyond which factors of K are used on whatever is left to go: new ones cost ten force evaluations and more."""
 
 KEPT = 0.1
 """Factor of the residual in one iteration up to which the factors of K are good for another one."""
@@ -102,6 +108,24 @@ class Equilibrium:
     def fx(self) -> float:
         """F_x on each disk of the upper layer."""
         return self.packing.fx
+
+
+class Guess(NamedTuple):
+    """Where an iteration starts.
+
+    Attributes
+    ----------
+    displacement : ndarray, shape (3N,)
+        (dx.., dy.., R dtheta..), length.
+    factors : Factors, optional
+        Those of K that it was found with.
+    answers : float
+        The largest force that it answers.
+    """
+
+    displacement: Floats
+    factors: Factors | None = None
+    answers: float = np.inf
 
 
 def rounding_floor(packing: Packing, displaced: float = 0.0) -> float:
@@ -173,7 +197,7 @@ def equilibrate(
             here, target = found, fx
 
 
-def _response(engine: Engine, last: Equilibrium, fx: float) -> Floats | None:
+def _response(engine: Engine, last: Equilibrium, fx: float) -> Guess | None:
     """The linear response to the increment, which is Newton's first step; None where there is none."""
     packing = last.packing
     if fx == packing.fx:
@@ -183,15 +207,15 @@ def _response(engine: Engine, last: Equilibrium, fx: float) -> Floats | None:
     trial = engine.kept(packing)
     factors = factored(trial, trial.floor)
     step = None if factors is None else factors.solve(push)
-    return None if step is None or _too_long(step, packing) else step
+    return None if step is None or _too_long(step, packing) else Guess(step, factors, abs(fx - packing.fx))
 
 
-def _in_proportion(last: Equilibrium, beside: Equilibrium, fx: float) -> Floats:
+def _in_proportion(last: Equilibrium, beside: Equilibrium, fx: float) -> Guess:
     """The displacement from one equilibrium to another, (dx.., dy.., R dtheta..), in proportion to the increment."""
     a, b = last.packing, beside.packing
     moved = nearest_image(b.position - a.position, a.box_length)
     displacement = np.concatenate([moved[:, 0], moved[:, 1], b.scaled_angle - a.scaled_angle])
-    return displacement * ((fx - last.fx) / (beside.fx - last.fx))
+    return Guess(displacement * ((fx - last.fx) / (beside.fx - last.fx)))
 
 
 def _too_long(step: Floats, packing: Packing) -> bool:
@@ -200,7 +224,7 @@ def _too_long(step: Floats, packing: Packing) -> bool:
 
 
 def _newton(
-    engine: Engine, base: Packing, force_tolerance: float | None, guess: Floats | None = None
+    engine: Engine, base: Packing, force_tolerance: float | None, guess: Guess | None = None
 ) -> tuple[Equilibrium | None, int]:
     """Newton's method from one base at the engine's fx; None where it does not converge."""
     with engine.displacing() as displaced:
@@ -214,23 +238,21 @@ def _iterated(
     displaced: Callable[[Packing, Floats], Trial],
     start: Trial,
     force_tolerance: float | None,
-    guess: Floats | None,
+    guess: Guess | None,
 ) -> tuple[Trial | None, int]:
     base, loose = start.packing, _loose(start)
-    displacement = np.zeros(3 * len(base)) if guess is None else guess
+    displacement, factors, last = guess or Guess(np.zeros(3 * len(base)))
     best: Trial | None = None
-    factors: Factors | None = None
+    floor = start.floor
     worse = 0  # iterations that gained nothing; changes of contacts cost some
     moved, moves = np.zeros(len(base), dtype=np.bool_), 0  # rattlers that are out of the way
-    earlier = last = np.inf  # residuals of the two iterations before
+    earlier = np.inf  # residual of the iteration before the last
     for evaluation in range(1, ITERATIONS + 1):
         trial = displaced(base, displacement)
         residual = trial.residual
-        if factors is None:
-            floor = trial.floor
         if best is not None and residual > 0.5 * best.residual:
-            if best.residual < 10 * floor:
-                return best, evaluation + moves
+            if best.residual < 10 * floor:  # below the floor the one that moved less is as good
+                return (trial if floor < best.residual > residual else best), evaluation + moves
             worse += 1
             if worse > FRUITLESS:
                 return None, evaluation + moves
@@ -243,8 +265,8 @@ def _iterated(
         factor = last / earlier if earlier < np.inf else GAIN
         if best is not None and residual < floor and factor * last < 0.1 * floor:
             return best, evaluation + moves
-        # the same factors would lead to the floor
-        sufficient = residual * (residual / last) < 0.1 * floor
+        # the same factors would lead to the floor soon
+        sufficient = residual * (residual / last) ** SPARED < 0.1 * floor
         if factors is None or not (sufficient or (len(base) > SPARING and residual <= KEPT * last)):
             floor = trial.floor
             hit = _hit(trial, loose) & ~moved
