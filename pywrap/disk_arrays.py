@@ -1,12 +1,12 @@
 """Numbers of the disks, into LAMMPS and out of it.
 
 Arrays stand in the order of IDs, and every rank has the whole of them. LAMMPS's library reads and writes NumPy's
-memory; by way of LAMMPS's Python module there would be copies in between, and every call three times as long.
+memory; by way of LAMMPS's Python module there would be copies in between.
 """
 
 from collections.abc import Callable
 from ctypes import POINTER, c_int
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,17 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 DOUBLE = 1
+
+
+class _Channel(NamedTuple):
+    """How one array goes in and out, by way of memory whose address is looked up once."""
+
+    gather: Callable[..., None]
+    scatter: Callable[..., None]
+    name: bytes
+    columns: int
+    values: Floats
+    address: int
 
 
 class DiskArrays:
@@ -35,29 +46,35 @@ class DiskArrays:
         self._extract_fix = self._library["lammps_extract_fix"]  # a function of our own: that of the module is shared
         self._extract_fix.argtypes = self._library.lammps_extract_fix.argtypes
         self._extract_fix.restype = POINTER(c_int)
-        self._functions: dict[tuple[str, str], tuple[Callable[..., None], bytes]] = {}
+        self._channels: dict[tuple[str, int], _Channel] = {}
 
     def gather(self, name: str, columns: int) -> Floats:
         """An array of LAMMPS (x, v, f ..., f_FIX, d_NAME), shape (N, columns)."""
-        values = np.empty((self._disks, columns))
-        self._call("gather", name, values)
-        return values
+        channel = self._channel(name, columns)
+        self._call(channel.gather, channel)
+        return channel.values.copy()
 
     def scatter(self, name: str, values: Floats) -> None:
-        """Write such an array, shape (N,) or (N, columns); in fixes it counts from the next run's setup."""
-        self._call("scatter", name, np.ascontiguousarray(values, dtype=np.float64))
+        """Write such an array, shape (N,) or (N, columns); in fixes it counts from the next run's begin."""
+        channel = self._channel(name, values.size // self._disks)
+        channel.values.reshape(values.shape)[...] = values
+        self._call(channel.scatter, channel)
 
     def columns(self, fix: str) -> int:
         """Columns of the array of a fix."""
         return int(self._extract_fix(self._lammps.lmp, fix.encode(), *self._size_of_fix)[0])
 
-    def _call(self, way: str, name: str, values: Floats) -> None:
-        function, code = self._functions.get((way, name)) or self._function(way, name)
-        function(self._lammps.lmp, code, DOUBLE, values.size // self._disks, values.ctypes.data)
+    def _channel(self, name: str, columns: int) -> "_Channel":
+        if (name, columns) not in self._channels:
+            kind = "" if name[:2] in ("f_", "d_") else "_atoms"
+            gather, scatter = (getattr(self._library, f"lammps_{way}{kind}") for way in ("gather", "scatter"))
+            values = np.zeros((self._disks, columns))
+            self._channels[name, columns] = _Channel(
+                gather, scatter, name.encode(), columns, values, values.ctypes.data
+            )
+        return self._channels[name, columns]
+
+    def _call(self, function: Callable[..., None], channel: "_Channel") -> None:
+        function(self._lammps.lmp, channel.name, DOUBLE, channel.columns, channel.address)
         if self._library.lammps_has_error(self._lammps.lmp):
             raise self._lammps._lammps_exception
-
-    def _function(self, way: str, name: str) -> tuple[Callable[..., None], bytes]:
-        kind = "" if name[:2] in ("f_", "d_") else "_atoms"
-        self._functions[way, name] = getattr(self._library, f"lammps_{way}{kind}"), name.encode()
-        return self._functions[way, name]
