@@ -42,7 +42,7 @@ protected:
   template <bool ROTATION, bool COMPENSATED> void move(int i);    // by v dt and omega dt
   template <bool COMPENSATED> void complete_force(int i);
   void complete_forces();
-  void wrap();    // all disks into the periodic box
+  void wrap();                                       // all disks into the periodic box
   void refuse(int i, double dx, double dy) const;    // disk i cannot move so far
   double *angles() const;                            // null: there are none
 
