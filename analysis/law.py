@@ -165,19 +165,17 @@ class MindlinLaw:
             return Derivatives(normal_force, zero, normal_stiffness, zero, zero)
         limit = overlap * (self.mu * self.kn / self.kt)
         slip = np.minimum(np.maximum(slip, -limit), limit)
-        if np.all(limit > 0):
+        if limit.all():
             x, steep = np.abs(slip) / limit, slip / root
         else:  # an open contact has no slip either
             x, steep = _ratio(np.abs(slip), limit), _ratio(slip, root)
-        square = x * x
-        bend = 1 + x - square
-        soft = -self.kt * root
+        rest, triple, soft = 1 - x, 3 * x, -self.kt * root
         return Derivatives(
             normal_force,
-            soft * bend * slip,
+            soft * (1 + x * rest) * slip,
             normal_stiffness,
-            soft * ((1 - x) * (1 + 3 * x)),  # vanishes at the bound to the last bit
-            (0.5 * bend + (2 * square - x)) * (-self.kt * steep),
+            soft * (rest * (1 + triple)),  # vanishes at the bound to the last bit
+            (1 + x * (triple - 1)) * (-0.5 * self.kt * steep),
         )
 
     def _reduced(self, overlap: Floats, slip: ArrayLike) -> tuple[Floats, Floats]:

@@ -455,7 +455,7 @@ def _floats(name: str, value: ArrayLike, shape: Iterable[int]) -> Floats:
     array = np.array(value, dtype=np.float64)
     if array.shape != tuple(shape):
         raise ValueError(f"{name} has shape {array.shape}; {tuple(shape)} is needed.")
-    if not np.all(np.isfinite(array)):
+    if not np.isfinite(array).all():
         raise ValueError(f"{name} holds a value that is not finite.")
     return array
 

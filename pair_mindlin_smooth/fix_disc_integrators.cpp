@@ -88,6 +88,14 @@ void FixDiscIntegrator::complete_forces()
   for (int i = 0; i < atom->nlocal; i++) complete_force<true>(i);
 }
 
+void FixDiscIntegrator::wrap()
+{
+  if (low_parts)
+    low_parts->setup_pre_exchange();
+  else
+    domain->pbc();
+}
+
 template <bool COMPENSATED> FAULTGOUGE_INLINE void FixDiscIntegrator::complete_force(int i)
 {
   if constexpr (COMPENSATED) low_parts->complete_force(i);
@@ -181,11 +189,18 @@ int FixDisplaceDisc::setmask()
 void FixDisplaceDisc::init()
 {
   FixDiscIntegrator::init();
+  take_given();
+}
+
+bool FixDisplaceDisc::take_given()
+{
+  bool given = false;
   double *const theta = angles();
   for (int i = 0; i < atom->nlocal; i++) {
     double *const state = array_atom[i];
     if (state[GIVEN] == 0.0) continue;
     state[GIVEN] = 0.0;
+    given = true;
     atom->x[i][0] = state[X];
     atom->x[i][1] = state[Y];
     atom->v[i][0] = state[VX];
@@ -193,6 +208,7 @@ void FixDisplaceDisc::init()
     atom->omega[i][2] = state[OMEGA];
     if (theta) theta[i] = state[THETA];
   }
+  return given;
 }
 
 void FixDisplaceDisc::post_run()
@@ -207,12 +223,16 @@ void FixDisplaceDisc::post_run()
   }
 }
 
+// Disks are wrapped into the box before and after, and not when neighbour lists happen to be built: what comes out
+// depends on what was given alone, with or without a setup in between.
 void FixDisplaceDisc::initial_integrate(int /*vflag*/)
 {
+  if (take_given()) wrap();
   choose([this](auto rotates, auto compensates) {
     for (int i = 0; i < atom->nlocal; i++)
       if (atom->mask[i] & groupbit) move<decltype(rotates)::value, decltype(compensates)::value>(i);
   });
+  wrap();
 }
 
 FixOverdampedDisc::FixOverdampedDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg, 2)

@@ -11,7 +11,7 @@
 //
 // displace/disc hands out all that a driver wants to know of the disks after a run, in one per-atom array: given, x, y,
 // theta, v_x, v_y, omega, f_x, f_y, torque. Written from outside (library scatter) with given = 1, coordinates, angle
-// and velocities of a disk count from the next run's begin.
+// and velocities of a disk count from the next run's begin, also with `pre no`.
 
 #ifndef LMP_FIX_DISC_INTEGRATORS_H
 #define LMP_FIX_DISC_INTEGRATORS_H
@@ -42,6 +42,7 @@ protected:
   template <bool ROTATION, bool COMPENSATED> void move(int i);    // by v dt and omega dt
   template <bool COMPENSATED> void complete_force(int i);
   void complete_forces();
+  void wrap();                                       // all disks into the periodic box
   void refuse(int i, double dx, double dy) const;    // disk i cannot move so far
   double *angles() const;                            // null: there are none
 
@@ -87,6 +88,8 @@ public:
   void post_run() override;
 
 private:
+  bool take_given();    // true if there was any
+
   enum Column { GIVEN, X, Y, THETA, VX, VY, OMEGA, FX, FY, TORQUE, COLUMNS };
 };
 

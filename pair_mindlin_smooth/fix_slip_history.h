@@ -4,7 +4,7 @@
 // disk i in the order of the partners' IDs; both partners keep theirs. In compensated arithmetic each slip is
 // followed by its low part. It is up to date whenever no run is
 // under way, moves with the disks between ranks, and goes through restart files. Written from outside
-// (library scatter) it takes effect at the next run's setup.
+// (library scatter) it takes effect in the next run.
 
 #ifndef LMP_FIX_SLIP_HISTORY_H
 #define LMP_FIX_SLIP_HISTORY_H

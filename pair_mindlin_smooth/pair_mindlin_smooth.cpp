@@ -196,13 +196,18 @@ void PairMindlinSmooth::rebuild_pairs()
     history->check_owners();
   }
   pairs.build(*list, neighbor->skin, *atom, *domain, original, has_friction, compensated);
-  if (!has_friction) return;
-  for (int p = 0; p < pairs.size(); p++)
-    if (const double *slip = history->find(pairs.first[p], pairs.second_tag[p])) {
-      pairs.slip[p] = slip[0];
-      if (compensated) pairs.slip_low[p] = slip[1];
-      pairs.touching[p] = 1;
-    }
+}
+
+void PairMindlinSmooth::load_slips()
+{
+  slips_in_fix = false;
+  for (int p = 0; p < pairs.size(); p++) {
+    const double *const slip = history->find(pairs.first[p], pairs.second_tag[p]);
+    pairs.touching[p] = slip != nullptr;
+    if (!slip) continue;
+    pairs.slip[p] = slip[0];
+    if (compensated) pairs.slip_low[p] = slip[1];
+  }
 }
 
 void PairMindlinSmooth::compute(int eflag, int vflag)
@@ -210,11 +215,11 @@ void PairMindlinSmooth::compute(int eflag, int vflag)
   ev_init(eflag, vflag);
   if (comm->nprocs > 1 && (compensated || domain->xperiodic || domain->yperiodic)) communicate_originals();
   if (neighbor->ago == 0) rebuild_pairs();
+  if (has_friction && slips_in_fix) load_slips();    // somebody may have written others
 
   // at setup the disks have not moved since the slips were last advanced
   const int crushed = contact_forces(!update->setupflag);
   if (crushed >= 0) refuse(crushed);
-  if (has_friction) slips_in_fix = false;
 
   const faultgouge::Forces forces{atom->f,         atom->torque,    compensated ? low_parts->array_atom : nullptr,
                                   FixLowParts::FX, FixLowParts::FY, FixLowParts::TORQUE};

@@ -59,6 +59,7 @@ private:
   void check_integrators() const;
   void set_force_grids();
   void rebuild_pairs();
+  void load_slips();    // from the fix
   void communicate_originals();
   faultgouge::Disks disks() const;
   faultgouge::Period period() const;

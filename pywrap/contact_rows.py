@@ -32,7 +32,7 @@ class ContactRows:
         self._radius, self._compensated = radius, compensated
         self.width = 3 if compensated else 2
         self.floor_columns = (FLOOR_SLIP_LOW if compensated else FLOOR_OVERLAP) + 1
-        self._seen: tuple[Floats, NDArray[np.bool_]] | None = None  # partners and who is on the floor, of _graph
+        self._seen = b""  # partners and who is on the floor, of _graph
 
     def slips(self, packing: Packing) -> Floats:
         """Rows of fix slips, as long as the disk with most contacts needs, shape (N, 1 + width M)."""
@@ -70,23 +70,19 @@ class ContactRows:
         """The contacts in rows of both fixes: the graph, which is the last one if nothing has changed, slips and their
         low parts, shape (C,)."""
         partners, touching = slips[:, 1 :: self.width], floor[:, FLOOR_OVERLAP] > 0
-        if not self._same(partners, touching):
-            self._seen = partners.copy(), touching
+        seen = partners.tobytes() + touching.tobytes()
+        if seen != self._seen:
+            self._seen = seen
             i, place = np.nonzero(partners > np.arange(1, len(slips) + 1)[:, None])
-            self._disk = np.flatnonzero(touching)
+            disk = np.flatnonzero(touching)
             self._place = i * slips.shape[1] + 2 + self.width * place
+            self._floor_place = disk * floor.shape[1] + FLOOR_SLIP
             j = partners[i, place].astype(np.int64) - 1
-            i = np.concatenate([i, self._disk])
-            j = np.concatenate([j, np.full(len(self._disk), FLOOR)])
+            i = np.concatenate([i, disk])
+            j = np.concatenate([j, np.full(len(disk), FLOOR)])
             self._graph = ContactGraph(Contacts(i, j, np.zeros(len(i))), self._radius)
-        flat = slips.ravel()
-        slip = np.concatenate([flat[self._place], floor[self._disk, FLOOR_SLIP]])
+        slip = np.concatenate([slips.take(self._place), floor.take(self._floor_place)])
         if not self._compensated:
             return self._graph, slip, None
-        return self._graph, slip, np.concatenate([flat[self._place + 1], floor[self._disk, FLOOR_SLIP_LOW]])
-
-    def _same(self, partners: Floats, touching: NDArray[np.bool_]) -> bool:
-        """Whether these are the contacts of the last rows that were read."""
-        if self._seen is None or self._seen[0].shape != partners.shape:
-            return False
-        return bool((self._seen[0] == partners).all() and (self._seen[1] == touching).all())
+        low = slips.take(self._place + 1), floor.take(self._floor_place + FLOOR_SLIP_LOW - FLOOR_SLIP)
+        return self._graph, slip, np.concatenate(low)

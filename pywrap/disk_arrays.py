@@ -4,7 +4,9 @@ Arrays stand in the order of IDs, and every rank has the whole of them. LAMMPS's
 memory; by way of LAMMPS's Python module there would be copies in between.
 """
 
-from typing import Any
+from collections.abc import Callable
+from ctypes import POINTER, c_int
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,17 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 DOUBLE = 1
+
+
+class _Channel(NamedTuple):
+    """How one array goes in and out, by way of memory whose address is looked up once."""
+
+    gather: Callable[..., None]
+    scatter: Callable[..., None]
+    name: bytes
+    columns: int
+    values: Floats
+    address: int
 
 
 class DiskArrays:
@@ -29,25 +42,39 @@ class DiskArrays:
         from lammps import LMP_SIZE_COLS, LMP_STYLE_ATOM
 
         self._lammps, self._library, self._disks = lammps, lammps.lib, disks
-        self._size_of_fix = LMP_STYLE_ATOM, LMP_SIZE_COLS
+        self._size_of_fix = LMP_STYLE_ATOM, LMP_SIZE_COLS, 0, 0
+        self._extract_fix = self._library["lammps_extract_fix"]  # a function of our own: that of the module is shared
+        self._extract_fix.argtypes = self._library.lammps_extract_fix.argtypes
+        self._extract_fix.restype = POINTER(c_int)
+        self._channels: dict[tuple[str, int], _Channel] = {}
 
     def gather(self, name: str, columns: int) -> Floats:
         """An array of LAMMPS (x, v, f ..., f_FIX, d_NAME), shape (N, columns)."""
-        values = np.zeros((self._disks, columns))
-        self._call("gather", name, values)
-        return values
+        channel = self._channel(name, columns)
+        self._call(channel.gather, channel)
+        return channel.values.copy()
 
     def scatter(self, name: str, values: Floats) -> None:
-        """Write such an array, shape (N,) or (N, columns); in fixes it counts from the next run's setup."""
-        self._call("scatter", name, np.ascontiguousarray(values, dtype=np.float64))
+        """Write such an array, shape (N,) or (N, columns); in fixes it counts from the next run's begin."""
+        channel = self._channel(name, values.size // self._disks)
+        channel.values.reshape(values.shape)[...] = values
+        self._call(channel.scatter, channel)
 
     def columns(self, fix: str) -> int:
         """Columns of the array of a fix."""
-        return int(self._lammps.extract_fix(fix, *self._size_of_fix))
+        return int(self._extract_fix(self._lammps.lmp, fix.encode(), *self._size_of_fix)[0])
 
-    def _call(self, way: str, name: str, values: Floats) -> None:
-        kind = "" if name[:2] in ("f_", "d_") else "_atoms"
-        function = getattr(self._library, f"lammps_{way}{kind}")
-        function(self._lammps.lmp, name.encode(), DOUBLE, values.size // self._disks, values.ctypes.data)
+    def _channel(self, name: str, columns: int) -> "_Channel":
+        if (name, columns) not in self._channels:
+            kind = "" if name[:2] in ("f_", "d_") else "_atoms"
+            gather, scatter = (getattr(self._library, f"lammps_{way}{kind}") for way in ("gather", "scatter"))
+            values = np.zeros((self._disks, columns))
+            self._channels[name, columns] = _Channel(
+                gather, scatter, name.encode(), columns, values, values.ctypes.data
+            )
+        return self._channels[name, columns]
+
+    def _call(self, function: Callable[..., None], channel: "_Channel") -> None:
+        function(self._lammps.lmp, channel.name, DOUBLE, channel.columns, channel.address)
         if self._library.lammps_has_error(self._lammps.lmp):
             raise self._lammps._lammps_exception

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -143,6 +143,8 @@ class Engine:
 
         self.communicator = communicator or MPI.COMM_WORLD
         self._static, self._fx = packing, packing.fx
+        ones = np.ones(len(packing))
+        self._levers = np.stack([ones, ones, packing.radius])  # of forces and torques, and of displacements and turns
         self._angle = packing.angle
         self._weakening = False
         arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none"]
@@ -155,7 +157,8 @@ class Engine:
         self._rows = ContactRows(packing.radius, packing.compensated)
         self._written: Packing | None = None  # the packing of _arrays
         self._kept: Trial | None = None
-        self._displaces = False
+        self._displaces = False  # whether fix displace/disc is there
+        self._set_up = False  # whether LAMMPS is, for the next displacement
         self._load(packing)
 
     def __enter__(self) -> Engine:
@@ -169,6 +172,7 @@ class Engine:
     @property
     def lammps(self) -> Any:
         """The LAMMPS instance, for what it holds and for commands that the driver does not cover."""
+        self._end_displacing()
         return self._lammps
 
     @property
@@ -182,17 +186,19 @@ class Engine:
         return self._force(self._state())
 
     def _force(self, state: Floats) -> Floats:
-        force = state[:, FORCE].T.copy()
-        force[2] = force[2] / self._static.radius if self._static.law.frictional else 0.0
-        return force.ravel()
+        return np.divide(state[:, FORCE].T, self._levers, order="C").ravel()
 
     def set_fx(self, fx: float) -> None:
         """Set the force along x on each disk of the upper layer."""
         self._fx = float(fx)
-        self._command(f"fix load top addforce {self._fx!r} {-self._static.fy!r} 0.0")
+        if self._displaces:
+            self._lammps.set_internal_variable("load", self._fx)
+        else:
+            self._load_top(repr(self._fx))
 
     def restore(self, packing: Packing) -> None:
         """Put the disks, slips and load of a packing back, to the bit."""
+        self._end_displacing()
         self._write(packing)
         self.set_fx(packing.fx)
 
@@ -276,25 +282,43 @@ class Engine:
         with self.displacing() as displaced:
             return displaced(base, displacement).packing
 
-    @contextmanager
-    def displacing(self) -> Iterator[Callable[[Packing, Floats], Trial]]:
-        """A function that does the same and returns a `Trial`, for many displacements in turn."""
-        self._command("timestep 1.0")
-        with self._displacement():
-            self._displaces = True
-            try:
-                yield self._displaced
-            finally:
-                self._displaces = False
+    def displacing(self) -> AbstractContextManager[Callable[[Packing, Floats], Trial]]:
+        """A function that does the same and returns a `Trial`, for many displacements in turn.
+
+        What LAMMPS needs for it stays from one increment to the next, and goes when something else is asked for.
+        """
+        return nullcontext(self._displaced)
 
     def _displaced(self, base: Packing, displacement: Floats) -> Trial:
-        velocity = displacement.reshape(3, -1).T.copy()
-        velocity[:, 2] /= base.radius
+        self._begin_displacing()
+        velocity = (displacement.reshape(3, -1) / self._levers).T
         self._write(base, velocity)
-        self._command("run 1 post no")
+        setup, self._set_up = "pre no " if self._set_up else "", False
+        self._command(f"run 1 {setup}post no")
+        self._set_up = True
         if not base.law.frictional:
             self._angle = base.angle + velocity[:, 2]
         return self._trial()
+
+    def _begin_displacing(self) -> None:
+        if self._displaces:
+            return
+        self._command("timestep 1.0")
+        self._command(f"variable load internal {self._fx!r}")
+        self._load_top("v_load")
+        rotation = "yes" if self._static.law.frictional else "no"
+        self._command(f"fix move all displace/disc rotation {rotation}" + " compensated" * self._static.compensated)
+        self._displaces, self._set_up = True, False
+
+    def _end_displacing(self) -> None:
+        if self._displaces:
+            self._displaces = False
+            self._command("unfix move")
+            self.set_fx(self._fx)
+            self._command("variable load delete")
+
+    def _load_top(self, fx: str) -> None:
+        self._command(f"fix load top addforce {fx} {-self._static.fy!r} 0.0")
 
     def keep(self, trial: Trial) -> Packing:
         """The packing of a trial, for displacements from there: LAMMPS is then given what it gave."""
@@ -403,9 +427,9 @@ class Engine:
             self._include("system.in")
         self._disks.scatter("rmass", packing.mass)
         if law.frictional or packing.compensated:
-            with self._displacement():
-                self._command("run 0 post no")  # makes the fixes slips and low
-            self._write(packing)
+            self._begin_displacing()
+            self._command("run 0 post no")  # makes the fixes slips and low
+            self.restore(packing)
 
     def _write(self, packing: Packing, velocity: Floats | float = 0.0) -> None:
         """Positions, angles and slips of a packing into LAMMPS, and velocities (v_x, v_y, omega), shape (N, 3); they
@@ -478,10 +502,6 @@ class Engine:
         force = self._force(state)
         return Trial(self._static, self._fx, position, low, angle, graph, slip, slip_low, force, arrays)
 
-    def _displacement(self) -> AbstractContextManager[None]:
-        keywords = f"rotation {'yes' if self._static.law.frictional else 'no'}"
-        return self._fix("move", f"all displace/disc {keywords}" + " compensated" * self._static.compensated)
-
     def _variables(self, **values: object) -> None:
         for name, value in values.items():
             text = repr(float(value)) if isinstance(value, float) else str(value)
@@ -511,6 +531,7 @@ class Engine:
         self._command(f"unfix {name}")
 
     def _include(self, deck: str) -> None:
+        self._end_displacing()
         self._command(f'include "{DECKS / deck}"')
 
     def _command(self, command: str) -> None:

@@ -118,10 +118,10 @@ def _banded(band: Band, terms: Floats, idle: Booleans) -> Solve | None:
         return None
 
     def solve(force: Floats) -> Floats | None:
-        solution, _ = dgbtrs(factors, width, width, force[band.coordinates], pivots)
-        step = np.zeros_like(force)
+        solution, _ = dgbtrs(factors, width, width, force.take(band.coordinates), pivots)
+        step = np.zeros(len(force))
         step[band.coordinates] = solution
-        return step if np.all(np.isfinite(solution)) else None
+        return step if np.isfinite(solution).all() else None
 
     return solve
 
@@ -129,14 +129,14 @@ def _banded(band: Band, terms: Floats, idle: Booleans) -> Solve | None:
 def _idle(graph: ContactGraph, carried: Floats, loaded: Booleans) -> Booleans:
     """Disks with none but contacts that carry nothing that matters, shape (N,)."""
     matters = loaded & (carried > IDLE * carried.max(initial=0.0))
-    return graph.per_disk(matters) == 0
+    return graph.count(matters) == 0
 
 
 def _held(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:
     """The diagonal of K with a little more stiffness for idle disks, and next to nothing more for all others."""
     held = (1 + AFLOAT) * diagonal
     creeping = idle[disk]
-    if np.any(creeping):
+    if creeping.any():
         stiffest = np.zeros(len(idle))
         np.maximum.at(stiffest, disk, diagonal)
         held[creeping] = diagonal[creeping] + CREEP * stiffest[disk[creeping]]

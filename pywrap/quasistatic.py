@@ -20,9 +20,10 @@ displacements count from the iterate. What is left, :math:`q'`, is of order :mat
 start at an iterate changes them by :math:`|q| |q'|`, which is less than they can resolve.
 
 The first step needs no forces: at an equilibrium they are those of the increment on the upper layer, and the iteration
-starts from the linear response to these. Between equilibria q is nearly proportional to the increment, too: where a
-third one is known, its displacement in proportion saves a factorisation. The ramp of an onset takes the equilibrium
-before the last; a ramp that is stored does not, so that it goes on to the bit where it was cut off.
+starts from the linear response to these. Its factors of K serve the next iterations, too, as long as these converge
+fast: a small increment takes no others. Between equilibria q is nearly proportional to the increment: where a third one
+is known, its displacement in proportion is a better start. The ramp of an onset takes the equilibrium before the last;
+a ramp that is stored does not, so that it goes on to the bit where it was cut off.
 
 A rattler that a neighbour runs into on the way is moved to the middle of its cage: it carries nothing, and where it
 lies is no matter (:mod:`~faultgouge.pywrap.rattlers`).
@@ -32,6 +33,7 @@ Where Newton fails the increment is halved, since the path matters: friction rem
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,8 +67,12 @@ MOVES = 3
 NOISE = 10
 """Rounding floors up to which a residual that no longer falls is one."""
 
+SPARED = 3
+"""Iterations that are made with the factors of K at hand if these suffice to reach the floor. New ones cost as much as
+two iterations at 100 disks, and one or two more follow."""
+
 SPARING = 300
-"""Disks beyond which factors of K are used again: a factorisation costs ten force evaluations and more."""
+"""Disks beyond which factors of K are used on whatever is left to go: new ones cost ten force evaluations and more."""
 
 KEPT = 0.1
 """Factor of the residual in one iteration up to which the factors of K are good for another one."""
@@ -110,21 +116,31 @@ class Equilibrium:
         return self.packing.fx
 
 
-def rounding_floor(packing: Packing, displaced: float = 0.0) -> float:
+class Guess(NamedTuple):
+    """Where an iteration starts.
+
+    Attributes
+    ----------
+    displacement : ndarray, shape (3N,)
+        (dx.., dy.., R dtheta..), length.
+    factors : Factors, optional
+        Those of K that it was found with.
+    answers : float
+        The largest force that it answers.
+    """
+
+    displacement: Floats
+    factors: Factors | None = None
+    answers: float = np.inf
+
+
+def rounding_floor(packing: Packing) -> float:
     """Residual that one unit in the last place of each coordinate leaves, force.
 
     The forces of a disk's contacts are summed as independent errors, and the largest over disks is taken.
-
-    Parameters
-    ----------
-    packing : Packing
-        The configuration.
-    displaced : float
-        Length of the displacement that led to it, a double, whose last place counts as well.
     """
     graph = ContactGraph(packing.contacts, packing.radius)
-    unit = packing.coordinate_rounding + EPSILON * displaced
-    return rounding(packing.law, graph, packing.geometry.overlap, unit)
+    return rounding(packing.law, graph, packing.geometry.overlap, packing.coordinate_rounding)
 
 
 def equilibrate(
@@ -160,13 +176,10 @@ def equilibrate(
         If halving the increment leads nowhere.
     """
     here, target, evaluations = last, fx, 0
-    if beside is None:
-        guess, factors = _response(engine, last, fx)
-    else:
-        guess, factors = _in_proportion(last, beside, fx), None
+    guess = _response(engine, last, fx) if beside is None else _in_proportion(last, beside, fx)
     while True:
         engine.set_fx(target)
-        found, spent = _newton(engine, here.packing, force_tolerance, guess, factors)
+        found, spent = _newton(engine, here.packing, force_tolerance, guess)
         evaluations += spent
         if found is None and guess is not None:
             guess = None
@@ -182,25 +195,25 @@ def equilibrate(
             here, target = found, fx
 
 
-def _response(engine: Engine, last: Equilibrium, fx: float) -> tuple[Floats | None, Factors | None]:
-    """The linear response to the increment, which is Newton's first step, and the factors of K; None for what fails."""
+def _response(engine: Engine, last: Equilibrium, fx: float) -> Guess | None:
+    """The linear response to the increment, which is Newton's first step; None where there is none."""
     packing = last.packing
     if fx == packing.fx:
-        return None, None
+        return None
     push = np.zeros(3 * len(packing))
     push[: len(packing)][packing.top] = fx - packing.fx
     trial = engine.kept(packing)
     factors = factored(trial, trial.floor)
     step = None if factors is None else factors.solve(push)
-    return None if step is None or _too_long(step, packing) else step, factors
+    return None if step is None or _too_long(step, packing) else Guess(step, factors, abs(fx - packing.fx))
 
 
-def _in_proportion(last: Equilibrium, beside: Equilibrium, fx: float) -> Floats:
+def _in_proportion(last: Equilibrium, beside: Equilibrium, fx: float) -> Guess:
     """The displacement from one equilibrium to another, (dx.., dy.., R dtheta..), in proportion to the increment."""
     a, b = last.packing, beside.packing
     moved = nearest_image(b.position - a.position, a.box_length)
     displacement = np.concatenate([moved[:, 0], moved[:, 1], b.scaled_angle - a.scaled_angle])
-    return displacement * ((fx - last.fx) / (beside.fx - last.fx))
+    return Guess(displacement * ((fx - last.fx) / (beside.fx - last.fx)))
 
 
 def _too_long(step: Floats, packing: Packing) -> bool:
@@ -209,11 +222,11 @@ def _too_long(step: Floats, packing: Packing) -> bool:
 
 
 def _newton(
-    engine: Engine, base: Packing, force_tolerance: float | None, guess: Floats | None, nearby: Factors | None
+    engine: Engine, base: Packing, force_tolerance: float | None, guess: Guess | None
 ) -> tuple[Equilibrium | None, int]:
     """Newton's method from one base at the engine's fx; None where it does not converge."""
     with engine.displacing() as displaced:
-        best, evaluations = _iterated(displaced, engine.kept(base), force_tolerance, guess, nearby)
+        best, evaluations = _iterated(displaced, engine.kept(base), force_tolerance, guess)
     if best is None:
         return None, evaluations
     return Equilibrium(engine.keep(best), best.residual, best.floor, evaluations), evaluations
@@ -223,24 +236,21 @@ def _iterated(
     displaced: Callable[[Packing, Floats], Trial],
     start: Trial,
     force_tolerance: float | None,
-    guess: Floats | None,
-    nearby: Factors | None,
+    guess: Guess | None,
 ) -> tuple[Trial | None, int]:
     base, since, loose = start.packing, start.graph, _loose(start)
-    displacement = np.zeros(3 * len(base)) if guess is None else guess
+    displacement, factors, last = guess or Guess(np.zeros(3 * len(base)))
     best: Trial | None = None
-    factors: Factors | None = None
+    floor = start.floor
     worse = 0  # iterations that gained nothing; changes of contacts cost some
     moved, moves = np.zeros(len(base), dtype=np.int64), 0  # how often rattlers were moved out of the way
-    earlier = last = np.inf  # residuals of the two iterations before
+    earlier = np.inf  # residual of the iteration before the last
     for evaluation in range(1, ITERATIONS + 1):
         trial = displaced(base, displacement)
         residual = trial.residual
-        if factors is None:
-            floor = trial.floor
         if best is not None and residual > 0.5 * best.residual:
-            if best.residual < NOISE * floor:
-                return best, evaluation + moves
+            if best.residual < NOISE * floor:  # below the floor the one that moved less is as good
+                return (trial if residual < best.residual and floor < best.residual else best), evaluation + moves
             worse += 1
             if worse > FRUITLESS:
                 return None, evaluation + moves
@@ -250,25 +260,25 @@ def _iterated(
         if best is not None and residual <= (force_tolerance if force_tolerance is not None else 0.1 * floor):
             return best, evaluation + moves
         # What is not rounding falls by no less than it did the time before: it may be far below the floor now.
-        factor = last / earlier if np.isfinite(earlier) else GAIN
+        factor = last / earlier if earlier < np.inf else GAIN
         if best is not None and residual < floor and factor * last < 0.1 * floor:
             return best, evaluation + moves
-        # the same factors would lead to the floor
-        sufficient = residual * (residual / last) < 0.1 * floor
+        # the same factors would lead to the floor soon
+        sufficient = residual * (residual / last) ** SPARED < 0.1 * floor
         if factors is None or not (sufficient or (len(base) > SPARING and residual <= KEPT * last)):
             floor = trial.floor
             hit = _hit(trial, loose) & (moved < MOVES)
-            if np.any(hit):
+            if hit.any():
                 displacement = _out_of_the_way(trial.packing, np.flatnonzero(hit), displacement)
                 trial = displaced(base, displacement)
                 residual = trial.residual
                 moved, moves = moved + hit, moves + 1
-            factors = factored(trial, floor, since, factors or nearby)
+            factors = factored(trial, floor, since, factors)
         earlier, last = last, residual
         step = None if factors is None else factors.solve(trial.force)
         if factors is None or step is None or _too_long(step, base):
             return None, evaluation + moves
-        if evaluation <= FREEING:
+        if evaluation <= FREEING and factors.expelled.any():
             step.reshape(3, -1)[:, factors.expelled] *= 1.5
         if base.compensated and residual < 10 * trial.rounded(
             trial.coordinate_rounding + EPSILON * np.abs(displacement).max()
@@ -280,7 +290,7 @@ def _iterated(
 
 def _carrying(trial: Trial, least: float) -> Floats:
     """Number of contacts of each disk that carry more than a given force, shape (N,)."""
-    return trial.graph.per_disk(trial.derivatives.normal_force > least)
+    return trial.graph.count(trial.derivatives.normal_force > least)
 
 
 def _loose(trial: Trial) -> Booleans:
