@@ -66,7 +66,7 @@ class SparseSolver:
         self._active = np.flatnonzero(self._stiffness)
         self._matrix = matrix[self._active][:, self._active]
         self._pairs = i, j
-        self._factors = None if nearby is None else nearby._factors
+        self._factors: SparseFactors | None = None if nearby is None else nearby._factors
         self._own = False
 
     def solve(self, force: Floats) -> Floats | None:
