@@ -9,8 +9,8 @@ collective over the ranks of the communicator, and every rank sees the whole pac
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -279,17 +279,13 @@ class Engine:
         Packing
             The configuration at the end of the path; `net_force` has its forces.
         """
-        with self.displacing() as displaced:
-            return displaced(base, displacement).packing
+        return self.displaced(base, displacement).packing
 
-    def displacing(self) -> AbstractContextManager[Callable[[Packing, Floats], Trial]]:
-        """A function that does the same and returns a `Trial`, for many displacements in turn.
+    def displaced(self, base: Packing, displacement: Floats) -> Trial:
+        """The same as a `Trial`, for many displacements in turn.
 
-        What LAMMPS needs for it stays from one increment to the next, and goes when something else is asked for.
+        What LAMMPS needs for it stays from one to the next, and goes when something else is asked for.
         """
-        return nullcontext(self._displaced)
-
-    def _displaced(self, base: Packing, displacement: Floats) -> Trial:
         self._begin_displacing()
         velocity = (displacement.reshape(3, -1) / self._levers).T
         self._write(base, velocity)

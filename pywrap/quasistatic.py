@@ -141,8 +141,7 @@ def _newton(
     engine: Engine, base: Packing, force_tolerance: float | None, guess: Guess | None
 ) -> tuple[Equilibrium | None, int]:
     """Newton's method from one base at the engine's fx; None where it does not converge."""
-    with engine.displacing() as displaced:
-        best, evaluations = iterated(displaced, engine.kept(base), force_tolerance, guess)
+    best, evaluations = iterated(engine.displaced, engine.kept(base), force_tolerance, guess)
     if best is None:
         return None, evaluations
     return Equilibrium(engine.keep(best), best.residual, best.floor, evaluations), evaluations

@@ -102,8 +102,8 @@ def test_nothing_that_holds():
 
 def test_a_trial_is_its_packing(reference_packing):
     start = reference_packing(1.0)
-    with Engine(start) as engine, engine.displacing() as displaced:
-        trial = displaced(start, 1e-5 * np.random.default_rng(6).standard_normal(300))
+    with Engine(start) as engine:
+        trial = engine.displaced(start, 1e-5 * np.random.default_rng(6).standard_normal(300))
     packing = trial.packing
     geometry = packing.geometry
     assert trial.floor == pytest.approx(rounding_floor(packing), rel=1e-12)
