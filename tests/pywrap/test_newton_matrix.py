@@ -136,3 +136,32 @@ def test_contacts_through_rows(reference_packing, compensated):
     assert changed[0] is not graph
     assert np.array_equal(changed[0].i, contacts.i[1:])
     assert np.array_equal(changed[1], slip[1:])
+
+
+def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
+    """A change of forces from changed displacements, and back: with what K knows of new contacts, and without."""
+    base = reference_packing(1.0)
+    rng = np.random.default_rng(3)
+    displacement, step = 1e-4 * rng.standard_normal(300), 1e-7
+    with Engine(base) as engine:
+        trial = engine.displaced(base, displacement)
+        since = engine.kept(base).graph
+        new = ~trial.graph.old(since)
+        disk = int(trial.graph.i[new][0])
+        change = np.zeros(300)
+        change[[disk, 100 + disk, 200 + disk]] = rng.standard_normal(3)
+        forces = [engine.displaced(base, displacement + sign * step * change).force for sign in (1, -1)]
+    softening = (forces[1] - forces[0]) / (2 * step)
+    errors = [np.abs(factored(trial, trial.floor, start).solve(softening) - change).max() for start in (since, None)]
+    # a hundredth of the stiffness is left
+    assert errors[0] < 0.03 < 0.3 < errors[1]
+
+
+def test_which_contacts_are_old(reference_packing):
+    contacts, radius = reference_packing(1.0).contacts, reference_packing(1.0).radius
+    graph = ContactGraph(contacts, radius)
+    kept = np.arange(len(contacts)) % 5 > 0
+    fewer = ContactGraph(Contacts(contacts.i[kept], contacts.j[kept], contacts.slip[kept]), radius)
+    assert np.array_equal(graph.old(fewer), kept)
+    assert fewer.old(graph) is None
+    assert graph.old(graph) is None

@@ -1,0 +1,62 @@
+"""Rattlers in the middle of their cages: known middles, narrow cages, and gaps that never get narrower."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, nearest_image
+from faultgouge.pywrap.rattlers import middle_of_cage
+
+
+def packing(position, radius, box_length=None):
+    return Packing(
+        position=np.array(position, dtype=float),
+        radius=np.broadcast_to(radius, len(position)),
+        contacts=Contacts([], [], []),
+        law=MindlinLaw(2e5, 1e5, 1.0),
+        box_length=box_length,
+    )
+
+
+def narrowest_gap(cage, disk, place):
+    others = np.delete(np.arange(len(cage)), disk)
+    branch = nearest_image(place - cage.position[others], cage.box_length)
+    gaps = np.hypot(branch[:, 0], branch[:, 1]) - cage.radius[others] - cage.radius[disk]
+    return min(gaps.min(), place[1] - cage.radius[disk])
+
+
+@pytest.mark.parametrize("width", [0.1, 1e-3, 1e-6])
+@pytest.mark.parametrize("angles", [(0, 120, 240), (20, -117, -171), (154, -38, 83)])
+def test_middle_of_three(width, angles):
+    """Three disks about a point, all as far: it is the middle, however narrow the cage and oblique its walls."""
+    middle = np.array([3.0, 5.0])
+    towards = np.column_stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))])
+    start = middle + 0.4 * width * np.array([0.6, -0.8])
+    cage = packing(np.vstack([start, middle + (1.2 + width) * towards]), [0.5, 0.7, 0.7, 0.7])
+    (place,) = middle_of_cage(cage, np.array([0]))
+    # the linear programs stop where they gain a twentieth, and know gaps to 1e-7
+    assert narrowest_gap(cage, 0, place) > 0.94 * width - 1e-7
+    assert narrowest_gap(cage, 0, start) < 0.84 * width
+
+
+def test_floor_and_period_are_walls():
+    # between the floor and a disk above it, which is its own neighbour across the box
+    cage = packing([[0.1, 0.52], [3.9, 1.7]], [0.5, 0.5], box_length=4.0)
+    (place,) = middle_of_cage(cage, np.array([0]))
+    assert narrowest_gap(cage, 0, place) > 3 * narrowest_gap(cage, 0, cage.position[0])
+
+
+def test_nothing_to_move():
+    assert middle_of_cage(packing([[0.0, 1.0]], 0.5), np.array([], dtype=np.int64)).shape == (0, 2)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10_000), st.sampled_from([None, 4.0]))
+def test_the_narrowest_gap_of_a_lone_mover_is_never_narrower(seed, box_length):
+    rng = np.random.default_rng(seed)
+    cage = packing(rng.uniform(0.5, 3.5, (9, 2)), rng.uniform(0.2, 0.5, 9), box_length)
+    (place,) = middle_of_cage(cage, np.array([4]))
+    # no gap needs to be wider than the radius; linear programs are solved to 1e-7
+    least = min(narrowest_gap(cage, 4, cage.position[4]), cage.radius[4])
+    assert narrowest_gap(cage, 4, place) >= least - 1e-6
