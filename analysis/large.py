@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
-from .edges import Edge, LostPairError, State, locate
+from .edges import JUMP, Edge, LostPairError, State, jump_between, locate
 from .meetings import meetings
 from .modes import Modes, Operator, Pair, span
 from .packing import Floats
@@ -247,6 +247,7 @@ class _Search:
         here = self.passed[-1]
         increment = there.fx - here.fx
         first: Window | None = None
+        lost: RuntimeError | None = None
         doubt = False
         for candidate in sorted(candidates, key=lambda candidate: candidate.onset):
             # Clusters are off by a share of the way from here: one that is far beyond cannot be first.
@@ -255,9 +256,8 @@ class _Search:
             try:
                 window = self.confirmed(candidate, there, first)
             except RuntimeError as error:
-                if finest and not isinstance(error, _DoubtError):
-                    raise
                 window, doubt = None, True
+                lost = lost if isinstance(error, _DoubtError) else error
             if window is not None:
                 late = abs(window.fx_onset - candidate.onset) > 2 * REACH * increment
                 doubt = doubt or (late and window.fx_onset > here.fx)
@@ -265,6 +265,8 @@ class _Search:
                     first = window
             if doubt and not finest:
                 break
+        if finest and first is None and lost is not None:
+            raise lost
         return first, doubt
 
     def parts(self, matrix: csr_array) -> Iterable[Projection]:
@@ -318,13 +320,33 @@ class _Search:
         if inside is None or (first is not None and self.later(inside, first)):
             return None
         above = inside if inside.fx == there.fx else inside.at(*there)
-        end = locate(self.operator, inside, above)[0] if above.discriminant > 0 else None
+        end = self.edge(above, inside) if above.discriminant > 0 else None
         for place in reversed(self.passed):
             below = inside if inside.fx == place.fx else inside.at(*place)
             if below.discriminant > 0:
-                return window_between(locate(self.operator, below, inside)[0], end)
+                return window_between(self.edge(below, inside), end)
             inside = below
         return window_between(Edge(inside.fx, 0.0, inside.block.mean, inside.block.overlap, "start"), end)
+
+    def edge(self, outside: State, inside: State) -> Edge:
+        """Where a pair turns complex between a load where it is real and one where it is not.
+
+        A real pair may have changed partners with a third mode on the way; one that is complex is the only one of its
+        kind. So it is from inside that the pair is followed, in halves of the way, until it leads from outside to
+        inside as well. If it never does, the equilibrium jumps.
+        """
+        width = abs(inside.fx - outside.fx)
+        while abs(inside.fx - outside.fx) > JUMP * width:
+            returned = continued(inside.matrix, outside.block)
+            if returned is not None and returned.discriminant < 0 and returned.same_plane(inside.block):
+                try:
+                    return locate(self.operator, *sorted((outside, inside), key=lambda state: state.fx))[0]
+                except LostPairError:
+                    pass
+            fx = 0.5 * (outside.fx + inside.fx)
+            middle = inside.at(fx, self.operator(fx))
+            outside, inside = (middle, inside) if middle.discriminant > 0 else (outside, middle)
+        return jump_between(outside, inside)
 
     def later(self, inside: State, first: Window) -> bool:
         """Whether a pair is still real where the first one so far turns complex."""
