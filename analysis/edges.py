@@ -136,7 +136,7 @@ def locate(operator: Callable[[float], Operator], here: State, there: State) -> 
     # D jumps: nothing but bisection will do.
     order = sorted(known)
     below, above = next((a, b) for a, b in pairwise(order) if known[a].discriminant * known[b].discriminant <= 0)
-    while above - below > max(JUMP * span, 4 * float(np.spacing(abs(above)))):
+    while above - below > jump_width(here, there):
         middle = 0.5 * (below + above)
         if state(middle).discriminant * known[below].discriminant > 0:
             below = middle
@@ -150,6 +150,11 @@ def locate(operator: Callable[[float], Operator], here: State, there: State) -> 
             f"F_x = {above:.10g}: take smaller increments"
         )
     return jump_between(known[below], known[above]), known[below], known[above]
+
+
+def jump_width(here: State, there: State) -> float:
+    """Width to which a jump between two loads is bracketed, force."""
+    return max(JUMP * abs(there.fx - here.fx), 4 * float(np.spacing(max(abs(here.fx), abs(there.fx)))))
 
 
 def jump_between(here: State, there: State) -> Edge:
