@@ -32,9 +32,8 @@ JUMP = 1e-9
 """Width to which a jump of the equilibrium is bracketed, in increments: the place depends on the path, and with it on
 the increment, by far more."""
 
-ALL_MODES = 2000
-"""Coordinates up to which a pair that cannot be continued is looked for among all modes, which takes half a minute
-there."""
+ALL_MODES = 900
+"""Coordinates up to which a pair that cannot be continued is looked for among all modes, which takes a second there."""
 
 SHORTEST = 2.0**-6
 """Shortest steps, in shares of the way from one operator to the other, in which a pair of a larger one is followed."""
@@ -137,20 +136,36 @@ def locate(operator: Callable[[float], Operator], here: State, there: State) -> 
     # D jumps: nothing but bisection will do.
     order = sorted(known)
     below, above = next((a, b) for a, b in pairwise(order) if known[a].discriminant * known[b].discriminant <= 0)
-    while above - below > max(JUMP * span, 4 * float(np.spacing(abs(above)))):
+    while above - below > jump_width(here, there):
         middle = 0.5 * (below + above)
         if state(middle).discriminant * known[below].discriminant > 0:
             below = middle
         else:
             above = middle
-    jump = Edge(
-        fx=0.5 * (below + above),
-        error=0.5 * (above - below),
-        eigenvalue=known[above].block.mean,
-        overlap=min(known[below].block.overlap, known[above].block.overlap),
+    # Where the equilibrium does not jump, it is the pair that has become another one on the way.
+    across = known[below].at(above, known[above].matrix)
+    if across.discriminant * known[above].discriminant < 0 or not across.block.same_plane(known[above].block):
+        raise LostPairError(
+            f"the pair of eigenvalues about {known[above].block.mean:.6g} cannot be told from its neighbours at "
+            f"F_x = {above:.10g}: take smaller increments"
+        )
+    return jump_between(known[below], known[above]), known[below], known[above]
+
+
+def jump_width(here: State, there: State) -> float:
+    """Width to which a jump between two loads is bracketed, force."""
+    return max(JUMP * abs(there.fx - here.fx), 4 * float(np.spacing(max(abs(here.fx), abs(there.fx)))))
+
+
+def jump_between(here: State, there: State) -> Edge:
+    """The edge of a pair where the equilibrium jumps, somewhere between two loads."""
+    return Edge(
+        fx=0.5 * (here.fx + there.fx),
+        error=0.5 * abs(there.fx - here.fx),
+        eigenvalue=there.block.mean,
+        overlap=min(here.block.overlap, there.block.overlap),
         kind="contact change",
     )
-    return jump, known[below], known[above]
 
 
 def _coalescence(points: Sequence[State]) -> Edge | None:

@@ -15,6 +15,9 @@ slice by slice of the spectrum (:mod:`~faultgouge.analysis.slices`), each as a p
 not where contacts open, close or slide. What the operator has instead shows it: the pair that is announced is not
 there, cannot be followed, or turns complex elsewhere. Such an increment is walked again in `PARTS` shorter ones, and
 these again, `DEPTH` times. What is in doubt even then is handed out with the result.
+
+**Edges.** A real pair may exchange partners with a third mode within an increment; one that is complex is the only one
+of its kind. So it is from inside of its window that a pair is followed to the edge, see `_Search.edge`.
 """
 
 import os
@@ -28,7 +31,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
-from .edges import Edge, LostPairError, State, locate
+from .edges import Edge, LostPairError, State, jump_between, jump_width, locate
 from .meetings import meetings
 from .modes import Modes, Operator, Pair, span
 from .packing import Floats
@@ -78,7 +81,8 @@ class FirstWindow:
     Attributes
     ----------
     window : Window or None
-        None if all eigenvalues are real. Its fx_end is None if the pair is complex at the load above the onset.
+        None if all eigenvalues are real. Its fx_end is None if the pair is complex at the load above the onset, of the
+        finest increments that were made.
     doubtful : tuple of (float, float)
         Increments, the finest that were made, on which clusters announce a pair that the operator was not seen to have:
         an earlier window may hide there.
@@ -117,7 +121,8 @@ def first_window(
     Raises
     ------
     LostPairError
-        If a pair that is complex cannot be followed to its onset, not even in the shortest increments.
+        If a pair that is complex cannot be followed to its onset, not even in the shortest increments, and no other is
+        found in the same one.
     SliceError
         If a part of the spectrum is not found.
     """
@@ -242,11 +247,13 @@ class _Search:
     def earliest(self, candidates: list[_Candidate], there: Place, finest: bool) -> tuple[Window | None, bool]:
         """The first window of the operator itself that one of the candidates has become, and whether that is in doubt.
 
-        At the first doubt the search ends, but for the finest increments.
+        At the first doubt the search ends, but for the finest increments. There an error, of a complex pair that cannot
+        be followed or a load without equilibrium, is raised if no window has been found beside it.
         """
         here = self.passed[-1]
         increment = there.fx - here.fx
         first: Window | None = None
+        lost: RuntimeError | None = None
         doubt = False
         for candidate in sorted(candidates, key=lambda candidate: candidate.onset):
             # Clusters are off by a share of the way from here: one that is far beyond cannot be first.
@@ -255,9 +262,8 @@ class _Search:
             try:
                 window = self.confirmed(candidate, there, first)
             except RuntimeError as error:
-                if finest and not isinstance(error, _DoubtError):
-                    raise
                 window, doubt = None, True
+                lost = lost if isinstance(error, _DoubtError) else error
             if window is not None:
                 late = abs(window.fx_onset - candidate.onset) > 2 * REACH * increment
                 doubt = doubt or (late and window.fx_onset > here.fx)
@@ -265,6 +271,8 @@ class _Search:
                     first = window
             if doubt and not finest:
                 break
+        if finest and first is None and lost is not None:
+            raise lost
         return first, doubt
 
     def parts(self, matrix: csr_array) -> Iterable[Projection]:
@@ -318,18 +326,40 @@ class _Search:
         if inside is None or (first is not None and self.later(inside, first)):
             return None
         above = inside if inside.fx == there.fx else inside.at(*there)
-        end = locate(self.operator, inside, above)[0] if above.discriminant > 0 else None
+        end = self.edge(above, inside) if above.discriminant > 0 else None
         for place in reversed(self.passed):
             below = inside if inside.fx == place.fx else inside.at(*place)
             if below.discriminant > 0:
-                return window_between(locate(self.operator, below, inside)[0], end)
+                return window_between(self.edge(below, inside), end)
             inside = below
         return window_between(Edge(inside.fx, 0.0, inside.block.mean, inside.block.overlap, "start"), end)
+
+    def edge(self, outside: State, inside: State) -> Edge:
+        """Where a pair turns complex between a load where it is real and one where it is not.
+
+        A real pair may have changed partners with a third mode on the way; one that is complex is the only one of its
+        kind. So it is from inside that the pair is followed, in halves of the way, until it leads from outside to
+        inside as well. If it never does, the equilibrium jumps.
+        """
+        width = jump_width(outside, inside)
+        while abs(inside.fx - outside.fx) > width:
+            if _leads_back(outside, inside):
+                try:
+                    return locate(self.operator, *sorted((outside, inside), key=lambda state: state.fx))[0]
+                except LostPairError:
+                    pass
+            fx = 0.5 * (outside.fx + inside.fx)
+            middle = inside.at(fx, self.operator(fx))
+            outside, inside = (middle, inside) if middle.discriminant > 0 else (outside, middle)
+        return jump_between(outside, inside)
 
     def later(self, inside: State, first: Window) -> bool:
         """Whether a pair is still real where the first one so far turns complex."""
         onset = first.fx_onset
-        return inside.fx > onset and inside.at(onset, self.operator(onset)).discriminant > 0
+        if inside.fx <= onset:
+            return False
+        below = inside.at(onset, self.operator(onset))
+        return below.discriminant > 0 and _leads_back(below, inside)
 
     def complex_state(self, candidate: _Candidate, there: Place) -> State | None:
         """The pair at a load where it is complex; None if it is surely real, or not before these loads are passed."""
@@ -364,6 +394,12 @@ class _Search:
             nearest = min(states, key=lambda state: abs(state.fx - fx))
             states.append(nearest.at(fx, self.operator(fx)))
         raise _DoubtError
+
+
+def _leads_back(outside: State, inside: State) -> bool:
+    """Whether a real pair becomes the complex one from which it was followed."""
+    returned = continued(inside.matrix, outside.block)
+    return returned is not None and returned.discriminant < 0 and returned.same_plane(inside.block)
 
 
 def _exceeding(block: Floats) -> Floats:

@@ -15,10 +15,16 @@ The result counts only if the residuals :math:`A V - V (V^T A V)`, and those on 
 rounding: then V and U belong to an operator that differs from A by no more, and as both are used D is in
 error by their product over the distance of the other modes. It must also be the same plane; an iteration that
 went to other modes is rejected.
+
+A third eigenvalue may be closer to that shift than the pair, or hardly farther. Then shifts on the other side and
+nearer by are tried. A complex pair is found, too, by its eigenvectors with its own eigenvalue as the shift: the closest
+of the others is no nearer than the real axis.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
@@ -26,9 +32,17 @@ from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import splu
 
 from .packing import Floats
+from .spectrum import Complexes
 
 STEPS = 40
 """Inverse iterations before a continuation is given up: a solve costs a hundredth of a decomposition."""
+
+PACE = 5
+"""Steps by which the pace of an iteration is judged: it slows down while the farther modes go, and then keeps it."""
+
+OFFSETS = (1.0, -1.0, 0.1, -0.1)
+"""Distances of the shift from the mean of a pair that are tried in turn, in units of its spread: a third eigenvalue may
+be closer than the spread, and a tenth of it costs the second direction no more than a digit."""
 
 RESIDUAL = 100.0
 """Residuals of accepted bases, in units of u |A|_F; LAPACK's own are of some 10."""
@@ -126,21 +140,78 @@ def continued(matrix: csr_array, block: Block) -> Block | None:
         None if the iteration does not converge to this plane: other modes are too close, or the neighbour is
         too far.
     """
+    ways: list[Callable[[], Block | None]] = [partial(_by_real_shift, matrix, block, share) for share in OFFSETS]
+    if block.discriminant < 0:
+        ways.insert(1, partial(_by_complex_shift, matrix, block))
+    for way in ways:
+        found = way()
+        if found is not None and found.same_plane(block):
+            return found
+    return None
+
+
+def _by_real_shift(matrix: csr_array, block: Block, share: float) -> Block | None:
+    """Inverse iteration of both planes, good through a coalescence; the shift is off by a share of the spread."""
     v, u = block.right, block.left
-    shift = float(np.sum(u * (matrix @ v @ np.linalg.inv(u.T @ v)))) / 2 + max(
-        block.spread, 1e3 * np.finfo(np.float64).eps * abs(block.mean)
-    )
-    solve = _shifted_solver(matrix, shift)
+    mean = float(np.sum(u * (matrix @ v @ np.linalg.inv(u.T @ v)))) / 2
+    solve = _shifted_solver(matrix, mean + share * max(block.spread, 1e3 * np.finfo(np.float64).eps * abs(block.mean)))
     if solve is None:
         return None
-    level = RESIDUAL * 0.5 * np.finfo(np.float64).eps * float(np.linalg.norm(matrix.data))
-    transposed = matrix.T
-    for _ in range(STEPS):
+    progress = _Progress(matrix)
+    while progress.promising:
         v, u = np.linalg.qr(solve(v, False))[0], np.linalg.qr(solve(u, True))[0]
-        if max(_residual(matrix, v), _residual(transposed, u)) < level:
-            found = Block.of(matrix, v, u)
-            return found if found.same_plane(block) else None
+        if progress.converged(v, u):
+            return Block.of(matrix, v, u)
     return None
+
+
+def _by_complex_shift(matrix: csr_array, block: Block) -> Block | None:
+    """Inverse iteration of the eigenvectors of a complex pair, whatever real eigenvalue is close to it."""
+    near = Block.of(matrix, block.right, block.left)
+    if near.discriminant >= 0:
+        return None
+    solve = _shifted_solver(matrix, complex(near.mean, 0.5 * np.sqrt(-near.discriminant)))
+    if solve is None:
+        return None
+    metric = near.left.T @ near.right
+    x = near.right @ _upper(near.entries)
+    y = near.left @ _upper(np.linalg.solve(metric.T, (metric @ near.entries).T))  # A^T y = lambda y
+    progress = _Progress(matrix)
+    while progress.promising:
+        x, y = (each / np.linalg.norm(each) for each in (solve(x, False), solve(y, True)))
+        v, u = (np.linalg.qr(np.column_stack([each.real, each.imag]))[0] for each in (x, y))
+        if progress.converged(v, u):
+            return Block.of(matrix, v, u)
+    return None
+
+
+def _upper(entries: Floats) -> Complexes:
+    """The eigenvector of a 2 x 2 matrix whose eigenvalue has the positive imaginary part."""
+    values, vectors = np.linalg.eig(entries)
+    return np.asarray(vectors[:, np.argmax(values.imag)])
+
+
+class _Progress:
+    """The residuals of inverse iteration, down to rounding."""
+
+    def __init__(self, matrix: csr_array) -> None:
+        self.matrix, self.transposed = matrix, matrix.T
+        self.level = RESIDUAL * 0.5 * np.finfo(np.float64).eps * float(np.linalg.norm(matrix.data))
+        self.residuals: list[float] = []
+
+    def converged(self, right: Floats, left: Floats) -> bool:
+        """Whether both planes are invariant."""
+        self.residuals.append(max(_residual(self.matrix, right), _residual(self.transposed, left)))
+        return self.residuals[-1] < self.level
+
+    @property
+    def promising(self) -> bool:
+        """Whether rounding may be reached within `STEPS`, at the pace of the last `PACE` steps."""
+        left = STEPS - len(self.residuals)
+        if len(self.residuals) <= 2 * PACE:
+            return True
+        last, before = self.residuals[-1], self.residuals[-1 - PACE]
+        return left > 0 and last * (last / before) ** (left / PACE) < self.level
 
 
 def _residual(matrix: csr_array, basis: Floats) -> float:
@@ -148,7 +219,7 @@ def _residual(matrix: csr_array, basis: Floats) -> float:
     return float(np.linalg.norm(image - basis @ (basis.T @ image)))
 
 
-def _shifted_solver(matrix: csr_array, shift: float) -> Callable[[Floats, bool], Floats] | None:
+def _shifted_solver(matrix: csr_array, shift: complex) -> Callable[[Any, bool], Any] | None:
     """(right-hand sides, transposed) -> solutions of A - shift; None if that is singular."""
     size = matrix.shape[0]
     shifted = csc_array(matrix - shift * eye_array(size))
