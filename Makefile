@@ -38,7 +38,7 @@ format: $(VENV)/.check
 
 benchmark: $(VENV)/.installed
 	$(BIN)/python benchmarks/time_per_step.py
-	$(BIN)/python benchmarks/time_per_step.py --disks 100000 --turns 3
+	$(BIN)/python benchmarks/time_per_step.py --disks 100000 --turns 5
 	$(BIN)/faultgouge explain scenes/paper.toml
 	$(BIN)/faultgouge explain scenes/frictionless.toml
 	$(BIN)/python benchmarks/increment.py
