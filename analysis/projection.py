@@ -33,7 +33,7 @@ CORE, MARGIN = 20, 20
 """Modes of a cluster that are its own, and further ones on either side that are coupled to these in all orders."""
 
 BEYOND = 10
-"""Modes of a part on either side beyond those of its clusters: they count in second order, as those of `MARGIN` do in
+"""Modes of a part on either side beyond those of its clusters. They count in second order, as those of `MARGIN` do in
 all orders. What is farther away changes levels by less than (coupling / spacing)^2 / 30 of their spacing."""
 
 SMALL = 1000
