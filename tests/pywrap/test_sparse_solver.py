@@ -30,7 +30,10 @@ def pairs(packing):
 
 @pytest.fixture(scope="module")
 def solver(matrix, pairs):
-    return SparseSolver(matrix, *pairs)
+    """With factors of its own: they are made at the first solution."""
+    solver = SparseSolver(matrix, *pairs)
+    solver.solve(np.ones(matrix.shape[0]))
+    return solver
 
 
 def fill(matrix, order):
