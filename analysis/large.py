@@ -29,13 +29,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csc_array, csr_array, eye_array
-from scipy.sparse.linalg import LinearOperator, eigs, splu
+from scipy.sparse.linalg import LinearOperator, eigs
 
 from .edges import Edge, LostPairError, State, jump_between, jump_width, locate
 from .meetings import meetings
 from .modes import Modes, Operator, Pair, span
 from .packing import Floats
 from .projection import MIXING, Cluster, Levels, Projection
+from .sparse_lu import symmetric_lu
 from .spectrum import believable, unit_rounding
 from .tracking import Block, continued
 from .windows import Place, Window, complex_windows, dip_between, increasing, window_between
@@ -66,12 +67,14 @@ than two while a basis passes by, and the finest are a sixteenth."""
 NEAR = 12
 """Modes among which a pair is looked for that the clusters announce where the operator has another one."""
 
-KEPT = 9000
-"""Coordinates up to which the basis is kept from increment to increment, which takes a gigabyte there; of a larger
-operator it never exists as a whole."""
+KEPT = 3e8
+"""Numbers of a basis that is kept from increment to increment, 3.6 GB of them in double and in single precision; a
+larger one never exists as a whole."""
 
 AHEAD = 2
-"""Increments that are looked at while the basis of a larger operator passes by: each costs a twentieth of it."""
+"""Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of it."""
+
+Watch = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,12 @@ class FirstWindow:
 
 
 def first_window(
-    operator: Callable[[float], Operator], forces: ArrayLike, *, narrowest: float | None = None
+    operator: Callable[[float], Operator],
+    forces: ArrayLike,
+    *,
+    narrowest: float | None = None,
+    modes: tuple[int, int] | None = None,
+    watch: Watch = lambda says: None,
 ) -> FirstWindow:
     """The first window of complex eigenvalues of a family of large matrices, without all their eigenvalues.
 
@@ -113,6 +121,8 @@ def first_window(
         been found before it.
     narrowest
         As in :func:`~faultgouge.analysis.find_onset`; no less than a thousandth of an increment.
+    modes, watch
+        As in :func:`~faultgouge.analysis.find_onset`.
 
     Returns
     -------
@@ -125,11 +135,13 @@ def first_window(
         found in the same one.
     SliceError
         If a part of the spectrum is not found.
+    ValueError
+        If the packing has none of these modes.
     """
     loads = increasing(forces)
     here = Place(float(loads[0]), csr_array(operator(float(loads[0]))))
-    search = _Search(operator, narrowest or 0.0)
-    ahead = 1 if here.matrix.shape[0] <= KEPT else AHEAD
+    search = _Search(operator, narrowest or 0.0, modes, watch)
+    ahead = 1 if search.keeps(here.matrix) else AHEAD
     done = 1
     while done < len(loads):
         places = [here, *_reached(operator, loads[done : done + ahead])]
@@ -181,7 +193,7 @@ def _complex_pair_near(matrix: csr_array, guess: Block) -> Block | None:
     By ARPACK with shift and inversion.
     """
     shift = guess.mean + 0.1 * guess.spread
-    factors = splu(csc_array(matrix - shift * eye_array(matrix.shape[0])))
+    factors = symmetric_lu(csc_array(matrix - shift * eye_array(matrix.shape[0])))
     found = []
     for trans, operator in (("N", matrix), ("T", matrix.T)):
         inverse = LinearOperator(matrix.shape, matvec=partial(factors.solve, trans=trans), dtype=np.float64)
@@ -206,8 +218,14 @@ def _complex_pair_near(matrix: csr_array, guess: Block) -> Block | None:
 class _Search:
     """The first window of large operators, from load to load."""
 
-    def __init__(self, operator: Callable[[float], Operator], narrowest: float) -> None:
-        self.operator, self.narrowest = operator, narrowest
+    def __init__(
+        self,
+        operator: Callable[[float], Operator],
+        narrowest: float,
+        modes: tuple[int, int] | None = None,
+        watch: Watch = lambda says: None,
+    ) -> None:
+        self.operator, self.narrowest, self.modes, self.watch = operator, narrowest, modes, watch
         self.passed: list[Place] = []
         self.kept: list[Projection] = []
         self.doubtful: list[tuple[float, float]] = []
@@ -215,7 +233,11 @@ class _Search:
     def walk(self, places: list[Place], depth: int = DEPTH) -> Window | None:
         """The first window that begins between the first and the last of several loads."""
         found: list[list[_Candidate]] = [[] for _ in places[1:]]
+        first, stop = self.range(places[0].matrix)
+        done = 0
         for part in self.parts(places[0].matrix):
+            done += part.own.stop - part.own.start
+            self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {done} of {stop - first} modes")
             before = part.levels(places[0].matrix)
             for candidates, (here, there) in zip(found, pairwise(places), strict=True):
                 after = part.change(before, there.matrix - here.matrix)
@@ -275,14 +297,27 @@ class _Search:
             raise lost
         return first, doubt
 
+    def range(self, matrix: csr_array) -> tuple[int, int]:
+        """Numbers of the first mode that is looked at and of the first that is not."""
+        count = int(np.count_nonzero(np.diff(matrix.indptr)))
+        first, stop = self.modes or (0, count)
+        if not 0 <= first < min(stop, count):
+            raise ValueError(f"modes {first}:{stop} is no part of the {count} modes of this packing, 0:{count}")
+        return first, min(stop, count)
+
+    def keeps(self, matrix: csr_array) -> bool:
+        """Whether the basis is kept."""
+        first, stop = self.range(matrix)
+        return Projection.width(stop - first) * matrix.shape[0] <= KEPT
+
     def parts(self, matrix: csr_array) -> Iterable[Projection]:
         """Projections of all modes, those of an earlier load as long as they serve."""
         if self.kept and all(part.covers(matrix) for part in self.kept):
             mixing = [each for part in self.kept for each in part.mixing(part.onto(matrix))]
             if np.median(mixing) < MIXING:
                 return self.kept
-        parts = Projection.parts(matrix, workers=_cores())
-        if matrix.shape[0] > KEPT:
+        parts = Projection.parts(matrix, _cores(), self.range(matrix))
+        if not self.keeps(matrix):
             return parts
         self.kept = list(parts)
         return self.kept
@@ -322,6 +357,7 @@ class _Search:
 
     def confirmed(self, candidate: _Candidate, there: Place, first: Window | None) -> Window | None:
         """The window of the operator itself in place of that of a cluster; None if it is none, or not the first."""
+        self.watch(f"a pair that turns complex about F_x = {candidate.onset:.6g}: its onset")
         inside = self.complex_state(candidate, there)
         if inside is None or (first is not None and self.later(inside, first)):
             return None

@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from .edges import State
-from .large import first_window
+from .large import Watch, first_window
 from .modes import Modes, assign, full_operator
 from .packing import Packing
 from .spectrum import Complexes
@@ -64,11 +64,14 @@ class Onset:
     doubtful : tuple of (float, float)
         Of a large packing, increments before the onset in which a pair was expected and not found: an earlier window
         may hide there, which smaller increments would tell.
+    modes : tuple of (int, int) or None
+        Modes among which the onset was sought; None for all.
     """
 
     windows: tuple[Window, ...]
     complete: bool = True
     doubtful: tuple[tuple[float, float], ...] = ()
+    modes: tuple[int, int] | None = None
 
     @property
     def fx_c(self) -> float:
@@ -81,13 +84,19 @@ class Onset:
         return self.windows[0].error
 
     def as_dict(self) -> dict[str, Any]:
-        """{"fx_c", "error", "windows": [...], "doubtful": [[from, to], ...]} of plain numbers, for JSON."""
+        """{"fx_c", "error", "windows": [...], "doubtful": [[from, to], ...], "modes"} of plain numbers, for JSON."""
         return {
             "fx_c": self.fx_c,
             "error": self.error,
             "windows": [window.as_dict() for window in self.windows],
             "doubtful": [list(increment) for increment in self.doubtful],
+            "modes": None if self.modes is None else list(self.modes),
         }
+
+
+def seeks_all(packing: Packing, modes: tuple[int, int] | None = None) -> bool:
+    """Whether `find_onset` seeks all windows, at all loads; else it asks for loads up to the first window."""
+    return modes is None and len(packing) <= ALL_WINDOWS
 
 
 def find_onset(
@@ -96,6 +105,8 @@ def find_onset(
     *,
     form: Form = "consistent",
     narrowest: float | None = None,
+    modes: tuple[int, int] | None = None,
+    watch: Watch = lambda says: None,
 ) -> Onset:
     """The windows of complex eigenvalues between the smallest and the largest load.
 
@@ -116,6 +127,13 @@ def find_onset(
     narrowest : float, optional
         Windows narrower than this are not looked for, force; 1e-7 of the largest |load| by default. Such a
         pair would grow more slowly than any run can show.
+    modes : tuple of (int, int), optional
+        Search these modes alone, and for their first window: numbers of the first one and of the first one beyond, by
+        frequency, the lowest being 0. The modes of the symmetric part are counted, at the load where the search
+        stands. Parts of a spectrum that are searched apart, on machines of their own, have together the same first
+        window as all of it.
+    watch : callable, optional
+        Told in words what is being looked at in a large packing.
 
     Returns
     -------
@@ -128,9 +146,8 @@ def find_onset(
     LostPairError, SliceError
         Of a large packing, see :func:`first_window`.
     ValueError
-        If the loads are not at least two increasing numbers.
+        If the loads are not at least two increasing numbers, or the packing has none of the modes.
     """
-
     loads = increasing(forces)
     start = equilibrium(float(loads[0]))
     unbalanced: dict[float, float] = {}
@@ -143,22 +160,25 @@ def find_onset(
     def balance(fx: float) -> float:
         return unbalanced[min(unbalanced, key=lambda known: abs(known - fx))]
 
-    complete = len(start) <= ALL_WINDOWS
+    complete = seeks_all(start, modes)
     doubtful: tuple[tuple[float, float], ...] = ()
     if complete:
         found = complex_windows(operator, loads, narrowest=narrowest)
     else:
-        first = first_window(operator, loads, narrowest=narrowest)
+        first = first_window(operator, loads, narrowest=narrowest, modes=modes, watch=watch)
         found = () if first.window is None else (first.window,)
         doubtful = first.doubtful
+    among = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
     if doubtful and not found:
         below, above = doubtful[0]
         raise OnsetError(
-            f"No pair of eigenvalues was found to become complex up to fx = {loads[-1]:.17g}, but one was expected "
-            f"between {below:.10g} and {above:.10g}: take smaller increments, or raise the largest load."
+            f"No pair of eigenvalues{among} was found to become complex up to fx = {loads[-1]:.17g}, but one was "
+            f"expected between {below:.10g} and {above:.10g}: take smaller increments, or raise the largest load."
         )
     if not found:
-        raise OnsetError(f"No pair of eigenvalues becomes complex up to fx = {loads[-1]:.17g}: raise the largest load.")
+        raise OnsetError(
+            f"No pair of eigenvalues{among} becomes complex up to fx = {loads[-1]:.17g}: raise the largest load."
+        )
     windows = tuple(
         replace(
             window,
@@ -167,7 +187,7 @@ def find_onset(
         )
         for window in found
     )
-    return Onset(windows, complete, doubtful)
+    return Onset(windows, complete, doubtful, modes)
 
 
 def scan_windows(packings: Sequence[Packing], form: Form = "consistent") -> tuple[Window, ...]:

@@ -19,7 +19,7 @@ the other (:mod:`~faultgouge.analysis.slices`), with a margin on either side, an
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -151,8 +151,8 @@ class Projection:
         return cls(matrix.shape[0], active, values, basis, slice(0, len(values)))
 
     @classmethod
-    def parts(cls, matrix: csr_array, workers: int) -> "Iterator[Projection]":
-        """Projections whose own modes are, together, those of the symmetric part.
+    def parts(cls, matrix: csr_array, workers: int, modes: tuple[int, int]) -> "Iterator[Projection]":
+        """Projections whose own modes are, together, these of the symmetric part.
 
         Parameters
         ----------
@@ -160,16 +160,25 @@ class Projection:
             The operator, 1 / time^2.
         workers : int
             Threads.
+        modes : tuple of (int, int)
+            Numbers of the first mode that is wanted and of the first that is not, the lowest being 0.
         """
         active = np.flatnonzero(np.diff(matrix.indptr))
         if len(active) <= SMALL:
-            yield cls.of(matrix)
+            yield replace(cls.of(matrix), own=slice(*modes))
             return
         from .slices import slices  # with libraries that nothing else needs
 
         inner = matrix[active][:, active]
-        for part in slices(csc_array(0.5 * (inner + inner.T)), MARGIN + BEYOND, workers):
+        for part in slices(csc_array(0.5 * (inner + inner.T)), MARGIN + BEYOND, workers, modes):
             yield cls(matrix.shape[0], active, part.values, part.vectors, part.own)
+
+    @staticmethod
+    def width(modes: int) -> int:
+        """Modes of the parts that share so many among them, margins included."""
+        from .slices import OWN
+
+        return modes + 2 * (MARGIN + BEYOND) * max(1, round(modes / OWN))
 
     @property
     def clusters(self) -> list[Cluster]:

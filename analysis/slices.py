@@ -19,16 +19,17 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from itertools import count
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.linalg import eigh, qr
 from scipy.sparse import csc_array, eye_array
-from scipy.sparse.linalg import SuperLU, eigsh, splu
+from scipy.sparse.linalg import SuperLU, eigsh
 from threadpoolctl import threadpool_limits
 
 from .packing import Floats, Indices
+from .sparse_lu import symmetric_lu
 
 OWN = 120
 """Eigenvalues from one shift to the next. Fewer cost more factorisations, more cost more orthogonalisation."""
@@ -53,11 +54,6 @@ ACCURATE = 1e-2
 modes far from the shift weigh less: with S itself up to 0.2 was measured (29,000 coordinates). It enters an eigenvalue
 as its square over the distance of modes outside the slice, which are ten such distances away and more: 4e-6 at the
 most was measured. An eigenvalue may be off its Rayleigh quotient with S by 1e-2, too."""
-
-ORDERED: dict[str, Any] = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-"""SuperLU without pivoting: the factors stay sparse, and the signs of the pivots tell the inertia. What stability that
-costs is looked at afterwards: the Krylov space knows the factors alone, so the eigenvalues that come out of it are
-compared with Rayleigh quotients of the matrix itself."""
 
 
 class SliceError(RuntimeError):
@@ -87,8 +83,8 @@ class Slice:
     own: slice
 
 
-def slices(matrix: csc_array, margin: int, workers: int = 1) -> Iterator[Slice]:
-    """All eigenvalues and eigenvectors, by increasing eigenvalue.
+def slices(matrix: csc_array, margin: int, workers: int = 1, modes: tuple[int, int] | None = None) -> Iterator[Slice]:
+    """Eigenvalues and eigenvectors, by increasing eigenvalue.
 
     Parameters
     ----------
@@ -98,6 +94,8 @@ def slices(matrix: csc_array, margin: int, workers: int = 1) -> Iterator[Slice]:
         Further modes wanted on either side of a slice.
     workers : int
         Threads.
+    modes : tuple of (int, int), optional
+        Numbers of the first eigenvalue that is wanted and of the first that is not, the lowest being 0; all by default.
 
     Yields
     ------
@@ -113,7 +111,7 @@ def slices(matrix: csc_array, margin: int, workers: int = 1) -> Iterator[Slice]:
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(workers) as pool:
         waiting: deque[Future[Slice]] = deque()
         before: Slice | None = None
-        for shift, own in spectrum.shifts(pool):
+        for shift, own in spectrum.shifts(pool, *(modes or (0, matrix.shape[0]))):
             waiting.append(pool.submit(spectrum.slice_about, shift, own, margin))
             if len(waiting) > workers:
                 before = _checked(before, waiting.popleft().result())
@@ -143,33 +141,45 @@ class _Spectrum:
     def __init__(self, matrix: csc_array) -> None:
         size = matrix.shape[0]
         self.bound = float(abs(matrix).sum(axis=0).max())  # no eigenvalue is beyond
-        order = splu(csc_array(matrix + 2 * self.bound * eye_array(size)), **ORDERED).perm_c
+        order = symmetric_lu(csc_array(matrix + 2 * self.bound * eye_array(size))).perm_c
         self.place: Indices = order
         self.matrix = csc_array(matrix[np.argsort(order)][:, np.argsort(order)])
 
     def factored(self, shift: float) -> tuple[SuperLU, int]:
-        """Factors of S - shift without pivoting, and how many eigenvalues are below the shift."""
+        """Factors of S - shift, and how many eigenvalues are below the shift.
+
+        Without pivoting, so that the signs of the pivots tell the inertia. What stability that costs is looked at
+        afterwards, see `compare`.
+        """
         shifted = csc_array(self.matrix - shift * eye_array(self.matrix.shape[0]))
-        factors = splu(shifted, **(ORDERED | {"permc_spec": "NATURAL"}))
+        factors = symmetric_lu(shifted, ordered=True)
         return factors, int(np.count_nonzero(factors.U.diagonal() < 0))
 
-    def count(self, shift: float) -> int:
+    def below(self, shift: float) -> int:
         """How many eigenvalues are below the shift."""
         return self.factored(shift)[1]
 
-    def shifts(self, pool: ThreadPoolExecutor) -> Iterator[tuple[float, tuple[int, int]]]:
-        """Shifts, and the numbers of the first eigenvalue that belongs to each and of the first that does not."""
+    def shifts(self, pool: ThreadPoolExecutor, first: int, stop: int) -> Iterator[tuple[float, tuple[int, int]]]:
+        """Shifts, and the numbers of the first eigenvalue that belongs to each and of the first that does not.
+
+        Those from the eigenvalue of number `first` on, and before that of number `stop`.
+        """
         size = self.matrix.shape[0]
         top = float(eigsh(self.matrix, k=1, which="LA", tol=1e-3, return_eigenvectors=False)[0])
         places = np.array([-self.bound, -1e-9 * self.bound, 1.01 * top])
-        numbers = np.array([0, self.count(places[1]), size])
-        while len(wide := np.flatnonzero((np.diff(numbers) > COARSE) & (np.diff(places) > 1e-6 * top))):
-            halves = 0.5 * (places[wide] + places[wide + 1])
-            numbers = np.insert(numbers, wide + 1, list(pool.map(self.count, halves)))
-            places = np.insert(places, wide + 1, halves)
+        numbers = np.array([0, self.below(places[1]), size])
+        for turn in count():
+            wanted = (numbers[1:] > first) & (numbers[:-1] < stop)
+            wide = np.flatnonzero(wanted & (np.diff(numbers) > COARSE) & (np.diff(places) > 1e-6 * top))
+            if len(wide) == 0:
+                break
+            share = _share(numbers[wide], numbers[wide + 1], first, stop) if turn % 2 == 0 else 0.5
+            between = places[wide] + share * (places[wide + 1] - places[wide])
+            numbers = np.insert(numbers, wide + 1, list(pool.map(self.below, between)))
+            places = np.insert(places, wide + 1, between)
         numbers, last = np.unique(numbers[::-1], return_index=True)
-        pieces = max(1, round(size / OWN))
-        ends = np.arange(pieces + 1) * size // pieces
+        pieces = max(1, round((stop - first) / OWN))
+        ends = first + np.arange(pieces + 1) * (stop - first) // pieces
         borders = PchipInterpolator(numbers, places[::-1][last])(ends)
         middles = 0.5 * (borders[:-1] + borders[1:])
         for middle, start, stop in zip(middles, ends[:-1], ends[1:], strict=True):
@@ -207,7 +217,10 @@ class _Spectrum:
         return part
 
     def compare(self, part: Slice, vectors: Floats) -> None:
-        """Raise an error if a slice's own eigenvalues are not those of the matrix, but of inaccurate factors."""
+        """Raise an error if a slice's own eigenvalues are not those of the matrix, but of inaccurate factors.
+
+        The Krylov space knows the factors alone; the Rayleigh quotients are of the matrix itself.
+        """
         values = part.values[part.own]
         quotients = np.sum(vectors.T * (self.matrix @ vectors.T), axis=0)
         worst = int(np.argmax(np.abs(quotients - values)))
@@ -217,6 +230,16 @@ class _Spectrum:
                 f"the eigenvalue of number {number} is {values[worst]:.10g} from the factors and "
                 f"{quotients[worst]:.10g} from the matrix: the factors are inaccurate; take other loads"
             )
+
+
+def _share(low: Indices, high: Indices, first: int, stop: int) -> Floats:
+    """Where to divide intervals that hold the eigenvalues of these numbers, as if these lay there evenly.
+
+    In halves, but for one of which little is wanted: that little, and half of `COARSE` on either side, is cut off.
+    """
+    start, end = np.maximum(low, first - COARSE // 2), np.minimum(high, stop + COARSE // 2)
+    target = np.where(start > low, start, np.where(end < high, end, 0.5 * (low + high)))
+    return np.asarray((target - low) / (high - low))
 
 
 class _Krylov:

@@ -16,26 +16,40 @@ rounding: then V and U belong to an operator that differs from A by no more, and
 error by their product over the distance of the other modes. It must also be the same plane; an iteration that
 went to other modes is rejected.
 
+**Large operators.** There a factorisation costs as much as a hundred solutions, and the one from which a pair was found
+is good for its neighbours, too, if P, what it is of, is A - sigma but for a small part of the distance of the other
+modes: the iteration
+
+.. math:: V \leftarrow V - P^{-1} (A V - V (V^T A V))
+
+is inverse iteration where P is :math:`A - \sigma`, and ends at an invariant subspace of A whatever P is (residual
+inverse iteration, Neumaier, SIAM J. Numer. Anal. 22, 914 (1985)). So factors need not be accurate either, and are
+computed without pivoting.
+
 A third eigenvalue may be closer to that shift than the pair, or hardly farther. Then shifts on the other side and
 nearer by are tried. A complex pair is found, too, by its eigenvectors with its own eigenvalue as the shift: the closest
 of the others is no nearer than the real axis.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import csc_array, csr_array, eye_array
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU
 
 from .packing import Floats
+from .sparse_lu import symmetric_lu
 from .spectrum import Complexes
 
 STEPS = 40
 """Inverse iterations before a continuation is given up: a solve costs a hundredth of a decomposition."""
+
+STEPS_ON = 12
+"""The same with the factors of a neighbour: four solutions a step, against the hundred of a factorisation."""
 
 PACE = 5
 """Steps by which the pace of an iteration is judged: it slows down while the farther modes go, and then keeps it."""
@@ -69,6 +83,8 @@ class Block:
         B itself, 1 / time^2.
     right, left : ndarray, shape (n, 2)
         Orthonormal bases V and U.
+    inverse : SparseInverse or None
+        With which they were found, in a large operator; it may serve for a neighbour as well.
     """
 
     mean: float
@@ -78,9 +94,10 @@ class Block:
     entries: Floats
     right: Floats
     left: Floats
+    inverse: "SparseInverse | None" = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, matrix: csr_array, right: Floats, left: Floats) -> "Block":
+    def of(cls, matrix: csr_array, right: Floats, left: Floats, inverse: "SparseInverse | None" = None) -> "Block":
         """The block of an operator on orthonormal bases of a right and a left invariant subspace."""
         metric = left.T @ right
         b = np.linalg.solve(metric, left.T @ (matrix @ right))
@@ -93,6 +110,7 @@ class Block:
             entries=b,
             right=right,
             left=left,
+            inverse=inverse,
         )
 
     def slope(self, change: csr_array) -> float:
@@ -143,6 +161,8 @@ def continued(matrix: csr_array, block: Block) -> Block | None:
     ways: list[Callable[[], Block | None]] = [partial(_by_real_shift, matrix, block, share) for share in OFFSETS]
     if block.discriminant < 0:
         ways.insert(1, partial(_by_complex_shift, matrix, block))
+    if block.inverse is not None:
+        ways.insert(0, partial(_improved, matrix, block, block.inverse, STEPS_ON))
     for way in ways:
         found = way()
         if found is not None and found.same_plane(block):
@@ -154,14 +174,20 @@ def _by_real_shift(matrix: csr_array, block: Block, share: float) -> Block | Non
     """Inverse iteration of both planes, good through a coalescence; the shift is off by a share of the spread."""
     v, u = block.right, block.left
     mean = float(np.sum(u * (matrix @ v @ np.linalg.inv(u.T @ v)))) / 2
-    solve = _shifted_solver(matrix, mean + share * max(block.spread, 1e3 * np.finfo(np.float64).eps * abs(block.mean)))
-    if solve is None:
-        return None
-    progress = _Progress(matrix)
+    shift = mean + share * max(block.spread, 1e3 * np.finfo(np.float64).eps * abs(block.mean))
+    inverse = _inverse(matrix, shift)
+    return None if inverse is None else _improved(matrix, block, inverse, STEPS)
+
+
+def _improved(matrix: csr_array, block: Block, inverse: "Inverse", most: int) -> Block | None:
+    """Both planes iterated until they are invariant."""
+    v, u, transposed = block.right, block.left, matrix.T
+    progress = _Progress(matrix, most)
     while progress.promising:
-        v, u = np.linalg.qr(solve(v, False))[0], np.linalg.qr(solve(u, True))[0]
+        v = np.linalg.qr(inverse.step(matrix, v, False))[0]
+        u = np.linalg.qr(inverse.step(transposed, u, True))[0]
         if progress.converged(v, u):
-            return Block.of(matrix, v, u)
+            return Block.of(matrix, v, u, inverse if isinstance(inverse, SparseInverse) else None)
     return None
 
 
@@ -170,15 +196,15 @@ def _by_complex_shift(matrix: csr_array, block: Block) -> Block | None:
     near = Block.of(matrix, block.right, block.left)
     if near.discriminant >= 0:
         return None
-    solve = _shifted_solver(matrix, complex(near.mean, 0.5 * np.sqrt(-near.discriminant)))
-    if solve is None:
+    inverse = _inverse(matrix, complex(near.mean, 0.5 * np.sqrt(-near.discriminant)))
+    if inverse is None:
         return None
     metric = near.left.T @ near.right
     x = near.right @ _upper(near.entries)
     y = near.left @ _upper(np.linalg.solve(metric.T, (metric @ near.entries).T))  # A^T y = lambda y
-    progress = _Progress(matrix)
+    progress = _Progress(matrix, STEPS)
     while progress.promising:
-        x, y = (each / np.linalg.norm(each) for each in (solve(x, False), solve(y, True)))
+        x, y = (each / np.linalg.norm(each) for each in (inverse.solve(x, False), inverse.solve(y, True)))
         v, u = (np.linalg.qr(np.column_stack([each.real, each.imag]))[0] for each in (x, y))
         if progress.converged(v, u):
             return Block.of(matrix, v, u)
@@ -194,8 +220,8 @@ def _upper(entries: Floats) -> Complexes:
 class _Progress:
     """The residuals of inverse iteration, down to rounding."""
 
-    def __init__(self, matrix: csr_array) -> None:
-        self.matrix, self.transposed = matrix, matrix.T
+    def __init__(self, matrix: csr_array, most: int) -> None:
+        self.matrix, self.transposed, self.most = matrix, matrix.T, most
         self.level = RESIDUAL * 0.5 * np.finfo(np.float64).eps * float(np.linalg.norm(matrix.data))
         self.residuals: list[float] = []
 
@@ -206,30 +232,68 @@ class _Progress:
 
     @property
     def promising(self) -> bool:
-        """Whether rounding may be reached within `STEPS`, at the pace of the last `PACE` steps."""
-        left = STEPS - len(self.residuals)
-        if len(self.residuals) <= 2 * PACE:
+        """Whether rounding may be reached within so many steps, at the pace of the last `PACE`."""
+        left = self.most - len(self.residuals)
+        if len(self.residuals) <= min(2 * PACE, self.most // 2):
             return True
         last, before = self.residuals[-1], self.residuals[-1 - PACE]
         return left > 0 and last * (last / before) ** (left / PACE) < self.level
 
 
 def _residual(matrix: csr_array, basis: Floats) -> float:
+    return float(np.linalg.norm(_image_beyond(matrix, basis)))
+
+
+def _image_beyond(matrix: csr_array, basis: Floats) -> Floats:
+    """A V - V (V^T A V)."""
     image = matrix @ basis
-    return float(np.linalg.norm(image - basis @ (basis.T @ image)))
+    return np.asarray(image - basis @ (basis.T @ image))
 
 
-def _shifted_solver(matrix: csr_array, shift: complex) -> Callable[[Any, bool], Any] | None:
-    """(right-hand sides, transposed) -> solutions of A - shift; None if that is singular."""
+class Inverse(Protocol):
+    """The inverse of A - sigma, or of its like."""
+
+    def solve(self, vectors: Any, transposed: bool) -> Any:
+        """Its product with vectors, or that of its transpose."""
+
+    def step(self, matrix: csr_array, basis: Floats, transposed: bool) -> Floats:
+        """A step of inverse iteration for an operator, or for the transpose that is handed over."""
+
+
+@dataclass(frozen=True, eq=False)
+class DenseInverse:
+    """By LAPACK, accurate."""
+
+    factors: tuple[Floats, Floats]
+
+    def solve(self, vectors: Any, transposed: bool) -> Any:
+        return lu_solve(self.factors, vectors, trans=int(transposed), check_finite=False)
+
+    def step(self, matrix: csr_array, basis: Floats, transposed: bool) -> Floats:
+        return np.asarray(self.solve(basis, transposed))
+
+
+@dataclass(frozen=True, eq=False)
+class SparseInverse:
+    """By SuperLU without pivoting: of another operator, or inaccurate, which residuals make up for."""
+
+    factors: SuperLU
+
+    def solve(self, vectors: Any, transposed: bool) -> Any:
+        return self.factors.solve(np.ascontiguousarray(vectors), trans="T" if transposed else "N")
+
+    def step(self, matrix: csr_array, basis: Floats, transposed: bool) -> Floats:
+        return basis - np.asarray(self.solve(_image_beyond(matrix, basis), transposed))
+
+
+def _inverse(matrix: csr_array, shift: complex) -> Inverse | None:
+    """That of A - shift; None if it is singular."""
     size = matrix.shape[0]
     shifted = csc_array(matrix - shift * eye_array(size))
-    if size <= DENSE:
-        factors = lu_factor(shifted.toarray(), check_finite=False)
-        if not np.all(np.diag(factors[0])):
+    if size > DENSE:
+        try:
+            return SparseInverse(symmetric_lu(shifted))
+        except RuntimeError:
             return None
-        return lambda b, transposed: lu_solve(factors, b, trans=int(transposed), check_finite=False)
-    try:
-        sparse = splu(shifted)
-    except RuntimeError:
-        return None
-    return lambda b, transposed: sparse.solve(np.ascontiguousarray(b), trans="T" if transposed else "N")
+    factors = lu_factor(shifted.toarray(), check_finite=False)
+    return DenseInverse(factors) if np.all(np.diag(factors[0])) else None

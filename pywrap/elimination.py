@@ -8,7 +8,8 @@ by minimum degree, and the coordinates of a disk stay together, which also gives
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
-from scipy.sparse.linalg import splu
+
+from ..analysis.sparse_lu import symmetric_lu
 
 Indices = NDArray[np.int64]
 
@@ -38,6 +39,6 @@ def elimination_order(i: Indices, j: Indices, disks: int, coordinates: Indices) 
         (np.concatenate([-ones, -ones, degree + 1.0]), (np.concatenate([i, j, every]), np.concatenate([j, i, every]))),
         shape=(disks, disks),
     )
-    factors = splu(csc_array(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    factors = symmetric_lu(csc_array(graph))
     axis, disk = np.divmod(coordinates, disks)
     return np.lexsort((axis, factors.perm_c[disk]))

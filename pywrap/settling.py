@@ -32,9 +32,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import SuperLU
 
 from ..analysis import Packing, stiffness_matrix, touching
+from ..analysis.sparse_lu import symmetric_lu
 from .engine import Engine
 from .quasistatic import Equilibrium, NoEquilibriumError, equilibrate, rounding_floor
 
@@ -173,7 +174,7 @@ def _positive(packing: Packing, sigma: float) -> SuperLU | None:
     matrix = csc_array(stiffness_matrix(packing)[:size, :size] + diags_array(np.full(size, sigma)))
     try:
         # symmetric, and without pivoting: the pivots are positive if and only if the matrix is positive definite
-        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        factors = symmetric_lu(matrix)
     except RuntimeError:
         return None
     return factors if np.all(factors.U.diagonal() > 0) else None

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
-from scipy.sparse.linalg import LinearOperator, SuperLU, gmres, splu
+from scipy.sparse.linalg import LinearOperator, SuperLU, gmres
 
+from ..analysis.sparse_lu import symmetric_lu
 from .elimination import elimination_order
 
 Floats = NDArray[np.float64]
@@ -85,12 +86,7 @@ class SparseSolver:
         order = elimination_order(*self._pairs, len(self._stiffness) // 3, self._active)
         try:
             # nearly symmetric: pivots on the diagonal where good
-            factors = splu(
-                csc_array(self._matrix[order][:, order]),
-                permc_spec="NATURAL",
-                diag_pivot_thresh=0.01,
-                options={"SymmetricMode": True},
-            )
+            factors = symmetric_lu(csc_array(self._matrix[order][:, order]), ordered=True, pivoting=0.01)
         except RuntimeError:
             return None
         return SparseFactors(self._active[order], factors)

@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -171,16 +172,24 @@ def spectrum(
 def onset(
     scene: ScenePath,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Also write the JSON to this file.")] = None,
+    modes: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FIRST:STOP",
+            help="Search these modes alone, counted by frequency from 0: of 100,000 disks a part is what one has time "
+            "for. 0:600 are the 600 lowest.",
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """The onset F_x^c and the windows of complex eigenvalues, for each friction coefficient of the scene."""
     from faultgouge.studies.onsets import onset_run
 
-    wanted = _scene(scene)
+    wanted, part = _scene(scene), None if modes is None else _modes(modes)
     found = []
     for mu in wanted.law.mus:
-        with _status(f"mu = {mu:g}: ramp and onset"):
-            run = onset_run(wanted, mu)
+        with _status(f"mu = {mu:g}") as say:
+            run = onset_run(wanted, mu, modes=part, watch=partial(_under_way, say, f"mu = {mu:g}"))
         found.append({"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond})
         _say(f"mu = {mu:g}: F_x^c = {run.onset.fx_c:.12g} +- {run.onset.error:.1g}")
         for below, above in run.onset.doubtful:
@@ -398,6 +407,20 @@ def _settled(scene: Scene, record: Record) -> Equilibrium:
             record.append(settle(scene, watch=lambda what: say(f"settling: {what}")))
     assert record.last is not None
     return record.last
+
+
+def _under_way(say: Callable[[str], None], what: str, now: str) -> None:
+    say(f"{what}: {now}")
+
+
+def _modes(text: str) -> tuple[int, int]:
+    """FIRST:STOP as numbers."""
+    first, _, stop = text.partition(":")
+    if not (first.isdecimal() and stop.isdecimal() and int(first) < int(stop)):
+        raise typer.BadParameter(
+            f"--modes {text}: give the first mode and the first one beyond, as in --modes 0:600 for the 600 lowest"
+        )
+    return int(first), int(stop)
 
 
 @contextmanager

@@ -355,6 +355,26 @@ def test_large_packings_are_searched_for_the_first_window(ramp, monkeypatch):
         find_onset(path, path.grid[:4])
 
 
+def test_parts_of_the_spectrum_have_together_the_windows_of_all(ramp):
+    path = ramp(1.0, 1e-3, 22)
+    every = find_onset(path, path.grid[12:])
+    found = []
+    for modes in ((0, 100), (100, 200), (200, 285)):
+        try:
+            onset = find_onset(path, path.grid[12:], modes=modes)
+        except OnsetError as error:
+            assert f"among the modes {modes[0]}:{modes[1]}" in str(error)  # noqa: PT017, some have none
+        else:
+            assert onset.as_dict()["modes"] == list(modes)
+            found.append(onset)
+    first = min(found, key=lambda onset: onset.fx_c)
+    assert abs(first.fx_c - every.fx_c) < first.error + every.error
+    for onset in found:
+        assert min(abs(onset.fx_c - window.fx_onset) for window in every.windows) < onset.error + every.error
+    with pytest.raises(ValueError, match="modes 285:300 is no part of the 285 modes of this packing"):
+        find_onset(path, path.grid[12:], modes=(285, 300))
+
+
 @pytest.mark.parametrize("half_width", [0.2, 0.03])
 def test_first_window_that_ends_within_its_increment(half_width):
     window = first_window(crossing(0.47, -(half_width**2)), [0.0, 1.0, 2.0]).window

@@ -50,6 +50,29 @@ def test_slices_are_the_whole_spectrum(workers):
     np.testing.assert_allclose(np.concatenate(values), expected, atol=1e-4 * 8 / 1156)
 
 
+@pytest.mark.parametrize("modes", [(0, 100), (500, 760), (1100, 1156), (700, 701)])
+def test_part_of_the_spectrum(modes, monkeypatch):
+    """The eigenvalues of these numbers, with shifts about them alone."""
+    monkeypatch.setattr(module, "COARSE", 60)
+    shifts = []
+    factored = module._Spectrum.factored
+
+    def watched(self, shift):
+        shifts.append(shift)
+        return factored(self, shift)
+
+    monkeypatch.setattr(module._Spectrum, "factored", watched)
+    matrix = network(34, 4)
+    expected = np.linalg.eigvalsh(matrix.toarray())
+    parts = list(slices(matrix, 20, modes=modes))
+    assert parts[0].first + parts[0].own.start == modes[0]
+    values = np.concatenate([part.values[part.own] for part in parts])
+    np.testing.assert_allclose(values, expected[slice(*modes)], rtol=0, atol=1e-4 * 8 / 1156)
+    few = len(shifts)
+    list(slices(matrix, 20))
+    assert few < 0.5 * (len(shifts) - few)
+
+
 def test_degenerate_eigenvalues_are_all_found():
     """A square lattice on a torus, stiffer along one side: most eigenvalues are fourfold."""
     along = 2 * np.eye(34) - np.roll(np.eye(34), 1, axis=0) - np.roll(np.eye(34), -1, axis=0)

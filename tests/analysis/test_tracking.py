@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 
-from faultgouge.analysis import Contacts, Packing
+from faultgouge.analysis import Contacts, Packing, tracking
 from faultgouge.analysis.large import first_window
 from faultgouge.analysis.meetings import meetings
 from faultgouge.analysis.modes import Modes, full_operator
@@ -26,12 +26,18 @@ def pair_of(packing):
     return modes.block(pair)
 
 
+@pytest.mark.parametrize("factors", ["dense", "sparse", "of a neighbour"])
 @pytest.mark.parametrize("fx", [0.0218, 0.0218330564, 0.021833056408868, 0.0219, 0.022])
-def test_continued_pair_is_that_of_lapack(ramp, fx):
+def test_continued_pair_is_that_of_lapack(ramp, fx, factors, monkeypatch):
     """From real through double to complex, from a load at which the pair is complex."""
     path = ramp(1.0, 1e-3, 22)
     matrix = full_operator(path(fx))
     start = pair_of(path(0.022))
+    if factors != "dense":
+        monkeypatch.setattr(tracking, "DENSE", 0)
+    if factors == "of a neighbour":
+        start = continued(full_operator(path(0.0221)), start)
+        monkeypatch.setattr(tracking, "_inverse", lambda *_: pytest.fail("other factors were made"))
     found, expected = continued(matrix, start), dense_block(matrix, start)
     rounding = 0.5 * np.finfo(float).eps * np.linalg.norm(matrix.data)
     # D is in error by its coefficients, the entries of B - mean, times some ten of the operator's rounding.
@@ -60,6 +66,18 @@ def test_overlap_of_a_block_is_that_of_the_eigenvectors(ramp):
     (pair,) = modes.complex_pairs
     expected = abs(np.vdot(modes.left[:, pair[0]], modes.right[:, pair[0]]))
     assert modes.block(pair).overlap == pytest.approx(expected, rel=1e-8)
+
+
+def test_factors_of_a_distant_neighbour_are_given_up(ramp, monkeypatch):
+    """Those of another spectrum, nowhere near the pair: its own are made."""
+    monkeypatch.setattr(tracking, "DENSE", 0)
+    path = ramp(1.0, 1e-3, 22)
+    matrix = full_operator(path(0.022))
+    start = pair_of(path(0.0219))
+    far = tracking._inverse(matrix, 10 * start.mean)
+    found = continued(matrix, replace(start, inverse=far))
+    assert found.inverse is not far
+    assert found.discriminant == pytest.approx(continued(matrix, start).discriminant, rel=1e-9)
 
 
 @pytest.mark.parametrize("fx", [0.0215, 0.0218330564, 0.022])

@@ -134,6 +134,19 @@ def test_onset_as_json(faultgouge, tmp_path):
     assert result["windows"][0].keys() >= {"fx_onset", "fx_end", "lambda", "error"}
 
 
+def test_onset_among_some_modes(faultgouge, tmp_path):
+    (tmp_path / "scene.toml").write_text(SCENE.replace("until = 4e-3", "until = 0.022"))
+    done = faultgouge("onset", "scene.toml", "--modes", "0:285", "--json")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["modes"] == [0, 285]
+    assert result["fx_c"] == pytest.approx(0.0218330564080, rel=1e-9)
+    for modes, says in (("600", "as in --modes 0:600"), ("5:5", "as in --modes 0:600"), ("900:910", "are no part of")):
+        done = faultgouge("onset", "scene.toml", "--modes", modes)
+        assert done.returncode == 2
+        assert says in done.stderr
+
+
 def test_no_onset_is_a_failed_computation(faultgouge):
     done = faultgouge("onset", "scene.toml")
     assert done.returncode == 1
