@@ -75,12 +75,15 @@ class Slice:
         Orthonormal eigenvectors in columns.
     own : slice
         Which of the M belong to this slice and to no other.
+    spacing : float
+        Mean distance of these and of the next ones on either side.
     """
 
     first: int
     values: Floats
     vectors: Floats
     own: slice
+    spacing: float
 
 
 def slices(matrix: csc_array, margin: int, workers: int = 1, modes: tuple[int, int] | None = None) -> Iterator[Slice]:
@@ -126,8 +129,7 @@ def _checked(before: Slice | None, after: Slice) -> Slice:
     if before is not None:
         number = after.first + after.own.start
         here, there = after.values[after.own.start], before.values[number - before.first]
-        spacing = np.ptp(after.values[after.own]) / (after.own.stop - after.own.start)
-        if abs(here - there) > 0.01 * spacing:
+        if abs(here - there) > 0.01 * after.spacing:
             raise SliceError(
                 f"the eigenvalue of number {number} is {there:.10g} from one shift and {here:.10g} from the next: "
                 "one is missing in between"
@@ -212,6 +214,7 @@ class _Spectrum:
             values=values[kept],
             vectors=np.ascontiguousarray(found[:, self.place].T),
             own=slice(start, start + own[1] - own[0]),
+            spacing=float(spacing),
         )
         self.compare(part, found[part.own])
         return part
@@ -224,7 +227,7 @@ class _Spectrum:
         values = part.values[part.own]
         quotients = np.sum(vectors.T * (self.matrix @ vectors.T), axis=0)
         worst = int(np.argmax(np.abs(quotients - values)))
-        if abs(quotients[worst] - values[worst]) > ACCURATE * np.ptp(values) / len(values):
+        if abs(quotients[worst] - values[worst]) > ACCURATE * part.spacing:
             number = part.first + part.own.start + worst
             raise SliceError(
                 f"the eigenvalue of number {number} is {values[worst]:.10g} from the factors and "
