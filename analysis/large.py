@@ -235,10 +235,9 @@ class _Search:
         found: list[list[_Candidate]] = [[] for _ in places[1:]]
         first, stop = self.range(places[0].matrix)
         done = 0
-        for part in self.parts(places[0].matrix):
+        for part, before in self.projected(places[0].matrix):
             done += part.own.stop - part.own.start
             self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {done} of {stop - first} modes")
-            before = part.levels(places[0].matrix)
             for candidates, (here, there) in zip(found, pairwise(places), strict=True):
                 after = part.change(before, there.matrix - here.matrix)
                 candidates.extend(self.candidates(part, (here.fx, before), (there.fx, after)))
@@ -310,17 +309,18 @@ class _Search:
         first, stop = self.range(matrix)
         return Projection.width(stop - first) * matrix.shape[0] <= KEPT
 
-    def parts(self, matrix: csr_array) -> Iterable[Projection]:
-        """Projections of all modes, those of an earlier load as long as they serve."""
+    def projected(self, matrix: csr_array) -> Iterable[tuple[Projection, Levels]]:
+        """Projections of all modes, those of an earlier load as long as they serve, and the operator in them."""
         if self.kept and all(part.covers(matrix) for part in self.kept):
-            mixing = [each for part in self.kept for each in part.mixing(part.onto(matrix))]
+            known = [(part, part.levels(matrix)) for part in self.kept]
+            mixing = [each for part, levels in known for each in part.mixing(part.blocks(levels))]
             if np.median(mixing) < MIXING:
-                return self.kept
-        parts = Projection.parts(matrix, _cores(), self.range(matrix))
-        if not self.keeps(matrix):
-            return parts
-        self.kept = list(parts)
-        return self.kept
+                return known
+        parts: Iterable[Projection] = Projection.parts(matrix, _cores(), self.range(matrix))
+        if self.keeps(matrix):
+            self.kept = []  # its memory is free before that for the next ones is taken
+            parts = self.kept = list(parts)
+        return ((part, part.levels(matrix)) for part in parts)
 
     def candidates(
         self, part: Projection, here: tuple[float, Levels], there: tuple[float, Levels]

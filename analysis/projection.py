@@ -190,9 +190,8 @@ class Projection:
             found.append(Cluster(slice(start, stop), (first - start, min(first + CORE, self.own.stop) - 1 - start)))
         return found
 
-    def onto(self, matrix: csr_array) -> list[Floats]:
+    def blocks(self, levels: Levels) -> list[Floats]:
         """Every cluster of an operator; 1 / time^2."""
-        levels = self.levels(matrix)
         return [levels.block(cluster) for cluster in self.clusters]
 
     def covers(self, matrix: csr_array) -> bool:
@@ -241,12 +240,6 @@ class Projection:
         full = np.zeros((self.size, vectors.shape[1]))
         full[self.active] = self.basis[:, cluster.modes] @ vectors
         return full
-
-    def fits(self, matrix: csr_array, blocks: list[Floats]) -> bool:
-        """Whether the projection is good enough for an operator with these cluster blocks."""
-        if not self.covers(matrix):
-            return False
-        return bool(np.median(self.mixing(blocks)) < MIXING)
 
     def mixing(self, blocks: list[Floats]) -> list[float]:
         """The typical coupling over the spacing in each cluster: |off-diagonal|_F over the cluster's width."""

@@ -1,8 +1,8 @@
 """Settle, ramp, undamped run and tracked onset of packings of growing size: time, memory, and how they grow.
 
 Square packings of disks of two radii, width 1.192 sqrt(N), with the upper layer of a scene that does not say `top`.
-Each size runs in a process of its own, so that its peak of memory is its own, and with one thread, but for the onset,
-which takes as many as there are cores.
+Each size runs in a process of its own, and with one thread, but for onsets, which take as many as there are cores.
+Memory is the peak of all stages before the onsets, and of all.
 
     settle     from the loose start to the rounding floor, at F_x = 0
     newton     one increment of F_x by 2/N from there, median of three
@@ -10,7 +10,8 @@ which takes as many as there are cores.
     solve      of K dq = F, factorisation included
     largest    eigenvalue of K, for the time step of an undamped run
     undamped   1000 steps of such a run
-    onset      the first window of complex eigenvalues, the ramp to it included
+    lowest     the first window among the 600 modes of lowest frequency, the ramp to it included
+    onset      the first window of all modes, the same way; not with --no-onset, and hours for 100,000 disks
     file       run.h5, for each equilibrium
 
 Beside these, square crystals of disks, whose equilibria are known and need no settling.
@@ -46,6 +47,8 @@ from faultgouge.studies.stability_cases.packings import crystal
 
 Row = dict[str, float | int | None]
 
+LOWEST = (0, 600)
+
 INCREMENTS = 50
 """Of 2/N each: the first onset falls somewhat faster than that with N, and contacts change as often in an increment."""
 
@@ -68,13 +71,18 @@ def measured(disks: int, seed: int, with_onset: bool) -> Row:
     wanted = scene(disks, seed)
     begin = time.perf_counter()
     start = settle(wanted)
-    row: Row = {"disks": disks, "settle": time.perf_counter() - begin, "onset": None, "fx_c": None}
+    row: Row = {"disks": disks, "settle": time.perf_counter() - begin}
     with Engine(start.packing) as engine:
-        row |= increments(engine, start) | undamped(engine, start)
+        row |= increments(engine, start) | undamped(engine, start) | {"memory": peak()}
+        row["lowest"], row["fx_lowest"] = onset(engine, start, wanted, LOWEST)
         if with_onset:
-            row |= onset(engine, start, wanted)
-    row["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    return row
+            row["onset"], row["fx_c"] = onset(engine, start, wanted)
+    return row | {"in all": peak()}
+
+
+def peak() -> float:
+    """The most memory so far, GB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
 
 
 def measured_crystal(disks: int) -> Row:
@@ -83,10 +91,8 @@ def measured_crystal(disks: int) -> Row:
     packing = crystal(columns, columns)
     with Engine(packing) as engine:
         start = equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), 0.0)
-        row: Row = {"disks": len(packing), "settle": None, "onset": None, "fx_c": None}
-        row |= increments(engine, start) | undamped(engine, start)
-    row["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    return row
+        row: Row = {"disks": len(packing)}
+        return row | increments(engine, start) | undamped(engine, start) | {"memory": peak()}
 
 
 def increments(engine: Engine, start: Equilibrium) -> Row:
@@ -142,15 +148,17 @@ def undamped(engine: Engine, start: Equilibrium) -> dict[str, float]:
         return {"largest": known - begin, "undamped": time.perf_counter() - ready}
 
 
-def onset(engine: Engine, start: Equilibrium, wanted: Scene) -> dict[str, float | None]:
+def onset(
+    engine: Engine, start: Equilibrium, wanted: Scene, modes: tuple[int, int] | None = None
+) -> tuple[float, float | None]:
     """Time to the first window, and where it opens; None if the packing flows, or is stable to the ramp's end."""
     begin = time.perf_counter()
     path = EquilibriumPath(engine, start, wanted)
     try:
-        fx_c = find_onset(path, 2 * np.arange(INCREMENTS + 1) / len(start.packing)).fx_c
+        fx_c = find_onset(path, 2 * np.arange(INCREMENTS + 1) / len(start.packing), modes=modes).fx_c
     except (NoEquilibriumError, OnsetError):
         fx_c = None
-    return {"onset": time.perf_counter() - begin, "fx_c": fx_c}
+    return time.perf_counter() - begin, fx_c
 
 
 def text(value: float | int | None, format_: str) -> str:
@@ -191,16 +199,19 @@ COLUMNS = {
     "solve": "9.2f",
     "largest": "9.3f",
     "undamped": "9.2f",
-    "onset": "9.1f",
-    "memory": "9.2f",
     "file": "9.3f",
+    "memory": "9.2f",
+    "lowest": "9.1f",
+    "onset": "9.1f",
+    "in all": "9.2f",
 }
-UNITS = {"memory": "GB", "file": "MB"}
+UNITS = {"memory": "GB", "in all": "GB", "file": "MB"}
+FORCES = {"fx_lowest": "F_x^c lowest", "fx_c": "F_x^c"}
 
 
 def table(title: str, sizes: list[int], arguments: list[str]) -> list[Row]:
     """Measure packings of several sizes, each in a process of its own, and print them."""
-    print(f"\n{title:18s}" + "".join(f"{name:>9s}" for name in COLUMNS) + f"{'F_x^c':>16s}")
+    print(f"\n{title:18s}" + "".join(f"{name:>9s}" for name in COLUMNS) + "".join(f"{f:>16s}" for f in FORCES.values()))
     print(f"{'':18s}" + "".join(f"{UNITS.get(name, 's'):>9s}" for name in COLUMNS))
     rows: list[Row] = []
     for disks in sizes:
@@ -210,13 +221,13 @@ def table(title: str, sizes: list[int], arguments: list[str]) -> list[Row]:
             sys.exit(f"{disks} disks: {done.stderr.strip().splitlines()[-1]}")
         row = json.loads(done.stdout.splitlines()[-1])
         rows.append(row)
-        cells = "".join(text(row[name], format_) for name, format_ in COLUMNS.items())
-        print(f"{row['disks']:18d}{cells}{text(row['fx_c'], '16.10f')}", flush=True)
+        cells = "".join(text(row.get(name), format_) for name, format_ in COLUMNS.items())
+        print(f"{row['disks']:18d}{cells}" + "".join(text(row.get(f), "16.10f") for f in FORCES), flush=True)
     if len(rows) > 1:
         small, large = rows[0], rows[-1]
         span = math.log(large["disks"] / small["disks"])
         exponents = {
-            name: math.log(large[name] / small[name]) / span for name in COLUMNS if small[name] and large[name]
+            name: math.log(large[name] / small[name]) / span for name in COLUMNS if small.get(name) and large.get(name)
         }
         print(f"{'exponent':18s}" + "".join(text(exponents.get(name), "9.2f") for name in COLUMNS))
     return rows

@@ -8,10 +8,10 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import Contacts, Packing, tracking
-from faultgouge.analysis.large import first_window
+from faultgouge.analysis.large import _Search, first_window
 from faultgouge.analysis.meetings import meetings
 from faultgouge.analysis.modes import Modes, full_operator
-from faultgouge.analysis.projection import Projection
+from faultgouge.analysis.projection import MIXING, Projection
 from faultgouge.analysis.tracking import Block, continued
 
 
@@ -105,8 +105,8 @@ def test_clusters_have_the_eigenvalues_of_the_operator(ramp):
     for fx, accuracy in ((0.001, 1e-4), (0.01, 2e-2)):
         matrix = full_operator(path(fx))
         expected = np.sort(eigvals(matrix.toarray()).real)[15:]  # five rattlers
-        blocks = projection.onto(matrix)
-        assert projection.fits(matrix, blocks)
+        blocks = projection.blocks(projection.levels(matrix))
+        assert np.median(projection.mixing(blocks)) < MIXING
         for cluster, block in zip(projection.clusters, blocks, strict=True):
             core = slice(cluster.core[0], cluster.core[1] + 1)
             values = np.sort(eigvals(block).real)[core]
@@ -159,14 +159,22 @@ def test_meetings_of_crossing_levels_between_two_loads():
 def test_projection_is_given_up_where_modes_mix_or_disks_move_in(ramp):
     path = ramp(1.0, 1e-3, 22)
     matrix = full_operator(path(0.0))
-    projection = Projection.of(matrix)
     noise = np.random.default_rng(1).normal(size=(300, 300)) * 20.0
     other = matrix + csr_array(
         noise * (matrix.toarray() != 0).any(axis=1)[:, None] * (matrix.toarray() != 0).any(axis=0)
     )
-    assert not projection.fits(csr_array(other), projection.onto(csr_array(other)))
     more = csr_array(matrix + csr_array(([1.0], ([58], [58])), shape=matrix.shape))
-    assert not projection.fits(more, projection.onto(more))
+    search = _Search(lambda _: matrix, 0.0)
+
+    def projection(operator):
+        ((part, _),) = search.projected(operator)
+        return part
+
+    first = projection(matrix)
+    assert projection(full_operator(path(0.001))) is first
+    for unlike in (csr_array(other), more):
+        assert projection(unlike) is not first
+        first = projection(matrix)
 
 
 @pytest.mark.parametrize("mu", [1.0, 0.8])
