@@ -218,14 +218,13 @@ class Projection:
 
     def _levels(self, inner: csr_array) -> Levels:
         count = len(self.values)
-        basis = self.basis.astype(np.float32)
         coupling = np.empty((count, count), dtype=np.float32)
         diagonal = np.empty(count)
         for start in range(0, count, CHUNK):
             part = self.basis[:, start : start + CHUNK]
             image = inner @ part - part * self.values[start : start + CHUNK]
             diagonal[start : start + CHUNK] = np.sum(part * image, axis=0)
-            coupling[:, start : start + CHUNK] = basis.T @ image.astype(np.float32)
+            coupling[:, start : start + CHUNK] = self.rough_basis.T @ image.astype(np.float32)
         np.fill_diagonal(coupling, 0.0)
         return Levels(self.values + diagonal, coupling)
 
