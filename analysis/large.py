@@ -311,16 +311,22 @@ class _Search:
 
     def projected(self, matrix: csr_array) -> Iterable[tuple[Projection, Levels]]:
         """Projections of all modes, those of an earlier load as long as they serve, and the operator in them."""
-        if self.kept and all(part.covers(matrix) for part in self.kept):
-            known = [(part, part.levels(matrix)) for part in self.kept]
-            mixing = [each for part, levels in known for each in part.mixing(part.blocks(levels))]
-            if np.median(mixing) < MIXING:
-                return known
+        known = self.known(matrix)
+        if known:
+            return known
         parts: Iterable[Projection] = Projection.parts(matrix, _cores(), self.range(matrix))
         if self.keeps(matrix):
             self.kept = []  # its memory is free before that for the next ones is taken
             parts = self.kept = list(parts)
         return ((part, part.levels(matrix)) for part in parts)
+
+    def known(self, matrix: csr_array) -> list[tuple[Projection, Levels]]:
+        """The projections that are kept and the operator in them; none if they do not serve."""
+        if not all(part.covers(matrix) for part in self.kept):
+            return []
+        known = [(part, part.levels(matrix)) for part in self.kept]
+        mixing = [each for part, levels in known for each in part.mixing(part.blocks(levels))]
+        return known if known and np.median(mixing) < MIXING else []
 
     def candidates(
         self, part: Projection, here: tuple[float, Levels], there: tuple[float, Levels]
