@@ -191,7 +191,8 @@ def onset(
         with _status(f"mu = {mu:g}") as say:
             run = onset_run(wanted, mu, modes=part, watch=partial(_under_way, say, f"mu = {mu:g}"))
         found.append({"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond})
-        _say(f"mu = {mu:g}: F_x^c = {run.onset.fx_c:.12g} +- {run.onset.error:.1g}")
+        among = "" if part is None else f" among the modes {part[0]}:{part[1]}"
+        _say(f"mu = {mu:g}: F_x^c = {run.onset.fx_c:.12g} +- {run.onset.error:.1g}{among}")
         for below, above in run.onset.doubtful:
             _say(
                 f"a pair was expected to become complex between F_x = {below:.6g} and {above:.6g}, and was not found: "
