@@ -1,5 +1,7 @@
 # make reproduce   sets everything up and runs the paper's protocol into results/
 # make test        sets everything up and runs all tests
+# make readers     reads exports by OVITO and VTK, in tests
+# make fuzz        a thousand odd scenes, 300 damaged files, 60 kills; says what went wrong (an hour)
 # make check       format, lint and types
 # make benchmark   time per step beside LAMMPS's own granular styles; what each part of a scene costs; where an increment's
 #                  time goes; the onset, solved and scanned; error against run time; growth with size
@@ -10,26 +12,35 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
-SOURCES := $(shell find pair_mindlin_smooth lammps_inputs analysis pywrap studies src scenes -type f -not -name '*.pyc') \
-           CMakeLists.txt pyproject.toml README.md
+PLUGIN := pyproject.toml CMakeLists.txt $(wildcard cmake/* pair_mindlin_smooth/*)
+PYTHON_SOURCES := $(shell find lammps_inputs analysis pywrap figures studies src scenes -type f -not -name '*.pyc' -not -name '*.so')
 
 # one thread a process: the matrices are small, and the ranks share the cores
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: reproduce test check format benchmark pictures docs clean
+.PHONY: reproduce test readers fuzz check format benchmark pictures docs clean
 
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
 
+# tests and checks take Python from src, where links lead to the folders: an edit of Python needs no installation
 test: $(VENV)/.test
-	$(BIN)/python -m pytest -q -n 2
+	PYTHONPATH=src $(BIN)/python -m pytest -q -n 2
+
+# the exports, read by the programs that they are for: half a gigabyte of OVITO and VTK
+readers: $(VENV)/.test
+	$(BIN)/python -m pip install --quiet --group readers
+	PYTHONPATH=src $(BIN)/python -m pytest -q tests/exchange
+
+fuzz: $(VENV)/.test
+	PYTHONPATH=src $(BIN)/python -m fuzz
 
 check: $(VENV)/.check
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/clang-format --dry-run --Werror pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp
-	$(BIN)/mypy -p faultgouge
+	MYPYPATH=src $(BIN)/mypy -p faultgouge
 
 format: $(VENV)/.check
 	$(BIN)/ruff format .
@@ -63,11 +74,20 @@ $(VENV)/bin/python:
 	  { echo "make: no virtual environment can be made: apt-get install python3-venv" >&2; rm -rf $(VENV); exit 1; }
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
 
-$(VENV)/.installed: $(VENV)/bin/python $(SOURCES)
-	$(BIN)/python -m pip install --quiet .
+# what tests and commands need beside Python: the dependencies, the package's metadata, and the plugin for the LAMMPS that
+# is there
+$(VENV)/.plugin: $(VENV)/bin/python $(PLUGIN)
+	$(BIN)/python -m pip install --quiet --group build
+	$(BIN)/python -m pip install --quiet --no-build-isolation .
+	mkdir -p src/faultgouge/lib
+	cd $(VENV) && cp "$$(bin/python -c 'import faultgouge.plugin as p; print(p.directory())')"/*.so $(CURDIR)/src/faultgouge/lib
 	touch $@
 
-$(VENV)/.test: $(VENV)/.installed
+$(VENV)/.installed: $(VENV)/.plugin $(PYTHON_SOURCES)
+	$(BIN)/python -m pip install --quiet --no-build-isolation --no-deps .
+	touch $@
+
+$(VENV)/.test: $(VENV)/.plugin
 	$(BIN)/python -m pip install --quiet --group test
 	touch $@
 

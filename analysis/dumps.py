@@ -10,7 +10,8 @@ to one disk. Pairs that do not overlap, which LAMMPS lists up to its cutoff, are
 there are neither slips nor angles, and their columns may be missing.
 
 Law, load and inertia are no part of a dump. They are given by the caller or by a sidecar file of the same
-name with the suffix ".params", which has one ``key value`` a line out of kn, kt, mu, fx, fy, inertia_factor;
+name with the suffix ".params", which has one ``key value`` a line out of kn, kt, mu, exponent, cn, ct, tau, fx, fy,
+inertia_factor;
 what the caller gives wins.
 """
 
@@ -25,9 +26,11 @@ from typing import TextIO
 import numpy as np
 
 from .compensated import normalized
+from .contacts import FLOOR, Contacts
 from .files import PackingFileError
+from .geometry import nearest_image
 from .law import MindlinLaw
-from .packing import FLOOR, Contacts, Floats, Packing, nearest_image
+from .packing import Floats, Packing
 
 DISK = {
     "id": ("id",),
@@ -123,7 +126,10 @@ def read_dump(
     shown = _snapshot(disks, frame)
     given = _sidecar(disks.with_suffix(".params"))
     try:
-        law = law or MindlinLaw(given["kn"], given["kt"], given["mu"])
+        law = law or MindlinLaw(
+            *(given[name] for name in ("kn", "kt", "mu")),
+            **{name: given[name] for name in ("exponent", "cn", "ct") if name in given},
+        )
     except KeyError as error:
         sidecar = disks.with_suffix(".params")
         raise PackingFileError(f"The law of {disks} is not given: {sidecar} does not name {error}.") from None
@@ -168,6 +174,7 @@ def read_dump(
             fx=given.get("fx", 0.0) if fx is None else fx,
             fy=given.get("fy", 0.0) if fy is None else fy,
             position_low=low,
+            drag_time=given.get("tau"),
         )
     except ValueError as error:
         raise PackingFileError(f"{disks} and {contacts} describe no possible packing: {error}") from error

@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from .errors import PackingFileError
+from .geometry import touching
 from .law import MindlinLaw
-from .packing import Packing, touching
-
-
-class PackingFileError(ValueError):
-    """A file is missing, broken, or not what it should be; the message names it."""
+from .packing import Packing
 
 
 def read_packing(
@@ -19,7 +17,6 @@ def read_packing(
     law: MindlinLaw,
     *,
     inertia_factor: float = 1.0,
-    fx: float = 0.0,
     fy: float = 0.0,
 ) -> Packing:
     """Read a packing from JSON; everything that touches is in contact, with zero slip.
@@ -31,7 +28,7 @@ def read_packing(
         0) and box_length (period along x). Other keys are ignored.
     law : MindlinLaw
         The law of its contacts.
-    inertia_factor, fx, fy : float
+    inertia_factor, fy : float
         As in :class:`~faultgouge.analysis.Packing`.
 
     Returns
@@ -64,7 +61,6 @@ def read_packing(
             inertia_factor=inertia_factor,
             box_length=box_length,
             top=top,
-            fx=fx,
             fy=fy,
         )
     except OSError as error:
@@ -73,5 +69,7 @@ def read_packing(
         raise PackingFileError(
             f"{path} lacks the key {error}; a packing file has x, y, radius, top, box_length."
         ) from error
-    except (TypeError, AttributeError, ValueError) as error:
+    except (TypeError, AttributeError, ValueError, OverflowError) as error:
         raise PackingFileError(f"{path} is not a packing file: {error}") from error
+    except RecursionError as error:
+        raise PackingFileError(f"{path} is not a packing file: its brackets are nested too deeply") from error

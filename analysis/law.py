@@ -1,40 +1,55 @@
-r"""The contact law: a Hertz-type repulsion and a tangential force that meets Coulomb's bound smoothly.
+r"""The contact law: a repulsion, a tangential force that meets Coulomb's bound smoothly, and dashpots.
 
 Two disks overlap by :math:`\delta > 0` and have slid by :math:`s` along the contact since they met.
 
 .. math::
 
-    f_n &= k_n \delta^{3/2} \\
-    f_t &= -k_t \delta^{1/2} (1 + x - x^2)\, s, \qquad
+    f_n &= k_n \delta^p \\
+    f_t &= -k_t \delta^{p-1} (1 + x - x^2)\, s, \qquad
     x = |s| / t^*, \quad t^* = \mu \frac{k_n}{k_t} \delta
 
-The slip is clamped to :math:`[-t^*, t^*]`, where :math:`|f_t| = \mu f_n` exactly. The derivatives that the
-stability operator needs are
+The exponent p is 3/2, that of Hertz and Mindlin, or 1: harmonic disks, which much of the literature takes. The slip
+is clamped to :math:`[-t^*, t^*]`, where :math:`|f_t| = \mu f_n` exactly. The derivatives that the stability operator
+needs are
 
 .. math::
 
-    \frac{\partial f_n}{\partial \delta} &= \tfrac32 k_n \delta^{1/2} \\
-    a = \frac{\partial f_t}{\partial s} &= -k_t \delta^{1/2} (1 + 2x - 3x^2) \\
-    b = \frac{\partial f_t}{\partial \delta} &= \frac{f_t}{2\delta} - k_t \delta^{1/2} s\, \frac{2x^2 -
-    x}{\delta}
+    \frac{\partial f_n}{\partial \delta} &= p\, k_n \delta^{p-1} \\
+    a = \frac{\partial f_t}{\partial s} &= -k_t \delta^{p-1} (1 + 2x - 3x^2) \\
+    b = \frac{\partial f_t}{\partial \delta} &= (p - 1) \frac{f_t}{\delta} - k_t \delta^{p-1} s\,
+    \frac{2x^2 - x}{\delta}
 
-The tangential stiffness :math:`-a` first rises, to :math:`\tfrac43 k_t \delta^{1/2}` at :math:`x = 1/3`, and
-falls to zero at :math:`x = 1`. There :math:`b = \tfrac32 f_t / \delta`, which is also the derivative of the
-clamped branch :math:`f_t = \mp \mu k_n \delta^{3/2}`: the force is once continuously differentiable at the
+The tangential stiffness :math:`-a` first rises, to :math:`\tfrac43 k_t \delta^{p-1}` at :math:`x = 1/3`, and
+falls to zero at :math:`x = 1`. There :math:`b = p f_t / \delta`, which is also the derivative of the
+clamped branch :math:`f_t = \mp \mu k_n \delta^p`: the force is once continuously differentiable at the
 bound, so the clamp needs no case of its own in the derivatives.
 
-:math:`k_n` and :math:`k_t` are in force / length\ :sup:`3/2`; no effective radius enters. :math:`\mu = 0` or
-:math:`k_t = 0` means no tangential force at all, and no memory of the slip.
+Dashpots resist the velocities of overlap and slip,
+
+.. math:: f_n' = C_N \delta^{p-1}\, \dot\delta, \qquad f_t' = -C_T \delta^{p-1}\, \dot s,
+
+as physics demands for p = 3/2 (no jump where a contact opens); for p = 1 they are constant while the contact lasts. The
+sum of :math:`f_t` and :math:`f_t'` is clamped to :math:`[-\mu f_n, \mu f_n]`, :math:`f_n` being the elastic force. So a
+contact at the bound has no tangential dashpot in the direction in which it slides; in the linear operator (`dashpots`)
+it has none at all.
+
+:math:`k_n, k_t, C_N` and :math:`C_T` are constants per length\ :sup:`p-1`; no effective radius enters. :math:`\mu = 0`
+or :math:`k_t = 0` means no tangential force at all, and no memory of the slip.
+
+This module and mindlin_law.h are the two places that know the law. See docs/howto_law.md for how to add another.
 """
 
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, prod
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
+
+EXPONENTS = (1.5, 1.0)
+"""Exponents of the repulsion that the law, and the plugin, have."""
 
 
 class Derivatives(NamedTuple):
@@ -64,34 +79,48 @@ class MindlinLaw:
     Parameters
     ----------
     kn : float
-        Normal stiffness, force / length^(3/2), positive.
+        Normal stiffness, force / length^p, positive.
     kt : float
-        Tangential stiffness, force / length^(3/2), not negative.
+        Tangential stiffness, force / length^p, not negative.
     mu : float
         Coulomb's coefficient of friction, not negative.
+    exponent : float
+        p, 3/2 (Hertz) or 1 (harmonic).
+    cn, ct : float
+        Normal and tangential dashpots, force time / length^p, not negative; none by default.
 
     Raises
     ------
     ValueError
-        If a parameter is not finite or has the wrong sign.
+        If a parameter is not finite or has the wrong sign, or the exponent is another one.
     """
 
     kn: float
     kt: float
     mu: float
+    exponent: float = 1.5
+    cn: float = 0.0
+    ct: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("kn", "kt", "mu"):
+        for name in ("kn", "kt", "mu", "exponent", "cn", "ct"):
             value = float(getattr(self, name))
             object.__setattr__(self, name, value)
             if not isfinite(value) or value < 0 or (name == "kn" and value == 0):
                 sign = "positive" if name == "kn" else "not negative"
                 raise ValueError(f"{name} = {value} must be finite and {sign}.")
+        if self.exponent not in EXPONENTS:
+            raise ValueError(f"exponent = {self.exponent:g} must be 1.5 (Hertz) or 1 (harmonic).")
 
     @property
     def frictional(self) -> bool:
         """Whether there is a tangential force at all."""
         return self.kt > 0 and self.mu > 0
+
+    @property
+    def damped(self) -> bool:
+        """Whether contacts have dashpots."""
+        return self.cn > 0 or (self.ct > 0 and self.frictional)
 
     def slip_limit(self, overlap: ArrayLike) -> Floats:
         """Slip t* at which the tangential force reaches Coulomb's bound.
@@ -115,13 +144,32 @@ class MindlinLaw:
         return np.clip(np.asarray(slip, dtype=np.result_type(slip, np.float64)), -limit, limit)
 
     def normal_force(self, overlap: ArrayLike) -> Floats:
-        """Repulsion f_n = kn overlap^(3/2), force."""
+        """Repulsion f_n = kn overlap^p, force."""
         overlap = _closed(overlap)
-        return self.kn * overlap * np.sqrt(overlap)
+        return self.kn * overlap * self._powers(overlap)[0]
+
+    def normal_energy(self, overlap: ArrayLike) -> Floats:
+        """Elastic energy kn overlap^(p+1) / (p+1) of the repulsion; the tangential force has none."""
+        overlap = _closed(overlap)
+        return self.normal_force(overlap) * overlap / (self.exponent + 1)
 
     def normal_stiffness(self, overlap: ArrayLike) -> Floats:
-        """d f_n / d overlap = (3/2) kn overlap^(1/2), force / length."""
-        return 1.5 * self.kn * np.sqrt(_closed(overlap))
+        """d f_n / d overlap = p kn overlap^(p-1), force / length."""
+        return self.exponent * self.kn * self._powers(_closed(overlap))[0]
+
+    def normal_curvature(self, overlap: ArrayLike, order: int = 2) -> Floats:
+        """Derivative of f_n of some order, 2 by default: force / length^order, of positive overlaps."""
+        factor = prod((self.exponent - k for k in range(order)), start=self.kn)
+        return factor * np.power(np.asarray(overlap, dtype=np.float64), self.exponent - order)
+
+    def overlap_of_force(self, force: float) -> float:
+        """The inverse of `normal_force`: overlap (force / kn)^(1/p) of a contact that carries a force, length."""
+        return float((force / self.kn) ** (1 / self.exponent))
+
+    def stiffness_scale(self, force: float) -> float:
+        """Force over overlap, kn^(1/p) force^((p-1)/p), of a contact that carries a force; force / length."""
+        p = self.exponent
+        return float(self.kn ** (1 / p) * force ** ((p - 1) / p))
 
     def tangential_force(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
         """Tangential force f_t along tau, force; at Coulomb's bound beyond the slip limit.
@@ -134,49 +182,76 @@ class MindlinLaw:
         Returns
         -------
         ndarray
-            f_t = -kt overlap^(1/2) (1 + x - x^2) slip: it opposes the slip.
+            f_t = -kt overlap^(p-1) (1 + x - x^2) slip: it opposes the slip.
         """
         overlap = _closed(overlap)
         slip, x = self._reduced(overlap, slip)
-        return -self.kt * np.sqrt(overlap) * (1 + x - x * x) * slip
+        return -self.kt * self._powers(overlap)[0] * (1 + x - x * x) * slip
 
     def tangential_slip_derivative(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
         """a = d f_t / d slip at constant overlap, force / length; never positive, zero at the bound."""
         overlap = _closed(overlap)
         _, x = self._reduced(overlap, slip)
         # Factored, 1 + 2x - 3x^2 vanishes at the bound to the last bit.
-        return -self.kt * np.sqrt(overlap) * ((1 - x) * (1 + 3 * x)) * self.frictional
+        return -self.kt * self._powers(overlap)[0] * ((1 - x) * (1 + 3 * x)) * self.frictional
 
     def tangential_overlap_derivative(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
         """b = d f_t / d overlap at constant slip, force / length: what makes the forces non-conservative."""
         overlap = _closed(overlap)
         slip, x = self._reduced(overlap, slip)
-        # f_t/2 and the term of d x/d overlap = -x/overlap, joined: both carry kt s / overlap^(1/2).
-        factor = 0.5 * (1 + x - x * x) + (2 * x * x - x)
-        return -self.kt * factor * _ratio(slip, np.sqrt(overlap))
+        # (p-1) f_t/overlap and the term of d x/d overlap = -x/overlap, joined: both carry kt s overlap^(p-2).
+        factor = (self.exponent - 1) * (1 + x - x * x) + (2 * x * x - x)
+        return -self.kt * factor * _ratio(slip, self._powers(overlap)[1])
 
     def derivatives(self, overlap: Floats, slip: Floats) -> Derivatives:
         """All of the above at once, at a fraction of the cost; overlaps that are not positive give zeros."""
-        overlap = np.maximum(overlap, 0.0)
-        root = np.sqrt(overlap)
-        normal_force, normal_stiffness = self.kn * overlap * root, 1.5 * self.kn * root
+        overlap, p = np.maximum(overlap, 0.0), self.exponent
+        root, rest_power = self._powers(overlap)
+        normal_force, normal_stiffness = self.kn * overlap * root, p * self.kn * root
         if not self.frictional:
             zero = np.zeros_like(root)
             return Derivatives(normal_force, zero, normal_stiffness, zero, zero)
         limit = overlap * (self.mu * self.kn / self.kt)
         slip = np.minimum(np.maximum(slip, -limit), limit)
         if limit.all():
-            x, steep = np.abs(slip) / limit, slip / root
+            x, steep = np.abs(slip) / limit, slip / rest_power
         else:  # an open contact has no slip either
-            x, steep = _ratio(np.abs(slip), limit), _ratio(slip, root)
+            x, steep = _ratio(np.abs(slip), limit), _ratio(slip, rest_power)
         rest, triple, soft = 1 - x, 3 * x, -self.kt * root
         return Derivatives(
             normal_force,
             soft * (1 + x * rest) * slip,
             normal_stiffness,
             soft * (rest * (1 + triple)),  # vanishes at the bound to the last bit
-            (1 + x * (triple - 1)) * (-0.5 * self.kt * steep),
+            ((p - 1) + x * ((3 - p) * x - (2 - p))) * (-self.kt * steep),
         )
+
+    def dashpots(self, overlap: ArrayLike, slip: ArrayLike) -> tuple[Floats, Floats]:
+        """Coefficients of the dashpots of small velocities, force time / length.
+
+        Parameters
+        ----------
+        overlap, slip : array_like
+            Overlap and slip of each contact, length.
+
+        Returns
+        -------
+        normal, tangential : ndarray
+            cn overlap^(p-1) and ct overlap^(p-1); the tangential one is zero at Coulomb's bound and without friction.
+        """
+        overlap = _closed(overlap)
+        power = self._powers(overlap)[0]
+        inside = np.abs(slip) < self.slip_limit(overlap)
+        return self.cn * power, self.ct * power * inside
+
+    def growth(self, overlap: Floats) -> Floats:
+        """overlap^(p-1), with which stiffnesses and dashpots grow; of overlaps that are not negative, or complex."""
+        return np.sqrt(overlap) if self.exponent != 1 else np.asarray(overlap != 0, dtype=overlap.dtype)
+
+    def _powers(self, overlap: Floats) -> tuple[Floats, Floats]:
+        """overlap^(p-1) and overlap^(2-p) of overlaps that are not negative."""
+        growth = self.growth(overlap)
+        return growth, overlap if self.exponent == 1 else growth
 
     def _reduced(self, overlap: Floats, slip: ArrayLike) -> tuple[Floats, Floats]:
         """The slip within its bound and x = |slip| / t*."""

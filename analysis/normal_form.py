@@ -1,4 +1,4 @@
-r"""The normal form of two coalescing modes, and where a real packing's pair stands in it.
+r"""The normal form of two coalescing modes.
 
 In the paper's equations 12 to 23, in units of time in which the mean of the two eigenvalues is one,
 
@@ -33,13 +33,6 @@ because :math:`N \mathbf e_\perp = -\delta (1 + \nu)\, \mathbf v^*`. It goes ove
 
 a function of :math:`\tau/\tau_d` alone with :math:`\tau_d = 1/\delta\sqrt\epsilon`: half of g at :math:`\tau =
 1.36\,\tau_d`, g far above and :math:`(2/e)\, g\, d\, \tau`, which does not depend on :math:`\epsilon`, far below.
-
-**A real pair.** On the right invariant subspace of two modes the operator A of a packing is a real 2 x 2 block. In an
-orthonormal basis of that plane its traceless part is a symmetric one, which a rotation makes diag(-p, p), and
-an antisymmetric one, q times the quarter turn, which a rotation leaves alone. With the mean m of the
-eigenvalues, :math:`\delta = p/m`, :math:`\eta = q/m` and :math:`t \to \sqrt m\, t`, it is the normal form without an
-approximation; a reflection takes care of the sign of q. What is oblique is only how the plane sees the other
-coordinates: a displacement z of the packing enters it by the left plane, :math:`W^T z`, with :math:`W^T V = 1`.
 """
 
 from collections.abc import Sequence
@@ -49,12 +42,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 
-from .modes import Modes as PackingModes
-from .modes import full_operator
-from .packing import Floats, Packing
+from .packing import Floats
 from .spectrum import Complexes
-from .stiffness import Form
-from .tracking import Block
 
 STAR = np.array([1.0, 1.0]) / np.sqrt(2)
 """v*, the direction that both eigenvectors take at the coalescence."""
@@ -128,11 +117,6 @@ class NormalForm:
     def tau_d(self) -> float:
         """1 / (delta epsilon^(1/2)), time that the response takes to build up; infinite where it never ends."""
         return float(1 / (self.delta * np.sqrt(self.epsilon))) if self.epsilon > 0 else np.inf
-
-    def asymptotic_damped_amplitude(self, damping_time: float) -> float:
-        """The maximum of (2/epsilon)^(1/2) exp(-t/2 tau) sin(t/(2^(1/2) tau_d)), at least the 1 of the start."""
-        theta = np.arctan(np.sqrt(2) * damping_time / self.tau_d)
-        return float(max(1.0, self.asymptotic_amplitude * np.sin(theta) * np.exp(-theta / np.tan(theta))))
 
     def solution(self, time: ArrayLike, start: ArrayLike = ORTHOGONAL, damping_time: float | None = None) -> Floats:
         """The exact motion from rest without forcing.
@@ -278,151 +262,6 @@ class NormalForm:
     def _on(self, vector: Floats, parts: Sequence[Floats]) -> Floats:
         even, odd = parts
         return np.outer(even, vector) + np.outer(odd, self._traceless @ vector)
-
-
-@dataclass(frozen=True, eq=False)
-class PairForm:
-    """A packing's pair of modes in the normal form.
-
-    Attributes
-    ----------
-    fx : float
-        Load of the packing, force per top disk.
-    form : NormalForm
-        delta and epsilon of the pair.
-    frequency : float
-        Square root of the mean eigenvalue, radian / time: the unit of time of the normal form is its inverse.
-    right : ndarray, shape (3N, 2)
-        V, orthonormal directions of the two coordinates of the normal form, in mass-weighted coordinates.
-    left : ndarray, shape (3N, 2)
-        W, with W^T V = 1: coordinates of a displacement z are W^T z.
-    """
-
-    fx: float
-    form: NormalForm
-    frequency: float
-    right: Floats
-    left: Floats
-
-    @classmethod
-    def of(cls, modes: PackingModes, block: Block) -> "PairForm":
-        """The pair with the planes of a block, from the operator itself."""
-        v, u = block.right, block.left
-        dual = np.linalg.solve(u.T @ v, u.T).T
-        b = dual.T @ (modes.matrix @ v)
-        mean = 0.5 * (b[0, 0] + b[1, 1])
-        # Traceless part: ((-c, k), (k, c)) + q ((0, 1), (-1, 0)); c = p cos 2a, k = -p sin 2a.
-        c, k, q = 0.5 * (b[1, 1] - b[0, 0]), 0.5 * (b[0, 1] + b[1, 0]), 0.5 * (b[0, 1] - b[1, 0])
-        p, angle = np.hypot(c, k), 0.5 * np.arctan2(-k, c)
-        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        turn[:, 1] *= 1.0 if q >= 0 else -1.0
-        # (p - |q|)/p by way of the discriminant, the one number that is linear in the load.
-        epsilon = block.discriminant / (4 * p * (p + abs(q)))
-        return cls(modes.fx, NormalForm(float(p / mean), float(epsilon)), float(np.sqrt(mean)), v @ turn, dual @ turn)
-
-    @property
-    def start(self) -> Floats:
-        """The unit displacement across the coalescing eigenvectors, mass-weighted, shape (3N,)."""
-        return self.right @ ORTHOGONAL
-
-    @property
-    def obliquity(self) -> float:
-        """Largest angle between the right and the left plane, radian; 0 for a symmetric operator."""
-        # W has the singular values 1/cos of the principal angles
-        return float(np.arccos(min(1.0, 1 / np.linalg.norm(self.left, 2))))
-
-    def amplitude(self, damping_time: float | None = None) -> float:
-        """Response to `start`, as of `NormalForm.amplitude`, for a damping time in the packing's units of time."""
-        return self.form.amplitude(None if damping_time is None else damping_time * self.frequency)
-
-    @property
-    def tau_d(self) -> float:
-        """1 / (delta epsilon^(1/2)) in the packing's units of time."""
-        return self.form.tau_d / self.frequency
-
-    def half_gain_time(self) -> float:
-        """The crossover of `NormalForm.half_gain_time` in the packing's units of time."""
-        return self.form.half_gain_time() / self.frequency
-
-
-@dataclass(frozen=True)
-class PowerLaw:
-    """A straight line through logarithms.
-
-    Attributes
-    ----------
-    exponent : float
-        Its slope.
-    error : float
-        Standard error of the slope from the scatter about the line.
-    factor : float
-        Value at 1.
-    """
-
-    exponent: float
-    error: float
-    factor: float
-
-
-def pair_forms(packings: Sequence[Packing], eigenvalue: float, form: Form = "consistent") -> list[PairForm]:
-    """The normal form of one pair, through equilibria on the way to its onset.
-
-    Parameters
-    ----------
-    packings : sequence of Packing
-        Equilibria in order of their distance from the onset, nearest first, close enough for the planes of the
-        pair to be recognised.
-    eigenvalue : float
-        The double eigenvalue at the onset, as of :class:`~faultgouge.analysis.Window`, 1 / time^2: the nearest two of
-        the first packing are the pair.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
-
-    Returns
-    -------
-    list of PairForm
-        In the order of the packings.
-    """
-    pairs: list[PairForm] = []
-    block = None
-    for packing in packings:
-        modes = PackingModes.of(packing.fx, full_operator(packing, form))
-        if block is None:
-            first, second = np.argsort(np.abs(modes.values - eigenvalue))[:2]
-            pair = int(first), int(second)
-        else:
-            pair = modes.nearest(block)
-        block = modes.block(pair)
-        pairs.append(PairForm.of(modes, block))
-    return pairs
-
-
-def fit_power_law(x: ArrayLike, y: ArrayLike) -> PowerLaw:
-    """Exponent of y(x) by least squares in the logarithms.
-
-    Parameters
-    ----------
-    x, y : array_like, shape (n,)
-        Positive numbers, at least three.
-
-    Returns
-    -------
-    PowerLaw
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than three points, all at one x, or a number is not positive.
-    """
-    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    if x.ndim != 1 or x.shape != y.shape or len(x) < 3 or not (np.all(x > 0) and np.all(y > 0)) or np.ptp(x) == 0:
-        raise ValueError("A power law needs at least three points of positive numbers, not all at one x.")
-    log_x, log_y = np.log(x), np.log(y)
-    about = log_x - log_x.mean()
-    slope = float(about @ log_y / (about @ about))
-    scatter = log_y - log_y.mean() - slope * about
-    error = float(np.sqrt(scatter @ scatter / (len(x) - 2) / (about @ about)))
-    return PowerLaw(slope, error, float(np.exp(log_y.mean() - slope * log_x.mean())))
 
 
 def _gamma(damping_time: float | None) -> float:

@@ -6,7 +6,7 @@ The file is H5MD 1.1, which MDAnalysis opens with
     /h5md                          version, author, creator
     /particles/disks/position      (T, N, 3)  centres, z = 0
     /particles/disks/box           dimension 3, periodic along x or not
-    /particles/disks/box/edges     (T, 3)     period, height and largest diameter; only if periodic
+    /particles/disks/box/edges     (T, 3)     period, twice the height, largest diameter; only if periodic
     /observables/angle             (T, N)     orientations
     /observables/fx, fy            (T,)       force per top disk
     /observables/residual          (T,)       the largest net force on a disk that has a contact
@@ -17,35 +17,52 @@ The file is H5MD 1.1, which MDAnalysis opens with
 
 Every element with a T is a group of ``value`` and of links to one common ``step`` (the number of the
 equilibrium) and ``time`` (the same number: equilibria have no time). A frame exists once ``step`` counts it,
-and ``step`` grows last, after everything else has been handed to the system: a run that is killed keeps every
-complete frame.
+and ``step`` grows last.
+
+The trajectory of an undamped run stands behind the equilibrium from which it began, as further frames of position, with
+the run's own time: readers of H5MD step through both. fx and fy are theirs, all other observables of such a frame are
+nan, or 0 if they are whole numbers. ``/faultgouge/trajectory`` has its times, so that it counts these frames, and low
+parts of its positions.
+
+The file on the disk is whole at any moment and has a checksum over all its bytes (:mod:`.sealedfile`). The attribute
+``complete`` of the root is false until the run has come to its end; ``/checkpoint`` is then the state from which an
+undamped run goes on. A file is checked whole when it is opened (:mod:`.runfile_check`).
 
 Datasets depend on the scene alone. What belongs to the circumstances (resolved scene, versions, seed, ranks)
 is an attribute of the root. One file holds one set of disks and one law.
 """
 
 from collections.abc import Mapping
+from dataclasses import MISSING, fields
 from os import PathLike
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal
 
 import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .files import PackingFileError
+from .contacts import Contacts
+from .errors import PackingFileError
 from .law import MindlinLaw
-from .packing import Contacts, Floats, Packing
+from .packing import Floats, Packing
+from .runfile_check import equilibria
+from .sealedfile import SealedFile, new_file, write
 
 CREATOR = "faultgouge"
 
-COMPACT = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
+CHECKED = {"fletcher32": True}
+"""A checksum for every chunk, for readers other than this one."""
+
+LAW_DEFAULTS = {field.name: field.default for field in fields(MindlinLaw) if field.default is not MISSING}
+"""Parameters of the law that are in a file only if they are others than these."""
+
+COMPACT = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHECKED}
 """Filters of what is stored for every disk or contact: half the size, mostly from indices and equal leading bytes, at a
 few milliseconds for a thousand disks. Slower ones gain 3 % more."""
 
 
-class RunFile:
+class RunFile(SealedFile):
     """A run.h5, open for reading or for appending; a context manager.
 
     Parameters
@@ -62,21 +79,8 @@ class RunFile:
     """
 
     def __init__(self, path: str | PathLike[str], mode: Literal["r", "a"] = "r") -> None:
-        self.path = Path(path)
-        if not self.path.is_file():
-            raise PackingFileError(f"{self.path} does not exist.")
-        try:
-            self._file = h5py.File(self.path, "r" if mode == "r" else "r+")
-        except OSError as error:
-            raise PackingFileError(f"{self.path} is not a readable HDF5 file: {error}.") from error
-        try:
-            foreign = self._file["h5md/creator"].attrs["name"] != CREATOR
-            self._step = self._file["particles/disks/position/step"]
-        except KeyError:
-            foreign = True
-        if foreign:
-            self._file.close()
-            raise PackingFileError(f"{self.path} is an HDF5 file, but not a run of {CREATOR}.")
+        super().__init__(path, mode)
+        self._step = self._file["particles/disks/position/step"]
 
     @classmethod
     def create(
@@ -100,43 +104,24 @@ class RunFile:
         Returns
         -------
         RunFile
-            Open for appending, without frames.
+            Open for appending, without frames, and not `complete`.
 
         Raises
         ------
-        PackingFileError
+        OutputError
             If the file cannot be written.
         """
-        try:
-            file = h5py.File(path, "w")
-        except OSError as error:
-            raise PackingFileError(f"{path} cannot be written: {error}.") from error
-        with file:
+        with new_file() as file:
             _write_header(file, packing)
+            file.attrs["complete"] = False
             for name, value in (attributes or {}).items():
                 file.attrs[name] = value
+            write(Path(path), file)
         return cls(path, "a")
 
-    def __enter__(self) -> "RunFile":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file; what was appended is already in it."""
-        self._file.close()
-
     def __len__(self) -> int:
-        """Number of complete frames."""
-        return int(self._step.shape[0])
-
-    @property
-    def attributes(self) -> dict[str, Any]:
-        """Attributes of the root: scene, versions, seed, ranks."""
-        return {name: getattr(value, "tolist", lambda value=value: value)() for name, value in self._file.attrs.items()}
+        """Number of complete frames, those of a trajectory left out: of equilibria."""
+        return equilibria(self._file)
 
     @property
     def fx(self) -> Floats:
@@ -176,6 +161,8 @@ class RunFile:
         """
         self._check_same(packing)
         count = len(self)
+        if count < self._step.shape[0]:
+            raise ValueError(f"{self.path} has a trajectory, behind which no equilibrium can follow.")
         columns = [packing.contacts.i, packing.contacts.j, packing.contacts.slip]
         if packing.contacts.slip_low is not None:
             columns.append(packing.contacts.slip_low)
@@ -195,6 +182,10 @@ class RunFile:
         frame |= scalars
         if count and set(frame) != set(self.observables):
             raise ValueError(f"Frames of {self.path} have the observables {', '.join(self.observables)}, not others.")
+        with self.change():
+            self._put_frame(packing, frame, count)
+
+    def _put_frame(self, packing: Packing, frame: Mapping[str, ArrayLike], count: int) -> None:
         for name, value in frame.items():
             self._put(f"observables/{name}", np.asarray(value), count)
         flat = np.column_stack([packing.position, np.zeros(len(packing))])
@@ -202,17 +193,16 @@ class RunFile:
         if packing.box_length is not None:
             edges = [
                 packing.box_length,
-                (packing.position[:, 1] + packing.radius).max(),
+                # twice the height: readers that take every axis as periodic see no neighbours across it
+                2 * (packing.position[:, 1] + packing.radius).max(),
                 2 * packing.radius.max(),
             ]
             self._put("particles/disks/box/edges", np.array(edges), count)
-        self._file.flush()
         time = self._file["particles/disks/position/time"]
         time.resize(count + 1, axis=0)
         time[count] = count
         self._step.resize(count + 1, axis=0)
         self._step[count] = count
-        self._file.flush()
 
     def packing(self, frame: int = -1) -> Packing:
         """The packing of a frame, bit for bit.
@@ -234,7 +224,12 @@ class RunFile:
         count = len(self)
         if not -count <= frame < count:
             raise PackingFileError(f"{self.path} has {count} frames; there is no frame {frame}.")
-        frame %= count
+        try:
+            return self._packing(frame % count)
+        except ValueError as error:  # numbers that no packing has
+            raise PackingFileError(f"{self.path} is damaged: {error}") from error
+
+    def _packing(self, frame: int) -> Packing:
         rows = self._file["observables/contacts/value"][frame]
         rows = rows[~np.isnan(rows[:, 0])]
         parameters = self._file["parameters"]
@@ -253,11 +248,47 @@ class RunFile:
                 rows[:, 2],
                 rows[:, 3] if rows.shape[1] > 3 else None,
             ),
-            law=MindlinLaw(*(parameters[name][()] for name in ("kn", "kt", "mu"))),
+            law=MindlinLaw(
+                *(parameters[name][()] for name in ("kn", "kt", "mu")),
+                **{name: parameters[name][()] for name in LAW_DEFAULTS if name in parameters},
+            ),
+            drag_time=parameters["drag_time"][()] if "drag_time" in parameters else None,
             fx=self._file["observables/fx/value"][frame],
             fy=self._file["observables/fy/value"][frame],
             position_low=low["value"][frame] if low is not None else None,
         )
+
+    def append_trajectory(self, time: ArrayLike, position: ArrayLike, position_low: ArrayLike | None = None) -> None:
+        """Add frames of the undamped run that began at the last equilibrium.
+
+        Parameters
+        ----------
+        time : array_like, shape (S,)
+            Since the begin of the run.
+        position : array_like, shape (S, N, 2)
+            Centres, length.
+        position_low : array_like, shape (S, N, 2), optional
+            Their low parts.
+        """
+        low = {} if position_low is None else {"position_low": position_low}
+        place = np.asarray(position, dtype=np.float64)
+        flat = np.concatenate([place, np.zeros((*place.shape[:2], 1))], axis=2)
+        begin, group = self._step.shape[0], self._file["particles/disks/position"]
+        end, last = begin + len(flat), len(self) - 1
+        with self.change():
+            self.append_series("trajectory", time=time, **low)
+            rows = {"position/value": flat, "position/time": time, "position/step": np.arange(begin, end)}
+            for name, values in rows.items():
+                group.parent[name].resize(end, axis=0)
+                group.parent[name][begin:] = values
+            repeated = [self._file[f"observables/{name}/value"] for name in ("fx", "fy")]
+            if "box/edges" in group.parent:
+                repeated.append(group.parent["box/edges/value"])
+            for data in (item["value"] for item in self._file["observables"].values()):
+                data.resize(end, axis=0)
+            for data in repeated:
+                data.resize(end, axis=0)
+                data[begin:] = data[last]
 
     def append_series(self, name: str, **columns: ArrayLike) -> None:
         """Add rows to a time series, which begins with the first call.
@@ -282,13 +313,20 @@ class RunFile:
         if len(group) and set(group) != set(arrays):
             raise ValueError(f"The series {name} has the columns {', '.join(group)}, not others.")
         start, rows = _rows(group), lengths.pop()
-        for column, array in arrays.items():
-            if column not in group:
-                shape = array.shape[1:]
-                group.create_dataset(column, (0, *shape), array.dtype, maxshape=(None, *shape), chunks=True)
-            group[column].resize(start + rows, axis=0)
-            group[column][start:] = array
-        self._file.flush()
+        with self.change():
+            for column, array in arrays.items():
+                if column not in group:
+                    shape = array.shape[1:]
+                    group.create_dataset(
+                        column, (0, *shape), array.dtype, maxshape=(None, *shape), chunks=True, **CHECKED
+                    )
+                group[column].resize(start + rows, axis=0)
+                group[column][start:] = array
+
+    @property
+    def names_of_series(self) -> tuple[str, ...]:
+        """Names of the time series."""
+        return tuple(self._file.get("faultgouge", ()))
 
     def series(self, name: str) -> dict[str, NDArray]:
         """The columns of a time series by name.
@@ -301,7 +339,10 @@ class RunFile:
         group = self._file.get(f"faultgouge/{name}")
         if group is None:
             raise PackingFileError(f"{self.path} has no series {name}.")
-        return {column: group[column][: _rows(group)] for column in group}
+        columns = {column: group[column][: _rows(group)] for column in group}
+        if name == "trajectory" and "position" not in columns:
+            columns["position"] = self._file["particles/disks/position/value"][len(self) :, :, :2]
+        return columns
 
     def _put(self, name: str, value: NDArray, frame: int) -> None:
         """Write one element of one frame; the contacts' second axis grows as it must, others stay."""
@@ -315,7 +356,7 @@ class RunFile:
                 maxshape=(None,) * (value.ndim + 1),
                 chunks=(1, *value.shape) if value.size > 1 else True,
                 fillvalue=np.nan if number is np.float64 else 0,
-                **(COMPACT if value.ndim else {}),
+                **(COMPACT if value.ndim else CHECKED),
             )
             for clock in ("step", "time"):
                 group[clock] = self._file[f"particles/disks/position/{clock}"]
@@ -342,8 +383,11 @@ def _parameters(packing: Packing) -> dict[str, Any]:
         "kn": law.kn,
         "kt": law.kt,
         "mu": law.mu,
+        "inertia_factor": packing.inertia_factor,
     }
-    values["inertia_factor"] = packing.inertia_factor
+    values |= {name: getattr(law, name) for name, default in LAW_DEFAULTS.items() if getattr(law, name) != default}
+    if packing.drag_time is not None:
+        values["drag_time"] = packing.drag_time
     if packing.box_length is not None:
         values["box_length"] = packing.box_length
     return values
@@ -361,8 +405,8 @@ def _write_header(file: h5py.File, packing: Packing) -> None:
     periodic = packing.box_length is not None
     box.attrs["boundary"] = np.array(["periodic" if periodic else "none", "none", "none"], dtype="S8")
     position = disks.create_group("position")
-    position.create_dataset("step", (0,), np.int64, maxshape=(None,))
-    position.create_dataset("time", (0,), np.float64, maxshape=(None,))
+    position.create_dataset("step", (0,), np.int64, maxshape=(None,), **CHECKED)
+    position.create_dataset("time", (0,), np.float64, maxshape=(None,), **CHECKED)
     shape = (len(packing), 3)
     position.create_dataset("value", (0, *shape), np.float64, maxshape=(None, *shape), chunks=(1, *shape), **COMPACT)
     file.create_group("observables")

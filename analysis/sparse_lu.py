@@ -10,6 +10,13 @@ from typing import Any
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
+from .errors import FaultgougeError
+
+
+class SingularMatrixError(FaultgougeError):
+    """A matrix has no factors: a pivot is zero."""
+
+
 SYMMETRIC: dict[str, Any] = {"relax": 1, "options": {"SymmetricMode": True}}
 
 
@@ -28,8 +35,11 @@ def symmetric_lu(matrix: csc_array, *, ordered: bool = False, pivoting: float = 
 
     Raises
     ------
-    RuntimeError
-        If the matrix is singular, or a pivot is zero.
+    SingularMatrixError
+        If a pivot is zero.
     """
     order = "NATURAL" if ordered else "MMD_AT_PLUS_A"
-    return splu(matrix, permc_spec=order, diag_pivot_thresh=pivoting, **SYMMETRIC)
+    try:
+        return splu(matrix, permc_spec=order, diag_pivot_thresh=pivoting, **SYMMETRIC)
+    except RuntimeError as error:  # SuperLU's only word for it
+        raise SingularMatrixError(f"The sparse factors of a matrix of {matrix.shape[0]} rows: {error}.") from error

@@ -37,10 +37,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, eigvals
-from scipy.optimize import linear_sum_assignment
-from scipy.sparse import csc_array, csr_array, eye_array
-from scipy.sparse.linalg import LinearOperator, eigs, splu
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import eigs
 
+from .display import table
 from .packing import Floats, Indices, Packing
 from .stiffness import Form, stiffness_matrix
 
@@ -72,10 +72,16 @@ class ComplexPair:
         The member with positive imaginary part, 1 / time^2.
     overlap : float
         |y^H x| of its unit left and right vectors: it vanishes where the pair coalesces.
+    participation : float
+        Participation ratio of the mode, from 1/N for one disk that moves alone to 1 for disks that move alike.
+    rotation : float
+        Share of rotation in the mode's kinetic energy, from 0 to 1.
     """
 
     eigenvalue: complex
     overlap: float
+    participation: float
+    rotation: float
 
     @property
     def condition(self) -> float:
@@ -118,6 +124,24 @@ class Spectrum:
     rattlers: Indices
     rounding: float
 
+    def __repr__(self) -> str:
+        real = self.eigenvalues.real
+        span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
+        return (
+            f"<Spectrum: {len(real)} eigenvalues{span}, {len(self.pairs)} complex pairs, {len(self.rattlers)} rattlers>"
+        )
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the complex pairs."""
+        rows = {
+            f"{pair.eigenvalue.real:.10g} \u00b1 {pair.eigenvalue.imag:.6g} i": (
+                f"2 |Im \u03c9| = {pair.growth_rate:.6g}, participation {pair.participation:.3f}, "
+                f"rotation {pair.rotation:.3f}"
+            )
+            for pair in self.pairs
+        }
+        return table(repr(self).strip("<>"), rows or {"no complex pair": "linearly stable"})
+
     @property
     def omega_max(self) -> float:
         """Largest |omega|, radian / time; zero for a packing without contacts."""
@@ -147,30 +171,30 @@ class Spectrum:
         return float(2 * np.abs(omega.imag).max(initial=0.0))
 
 
-@dataclass(frozen=True, eq=False)
-class Eigenpairs:
-    """Some eigenvalues with their vectors, in mass-weighted coordinates M^(1/2) q.
+def participation_ratio(right: Complexes | Floats) -> Floats:
+    r"""How many of the disks take part in a mode, as a share.
 
-    Attributes
+    With :math:`e_i` the kinetic energy of disk i, rotation included, the ratio is
+    :math:`(\sum_i e_i)^2 / (N \sum_i e_i^2)`: 1/N for one disk that moves alone, 1 for disks that move alike. Of a
+    complex mode :math:`e_i` is the mean over a period.
+
+    Parameters
     ----------
-    values : ndarray of complex, shape (k,)
-        Eigenvalues, 1 / time^2.
-    right, left : ndarray of complex, shape (3N, k)
-        Unit vectors A x = lambda x and y^H A = lambda y^H in columns, in the order (x.., y.., R theta..);
-        zero on coordinates that feel no force.
-    solves : int
-        Sparse solves that it took.
+    right : ndarray, shape (3N, k)
+        Right vectors in mass-weighted coordinates, in columns.
+
+    Returns
+    -------
+    ndarray, shape (k,)
     """
+    energy = (np.abs(right) ** 2).reshape(3, -1, right.shape[1]).sum(axis=0)
+    return energy.sum(axis=0) ** 2 / (len(energy) * (energy**2).sum(axis=0))
 
-    values: Complexes
-    right: Complexes
-    left: Complexes
-    solves: int
 
-    @property
-    def overlap(self) -> Floats:
-        """|y^H x| of each eigenvalue, shape (k,)."""
-        return np.abs(np.sum(self.left.conj() * self.right, axis=0))
+def rotation_share(right: Complexes | Floats) -> Floats:
+    """Share of rotation in the kinetic energy of modes, shape (k,); `right` as of :func:`participation_ratio`."""
+    energy = (np.abs(right) ** 2).reshape(3, -1, right.shape[1]).sum(axis=1)
+    return energy[2] / energy.sum(axis=0)
 
 
 def dynamical_matrix(packing: Packing, form: Form = "consistent") -> tuple[csr_array, Indices]:
@@ -220,7 +244,7 @@ def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
     -------
     Spectrum
     """
-    sparse, _ = dynamical_matrix(packing, form)
+    sparse, active = dynamical_matrix(packing, form)
     matrix = sparse.toarray()
     rounding = unit_rounding(matrix)
     values = eigvals(matrix) if len(matrix) else np.zeros(0, complex)
@@ -230,7 +254,10 @@ def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
         values, left, right = eig(matrix, left=True, right=True)
         overlap = np.abs(np.sum(left.conj() * right, axis=0))
         for k in np.flatnonzero(values.imag > 0):
-            pair = ComplexPair(complex(values[k]), float(overlap[k]))
+            vector = np.zeros((3 * len(packing), 1), dtype=np.complex128)
+            vector[active, 0] = right[:, k]
+            participation, rotation = float(participation_ratio(vector)[0]), float(rotation_share(vector)[0])
+            pair = ComplexPair(complex(values[k]), float(overlap[k]), participation, rotation)
             if believable(pair.eigenvalue, pair.overlap, rounding):
                 pairs.append(pair)
             else:
@@ -243,66 +270,6 @@ def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
         rattlers=packing.rattlers,
         rounding=rounding,
     )
-
-
-def eigenpairs(
-    packing: Packing, near: complex, count: int, form: Form = "consistent", tolerance: float = 0.0
-) -> Eigenpairs:
-    """The eigenvalues nearest to a shift, with left and right vectors: shift-invert Arnoldi (ARPACK).
-
-    One sparse LU factorisation of :math:`A - \\sigma` serves the right vectors and, transposed, the left
-    ones; the cost is that of a few solves, so that packings far beyond the dense solver are in reach.
-
-    Parameters
-    ----------
-    packing : Packing
-        The configuration.
-    near : complex
-        The shift sigma, 1 / time^2. It should not be an eigenvalue to the last digit.
-    count : int
-        How many eigenvalues, at least 1 and at most E - 2 of the E coordinates that feel a force.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
-    tolerance : float
-        Relative error of the eigenvalues of the inverted operator at which the iteration may end; 0 for that of
-        doubles.
-
-    Returns
-    -------
-    Eigenpairs
-        Sorted by real part, then imaginary part. A complex pair at the rim of the wanted set may lack its
-        partner.
-
-    Raises
-    ------
-    ValueError
-        If the count is out of range.
-    scipy.sparse.linalg.ArpackError
-        If Arnoldi's iteration does not converge.
-    """
-    matrix, active = dynamical_matrix(packing, form)
-    size = matrix.shape[0]
-    if not 1 <= count <= size - 2:
-        raise ValueError(f"{count} eigenvalues were asked of an operator with {size}; at most {size - 2} are possible.")
-    number = np.float64 if np.imag(near) == 0 else np.complex128
-    shift = near if number is np.complex128 else complex(near).real
-    matrix = matrix.astype(number)
-    shifted = csc_array(matrix - shift * eye_array(size, dtype=number))
-    factor = splu(shifted)
-    # A fixed start vector makes ARPACK, and with it every result, reproducible.
-    start = np.ones(size, dtype=number)
-    solves = 0
-
-    def solve(vector: Complexes, trans: str) -> Complexes:
-        nonlocal solves
-        solves += 1
-        return factor.solve(vector, trans=trans)
-
-    inverse = LinearOperator(shifted.shape, lambda v: solve(v, "N"), dtype=number)
-    values, right = eigs(matrix, count, sigma=shift, OPinv=inverse, v0=start, tol=tolerance)
-    adjoint = LinearOperator(shifted.shape, lambda v: solve(v, "H"), dtype=number)
-    mirrored, left = eigs(matrix.T, count, sigma=np.conj(shift), OPinv=adjoint, v0=start, tol=tolerance)
-    return _sorted_and_paired(values, right, mirrored.conj(), left, active, 3 * len(packing), solves)
 
 
 def growth_rate(eigenvalue: complex) -> float:
@@ -378,21 +345,3 @@ def believable(eigenvalue: complex, overlap: float | np.floating, rounding: floa
         u |A|_F of the operator.
     """
     return bool(abs(eigenvalue.imag) * overlap > SAFETY * rounding)
-
-
-def _sorted_and_paired(
-    values: Complexes,
-    right: Complexes,
-    mirrored: Complexes,
-    left: Complexes,
-    active: Indices,
-    size: int,
-    solves: int,
-) -> Eigenpairs:
-    """Bring left vectors beside the right vectors of the same eigenvalue, spread over all coordinates."""
-    order = np.lexsort((values.imag, values.real))
-    values, right = values[order], right[:, order]
-    _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored[None, :]))
-    spread = np.zeros((2, size, len(values)), dtype=np.complex128)
-    spread[0, active], spread[1, active] = right, left[:, partner]
-    return Eigenpairs(values, spread[0], spread[1], solves)

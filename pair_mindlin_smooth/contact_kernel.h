@@ -20,6 +20,7 @@ struct Disks {
   const double *low;                          // rows of fix low/parts; only compensated
   int low_columns;                            // and how long they are
   const Vector *elsewhere, *elsewhere_low;    // of disks owned elsewhere, null where nothing needs them
+  const double *felt;                         // v_x, v_y, omega that dashpots feel, null without dashpots
 };
 
 // Lengths of the periodic box, and what they lack to a multiple of the grid
@@ -104,23 +105,35 @@ struct Grids {
   SummationGrid force, tangential;
 };
 
-// All pairs: their forces, slips and whether they touch. With advance the slips advance by v dt and omega dt. Returns a
-// pair with one centre inside of the other disk, where the law means nothing, or -1. Compiled for several processors,
-// of which the one at hand is chosen at run time; results are the same on all.
+// What is compiled into a run
+struct Features {
+  bool friction;
+  bool advance;    // slips advance by v dt and omega dt
+  bool damped;     // dashpots
+};
+
+// All pairs: their forces, slips and whether they touch. Returns a pair with one centre inside of the other disk, where
+// the law means nothing, or -1. Compiled for several processors, of which the one at hand is chosen at run time;
+// results are the same on all.
 int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law, double dt,
-                   bool friction, bool advance);
+                   Features features);
 int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
-                               double dt, bool friction, bool advance, const Grids &grids);
+                               double dt, Features features, const Grids &grids);
 
 // A contact with the floor: n = (0, 1) and tau = (-1, 0)
 template <class Number> struct FloorContact {
   Number normal, tangential, slip, slip_limit;
 };
 
-FloorContact<double> floor_contact(const MindlinLaw &law, double overlap, double slip, double increment, bool friction,
-                                   bool advance);
+// how fast a contact with the floor opens and slips
+struct FloorRates {
+  double opening, slip;
+};
+
+FloorContact<double> floor_contact(const MindlinLaw &law, double overlap, double slip, double increment,
+                                   const FloorRates &rates, Features features);
 FloorContact<Compensated> floor_contact(const MindlinLaw &law, Compensated overlap, Compensated slip, double increment,
-                                        bool friction, bool advance);
+                                        const FloorRates &rates, Features features);
 
 // Where forces go: rows of f and torque, and with compensated arithmetic of fix low/parts
 struct Forces {

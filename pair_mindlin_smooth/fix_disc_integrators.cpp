@@ -14,7 +14,7 @@
 using namespace LAMMPS_NS;
 using namespace FixConst;
 
-FixDiscIntegrator::FixDiscIntegrator(LAMMPS *lmp, int narg, char **arg, int numbers) :
+FixDiscIntegrator::FixDiscIntegrator(LAMMPS *lmp, int narg, char **arg, int numbers, bool takes_drag) :
     FixDiskColumns(lmp, narg, arg),
     numbers(numbers)
 {
@@ -27,9 +27,12 @@ FixDiscIntegrator::FixDiscIntegrator(LAMMPS *lmp, int narg, char **arg, int numb
     } else if (strcmp(arg[k], "rotation") == 0) {
       if (++k == narg) error->all(FLERR, "fix {}: rotation takes yes or no", style);
       rotation = utils::logical(FLERR, arg[k], false, lmp) == 1;
+    } else if (takes_drag && strcmp(arg[k], "drag") == 0) {
+      if (++k == narg) error->all(FLERR, "fix {}: drag takes a time, TAU", style);
+      drag_time = positive_argument("TAU", arg[k]);
     } else {
-      error->all(FLERR, "fix {} takes {} and the keywords rotation yes|no and compensated, but got {}", style,
-                 needs[numbers], arg[k]);
+      error->all(FLERR, "fix {} takes {} and the keywords {}rotation yes|no and compensated, but got {}", style,
+                 needs[numbers], takes_drag ? "drag TAU, " : "", arg[k]);
     }
   }
   time_integrate = 1;
@@ -134,7 +137,7 @@ void FixDiscIntegrator::refuse(int i, double dx, double dy) const
       style, atom->tag[i], dx, dy, atom->radius[i]);
 }
 
-FixNVEDisc::FixNVEDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg, 1)
+FixNVEDisc::FixNVEDisc(LAMMPS *lmp, int narg, char **arg) : FixDiscIntegrator(lmp, narg, arg, 1, true)
 {
   inertia_factor = positive_argument("I0", arg[3]);
 }
@@ -155,11 +158,35 @@ template <bool ROTATION> FAULTGOUGE_INLINE void FixNVEDisc::kick(int i)
   }
 }
 
+void FixNVEDisc::reset_dt()
+{
+  FixDiscIntegrator::reset_dt();
+  kept = drag_time > 0.0 ? std::exp(-0.5 * dt / drag_time) : 1.0;
+}
+
+template <bool ROTATION> FAULTGOUGE_INLINE void FixNVEDisc::decay(int i)
+{
+  atom->v[i][0] *= kept;
+  atom->v[i][1] *= kept;
+  if constexpr (ROTATION) atom->omega[i][2] *= kept;
+}
+
+template <class Work> void FixNVEDisc::choose_all(Work work) const
+{
+  choose([this, work](auto rotates, auto compensates) {
+    if (drag_time > 0.0)
+      work(rotates, compensates, std::true_type());
+    else
+      work(rotates, compensates, std::false_type());
+  });
+}
+
 void FixNVEDisc::initial_integrate(int /*vflag*/)
 {
-  choose([this](auto rotates, auto compensates) {
+  choose_all([this](auto rotates, auto compensates, auto drags) {
     for (int i = 0; i < atom->nlocal; i++)
       if (atom->mask[i] & groupbit) {
+        if constexpr (decltype(drags)::value) decay<decltype(rotates)::value>(i);
         kick<decltype(rotates)::value>(i);
         move<decltype(rotates)::value, decltype(compensates)::value>(i);
       }
@@ -168,10 +195,12 @@ void FixNVEDisc::initial_integrate(int /*vflag*/)
 
 void FixNVEDisc::final_integrate()
 {
-  choose([this](auto rotates, auto compensates) {
+  choose_all([this](auto rotates, auto compensates, auto drags) {
     for (int i = 0; i < atom->nlocal; i++) {
       complete_force<decltype(compensates)::value>(i);
-      if (atom->mask[i] & groupbit) kick<decltype(rotates)::value>(i);
+      if (!(atom->mask[i] & groupbit)) continue;
+      kick<decltype(rotates)::value>(i);
+      if constexpr (decltype(drags)::value) decay<decltype(rotates)::value>(i);
     }
   });
 }

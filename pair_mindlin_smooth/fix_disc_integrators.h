@@ -1,12 +1,14 @@
 // Integrators of disks in the plane, with moment of inertia I = I0 m R^2.
 //
-//   fix ID group nve/disc I0                 velocity Verlet, undamped
+//   fix ID group nve/disc I0 [drag TAU]      velocity Verlet, undamped, or with the drag -(m/TAU) v and -(I/TAU) omega
 //   fix ID group overdamped/disc GAMMA I0    v = F/GAMMA, R omega = (T/R)/(GAMMA I0): the relaxation
 //                                            of the coordinates (x, y, R theta) by their forces
 //   fix ID group displace/disc               moves by v dt and omega dt, whatever the forces
 //
 // Keywords: with rotation no they leave spins and angles out, since without friction nothing turns a disk; with
-// compensated they carry the low parts of coordinates, see pair mindlin/smooth.
+// compensated they carry the low parts of coordinates, see pair mindlin/smooth. The drag lets velocities decay by
+// exp(-dt/(2 TAU)) before the first half of the kick and after the second (Strang's splitting): of second order in the
+// time step, stable for any TAU, and no force, so that restarts need nothing for it.
 // Where the input has a per-atom property d_theta (fix property/atom), it takes up the rotation angle.
 //
 // displace/disc hands out all that a driver wants to know of the disks after a run, in one per-atom array: given, x, y,
@@ -24,7 +26,7 @@ namespace LAMMPS_NS {
 
 class FixDiscIntegrator : public FixDiskColumns {
 public:
-  FixDiscIntegrator(class LAMMPS *, int, char **, int numbers);
+  FixDiscIntegrator(class LAMMPS *, int, char **, int numbers, bool takes_drag = false);
   int setmask() override;
   void init() override;
   void setup(int) override;
@@ -36,7 +38,8 @@ public:
 protected:
   double dt = 0.0;
   double inertia_factor = 1.0;
-  const int numbers;    // arguments before the keywords
+  double drag_time = 0.0;    // 0: no drag
+  const int numbers;         // arguments before the keywords
 
   double positive_argument(const char *name, const char *text);
   template <bool ROTATION, bool COMPENSATED> void move(int i);    // by v dt and omega dt
@@ -75,8 +78,15 @@ public:
   void initial_integrate(int) override;
   void final_integrate() override;
 
+  void reset_dt() override;
+
 private:
-  template <bool ROTATION> void kick(int i);    // by half a step
+  double kept = 1.0;    // share of a velocity that drag leaves over half a step
+
+  template <bool ROTATION> void kick(int i);     // by half a step
+  template <bool ROTATION> void decay(int i);    // likewise
+  // work(rotates, compensates, drags) with all known at compile time
+  template <class Work> void choose_all(Work work) const;
 };
 
 class FixDisplaceDisc : public FixDiscIntegrator {

@@ -4,6 +4,7 @@
 #include "contact_kernel.h"
 #include "domain.h"
 #include "error.h"
+#include "fix_dashpot_velocities.h"
 #include "fix_low_parts.h"
 #include "force.h"
 #include "input.h"
@@ -25,11 +26,8 @@ using faultgouge::value;
 
 FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : FixDiskColumns(lmp, narg, arg)
 {
-  compensated = narg == 9 && strcmp(arg[8], "compensated") == 0;
-  if (narg != (compensated ? 9 : 8))
-    error->all(FLERR,
-               "fix wall/mindlin/smooth takes KN KT MU ylo COORD and optionally compensated, but got {} arguments",
-               narg - 3);
+  if (narg < 8)
+    error->all(FLERR, "fix wall/mindlin/smooth takes KN KT MU ylo COORD and keywords, but got {} arguments", narg - 3);
   law.kn = utils::numeric(FLERR, arg[3], false, lmp);
   law.kt = utils::numeric(FLERR, arg[4], false, lmp);
   set_mu(arg[5]);
@@ -40,6 +38,7 @@ FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : 
     error->all(FLERR, "fix wall/mindlin/smooth knows a floor only: use ylo COORD instead of {}", arg[6]);
   height = utils::numeric(FLERR, arg[7], false, lmp);
   if (!std::isfinite(height)) error->all(FLERR, "fix wall/mindlin/smooth: ylo must be finite, not {}", arg[7]);
+  read_keywords(narg, arg);
 
   if (!atom->radius_flag || !atom->omega_flag || !atom->torque_flag)
     error->all(FLERR, "fix wall/mindlin/smooth needs disks with radius and spin: use atom_style sphere");
@@ -49,6 +48,34 @@ FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : 
   extscalar = 1;
   energy_global_flag = 1;
   make_columns(compensated ? SLIP_LOW + 1 : OVERLAP + 1);
+}
+
+void FixWallMindlinSmooth::read_keywords(int narg, char **arg)
+{
+  for (int k = 8; k < narg; k++) {
+    if (strcmp(arg[k], "compensated") == 0) {
+      compensated = true;
+    } else if (strcmp(arg[k], "exponent") == 0) {
+      if (++k >= narg || !law.set_exponent(utils::numeric(FLERR, arg[k], false, lmp)))
+        error->all(FLERR, "fix wall/mindlin/smooth: exponent must be 1.5 or 1, not {}", k < narg ? arg[k] : "left out");
+    } else if (strcmp(arg[k], "damping") == 0) {
+      if (k + 2 >= narg) error->all(FLERR, "fix wall/mindlin/smooth: damping takes two numbers, CN CT");
+      set_damping(arg[k + 1], arg[k + 2]);
+      k += 2;
+    } else {
+      error->all(FLERR, "fix wall/mindlin/smooth knows the keywords exponent, damping and compensated, but not {}",
+                 arg[k]);
+    }
+  }
+}
+
+void FixWallMindlinSmooth::set_damping(const char *cn, const char *ct)
+{
+  law.cn = utils::numeric(FLERR, cn, false, lmp);
+  law.ct = utils::numeric(FLERR, ct, false, lmp);
+  if (!law.valid_dashpots())
+    error->all(FLERR, "fix wall/mindlin/smooth: damping CN CT must be finite and not negative (got {} {})", cn, ct);
+  damping = true;
 }
 
 int FixWallMindlinSmooth::setmask()
@@ -68,6 +95,7 @@ void FixWallMindlinSmooth::init()
   if (compensated && !low_parts)
     error->all(FLERR, "fix wall/mindlin/smooth with the keyword compensated needs pair_style mindlin/smooth KN KT MU "
                       "compensated");
+  find_dashpots();
   if (!mu_variable.empty()) {
     mu_index = input->variable->find(mu_variable.c_str());
     if (mu_index < 0 || !input->variable->equalstyle(mu_index))
@@ -79,6 +107,17 @@ void FixWallMindlinSmooth::init()
   if (has_friction && update->whichflag == 2)
     error->all(FLERR, "fix wall/mindlin/smooth with friction cannot be minimized, since its forces depend on the path: "
                       "relax with fix overdamped/disc, or minimize with mu = 0");
+}
+
+// the pair style has made fix dashpot/velocities when fixes are initialized
+void FixWallMindlinSmooth::find_dashpots()
+{
+  damped = damping && !displaces_disks(*modify);
+  dashpots = dynamic_cast<FixDashpotVelocities *>(modify->get_fix_by_id(FixDashpotVelocities::ID));
+  if (damped && !dashpots)
+    error->all(FLERR,
+               "fix wall/mindlin/smooth with the keyword damping needs pair_style mindlin/smooth KN KT MU damping "
+               "CN CT (0 0 for none between disks)");
 }
 
 void FixWallMindlinSmooth::setup(int vflag)
@@ -105,6 +144,16 @@ void FixWallMindlinSmooth::set_mu(const char *text)
 
 int FixWallMindlinSmooth::modify_param(int narg, char **arg)
 {
+  if (strcmp(arg[0], "damping") == 0) {
+    if (narg > 1 && strcmp(arg[1], "no") == 0) {
+      damping = false;
+      law.cn = law.ct = 0.0;
+      return 2;
+    }
+    if (narg < 3) error->all(FLERR, "fix_modify {} damping takes two numbers, CN CT, or no", id);
+    set_damping(arg[1], arg[2]);
+    return 3;
+  }
   if (strcmp(arg[0], "mu") != 0) return 0;
   if (narg < 2) error->all(FLERR, "fix_modify {} mu takes a number or a variable v_NAME", id);
   set_mu(arg[1]);
@@ -123,14 +172,18 @@ void FixWallMindlinSmooth::update_mu()
 void FixWallMindlinSmooth::post_force(int /*vflag*/)
 {
   if (mu_index >= 0) update_mu();
-  if (compensated && has_friction)
-    contact_forces<Compensated, true>();
-  else if (compensated)
-    contact_forces<Compensated, false>();
-  else if (has_friction)
-    contact_forces<double, true>();
+  if (compensated)
+    choose_friction<Compensated>();
   else
-    contact_forces<double, false>();
+    choose_friction<double>();
+}
+
+template <class NUMBER> void FixWallMindlinSmooth::choose_friction()
+{
+  if (damped)
+    has_friction ? contact_forces<NUMBER, true, true>() : contact_forces<NUMBER, false, true>();
+  else
+    has_friction ? contact_forces<NUMBER, true, false>() : contact_forces<NUMBER, false, false>();
 }
 
 template <> double FixWallMindlinSmooth::overlap_of<double>(int i) const
@@ -164,7 +217,7 @@ template <> void FixWallMindlinSmooth::add_force(int i, Compensated x, Compensat
   add(atom->torque[i][2], low[FixLowParts::TORQUE], torque);
 }
 
-template <class NUMBER, bool FRICTION> void FixWallMindlinSmooth::contact_forces()
+template <class NUMBER, bool FRICTION, bool DAMPED> void FixWallMindlinSmooth::contact_forces()
 {
   constexpr bool COMPENSATED = std::is_same<NUMBER, Compensated>::value;
   const bool advance = !update->setupflag;    // at setup the disks have not moved
@@ -193,8 +246,13 @@ template <class NUMBER, bool FRICTION> void FixWallMindlinSmooth::contact_forces
     NUMBER slip = known && FRICTION ? contact[SLIP] : 0.0;
     if constexpr (COMPENSATED && FRICTION) slip.low = known ? contact[SLIP_LOW] : 0.0;
     const double increment = known && FRICTION ? -(atom->v[i][0] + radius * atom->omega[i][2]) * dt : 0.0;
+    faultgouge::FloorRates rates{};
+    if constexpr (DAMPED) {
+      const double *const felt = dashpots->array_atom[i];
+      rates = {felt[1], -(felt[0] + radius * felt[2])};
+    }
     const auto [normal, tangential, kept, limit] =
-        faultgouge::floor_contact(law, overlap, slip, increment, FRICTION, advance);
+        faultgouge::floor_contact(law, overlap, slip, increment, rates, {FRICTION, advance, DAMPED});
     if constexpr (FRICTION) {
       contact[TANGENTIAL] = value(tangential);
       contact[SLIP] = leading(kept);
@@ -222,5 +280,7 @@ void *FixWallMindlinSmooth::extract(const char *name, int &dim)
   if (strcmp(name, "kn") == 0) return &law.kn;
   if (strcmp(name, "kt") == 0) return &law.kt;
   if (strcmp(name, "mu") == 0) return &law.mu;
+  if (damping && strcmp(name, "cn") == 0) return &law.cn;
+  if (damping && strcmp(name, "ct") == 0) return &law.ct;
   return nullptr;
 }

@@ -1,10 +1,10 @@
-// fix ID group wall/mindlin/smooth KN KT MU ylo COORD [compensated]
+// fix ID group wall/mindlin/smooth KN KT MU ylo COORD [exponent P] [damping CN CT] [compensated]
 //
 // The flat floor at y = COORD below the disks: the law of mindlin_law.h with n = (0, 1), tau = (-1, 0).
-// MU may be v_NAME, an equal-style variable that is evaluated in every step; fix_modify ID mu MU changes it. Each
-// disk has one slip. The per-atom array has the columns of pair mindlin/smooth's single():
-// f_n, f_t, slip, slip/slip_limit, n_x, n_y, overlap, with compensated the slip's low part, and zeros for a disk
-// that does not touch.
+// MU may be v_NAME, an equal-style variable that is evaluated in every step; fix_modify ID mu MU changes it, and
+// fix_modify ID damping CN CT or damping no the dashpots. Each disk has one slip. The per-atom array has the columns of
+// pair mindlin/smooth's single(): f_n, f_t, slip, slip/slip_limit, n_x, n_y, overlap, with compensated the slip's low
+// part, and zeros for a disk that does not touch.
 
 #ifndef LMP_FIX_WALL_MINDLIN_SMOOTH_H
 #define LMP_FIX_WALL_MINDLIN_SMOOTH_H
@@ -36,14 +36,21 @@ private:
   double energy = 0.0;    // elastic energy of this rank's contacts
   bool has_friction = false;
   bool compensated = false;
+  bool damping = false;    // the keyword was given
+  bool damped = false;     // as compiled into this run, at init
   class FixLowParts *low_parts = nullptr;
+  class FixDashpotVelocities *dashpots = nullptr;
   std::string mu_variable;    // empty where mu is a number
   int mu_index = -1;          // of that variable
 
+  void read_keywords(int, char **);
+  void set_damping(const char *, const char *);
+  void find_dashpots();
   void set_mu(const char *);
   void update_mu();
   template <class NUMBER> NUMBER overlap_of(int i) const;
-  template <class NUMBER, bool FRICTION> void contact_forces();
+  template <class NUMBER> void choose_friction();
+  template <class NUMBER, bool FRICTION, bool DAMPED> void contact_forces();
   template <class NUMBER> void add_force(int i, NUMBER x, NUMBER y, NUMBER torque);
 };
 

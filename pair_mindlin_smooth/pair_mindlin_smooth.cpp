@@ -18,6 +18,7 @@
 using namespace LAMMPS_NS;
 using faultgouge::Compensated;
 using faultgouge::Disks;
+using faultgouge::Features;
 using faultgouge::leading;
 using faultgouge::MindlinLaw;
 using faultgouge::PairForce;
@@ -40,6 +41,7 @@ PairMindlinSmooth::~PairMindlinSmooth()
 {
   if (history && modify->get_fix_by_id(FixSlipHistory::ID)) modify->delete_fix(FixSlipHistory::ID);
   if (low_parts && modify->get_fix_by_id(FixLowParts::ID)) modify->delete_fix(FixLowParts::ID);
+  if (dashpots && modify->get_fix_by_id(FixDashpotVelocities::ID)) modify->delete_fix(FixDashpotVelocities::ID);
   delete[] svector;
   if (allocated) {
     memory->destroy(setflag);
@@ -61,14 +63,10 @@ void PairMindlinSmooth::allocate()
 
 void PairMindlinSmooth::settings(int narg, char **arg)
 {
-  if (narg < 3 || narg > 4)
-    error->all(
-        FLERR,
-        "pair_style mindlin/smooth takes three numbers, KN KT MU, and optionally compensated, but got {} arguments",
-        narg);
-  compensated = narg == 4;
-  if (compensated && strcmp(arg[3], "compensated") != 0)
-    error->all(FLERR, "pair_style mindlin/smooth knows the keyword compensated, but not {}", arg[3]);
+  if (narg < 3)
+    error->all(FLERR, "pair_style mindlin/smooth takes three numbers, KN KT MU, and keywords, but got {} arguments",
+               narg);
+  law = MindlinLaw();
   law.kn = utils::numeric(FLERR, arg[0], false, lmp);
   law.kt = utils::numeric(FLERR, arg[1], false, lmp);
   law.mu = utils::numeric(FLERR, arg[2], false, lmp);
@@ -76,6 +74,32 @@ void PairMindlinSmooth::settings(int narg, char **arg)
     error->all(FLERR,
                "pair_style mindlin/smooth: KN must be positive, KT and MU not negative, all finite (got {} {} {})",
                arg[0], arg[1], arg[2]);
+  read_keywords(narg, arg);
+}
+
+void PairMindlinSmooth::read_keywords(int narg, char **arg)
+{
+  compensated = damping = false;
+  for (int k = 3; k < narg; k++) {
+    if (strcmp(arg[k], "compensated") == 0) {
+      compensated = true;
+    } else if (strcmp(arg[k], "exponent") == 0) {
+      if (++k >= narg || !law.set_exponent(utils::numeric(FLERR, arg[k], false, lmp)))
+        error->all(FLERR, "pair_style mindlin/smooth: exponent must be 1.5 or 1, not {}",
+                   k < narg ? arg[k] : "left out");
+    } else if (strcmp(arg[k], "damping") == 0) {
+      if (k + 2 >= narg) error->all(FLERR, "pair_style mindlin/smooth: damping takes two numbers, CN CT");
+      law.cn = utils::numeric(FLERR, arg[++k], false, lmp);
+      law.ct = utils::numeric(FLERR, arg[++k], false, lmp);
+      if (!law.valid_dashpots())
+        error->all(FLERR, "pair_style mindlin/smooth: damping CN CT must be finite and not negative (got {} {})",
+                   arg[k - 1], arg[k]);
+      damping = true;
+    } else {
+      error->all(FLERR, "pair_style mindlin/smooth knows the keywords exponent, damping and compensated, but not {}",
+                 arg[k]);
+    }
+  }
 }
 
 void PairMindlinSmooth::coeff(int narg, char **arg)
@@ -97,6 +121,8 @@ void PairMindlinSmooth::init_style()
     error->all(FLERR, "pair mindlin/smooth is for single disks: use atom_style sphere without molecules");
 
   has_friction = law.frictional();
+  damped = damping && !displaces_disks(*modify);
+  if (damped) check_damping();
   if (has_friction && !comm->ghost_velocity)
     error->all(FLERR, "pair mindlin/smooth needs the velocities of ghost disks: use comm_modify vel yes");
   if (compensated && update->whichflag == 2)
@@ -112,7 +138,7 @@ void PairMindlinSmooth::init_style()
 
   make_fixes();
   if (compensated) check_integrators();
-  comm_forward = compensated ? 4 : 2;
+  comm_forward = (compensated ? 4 : 2) + (damped ? FixDashpotVelocities::FELT : 0);
 
   std::vector<double> mine(atom->ntypes + 1, 0.0);
   for (int i = 0; i < atom->nlocal; i++) mine[atom->type[i]] = std::max(mine[atom->type[i]], atom->radius[i]);
@@ -133,8 +159,10 @@ void PairMindlinSmooth::init_style()
 void PairMindlinSmooth::set_force_grids()
 {
   const double radius = *std::max_element(largest_radius + 1, largest_radius + atom->ntypes + 1);
-  const double normal = law.normal_force(radius);
-  force_grid = faultgouge::SummationGrid::for_largest(normal * std::hypot(1.0, law.mu));
+  double normal = law.normal_force(radius);
+  // no disk moves by more than its radius in a step, and the velocity that dashpots feel is up to three times that
+  if (damped) normal += law.cn * law.growth(radius) * 6.0 * radius / update->dt;
+  force_grid = faultgouge::SummationGrid::for_largest(normal * std::sqrt(1.0 + law.mu * law.mu));
   tangential_grid = faultgouge::SummationGrid::for_largest(normal * law.mu);
 }
 
@@ -159,6 +187,31 @@ void PairMindlinSmooth::make_fixes()
     modify->delete_fix(FixLowParts::ID);
     low_parts = nullptr;
   }
+  make_dashpots();
+}
+
+void PairMindlinSmooth::make_dashpots()
+{
+  dashpots = dynamic_cast<FixDashpotVelocities *>(modify->get_fix_by_id(FixDashpotVelocities::ID));
+  if (damping && !dashpots)
+    dashpots = dynamic_cast<FixDashpotVelocities *>(
+        modify->add_fix(fmt::format("{} all dashpot/velocities", FixDashpotVelocities::ID)));
+  if (!damping && dashpots) {
+    modify->delete_fix(FixDashpotVelocities::ID);
+    dashpots = nullptr;
+  }
+}
+
+void PairMindlinSmooth::check_damping() const
+{
+  if (update->whichflag == 2)
+    error->all(FLERR, "pair mindlin/smooth: a minimizer has no velocities: minimize without the keyword damping");
+  for (const auto &fix : modify->get_fix_list())
+    if (dynamic_cast<const FixOverdampedDisc *>(fix))
+      error->all(FLERR,
+                 "pair mindlin/smooth: fix {} of style {} has no dynamics that dashpots could damp, and equilibria do "
+                 "not depend on them: leave the keyword damping out",
+                 fix->id, fix->style);
 }
 
 void PairMindlinSmooth::check_integrators() const
@@ -186,6 +239,7 @@ void PairMindlinSmooth::reinit()
   if (!law.valid()) error->all(FLERR, "pair mindlin/smooth: KN KT MU became {} {} {}", law.kn, law.kt, law.mu);
   if (law.frictional() && !has_friction)
     error->all(FLERR, "pair mindlin/smooth: friction cannot be switched on within a run that began without");
+  if (!law.valid_dashpots()) error->all(FLERR, "pair mindlin/smooth: CN CT became {} {}", law.cn, law.ct);
   set_force_grids();
 }
 
@@ -213,7 +267,8 @@ void PairMindlinSmooth::load_slips()
 void PairMindlinSmooth::compute(int eflag, int vflag)
 {
   ev_init(eflag, vflag);
-  if (comm->nprocs > 1 && (compensated || domain->xperiodic || domain->yperiodic)) communicate_originals();
+  if (damped) collect_felt();
+  if (comm->nprocs > 1 && (compensated || damped || domain->xperiodic || domain->yperiodic)) communicate_originals();
   if (neighbor->ago == 0) rebuild_pairs();
   if (has_friction && slips_in_fix) load_slips();    // somebody may have written others
 
@@ -234,6 +289,14 @@ void PairMindlinSmooth::compute(int eflag, int vflag)
     tally<double>();
 }
 
+void PairMindlinSmooth::collect_felt()
+{
+  felt.resize(FixDashpotVelocities::FELT * (atom->nlocal + atom->nghost));
+  for (int i = 0; i < atom->nlocal; i++)
+    std::copy_n(dashpots->array_atom[i], FixDashpotVelocities::FELT, &felt[FixDashpotVelocities::FELT * i]);
+}
+
+// and with them what else ghosts need
 void PairMindlinSmooth::communicate_originals()
 {
   original.resize(atom->nlocal + atom->nghost);
@@ -252,11 +315,15 @@ int PairMindlinSmooth::pack_forward_comm(int n, int *list, double *buf, int /*pb
 {
   int m = 0;
   for (int k = 0; k < n; k++) {
-    buf[m++] = original[list[k]].x;
-    buf[m++] = original[list[k]].y;
-    if (!compensated) continue;
-    buf[m++] = original_low[list[k]].x;
-    buf[m++] = original_low[list[k]].y;
+    const int i = list[k];
+    buf[m++] = original[i].x;
+    buf[m++] = original[i].y;
+    if (compensated) {
+      buf[m++] = original_low[i].x;
+      buf[m++] = original_low[i].y;
+    }
+    if (damped)
+      for (int d = 0; d < FixDashpotVelocities::FELT; d++) buf[m++] = felt[FixDashpotVelocities::FELT * i + d];
   }
   return m;
 }
@@ -267,9 +334,12 @@ void PairMindlinSmooth::unpack_forward_comm(int n, int first, double *buf)
   for (int i = first; i < first + n; i++) {
     original[i] = {buf[m], buf[m + 1]};
     m += 2;
-    if (!compensated) continue;
-    original_low[i] = {buf[m], buf[m + 1]};
-    m += 2;
+    if (compensated) {
+      original_low[i] = {buf[m], buf[m + 1]};
+      m += 2;
+    }
+    if (damped)
+      for (int d = 0; d < FixDashpotVelocities::FELT; d++) felt[FixDashpotVelocities::FELT * i + d] = buf[m++];
   }
 }
 
@@ -277,7 +347,8 @@ Disks PairMindlinSmooth::disks() const
 {
   return {atom->nlocal,         atom->x[0],      atom->v[0],
           atom->omega[0],       atom->radius,    compensated ? low_parts->array_atom[0] : nullptr,
-          FixLowParts::COLUMNS, original.data(), original_low.data()};
+          FixLowParts::COLUMNS, original.data(), original_low.data(),
+          felt.data()};
 }
 
 Period PairMindlinSmooth::period() const
@@ -290,15 +361,16 @@ Period PairMindlinSmooth::period() const
 int PairMindlinSmooth::contact_forces(bool advance)
 {
   const double dt = update->dt;
-  if (!compensated) return faultgouge::contact_forces(pairs, disks(), period(), law, dt, has_friction, advance);
-  return faultgouge::compensated_contact_forces(pairs, disks(), period(), law, dt, has_friction, advance,
+  const Features features{has_friction, advance, damped};
+  if (!compensated) return faultgouge::contact_forces(pairs, disks(), period(), law, dt, features);
+  return faultgouge::compensated_contact_forces(pairs, disks(), period(), law, dt, features,
                                                 {low_parts->grid(), force_grid, tangential_grid});
 }
 
 void PairMindlinSmooth::refuse(int p) const
 {
   const auto r = faultgouge::leading_branch(pairs, p, disks(), period());
-  const double distance = std::hypot(r.x, r.y);
+  const double distance = std::sqrt(r.x * r.x + r.y * r.y);
   if (distance == 0.0)
     error->one(FLERR, "Disks {} and {} have the same centre, so that their contact has no direction",
                pairs.first_tag[p], pairs.second_tag[p]);
@@ -385,7 +457,23 @@ template <class NUMBER> double PairMindlinSmooth::measure(int p, int i)
   svector[4] = sign * value(contact.direction(r.x));
   svector[5] = sign * value(contact.direction(r.y));
   svector[6] = overlap;
+  if (damped) add_dashpots<NUMBER>(p, r);
   return law.normal_energy(overlap);
+}
+
+// to the forces of single(): what the dashpots of a pair add
+template <class NUMBER> void PairMindlinSmooth::add_dashpots(int p, const faultgouge::Branch<NUMBER> &r)
+{
+  const int i = pairs.first[p], j = pairs.second[p];
+  const auto contact = geometry(r, atom->radius[i], atom->radius[j]);
+  const double nx = value(contact.direction(r.x)), ny = value(contact.direction(r.y));
+  const double *const fi = &felt[FixDashpotVelocities::FELT * i], *const fj = &felt[FixDashpotVelocities::FELT * j];
+  const double vx = fi[0] - fj[0], vy = fi[1] - fj[1];
+  const double elastic = svector[0], overlap = svector[6];
+  svector[0] = law.damped_normal(elastic, overlap, nx * vx + ny * vy);
+  if (!has_friction) return;
+  const double slip_rate = (nx * vy - ny * vx) - (atom->radius[i] * fi[2] + atom->radius[j] * fj[2]);
+  svector[1] = law.damped_tangential(svector[1], elastic, overlap, slip_rate);
 }
 
 void *PairMindlinSmooth::extract(const char *name, int &dim)
@@ -394,6 +482,8 @@ void *PairMindlinSmooth::extract(const char *name, int &dim)
   if (strcmp(name, "kn") == 0) return &law.kn;
   if (strcmp(name, "kt") == 0) return &law.kt;
   if (strcmp(name, "mu") == 0) return &law.mu;
+  if (damping && strcmp(name, "cn") == 0) return &law.cn;
+  if (damping && strcmp(name, "ct") == 0) return &law.ct;
   return nullptr;
 }
 
@@ -414,6 +504,7 @@ void PairMindlinSmooth::write_restart_settings(FILE *fp)
 {
   fwrite(&law, sizeof(MindlinLaw), 1, fp);
   fwrite(&compensated, sizeof(bool), 1, fp);
+  fwrite(&damping, sizeof(bool), 1, fp);
 }
 
 void PairMindlinSmooth::read_restart_settings(FILE *fp)
@@ -421,9 +512,11 @@ void PairMindlinSmooth::read_restart_settings(FILE *fp)
   if (comm->me == 0) {
     utils::sfread(FLERR, &law, sizeof(MindlinLaw), 1, fp, nullptr, error);
     utils::sfread(FLERR, &compensated, sizeof(bool), 1, fp, nullptr, error);
+    utils::sfread(FLERR, &damping, sizeof(bool), 1, fp, nullptr, error);
   }
   MPI_Bcast(&law, sizeof(MindlinLaw), MPI_BYTE, 0, world);
   MPI_Bcast(&compensated, sizeof(bool), MPI_BYTE, 0, world);
+  MPI_Bcast(&damping, sizeof(bool), MPI_BYTE, 0, world);
 }
 
 double PairMindlinSmooth::memory_usage()

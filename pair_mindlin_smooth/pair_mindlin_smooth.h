@@ -1,14 +1,19 @@
-// pair_style mindlin/smooth KN KT MU [compensated]
+// pair_style mindlin/smooth KN KT MU [exponent P] [damping CN CT] [compensated]
 //
 // Frictional disks in the plane: the law of mindlin_law.h with a slip history in fix slip/history. With
-// MU = 0 or KT = 0 there is no tangential force, no history and no fix. compensated: coordinates, slips and forces
-// with low parts (compensated.h), kept in fix low/parts.
+// MU = 0 or KT = 0 there is no tangential force, no history and no fix.
+//
+//   exponent      3/2 by default, or 1
+//   damping       dashpots at the contacts, which feel the velocities of fix dashpot/velocities; none by default, and
+//                 none while fix displace/disc moves the disks
+//   compensated   coordinates, slips and forces with low parts (compensated.h), kept in fix low/parts
 
 #ifndef LMP_PAIR_MINDLIN_SMOOTH_H
 #define LMP_PAIR_MINDLIN_SMOOTH_H
 
 #include "contact_kernel.h"
 #include "contact_pairs.h"
+#include "fix_dashpot_velocities.h"
 #include "fix_low_parts.h"
 #include "fix_slip_history.h"
 #include "mindlin_law.h"
@@ -44,7 +49,10 @@ private:
   faultgouge::ContactPairs pairs;
   FixSlipHistory *history = nullptr;
   FixLowParts *low_parts = nullptr;
+  FixDashpotVelocities *dashpots = nullptr;
   bool compensated = false;
+  bool damping = false;                // the keyword was given
+  bool damped = false;                 // as compiled into this run, at init
   bool has_friction = false;           // as compiled into this run, at init
   bool slips_in_fix = true;            // false while pairs.slip is newer
   double *largest_radius = nullptr;    // of each type
@@ -53,13 +61,18 @@ private:
   // LAMMPS adds box lengths to the coordinates of ghosts, with a rounding that depends on which of two disks
   // is the ghost; with the original coordinates both owners of a pair find the same to the bit
   std::vector<faultgouge::Vector> original, original_low;
+  std::vector<double> felt;    // v_x, v_y, omega that dashpots feel, of owned and ghost disks
 
   void allocate();
+  void read_keywords(int, char **);
   void make_fixes();
+  void make_dashpots();
   void check_integrators() const;
+  void check_damping() const;
   void set_force_grids();
   void rebuild_pairs();
-  void load_slips();    // from the fix
+  void load_slips();      // from the fix
+  void collect_felt();    // of owned disks
   void communicate_originals();
   faultgouge::Disks disks() const;
   faultgouge::Period period() const;
@@ -68,6 +81,7 @@ private:
   template <class NUMBER> void tally();
   int pair_of(int i, int j) const;
   template <class NUMBER> double measure(int pair, int i);
+  template <class NUMBER> void add_dashpots(int pair, const faultgouge::Branch<NUMBER> &r);
 };
 
 }    // namespace LAMMPS_NS

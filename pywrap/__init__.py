@@ -1,13 +1,26 @@
 """The driver: from a scene to equilibria and undamped runs, with LAMMPS.
 
-`scene` says what is wanted, `stages` runs it, `engine` is LAMMPS with one packing in it, and `quasistatic` takes
-it from equilibrium to equilibrium. A ramp of one's own is a loop over `equilibrate`.
+`scene` says what is wanted. `bed` brings its packing into equilibrium, `equilibria` follows the equilibrium along F_x,
+and `undamped` perturbs it; `recording` keeps all of this in run.h5 and goes on where a run was cut off. `engine` is
+LAMMPS with one packing in it, and `quasistatic` takes it from equilibrium to equilibrium. A ramp of one's own is a loop
+over `equilibrate`.
 """
 
-from .engine import Engine, EngineError
-from .quasistatic import Equilibrium, NoEquilibriumError, equilibrate
-from .scene import Scene, SceneError
-from .stages import Record, Sample, perturb, ramp, reach, settle
+from .private_mpi import prepare
+
+prepare()  # before mpi4py.MPI is imported
+
+# ruff: noqa: E402
+from ..analysis import NoEquilibriumError
+from .bed import settle
+from .engine import Engine
+from .equilibria import ramp, reach
+from .instance import EngineError
+from .quasistatic import Equilibrium, equilibrate
+from .recording import Record
+from .refusals import SceneError
+from .scene import Scene
+from .undamped import Sample, perturb
 
 __all__ = [
     "Engine",

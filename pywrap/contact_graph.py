@@ -9,9 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis import Contacts
-from ..analysis.packing import FLOOR
-from .band import Band, band
+from ..analysis import FLOOR, Contacts
+from .linear import Band, band
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]

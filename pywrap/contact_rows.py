@@ -8,8 +8,7 @@ arithmetic each slip has its low part beside it. See fix_slip_history.h and fix_
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis import Contacts, Packing
-from ..analysis.packing import FLOOR
+from ..analysis import FLOOR, Contacts, Packing
 from .contact_graph import ContactGraph
 
 Floats = NDArray[np.float64]

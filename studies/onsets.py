@@ -10,11 +10,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..analysis import Onset, OnsetError, Packing, find_onset
-from ..analysis.modes import full_operator
-from ..analysis.onset import seeks_all
+from ..analysis.display import table
+from ..analysis.onset import full_operator, seeks_all
 from ..pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, SceneError
+from ..pywrap.bed import settle
+from ..pywrap.equilibria import EquilibriumPath, loads
+from ..pywrap.refusals import needed
 from ..pywrap.settling import Watch
-from ..pywrap.stages import EquilibriumPath, loads, settle
+from .path_error import with_path_error
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +31,7 @@ class OnsetRun:
     equilibria : tuple of Equilibrium
         Those of the ramp's increments, by increasing F_x.
     onset : Onset
-        Windows of complex eigenvalues.
+        Windows of complex eigenvalues, their errors those of rounding and of the path together.
     flows_beyond : float or None
         The last F_x that had an equilibrium, where the packing was found to flow before the ramp's `until`.
     between : dict
@@ -40,6 +43,21 @@ class OnsetRun:
     onset: Onset
     flows_beyond: float | None
     between: dict[float, Packing]
+
+    def __repr__(self) -> str:
+        return (
+            f"<OnsetRun: mu = {self.mu:g}, F_x^c = {self.onset.fx_c:.10g}, {len(self.onset.windows)} windows, "
+            f"{len(self.equilibria)} equilibria up to F_x = {self.equilibria[-1].fx:g}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the windows."""
+        rows = {
+            f"from {each.fx_onset:.10g}": f"to {'the end' if each.fx_end is None else format(each.fx_end, '.10g')}, "
+            f"lambda = {each.eigenvalue:.6g}, {each.kind}"
+            for each in self.onset.windows
+        }
+        return table(repr(self).strip("<>"), rows)
 
 
 def onset_run(
@@ -53,8 +71,9 @@ def onset_run(
 ) -> OnsetRun:
     """Ramp a scene for one friction coefficient and find the onset.
 
-    The ramp goes to its end, or to where the packing flows. Where the first onset alone is sought, and nobody else
-    wants the equilibria, it ends there.
+    The error of each onset is the whole one: that of rounding, and that of the path's increments
+    (:mod:`~faultgouge.studies.path_error`). The ramp goes to its end, or to where the packing flows. Where the first
+    onset alone is sought, and nobody else wants the equilibria, it ends there.
 
     Parameters
     ----------
@@ -82,9 +101,7 @@ def onset_run(
     NoEquilibriumError
         If the packing flows from the first increment on, or before an onset.
     """
-    if scene.ramp is None:
-        raise SceneError("the scene has no section [ramp]: add it, with step and until")
-    wanted = loads(scene.ramp)
+    wanted = loads(needed(scene.ramp, "ramp"))
     start = settle(scene, mu, communicator, watch=lambda what: watch(f"settling: {what}"))
     if modes is not None:
         count = np.count_nonzero(np.diff(full_operator(start.packing).indptr))
@@ -114,4 +131,6 @@ def onset_run(
         last = path.kept[-1].fx
         extra = [] if near_onset is None else [fx for fx in onset.fx_c + near_onset if 0 <= fx <= last]
         between = {float(fx): path(float(fx)) for fx in extra}
+        watch("the path once more, with other increments")
+        onset = with_path_error(onset, engine, path, scene)
     return OnsetRun(mu, tuple(path.kept), onset, last if flows else None, between)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..analysis import Contacts, MindlinLaw, Packing, touching
 from ..pywrap import Engine
-from ..pywrap.engine import Weakening
+from ..pywrap.dynamics import Dynamics, Weakening
 
 QUIET_SHARE = 1e-4
 """Time step of the runs, in units of the decks': a packing that has lost its floor or its sides stays what it is while
@@ -121,15 +121,15 @@ class Run:
     contacts: Path | None = None
 
     @contextmanager
-    def started(self, communicator: MPI.Comm, log: Path | None = None) -> Iterator[Engine]:
-        """LAMMPS ready for `Engine.advance`."""
+    def started(self, communicator: MPI.Comm, log: Path | None = None) -> Iterator[tuple[Engine, Dynamics]]:
+        """LAMMPS, and its dynamics ready for `advance`."""
         # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
-        stiffness = self.packing.law.kn ** (2 / 3) * (10 * self.packing.fy) ** (1 / 3)
+        stiffness = self.packing.law.stiffness_scale(10 * self.packing.fy)
         step = QUIET_SHARE * 0.2 / np.sqrt(12 * stiffness)
         push = self.push or Push(0.0, 0.0, None)
         with (
             Engine(self.packing, communicator, log) as engine,
-            engine.undamped(step, push.amplitude, push.omega, push.target, self.weakening),
+            engine.undamped(step, push.amplitude, push.omega, push.target, self.weakening) as dynamics,
         ):
             if not self.floor:
                 engine.lammps.command("unfix floor")
@@ -138,7 +138,7 @@ class Run:
                 engine.lammps.command(f'dump contact all local 100 "{self.contacts}" index c_contact[*]')
             if self.contacts or not self.floor:
                 engine.lammps.command("run 0 post no")
-            yield engine
+            yield engine, dynamics
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ def features(run: Run) -> Iterator[Feature]:
     )
 
     contacts = touching(packing.position, packing.radius, packing.box_length)  # with zero slips
-    rough_law = law if law.frictional else MindlinLaw(law.kn, 2 / 7 * law.kn, 1.0)
+    rough_law = law if law.frictional else replace(law, kt=2 / 7 * law.kn, mu=1.0)
     yield Feature(
         "tangential history",
         f"mu = {law.mu:g}, kt = {law.kt:g}" + ("" if law.frictional else ": no tangential force"),
@@ -220,6 +220,8 @@ def features(run: Run) -> Iterator[Feature]:
         moves=False,
     )
 
+    yield from _damping(bare, law)
+
     push = run.push or Push(1e-9, 0.01, None)
     yield Feature(
         "perturbation",
@@ -229,6 +231,30 @@ def features(run: Run) -> Iterator[Feature]:
         packing.top if push.target is None else where(packing, push.target),
         moves=True,
     )
+
+
+def _damping(bare: Run, law: MindlinLaw) -> Iterator[Feature]:
+    """Dashpots and drag, each with what the scene has or else a hundredth of what is critical for one contact."""
+    packing = bare.packing
+    rate = np.sqrt(law.stiffness_scale(packing.fy) / packing.mass.mean())
+    dashpot = float(0.01 * packing.mass.mean() * rate / law.growth(np.array(law.overlap_of_force(packing.fy))))
+    damped = law if law.damped else replace(law, cn=dashpot, ct=dashpot)
+    for name, reason, without, with_it in (
+        (
+            "dashpots",
+            f"cn = {law.cn:g}, ct = {law.ct:g}" if law.damped else "no cn or ct in [damping]",
+            replace(packing, law=replace(law, cn=0.0, ct=0.0)),
+            replace(packing, law=damped),
+        ),
+        (
+            "drag",
+            "no tau in [damping]" if packing.drag_time is None else f"tau = {packing.drag_time:g}",
+            replace(packing, drag_time=None),
+            replace(packing, drag_time=packing.drag_time or 100 / rate),
+        ),
+    ):
+        without_run, with_run = (replace(bare, packing=each) for each in (without, with_it))
+        yield Feature(name, reason, without_run, with_run, where(packing, []), moves=True)
 
 
 def _arrays(instance: Any, fixes: tuple[str, ...]) -> Iterator[str]:

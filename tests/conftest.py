@@ -14,8 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import pytest
 
-from faultgouge.analysis import MindlinLaw, Packing
-from faultgouge.analysis.packing import touching
+from faultgouge.analysis import MindlinLaw, Packing, touching
 
 BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parent / "reference" / "packing7.json"

@@ -22,7 +22,7 @@ from scipy.linalg import eigh
 
 from ...analysis import Contacts, Packing, spectrum, stable_timestep, stiffness_matrix, touching
 from ...pywrap import Engine, SceneError
-from ...pywrap.stages import time_step
+from ...pywrap.undamped import time_step
 from .alone import refused_by_lammps
 from .case import Case, Outcome, measured, refused
 from .packings import crystal, law, sheared
@@ -65,9 +65,9 @@ def _excited(share: float, amplitude: float, steps: np.ndarray) -> np.ndarray:
     mode, limit = _fastest()
     size = amplitude * packing.geometry.overlap.min()
     found = []
-    with Engine(_displaced(packing, size * mode)) as engine, engine.undamped(share * limit):
+    with Engine(_displaced(packing, size * mode)) as engine, engine.undamped(share * limit) as dynamics:
         for forward in np.diff(steps, prepend=0).tolist():
-            position = engine.advance(forward).position
+            position = dynamics.advance(forward).position
             found.append(mode @ (position - packing.position).T.ravel() / size)
     return np.array(found)
 
@@ -123,9 +123,9 @@ def _long_run(steps: int, samples: int = 400) -> tuple[np.ndarray, np.ndarray]:
     energy, momentum = [], []
     dt = 0.1 * limit
     # every rank has a run of its own, the same one: six disks on two ranks would do nothing but wait for each other
-    with Engine(_displaced(packing, push), MPI.COMM_SELF) as engine, engine.undamped(dt):
+    with Engine(_displaced(packing, push), MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
         for _ in range(samples):
-            motion = engine.advance(steps // samples)
+            motion = dynamics.advance(steps // samples)
             energy.append(_energy(packing, motion.position, motion.velocity, dt))
             momentum.append(motion.velocity[:, 0].sum() / np.abs(motion.velocity[:, 0]).sum())
     return np.array(energy), np.array(momentum)
@@ -153,9 +153,9 @@ def _momentum() -> Outcome:
     slip = np.resize([0.5, -0.9, 1.0], len(c)) * bare.law.slip_limit(bare.geometry.overlap)
     packing = replace(bare, contacts=Contacts(c.i, c.j, slip))
     worst = 0.0
-    with Engine(packing) as engine, engine.undamped(1e-5):
+    with Engine(packing) as engine, engine.undamped(1e-5) as dynamics:
         for _ in range(100):
-            velocity = engine.advance(1000).velocity
+            velocity = dynamics.advance(1000).velocity
             worst = max(worst, float((np.abs(velocity.sum(axis=0)) / np.abs(velocity).sum(axis=0)).max()))
     return measured(
         worst,

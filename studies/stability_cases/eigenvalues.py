@@ -29,7 +29,7 @@ from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 
 from ...analysis import Contacts, spectrum
-from ...analysis.modes import Modes, full_operator
+from ...analysis.onset import Modes, full_operator
 from ...analysis.spectrum import SAFETY, unit_rounding
 from ...pywrap import Scene
 from ..onsets import OnsetRun, onset_run
@@ -63,7 +63,7 @@ def _near_defective(eps: float, sign: int) -> Outcome:
     matrix = turn @ matrix @ turn.T
     modes = Modes.of(0.0, csr_array(matrix))
     first, second = np.argsort(np.abs(modes.values - 1))[:2]
-    found = modes.block((int(first), int(second))).discriminant
+    found = modes.pair((int(first), int(second))).discriminant
     rounding = unit_rounding(matrix)
     believed = modes.partner[first] >= 0
     if believed and sign < 0:
@@ -94,7 +94,7 @@ def _near_an_onset(distance: float) -> Outcome:
         first, second = np.argsort(np.abs(modes.values - run.onset.windows[0].eigenvalue))[:2]
         if (modes.partner[first] >= 0) != (fx > run.onset.fx_c):
             return Outcome("fails", None, None, f"the pair is real above the onset, or complex below it, at {fx!r}")
-        discriminants.append(modes.block((int(first), int(second))).discriminant)
+        discriminants.append(modes.pair((int(first), int(second))).discriminant)
         split = abs(modes.values[first] - modes.values[second])
     below, above = discriminants
     return measured(

@@ -41,7 +41,7 @@ def _disks(position: list[tuple[float, float]], contacts: Contacts | None = None
 def _one_disk() -> Outcome:
     """On the floor under the load: k_n delta^(3/2) = F_y."""
     packing = at_rest(_disks([(3.0, 0.4995)], top=np.array([True]), fy=3.0)).packing
-    exact = (3.0 / KN) ** (2 / 3)
+    exact = packing.law.overlap_of_force(3.0)
     return measured(
         abs(packing.geometry.overlap[0] / exact - 1),
         4e-16 * 3,
@@ -82,8 +82,8 @@ def _no_contact() -> Outcome:
         contacts=Contacts(c.i, c.j, c.slip),
     )
     last = len(packing) - 1
-    with Engine(packing) as engine, engine.undamped(1e-4):
-        moved = engine.advance(10_000).position[last] - hovering[0]
+    with Engine(packing) as engine, engine.undamped(1e-4) as dynamics:
+        moved = dynamics.advance(10_000).position[last] - hovering[0]
     counted = len(spectrum(packing).eigenvalues) - len(spectrum(settled).eigenvalues)
     return measured(
         np.abs(moved).max() + counted,
@@ -147,7 +147,7 @@ def _grazing() -> Outcome:
     overlap = closest.geometry.overlap
     if len(aside.contacts) or len(beyond.contacts) or len(overlap) != 1:
         return Outcome("fails", None, None, f"contacts on the way: {len(overlap)} and {len(beyond.contacts)}")
-    expected = KN * 1e-12**1.5
+    expected = float(aside.law.normal_force(1e-12))
     return measured(
         np.abs(force[1] / expected - [1, -1]).max() + np.abs(closest.contacts.slip[0]),
         1e-10,

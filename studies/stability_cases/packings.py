@@ -39,11 +39,11 @@ def crystal(
     columns: int, rows: int = 2, law: MindlinLaw = PAPERS, load: float = LOAD, compensated: bool = False
 ) -> Packing:
     """A crystal at rest up to rounding, with no slip yet; load is F_y / k_n."""
-    reach = load ** (2 / 3)
+    reach = law.overlap_of_force(load * law.kn)
     spacing, overlap = 1.0 - reach, reach
     for _ in range(200):  # a contraction by a factor of about a tenth
         rise = np.sqrt((1.0 - overlap) ** 2 - 0.25 * spacing**2)
-        overlap = (0.5 * load * (1.0 - overlap) / rise) ** (2 / 3)
+        overlap = law.overlap_of_force(0.5 * load * law.kn * (1.0 - overlap) / rise)
     row, column = np.divmod(np.arange(rows * columns), columns)
     position = np.column_stack([spacing * (column + 0.5 * (row % 2) + 0.25), 0.5 - reach + rise * row])
     radius = np.full(rows * columns, 0.5)
@@ -62,7 +62,7 @@ def crystal(
 
 def arches(ratio: float, law: MindlinLaw = PAPERS, load: float = 1e-6) -> Packing:
     """Three disks of radius 1, each on two of radius 1/ratio, which touch so that they cannot roll."""
-    small, reach = 1.0 / ratio, load ** (2 / 3)
+    small, reach = 1.0 / ratio, law.overlap_of_force(load * law.kn)
     half = small - 0.5 * reach
     centre = np.array([1.0, 3.05, 5.1])
     height = small - reach + np.sqrt((1.0 + small - reach) ** 2 - half**2)

@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from ...analysis import spectrum, stable_timestep
 from ...pywrap import Engine
-from ...pywrap.engine import DECKS
+from ...pywrap.decks import DECKS
 from ...pywrap.shared_folder import shared_folder
 from .case import Case, Outcome, measured
 from .loads import Make

@@ -18,7 +18,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ...analysis import Packing, RunFile, read_dump, stiffness_matrix, touching
-from ...analysis.packing import Contacts, Floats
+from ...analysis.contacts import Contacts
+from ...analysis.packing import Floats
 from ...analysis.spectrum import Complexes
 from ...pywrap import Engine
 from .study import Point, Settings, Study, Theory
@@ -67,12 +68,9 @@ def through_hdf5(packing: Packing, folder: Path) -> tuple[Packing, int]:
 
 
 def through_trajectory(packing: Packing) -> tuple[Packing, int]:
-    """MDAnalysis's positions, which are float32; angles and contacts from elsewhere."""
-    from MDAnalysis.coordinates.timestep import Timestep
-
-    frame = Timestep(len(packing))
-    frame.positions = np.column_stack([packing.position, np.zeros(len(packing))])
-    return _moved(packing, frame.positions[:, :2].astype(np.float64)), frame.positions.nbytes
+    """Positions in float32, as MDAnalysis hands them out; angles and contacts from elsewhere."""
+    positions = np.column_stack([packing.position, np.zeros(len(packing))]).astype(np.float32)
+    return _moved(packing, positions[:, :2].astype(np.float64)), positions.nbytes
 
 
 def without_slips(packing: Packing) -> tuple[Packing, int]:
@@ -105,7 +103,7 @@ def _study(settings: Settings, packing: Packing, folder: Path) -> Study:
     by = {(point.method, point.parameter): point.error for point in points}
     overlap, furthest = packing.geometry.overlap, np.abs(packing.position).max()
     stiffest = float(packing.law.normal_stiffness(overlap).max())
-    weakest = 0.75 * packing.law.kn * float(overlap.min()) ** -0.5 / stiffest
+    weakest = float(packing.law.normal_curvature(overlap.min())) / stiffest
     unit = [0.5 * 10.0 ** (np.ceil(np.log10(furthest)) - n) for n in digits]  # of the last digit of the largest
     expected = [each * weakest for each in unit]
     sizes = [float(point.evaluations or 0) for point in points if point.method == TEXT]

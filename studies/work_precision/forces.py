@@ -64,8 +64,8 @@ def net_force(packing: Packing, displacement: Numbers) -> Numbers:
     limit = mu * (kn / kt) * overlap
     slip = np.where(slip.real > limit.real, limit, np.where(slip.real < -limit.real, -limit, slip))
     x = np.where(slip.real < 0, -slip, slip) / np.where(limit == 0, 1, limit)
-    root = np.sqrt(overlap)
-    fn, ft = kn * overlap * root, -kt * root * (1 + x - x * x) * slip
+    growth = law.growth(overlap)
+    fn, ft = kn * overlap * growth, -kt * growth * (1 + x - x * x) * slip
 
     on_i = np.stack([fn * normal[0] - ft * normal[1], fn * normal[1] + ft * normal[0], -ft])
     total = np.zeros_like(q)

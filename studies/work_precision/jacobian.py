@@ -107,13 +107,13 @@ def _rounding(packing: Packing, number: type) -> float:
     length."""
     overlap, distance = packing.geometry.overlap, packing.geometry.distance
     unit = 0.5 * float(np.finfo(number).eps) * float(distance.max())
-    return 0.75 * packing.law.kn * float(overlap.min()) ** -0.5 * unit
+    return float(packing.law.normal_curvature(overlap.min())) * unit
 
 
 def _difference_errors(packing: Packing, scale: float, steps: Floats) -> tuple[Floats, Floats]:
     """Truncation of f_n at the smallest overlap and rounding of the coordinates at the stiffest contact, over steps."""
     law, overlap = packing.law, packing.geometry.overlap
-    third = 0.375 * law.kn * overlap.min() ** -1.5
+    third = abs(float(law.normal_curvature(overlap.min(), order=3)))
     stiffest = float(law.normal_stiffness(overlap).max())
     unit = 0.5 * float(np.finfo(float).eps) * float(np.abs(packing.position).max())
     return steps**2 * third / 6 / scale, stiffest * unit / steps / scale

@@ -100,9 +100,9 @@ class Mode:
         displacement = self.right.real / root
         engine.restore(engine.displace(self.packing, self.amplitude * displacement / np.abs(displacement).max()))
         signal = []
-        with engine.undamped(dt):
+        with engine.undamped(dt) as dynamics:
             for _ in range(max(4, int(time / dt / every))):
-                motion = engine.advance(every)
+                motion = dynamics.advance(every)
                 velocity = np.concatenate([*motion.velocity.T, self.packing.radius * motion.spin])
                 signal.append(np.vdot(self.left, root * velocity))
         b = np.array(signal)

@@ -78,8 +78,8 @@ class Increment:
         """Newton's dynamics with viscous drag."""
         self.engine.restore(self.start.packing)
         self.engine.set_fx(TO)
-        with self.engine.drag(rate), self.engine.undamped(time_step):
-            self.engine.advance(steps)
+        with self.engine.undamped(time_step, drag_time=1 / rate) as dynamics:
+            dynamics.advance(steps)
             return self.engine.packing, steps
 
     def fire(self, time_step: float, tolerance: float) -> tuple[Packing, int]:

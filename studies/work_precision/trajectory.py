@@ -49,8 +49,8 @@ def three_disks() -> Packing:
 def in_lammps(engine: Engine, packing: Packing, steps: int) -> Floats:
     """(x, y, u) after `TIME`, by the pair style; shape (3, N), length."""
     engine.restore(packing)
-    with engine.undamped(TIME / steps):
-        engine.advance(steps)
+    with engine.undamped(TIME / steps) as dynamics:
+        dynamics.advance(steps)
         end = engine.packing
     return np.array([*end.position.T, end.scaled_angle])
 

@@ -60,8 +60,8 @@ def ramp(bed: Callable[[float], Packing]) -> Callable[[float, float, int], Ramp]
     return make
 
 
-@pytest.fixture
-def cluster() -> Packing:
+@pytest.fixture(params=[1.5, 1.0], ids=["Hertz", "harmonic"])
+def cluster(request: pytest.FixtureRequest) -> Packing:
     """Six disks in every state of contact: sticking, near the bound, sliding either way, on the floor, across
     the box.
 
@@ -69,7 +69,7 @@ def cluster() -> Packing:
     """
     position = [[0.2, 0.49], [1.18, 0.493], [2.16, 0.488], [0.7, 1.34], [1.68, 1.345], [3.17, 0.492]]
     radius = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5]
-    law = MindlinLaw(kn=2e5, kt=2e5 * 2 / 7, mu=0.7)
+    law = MindlinLaw(kn=2e5, kt=2e5 * 2 / 7, mu=0.7, exponent=request.param)
     found = touching(position, radius, box_length=3.95)
     bare = Packing(position=position, radius=radius, contacts=found, law=law, box_length=3.95)
     share = np.resize([0.3, -0.99, 1.5, -0.2, 0.6, -1.5, 0.9], len(found))

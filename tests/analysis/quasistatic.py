@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse.linalg import splu
 
-from faultgouge.analysis import FLOOR, Contacts, Packing, stiffness_matrix, touching
+from faultgouge.analysis import FLOOR, Contacts, NoEquilibriumError, Packing, stiffness_matrix, touching
 
 
 def moved(old: Packing, q: np.ndarray, fx: float) -> Packing:
@@ -65,12 +65,12 @@ def forces(packing: Packing) -> np.ndarray:
             normal, overlap = between / distance, packing.radius[i] + packing.radius[j] - distance
         if overlap <= 0:
             continue
-        fn, ft = law.kn * overlap**1.5, 0.0
+        fn, ft = law.kn * overlap**law.exponent, 0.0
         if law.frictional:
             limit = law.mu * law.kn / law.kt * overlap
             slip = min(max(slip, -limit), limit)
             x = abs(slip) / limit
-            ft = -law.kt * overlap**0.5 * (1 + x - x**2) * slip
+            ft = -law.kt * overlap ** (law.exponent - 1) * (1 + x - x**2) * slip
         force = fn * normal + ft * np.array([-normal[1], normal[0]])
         total[:2, i] += force
         total[2, i] -= ft
@@ -95,7 +95,7 @@ def equilibrium(old: Packing, fx: float, good_enough: float = 1e-8) -> Packing:
         if residual < best_residual:
             best, best_residual = trial, residual
         q[active] += splu(stiffness[active][:, active]).solve(force[active])
-    raise RuntimeError(f"no equilibrium at fx = {fx}: residual {best_residual:.1e}")
+    raise NoEquilibriumError(f"no equilibrium at fx = {fx}: residual {best_residual:.1e}")
 
 
 def ramp(packing: Packing, loads: np.ndarray) -> list[Packing]:

@@ -63,13 +63,21 @@ def dumped(tmp_path, cluster):
     (tmp_path / "bed.contacts").write_text(contacts)
     law = cluster.law
     (tmp_path / "bed.params").write_text(
-        f"kn {law.kn:.17g}\nkt {law.kt:.17g}\nmu {law.mu:.17g}\nfx 0.5\nfy 3\ninertia_factor 0.5\n"
+        f"kn {law.kn:.17g}\nkt {law.kt:.17g}\nmu {law.mu:.17g}\nexponent {law.exponent:.17g}\n"
+        "fx 0.5\nfy 3\ninertia_factor 0.5\n"
     )
     return tmp_path / "bed.disks"
 
 
 def test_roundtrip_to_the_bit(dumped, cluster):
     assert_identical(read_dump(dumped), cluster)
+
+
+def test_damping_of_the_sidecar(dumped, cluster):
+    with dumped.with_suffix(".params").open("a") as file:
+        file.write("cn 1.5\nct 0.25\ntau 30\n")
+    law = replace(cluster.law, cn=1.5, ct=0.25)
+    assert_identical(read_dump(dumped), replace(cluster, law=law, drag_time=30.0))
 
 
 def test_the_caller_wins_over_the_sidecar(dumped, cluster):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from faultgouge.analysis import fit_growth, fit_oscillation, growth_rate, mean_square_displacement
+from faultgouge.analysis import fit_growth, growth_rate, mean_square_displacement
 
 
 def motion(eigenvalue, vector, time):
@@ -63,7 +63,8 @@ def test_error_is_the_scatter():
     ("time", "msd", "says"),
     [
         (np.arange(10), np.ones(9), "one length"),
-        ([0, 1, 3] * 40, np.ones(120), "equally spaced"),
+        ([0, 1, 3] * 40, np.ones(120), "must increase"),
+        (np.geomspace(1, 1e5, 200), np.exp(1e-4 * np.geomspace(1, 1e5, 200)), "stretches with"),
         (np.arange(100), np.ones(100), "decade"),
         (np.arange(100), np.zeros(100), "0 samples"),
         (np.arange(30), np.exp(np.arange(30)), "samples"),
@@ -74,24 +75,24 @@ def test_no_growth_to_fit(time, msd, says):
         fit_growth(time, msd, 0.5, 1e9)
 
 
+def test_samples_at_uneven_times_give_the_same_rate():
+    """Those of an undamped run: equally spaced, and besides at times that grow geometrically."""
+    every = 50 * np.arange(1, 2001)
+    steps = np.union1d(every, np.geomspace(1, every[-1], 200).astype(int))
+
+    def grown(step):
+        time = 1e-3 * step
+        return fit_growth(time, 1e-24 * np.exp(0.4 * time) * (1 + 0.5 * np.cos(9 * time)), 1e-22, 1e-10)
+
+    even, uneven = grown(every), grown(steps)
+    assert uneven.rate == pytest.approx(0.4, rel=1e-3)
+    # the stretches begin and end at other samples, by a spacing at the most
+    assert uneven.rate == pytest.approx(even.rate, rel=1e-3)
+
+
 def test_mean_square_displacement_of_wrapped_positions():
     reference = np.array([[0.1, 1.0], [9.9, 2.0]])
     moved = np.array([[9.9, 1.0], [0.2, 2.4]])  # by -0.2 and by +0.3, +0.4, across the box
     d = mean_square_displacement(np.array([reference, moved]), reference, box_length=10.0)
     np.testing.assert_allclose(d, [0, (0.04 + 0.25) / 2], rtol=1e-12, atol=0)
     assert mean_square_displacement(moved, reference) > 50
-
-
-@pytest.mark.parametrize(("frequency", "sigma"), [(45.0, 0.02), (3.0, 0.5), (45.0, -0.1), (1.0, 0.0)])
-def test_oscillation_has_its_frequency_and_growth(frequency, sigma):
-    time = 0.013 * np.arange(3000) / frequency * 45
-    signal = 1e-12 * np.exp(sigma * time) * np.cos(frequency * time + 0.4)
-    omega = fit_oscillation(time, signal)
-    # exact but for roundings of the samples
-    assert omega.real == pytest.approx(frequency, rel=1e-10)
-    assert -omega.imag == pytest.approx(sigma, abs=1e-9 * frequency)
-
-
-def test_what_does_not_oscillate_is_refused():
-    with pytest.raises(ValueError, match="does not oscillate"):
-        fit_oscillation(np.arange(20), np.exp(np.arange(20) / 3))

@@ -9,20 +9,27 @@ from hypothesis import strategies as st
 from faultgouge.analysis import MindlinLaw
 
 
-def plain_force(kn, kt, mu, overlap, slip):
+def plain_force(kn, kt, mu, overlap, slip, exponent=1.5):
     """f_n and f_t, from the formulas, in whatever arithmetic the arguments bring."""
     if overlap <= 0:
         return 0, 0
-    normal = kn * overlap * overlap**0.5
+    normal = kn * overlap**exponent
     if kt == 0 or mu == 0:
         return normal, 0
     limit = mu * (kn / kt) * overlap
     slip = min(max(slip, -limit), limit)
     x = abs(slip) / limit
-    return normal, -kt * overlap**0.5 * (1 + x - x**2) * slip
+    return normal, -kt * overlap ** (exponent - 1) * (1 + x - x**2) * slip
 
 
-LAWS = [MindlinLaw(kn, kt, mu) for kn in (1.0, 2e5) for kt in (0.0, 0.3, 5e4) for mu in (0.0, 0.2, 1.0)]
+LAWS = [
+    MindlinLaw(kn, kt, mu, exponent)
+    for kn in (1.0, 2e5)
+    for kt in (0.0, 0.3, 5e4)
+    for mu in (0.0, 0.2, 1.0)
+    for exponent in (1.5, 1.0)
+]
+both_exponents = pytest.mark.parametrize("exponent", [1.5, 1.0])
 OVERLAPS = (1e-9, 6e-4, 0.2)
 SHARES = (-2.0, -1.0, -0.999, -1 / 3, -1e-6, 0.0, 1e-6, 0.5, 1.0, 3.0)
 
@@ -32,7 +39,7 @@ def test_forces(law):
     for overlap in (*OVERLAPS, 0.0, -0.1):
         for share in SHARES:
             slip = share * (float(law.slip_limit(overlap)) or 1e-3)
-            normal, tangential = plain_force(law.kn, law.kt, law.mu, overlap, slip)
+            normal, tangential = plain_force(law.kn, law.kt, law.mu, overlap, slip, law.exponent)
             # A handful of rounded operations each.
             assert law.normal_force(overlap) == pytest.approx(normal, rel=1e-15)
             assert law.tangential_force(overlap, slip) == pytest.approx(tangential, rel=2e-15)
@@ -44,12 +51,12 @@ def test_forces(law):
 def test_derivatives_have_all_digits(law, overlap, share):
     slip = share * float(law.slip_limit(overlap))
     with mpmath.workdps(40):
-        kn, kt, mu, d, s = (mpmath.mpf(v) for v in (law.kn, law.kt, law.mu, overlap, slip))
-        normal = mpmath.diff(lambda v: plain_force(kn, kt, mu, v, s)[0], d)
-        by_slip = mpmath.diff(lambda v: plain_force(kn, kt, mu, d, v)[1], s)
-        by_overlap = mpmath.diff(lambda v: plain_force(kn, kt, mu, v, s)[1], d)
+        kn, kt, mu, p, d, s = (mpmath.mpf(v) for v in (law.kn, law.kt, law.mu, law.exponent, overlap, slip))
+        normal = mpmath.diff(lambda v: plain_force(kn, kt, mu, v, s, p)[0], d)
+        by_slip = mpmath.diff(lambda v: plain_force(kn, kt, mu, d, v, p)[1], s)
+        by_overlap = mpmath.diff(lambda v: plain_force(kn, kt, mu, v, s, p)[1], d)
     # Some ten rounded operations on terms of this scale, which cancel towards the bound.
-    scale = law.kt * overlap**0.5
+    scale = law.kt * overlap ** (law.exponent - 1)
     assert law.normal_stiffness(overlap) == pytest.approx(float(normal), rel=1e-15)
     assert law.tangential_slip_derivative(overlap, slip) == pytest.approx(float(by_slip), abs=1e-14 * scale)
     assert law.tangential_overlap_derivative(overlap, slip) == pytest.approx(
@@ -69,7 +76,7 @@ def test_all_at_once(law):
         law.tangential_slip_derivative(overlap, slip),
         law.tangential_overlap_derivative(overlap, slip) * law.frictional,
     )
-    scale = law.kt * np.sqrt(np.maximum(overlap, 0.0))
+    scale = law.kt * np.maximum(overlap, 0.0) ** (law.exponent - 1)
     for together, alone in zip(found, singly, strict=True):
         # the same formulas, rounded in another order
         assert np.all(
@@ -77,36 +84,41 @@ def test_all_at_once(law):
         )
 
 
+@both_exponents
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_derivatives_are_continuous_at_the_bound(sign):
-    law, overlap = MindlinLaw(2e5, 6e4, 0.8), 1e-3
+def test_derivatives_are_continuous_at_the_bound(sign, exponent):
+    law, overlap = MindlinLaw(2e5, 6e4, 0.8, exponent), 1e-3
     limit = float(law.slip_limit(overlap))
     force = float(law.tangential_force(overlap, sign * limit))
     assert force == pytest.approx(-sign * law.mu * float(law.normal_force(overlap)), rel=1e-15)
     assert law.tangential_slip_derivative(overlap, sign * limit) == 0
-    # The clamped branch is f_t = -sign mu kn delta^(3/2).
-    clamped = -sign * 1.5 * law.mu * law.kn * overlap**0.5
+    # The clamped branch is f_t = -sign mu kn delta^p.
+    clamped = -sign * exponent * law.mu * law.kn * overlap ** (exponent - 1)
     assert law.tangential_overlap_derivative(overlap, sign * limit) == pytest.approx(clamped, rel=1e-15)
-    # C1 and not C2: just inside, f' has grown by 4 (1 - x) kt delta^(1/2), to first order in 1 - x.
+    # C1 and not C2: just inside, f' has grown by 4 (1 - x) kt delta^(p-1), to first order in 1 - x.
     inside = law.tangential_slip_derivative(overlap, sign * limit * (1 - 1e-4))
-    assert inside == pytest.approx(-4e-4 * law.kt * overlap**0.5, rel=1e-4)
+    assert inside == pytest.approx(-4e-4 * law.kt * overlap ** (exponent - 1), rel=1e-4)
 
 
-def test_tangential_stiffness_peaks_at_a_third():
-    law, overlap = MindlinLaw(2e5, 6e4, 1.0), 1e-3
+@both_exponents
+def test_tangential_stiffness_peaks_at_a_third(exponent):
+    law, overlap = MindlinLaw(2e5, 6e4, 1.0, exponent), 1e-3
     x = np.linspace(0, 1, 301)
     stiffness = -law.tangential_slip_derivative(overlap, x * law.slip_limit(overlap))
     assert x[np.argmax(stiffness)] == pytest.approx(1 / 3, abs=1e-12)
-    assert stiffness.max() == pytest.approx(4 / 3 * law.kt * overlap**0.5, rel=1e-14)
+    assert stiffness.max() == pytest.approx(4 / 3 * law.kt * overlap ** (exponent - 1), rel=1e-14)
 
 
 finite = st.floats(1e-6, 1e6)
 share = st.integers(-3000, 3000).map(lambda thousandths: thousandths / 1000)
 
 
-@given(kn=finite, kt=finite, mu=st.floats(1e-3, 10), overlap=st.floats(1e-8, 1.0), x=share, y=share)
-def test_properties(kn, kt, mu, overlap, x, y):
-    law = MindlinLaw(kn, kt, mu)
+exponents = st.sampled_from([1.5, 1.0])
+
+
+@given(kn=finite, kt=finite, mu=st.floats(1e-3, 10), p=exponents, overlap=st.floats(1e-8, 1.0), x=share, y=share)
+def test_properties(kn, kt, mu, p, overlap, x, y):
+    law = MindlinLaw(kn, kt, mu, p)
     limit = float(law.slip_limit(overlap))
     force = float(law.tangential_force(overlap, x * limit))
     assert law.tangential_force(overlap, -x * limit) == -force
@@ -122,8 +134,46 @@ def test_properties(kn, kt, mu, overlap, x, y):
         law.tangential_force(overlap, high * limit)
         <= law.tangential_force(overlap, low * limit) + abs(mu * float(law.normal_force(overlap))) * 1e-14
     )
-    twice = MindlinLaw(2 * kn, 2 * kt, mu)
+    twice = MindlinLaw(2 * kn, 2 * kt, mu, p)
     assert twice.tangential_force(overlap, x * limit) == 2 * force
+
+
+@both_exponents
+def test_energy_and_inverse(exponent):
+    law, overlap = MindlinLaw(2e5, 6e4, 0.8, exponent), np.array(OVERLAPS)
+    force = law.normal_force(overlap)
+    # 2/3 is rounded, and an error of the power counts |log(force/kn)| = 31 times
+    np.testing.assert_allclose([law.overlap_of_force(f) for f in force], overlap, rtol=4e-15)
+    np.testing.assert_allclose([law.stiffness_scale(f) for f in force], force / overlap, rtol=4e-15)
+    with mpmath.workdps(40):
+        energy = [mpmath.quad(lambda v: plain_force(law.kn, 0, 0, v, 0, exponent)[0], [0, d]) for d in overlap]
+        curvature = [
+            mpmath.diff(lambda v: plain_force(law.kn, 0, 0, v, 0, mpmath.mpf(exponent))[0], d, 2) for d in overlap
+        ]
+    np.testing.assert_allclose(law.normal_energy(overlap), np.array(energy, float), rtol=1e-13)  # the quadrature's
+    np.testing.assert_allclose(law.normal_curvature(overlap), np.array(curvature, float), rtol=1e-14, atol=1e-9)
+
+
+@both_exponents
+def test_dashpots(exponent):
+    law = MindlinLaw(2e5, 6e4, 0.8, exponent, cn=3.0, ct=5.0)
+    overlap = np.array([1e-3, 1e-3, 1e-3, 0.0, -1e-3])
+    slip = law.slip_limit(1e-3) * np.array([0.5, 1.0, -1.0, 0.0, 0.0])
+    normal, tangential = law.dashpots(overlap, slip)
+    grown = 1e-3 ** (exponent - 1)
+    np.testing.assert_allclose(normal, 3.0 * grown * np.array([1, 1, 1, 0, 0]), rtol=1e-15)
+    np.testing.assert_allclose(tangential, 5.0 * grown * np.array([1, 0, 0, 0, 0]), rtol=1e-15)
+    assert law.damped
+    assert not MindlinLaw(2e5, 6e4, 0.8, exponent).damped
+    assert not MindlinLaw(2e5, 6e4, 0.0, exponent, ct=5.0).damped
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("exponent", 2.0), ("exponent", 0.0), ("exponent", np.nan), ("cn", -1.0), ("ct", np.inf)]
+)
+def test_impossible_exponents_and_dashpots(field, value):
+    with pytest.raises(ValueError, match=field):
+        MindlinLaw(1.0, 1.0, 1.0, **{field: value})
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 import quasistatic
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
-from faultgouge.analysis import mean_square_displacement, spectrum, stiffness_matrix
-from faultgouge.analysis.response import Modes, Oscillator, layer_force, linear_response
+from faultgouge.analysis import damping_matrix, mean_square_displacement, spectrum, stiffness_matrix
+from faultgouge.analysis.matrix_functions import Modes
+from faultgouge.analysis.oscillator import Oscillator
+from faultgouge.analysis.response import LinearMotion, layer_force, layer_response, linear_response
 
 OMEGA = 0.7
 DISTANCES = [1e-2, 1e-6, 1e-12, 0.0, -1e-6]
@@ -218,6 +221,56 @@ def test_masses_and_inertia_of_a_packing(cluster):
     np.testing.assert_allclose(found.layer_velocity, known[:, 18:24][:, cluster.top].mean(axis=1), atol=1e-7)
 
 
+def dissipative(packing, cn=0.0, ct=0.0, tau=None):
+    """A packing with dashpots and drag."""
+    return replace(packing, law=replace(packing.law, cn=cn, ct=ct), drag_time=tau)
+
+
+@pytest.mark.parametrize(
+    "dissipation", [{"cn": 30.0, "ct": 10.0}, {"cn": 3e3}, {"ct": 20.0, "tau": 0.03}, {"tau": 0.05}]
+)
+def test_dashpots_and_drag_against_the_exponential(cluster, dissipation):
+    """M q'' + C q' + K q = f cos(omega t); dashpots of 3e3 are far beyond critical damping."""
+    packing = dissipative(cluster, **dissipation)
+    mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
+    force, start, omega = layer_force(packing, 2.0), 1e-3 * np.random.default_rng(7).normal(size=18), 40.0
+    system = np.zeros((38, 38))  # q, q', cos and sin
+    system[:18, 18:36] = np.eye(18)
+    system[18:36, :18] = -stiffness_matrix(packing).toarray() / mass[:, None]
+    system[18:36, 18:36] = -damping_matrix(packing).toarray() / mass[:, None]
+    system[18:36, 36] = force / mass
+    system[36, 37], system[37, 36] = -omega, omega
+    time, begin = np.linspace(0, 0.1, 6), np.concatenate([start, np.zeros(18), [1, 0]])
+    known = np.array([expm(system * t) @ begin for t in time])
+    found = linear_response(packing, time, force=force, omega=omega, initial=start)
+    np.testing.assert_allclose(found.displacement, known[:, :18], atol=1e-11 * np.abs(known[:, :18]).max())
+    np.testing.assert_allclose(found.velocity, known[:, 18:36], atol=1e-11 * np.abs(known[:, 18:36]).max())
+
+
+def test_what_is_left_of_a_sudden_start_is_the_transfer_function(equilibrium):
+    """The layer's velocity per unit of force, in and out of resonance, after the transient has died out."""
+    packing = dissipative(equilibrium, cn=20.0, ct=10.0, tau=5.0)
+    motion, time = LinearMotion.of(packing), 400.0 + np.linspace(0, 3, 31)
+    for omega in (0.01, 4.9, 17.0, 90.0):
+        stationary = (layer_response(packing, omega) * np.exp(1j * omega * time)).real
+        # exp(-400 / 2 tau) = 4e-18 of the transient is left, which is far larger than the rest at omega = 0.01
+        np.testing.assert_allclose(motion.layer_velocity(time, omega), stationary, atol=1e-7 * np.abs(stationary).max())
+    whole = linear_response(packing, [0.3, 2.0], force=layer_force(packing, 1.0), omega=17.0)
+    np.testing.assert_allclose(motion.layer_velocity([0.3, 2.0], 17.0), whole.layer_velocity, rtol=1e-9)
+
+
+def test_the_transfer_function_absorbs_power(bed):
+    """The mean power |a|^2 Re V/2 of a force is what dashpots and drag take, as long as K is symmetric."""
+    packing = dissipative(bed(1.0), cn=1.0, ct=1.0)
+    omega = np.geomspace(0.1, 300, 50)
+    response = layer_response(packing, omega)
+    assert response.shape == (50,)
+    assert np.all(response.real > 0)
+    np.testing.assert_allclose(layer_response(packing, -omega), response.conj(), rtol=1e-9)
+    # without dissipation velocity and force are a quarter of a period apart
+    assert np.abs(layer_response(bed(1.0), omega).real).max() == 0
+
+
 def test_rattlers_are_held_still(bed):
     packing = bed(1.0)
     everything = layer_force(packing, 1e-6, np.ones(100, bool))
@@ -236,6 +289,7 @@ def test_rattlers_are_held_still(bed):
         ({"times": [-1.0]}, "negative"),
         ({"times": [[1.0]]}, "list"),
         ({"times": [0.05], "dt": 0.02}, "multiples"),
+        ({"damping_time": -1.0}, "drag_time"),
         ({"force": np.zeros(5)}, "force has shape"),
         ({"initial": np.zeros((3, 6))}, "initial has shape"),
     ],
@@ -259,8 +313,8 @@ def test_against_lammps(equilibrium, omega):
 
     packing, amplitude, every, count = equilibrium, 1e-6, 50, 400
     dt = 0.1 / spectrum(packing).omega_max
-    with Engine(packing) as engine, engine.undamped(dt, amplitude, omega):
-        run = [engine.advance(every) for _ in range(count)]
+    with Engine(packing) as engine, engine.undamped(dt, amplitude, omega) as dynamics:
+        run = [dynamics.advance(every) for _ in range(count)]
     time = dt * every * np.arange(1, count + 1)
     msd = mean_square_displacement(np.array([motion.position for motion in run]), packing.position, packing.box_length)
     velocity = np.array([motion.velocity[packing.top, 0].mean() for motion in run])

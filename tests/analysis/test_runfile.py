@@ -11,7 +11,7 @@ import MDAnalysis
 import numpy as np
 import pytest
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, PackingFileError, RunFile
+from faultgouge.analysis import Contacts, MindlinLaw, OutputError, Packing, PackingFileError, RunFile
 
 
 def assert_identical(a: Packing, b: Packing) -> None:
@@ -66,9 +66,24 @@ def test_what_was_written_is_what_is_read(tmp_path, states):
         np.testing.assert_array_equal(run.observable("floor"), 4 * [1e-11 / 3])
         np.testing.assert_array_equal(run.observable("evaluations"), range(4))
         np.testing.assert_array_equal(run.observable("residual"), [state.residual for state in states])
-        assert run.attributes == attributes
+        assert run.attributes == attributes | {"complete": False}
         with pytest.raises(PackingFileError, match="no frame 4"):
             run.packing(4)
+
+
+def test_damping_is_in_the_file_if_it_is_in_the_packing(tmp_path, cluster):
+    parameters = []
+    damped = replace(cluster, law=replace(cluster.law, cn=0.1, ct=0.2), drag_time=0.3)
+    for k, state in enumerate((cluster, damped)):
+        with RunFile.create(tmp_path / f"{k}.h5", state) as run:
+            run.append(state)
+        with RunFile(tmp_path / f"{k}.h5") as run:
+            assert_identical(run.packing(0), state)
+        with h5py.File(tmp_path / f"{k}.h5") as file:
+            parameters.append(set(file["parameters"]))
+    harmonic = {"exponent"} if cluster.law.exponent == 1 else set()
+    assert parameters[0] == {"radius", "mass", "top", "kn", "kt", "mu", "inertia_factor", "box_length"} | harmonic
+    assert parameters[1] - parameters[0] == {"cn", "ct", "drag_time"}
 
 
 def test_open_box_and_frictionless_law(tmp_path, cluster):
@@ -90,7 +105,7 @@ def test_appending_goes_on_later(tmp_path, states):
 
 
 def test_a_killed_run_keeps_its_frames(tmp_path, states):
-    """The writer dies without a chance to close; then a frame that was cut short is written over."""
+    """The writer dies without a chance to close."""
     path = tmp_path / "run.h5"
     script = (
         "import os, sys, pickle\n"
@@ -99,27 +114,159 @@ def test_a_killed_run_keeps_its_frames(tmp_path, states):
         "run = RunFile.create(sys.argv[1], states[0])\n"
         "for state in states[:2]: run.append(state)\n"
         "run.append_series('msd', time=[0.0, 1.0], value=[1e-20, 2e-20])\n"
+        "run.save()\n"
+        "run.append(states[2])\n"
         "os._exit(9)\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", script, str(path)], input=pickle.dumps(states).hex(), text=True, check=False
     )
     assert done.returncode == 9
-    with h5py.File(path, "r+") as file:  # as if the third frame had been cut short
-        value = file["observables/fx/value"]
-        value.resize(3, axis=0)
-        value[2] = 666.0
-        file["faultgouge/msd/time"].resize(3, axis=0)
     with RunFile(path, "a") as run:
-        assert len(run) == 2
-        assert len(run.fx) == 2
-        np.testing.assert_array_equal(run.series("msd")["time"], [0, 1])
-        run.append(states[2])
+        assert len(run) in (2, 3)  # the third was saved if the others took no time
+        assert not run.complete
+        for state in states[len(run) : 3]:
+            run.append(state)
         run.append_series("msd", time=[2.0], value=[3e-20])
+        run.complete = True
     with RunFile(path) as run:
+        assert run.complete
         for k in range(3):
             assert_identical(run.packing(k), states[k])
         np.testing.assert_array_equal(run.series("msd")["value"], [1e-20, 2e-20, 3e-20])
+
+
+def test_what_an_error_leaves_half_done_is_not_saved(tmp_path, states):
+    path = tmp_path / "run.h5"
+    run = RunFile.create(path, states[0])
+    run.append(states[0])
+    run.save()
+
+    def cut_short():
+        with run.change():
+            run.append(states[1])
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        cut_short()
+    run.close()
+    with RunFile(path) as run:
+        assert len(run) == 1
+    assert [each.name for each in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_the_file_is_sound_at_any_moment(tmp_path, states):
+    """Somebody who reads while it is written, at any moment, meets a whole file."""
+    path = tmp_path / "run.h5"
+    with RunFile.create(path, states[0]) as run:
+        for k in range(20):
+            with RunFile(path) as reader:
+                assert len(reader) <= k
+            run.append(states[k % 4])
+
+
+def test_a_checkpoint_is_replaced_and_removed(tmp_path, states):
+    path = tmp_path / "run.h5"
+    with RunFile.create(path, states[0]) as run:
+        for k in range(3):
+            run.put_checkpoint(step=np.int64(k), x=np.full((k + 1, 2), 0.1))
+    with RunFile(path, "a") as run:
+        assert run.checkpoint["step"] == 2
+        np.testing.assert_array_equal(run.checkpoint["x"], np.full((3, 2), 0.1))
+        run.put_checkpoint()
+    with RunFile(path) as run:
+        assert run.checkpoint == {}
+
+
+@pytest.fixture
+def sound(tmp_path, states):
+    path = tmp_path / "run.h5"
+    with RunFile.create(path, states[0], {"scene": "{}"}) as run:
+        for state in states:
+            run.append(state, floor=2.0)
+        run.append_series("undamped", time=np.arange(50.0), msd=np.linspace(0, 1, 50))
+    return path
+
+
+def test_every_flipped_byte_is_noticed(sound):
+    content = sound.read_bytes()
+    rng = np.random.default_rng(1)
+    places = [*range(0, 520, 13), *rng.integers(0, len(content), 120).tolist()]
+    for place in places:
+        sound.write_bytes(content[:place] + bytes([content[place] ^ (1 << rng.integers(8))]) + content[place + 1 :])
+        for mode in ("r", "a"):
+            with pytest.raises(PackingFileError, match=r"run\.h5"):
+                RunFile(sound, mode)
+    sound.write_bytes(content)
+    with RunFile(sound) as run:
+        assert len(run) == 4
+
+
+def unsealed(path):
+    """The file as version 0.1.0 wrote it: HDF5 alone."""
+    path.write_bytes(path.read_bytes()[512:])
+
+
+def test_a_file_without_a_checksum_is_read_and_not_continued(sound, states):
+    unsealed(sound)
+    with RunFile(sound) as run:
+        assert_identical(run.packing(1), states[1])
+    with pytest.raises(PackingFileError, match="has no checksum"):
+        RunFile(sound, "a")
+
+
+def replaced(name, value):
+    def edit(file):
+        del file[name]
+        file[name] = value
+
+    return edit
+
+
+def changed(name, place, value):
+    def edit(file):
+        file[name][place] = value
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda file: file.__delitem__("parameters/radius"),
+        lambda file: file.__delitem__("observables/contacts"),
+        lambda file: file.__delitem__("observables/angle/value"),
+        lambda file: file.__delitem__("h5md/creator"),
+        lambda file: file["particles/disks/box"].attrs.__delitem__("boundary"),
+        lambda file: file["particles/disks/box"].attrs.__setitem__("boundary", 3.0),
+        lambda file: file["particles/disks/position/step"].resize(7, axis=0),
+        replaced("parameters/mass", np.ones(5)),
+        replaced("parameters/kn", np.inf),
+        replaced("parameters/kn", "2e5"),
+        replaced("parameters/kn", -1.0),
+        replaced("parameters/top", np.ones(6)),
+        replaced("observables/fx/value", np.zeros((4, 2))),
+        replaced("observables/angle", 1.0),
+        replaced("observables/contacts/value", np.zeros((4, 3))),
+        replaced("particles/disks/position/value", np.zeros((4, 6, 2))),
+        replaced("particles/disks/position/value", np.zeros((4, 6, 3), np.float32)),
+        replaced("particles/disks/position/step", np.array([0, 1, 1, 3])),
+        changed("particles/disks/position/value", (2, 3, 1), np.nan),
+        changed("particles/disks/position/value", (2, 3, 2), 1.0),
+        changed("observables/contacts/value", (0, 0, 1), 1e300),
+        changed("observables/contacts/value", (0, 0, 0), 1.5),
+        changed("observables/contacts/value", (0, 0, 2), np.nan),
+        changed("faultgouge/undamped/msd", 3, np.inf),
+        lambda file: file.create_dataset("faultgouge/undamped/huge", (10**13,), "f8", chunks=(1000,)),
+        lambda file: file.create_dataset("faultgouge/undamped/empty", (5000,), "f8", chunks=(1000,)),
+    ],
+)
+def test_what_is_not_as_it_should_be_is_refused(sound, edit):
+    unsealed(sound)
+    with h5py.File(sound, "r+") as file:
+        edit(file)
+    with pytest.raises(PackingFileError, match=r"run\.h5"):
+        RunFile(sound)
 
 
 def test_series(tmp_path, states):
@@ -224,5 +371,5 @@ def test_broken_missing_and_foreign_files(tmp_path, states, content):
 
 
 def test_a_file_that_cannot_be_written(tmp_path, states):
-    with pytest.raises(PackingFileError, match="nowhere"):
+    with pytest.raises(OutputError, match="nowhere"):
         RunFile.create(tmp_path / "nowhere" / "run.h5", states[0])

@@ -48,7 +48,8 @@ def test_derivative_of_one_contact(cluster, k):
         return quasistatic.forces(replace(alone, contacts=one, position=cluster.position + np.column_stack([dx, dy])))
 
     expected = np.array([(force(-q) - force(q)) / 2e-6 for q in 1e-6 * np.eye(18)]).T
-    assert np.abs(matrix - expected).max() < 1e-8 * np.abs(matrix).max()
+    # beside the bound the third derivative is some ten times that of the normal force
+    assert np.abs(matrix - expected).max() < 3e-8 * np.abs(matrix).max()
 
 
 @pytest.mark.parametrize("form", ["consistent", "paper"])
@@ -193,13 +194,13 @@ def test_mirror(cluster):
 
 def test_scales_with_the_stiffnesses(cluster):
     law = cluster.law
-    stiffer = replace(cluster, law=MindlinLaw(4 * law.kn, 4 * law.kt, law.mu))
+    stiffer = replace(cluster, law=replace(law, kn=4 * law.kn, kt=4 * law.kt))
     np.testing.assert_array_equal(stiffness_matrix(stiffer).toarray(), 4 * stiffness_matrix(cluster).toarray())
 
 
 @pytest.mark.parametrize(("kt", "mu"), [(0.0, 1.0), (6e4, 0.0)])
 def test_no_friction_no_rotation(cluster, kt, mu):
-    smooth = replace(cluster, law=MindlinLaw(2e5, kt, mu))
+    smooth = replace(cluster, law=replace(cluster.law, kt=kt, mu=mu))
     matrix = stiffness_matrix(smooth).toarray()
     assert not matrix[12:].any()
     assert not matrix[:, 12:].any()

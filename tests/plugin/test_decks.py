@@ -2,7 +2,7 @@
 
 import pytest
 
-from faultgouge.pywrap.engine import DECKS
+from faultgouge.pywrap.decks import DECKS
 
 SHORT = {"settle.in": (), "ramp.in": ("-var", "until", "2e-3"), "perturb.in": ("-var", "time", "0.5")}
 
@@ -59,7 +59,10 @@ def test_model_of_the_refusals_runs(lmp):
         ({"pair": "pair_style mindlin/smooth 2e5 5e4"}, "takes three numbers, KN KT MU"),
         ({"pair": "pair_style mindlin/smooth 2e5 5e4 -1"}, "KN must be positive, KT and MU not negative"),
         ({"pair": "pair_style mindlin/smooth nan 5e4 1"}, "instead of 'nan'"),
-        ({"pair": "pair_style mindlin/smooth 2e5 5e4 1 exact"}, "knows the keyword compensated, but not exact"),
+        (
+            {"pair": "pair_style mindlin/smooth 2e5 5e4 1 exact"},
+            "knows the keywords exponent, damping and compensated, but not exact",
+        ),
         ({"pair": "pair_style mindlin/smooth 2e5 5e4 1 compensated"}, "moves disks without the low parts"),
         ({"fix": "fix 1 all nve/disc 1.0 compensated"}, "needs pair_style mindlin/smooth KN KT MU compensated"),
         (
@@ -77,7 +80,7 @@ def test_model_of_the_refusals_runs(lmp):
         ({"fix": "fix 1 all overdamped/disc 1.0"}, "takes two numbers, GAMMA and I0"),
         (
             {"fix": "fix 1 all nve/disc 1.0 turning no"},
-            "and the keywords rotation yes|no and compensated, but got turning",
+            "rotation yes|no and compensated, but got turning",
         ),
         ({"fix": "fix 1 all nve/disc 1.0 rotation"}, "rotation takes yes or no"),
         ({"fix": "fix 1 all wall/mindlin/smooth 2e5 5e4 1.0 0.0"}, "takes KN KT MU ylo COORD"),

@@ -15,15 +15,15 @@ RADII = [(0.5, 0.5), (0.5, 0.7), (0.02, 1.0)]
 FRICTIONS = [0.0, 1e-6, 0.8, 10.0]
 
 
-def law(mu, overlap, slip):
-    """(f_n, f_t) of physics: Hertz, and Mindlin smoothed to the Coulomb limit."""
-    normal = KN * overlap**1.5
+def law(mu, overlap, slip, exponent=1.5):
+    """(f_n, f_t) of physics: Hertz or harmonic, and Mindlin smoothed to the Coulomb limit."""
+    normal = KN * overlap**exponent
     if mu == 0:
         return normal, 0.0
     limit = mu * KN / KT * overlap
     slip = max(-limit, min(slip, limit))
     x = abs(slip) / limit
-    return normal, -KT * overlap**0.5 * (1 + x - x**2) * slip
+    return normal, -KT * overlap ** (exponent - 1) * (1 + x - x**2) * slip
 
 
 def close(measured, expected):
@@ -31,15 +31,16 @@ def close(measured, expected):
     np.testing.assert_allclose(measured, expected, rtol=1e-13, atol=1e-13 * np.abs(expected).max())
 
 
-def single_contact(position, radius, contacts, mu, compensated=False):
+def single_contact(position, radius, contacts, mu, compensated=False, exponent=1.5):
     low = np.zeros_like(position) if compensated else None
-    law = MindlinLaw(kn=KN, kt=KT, mu=mu)
+    law = MindlinLaw(kn=KN, kt=KT, mu=mu, exponent=exponent)
     return Packing(position=position, radius=radius, law=law, contacts=contacts, position_low=low)
 
 
+@pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
 @pytest.mark.parametrize("compensated", [False, True], ids=["double", "compensated"])
 @pytest.mark.parametrize(("overlap", "radii", "mu"), [*itertools.product(OVERLAPS, RADII, FRICTIONS)])
-def test_two_disks(overlap, radii, mu, compensated):
+def test_two_disks(overlap, radii, mu, compensated, exponent):
     # the size ratio bounds the overlap that leaves the smaller centre outside of the other disk
     overlap = overlap * min(radii)
     angle = 0.3
@@ -49,30 +50,31 @@ def test_two_disks(overlap, radii, mu, compensated):
     position = np.array([centre + distance * normal, centre])
     for fraction in SLIPS:
         slip = fraction * mu * KN / KT * overlap
-        packing = single_contact(position, np.array(radii), Contacts([0], [1], [slip]), mu, compensated)
+        packing = single_contact(position, np.array(radii), Contacts([0], [1], [slip]), mu, compensated, exponent)
         with Engine(packing) as engine:
             engine.displace(packing, np.zeros(6))
             force = engine.net_force.reshape(3, 2)
         n, tau = packing.geometry.normal[0], packing.geometry.tangent[0]
         branch = position[0] - position[1]
         in_doubles = sum(radii) - np.sqrt(branch @ branch)
-        f_n, f_t = law(mu, packing.geometry.overlap[0] if compensated else in_doubles, slip)
+        f_n, f_t = law(mu, packing.geometry.overlap[0] if compensated else in_doubles, slip, exponent)
         close(force[:2, 0], f_n * n + f_t * tau)
         close(force[2], [-f_t, -f_t])
         assert np.array_equal(force[:2, 0], -force[:2, 1])  # momentum, exactly
         assert np.hypot(*force[:2, 0]) <= f_n * np.sqrt(1 + mu**2) * (1 + 1e-15)
 
 
+@pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
 @pytest.mark.parametrize(("overlap", "radius", "mu"), [*itertools.product(OVERLAPS, [0.5, 0.7], FRICTIONS)])
-def test_disk_on_floor(overlap, radius, mu):
+def test_disk_on_floor(overlap, radius, mu, exponent):
     position = np.array([[2.0, radius - overlap]])
     for fraction in SLIPS:
         slip = fraction * mu * KN / KT * overlap
-        packing = single_contact(position, np.array([radius]), Contacts([0], [-1], [slip]), mu)
+        packing = single_contact(position, np.array([radius]), Contacts([0], [-1], [slip]), mu, exponent=exponent)
         with Engine(packing) as engine:
             engine.displace(packing, np.zeros(3))
             force = engine.net_force
-        f_n, f_t = law(mu, packing.geometry.overlap[0], slip)
+        f_n, f_t = law(mu, packing.geometry.overlap[0], slip, exponent)
         close(force, [-f_t, f_n, -f_t])
         assert abs(force[0]) <= mu * f_n
 

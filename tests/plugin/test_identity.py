@@ -1,22 +1,25 @@
-"""One trajectory, to the bit: over ranks, newton, sorting, restarts and whatever looks on."""
+"""One trajectory, to the bit: over ranks, newton, sorting, restarts and whatever looks on, with dashpots or without."""
 
 import pytest
 
-from faultgouge.pywrap.engine import DECKS
+from faultgouge.pywrap.decks import DECKS
 
 HEAD = """
 newton          {newton}
 variable        decks index {decks}
 variable        fx index 3.0
 variable        precision index {precision}
+variable        exponent index {exponent}
+variable        kn index {kn}
 include         {decks}/system.in
 atom_modify     sort {sort} 0.0
 timestep        2e-3
+{dashpots}
 """
 START = (
     HEAD
     + """
-fix             move all nve/disc 1.0 ${{compensated}}
+fix             move all nve/disc 1.0 {drag} ${{compensated}}
 {extra}
 """
 )
@@ -30,15 +33,23 @@ run             2000
 write_dump      all custom end id x y {low} vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g
 """
 DEFAULTS = {"newton": "on", "sort": "1000", "extra": "", "middle": "", "decks": DECKS}
-PRECISIONS = {
-    "double": {"precision": "double", "low": ""},
-    "compensated": {"precision": "compensated", "low": "f_low[*]"},
+HERTZ = {"exponent": "1.5", "kn": "2e5"}
+HARMONIC = {"exponent": "1", "kn": "1e4"}
+DOUBLE = {"precision": "double", "low": ""}
+COMPENSATED = {"precision": "compensated", "low": "f_low[*]"}
+UNDAMPED = {"dashpots": "", "drag": ""}
+DAMPED = {"dashpots": "variable cn index 5.0\nvariable ct index 3.0\ninclude ${decks}/dashpots.in", "drag": "drag 50.0"}
+KINDS = {
+    "double": {**DOUBLE, **HERTZ, **UNDAMPED},
+    "compensated": {**COMPENSATED, **HERTZ, **UNDAMPED},
+    "damped": {**DOUBLE, **HERTZ, **DAMPED},
+    "harmonic, damped, compensated": {**COMPENSATED, **HARMONIC, **DAMPED},
 }
 
 
-@pytest.fixture(params=PRECISIONS)
+@pytest.fixture(params=KINDS)
 def defaults(request):
-    return {**DEFAULTS, **PRECISIONS[request.param]}
+    return {**DEFAULTS, **KINDS[request.param]}
 
 
 @pytest.fixture
@@ -91,8 +102,8 @@ variable        restart index middle.restart
 """
         + HEAD.format(**defaults)
         + """
-fix             move all nve/disc 1.0 ${compensated}
-"""
+fix             move all nve/disc 1.0 {drag} ${{compensated}}
+""".format(**defaults)
     )
     assert trajectory(ranks=ranks, middle=again) == trajectory()
 
@@ -107,7 +118,7 @@ def test_restart_in_a_new_process(trajectory, defaults, lmp, tmp_path, ranks):
     assert (tmp_path / "end").read_text() == straight[1] == trajectory()[1]
 
 
-@pytest.mark.parametrize("defaults", ["compensated"], indirect=True)
+@pytest.mark.parametrize("defaults", ["compensated", "harmonic, damped, compensated"], indirect=True)
 def test_compensated_run_in_one_piece_or_two(lmp, tmp_path, trajectory, defaults):
     """Disks are wrapped into the box at every set-up: on the grid that is exact."""
     pieces = trajectory()[1]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import read_dump
-from faultgouge.pywrap.engine import DECKS
+from faultgouge.pywrap.decks import DECKS
 
 ROOT = Path(__file__).parents[2]
 

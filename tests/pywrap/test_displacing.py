@@ -50,7 +50,7 @@ def test_the_load_and_the_disks_are_free_again_after_displacements(reference_pac
         instance.command("run 0 post no")
         np.testing.assert_array_equal(engine.net_force, pushed)
         engine.restore(packing)
-        with engine.undamped(1e-4):
-            still = engine.advance(0)
+        with engine.undamped(1e-4) as dynamics:
+            still = dynamics.advance(0)
         moved = nearest_image(still.position - packing.position, packing.box_length)
         np.testing.assert_allclose(moved, 0.0, atol=1e-14)

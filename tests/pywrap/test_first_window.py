@@ -5,10 +5,10 @@ import pytest
 from scipy.linalg import eigvals
 
 from faultgouge.analysis import find_onset
-from faultgouge.analysis.modes import full_operator
+from faultgouge.analysis.onset import full_operator
 from faultgouge.analysis.spectrum import unit_rounding
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.stages import EquilibriumPath
+from faultgouge.pywrap.equilibria import EquilibriumPath
 
 
 @pytest.mark.slow

@@ -16,7 +16,8 @@ from faultgouge.analysis import MindlinLaw, PackingFileError, read_dump, spectru
 from faultgouge.analysis.dumps import dump_frames
 from faultgouge.analysis.spectrum import dynamical_matrix
 from faultgouge.pywrap import Engine, EngineError, Equilibrium, Scene, equilibrate, settle
-from faultgouge.pywrap.engine import DECKS, Weakening
+from faultgouge.pywrap.decks import DECKS, Decks
+from faultgouge.pywrap.dynamics import Weakening
 from faultgouge.pywrap.quasistatic import rounding_floor
 from faultgouge.studies.switches import Loaded
 
@@ -24,7 +25,7 @@ BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
 MODEL = {"decks", "data", "sides", "kn", "kt", "mu", "fx", "fy", "inertia", "precision", "compensated", "rotation"}
-MODEL |= {"dt", "mobile"}
+MODEL |= {"dt", "mobile", "exponent", "stiffness"}
 PUSH = {"amplitude", "omega", "target", "push"}
 WEAKEN = {"B", "w", "mu_ss", "v0", "v_ss", "friction"}
 
@@ -144,12 +145,12 @@ def test_settling_and_relaxing_take_their_parts_away_again(reference_packing, tm
 def motion_of(packing, steps=400, commands=(), **run):
     """Where an undamped run ends that starts out of balance, so that disks move and contacts change."""
     torn = replace(packing, fx=3.0)
-    with Engine(torn) as engine, engine.undamped(2e-3, **run):
+    with Engine(torn) as engine, engine.undamped(2e-3, **run) as dynamics:
         for command in commands:
             engine.lammps.command(command)
         if commands:
             engine.lammps.command("run 0 post no")
-        return engine.advance(steps)
+        return dynamics.advance(steps)
 
 
 def assert_same_motion(one, other):
@@ -334,14 +335,16 @@ def test_output_changes_no_dataset(tmp_path, command, output):
     assert bool(more) == (output == "trajectory")
     assert all("trajectory" in name for name in more)
     for name, values in plain.items():
-        assert np.array_equal(values, rich[name], equal_nan=values.dtype.kind == "f"), name
+        # a trajectory follows the equilibria as further frames
+        same = rich[name][: len(values)] if output == "trajectory" and values.ndim else rich[name]
+        assert np.array_equal(values, same, equal_nan=values.dtype.kind == "f"), name
 
 
 def test_what_stops_a_run_is_what_is_said(reference_packing):
     packing = reference_packing(1.0)
     engine = Engine(packing)
     with pytest.raises(EngineError, match="Unknown command: nonsense"), engine.undamped(1e-4):
-        engine._command("nonsense")
+        Decks(engine.lammps).command("nonsense")
 
 
 def test_frictionless_scene_settles_to_the_start_of_the_frictional_one():

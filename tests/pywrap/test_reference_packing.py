@@ -8,9 +8,9 @@ import pytest
 
 from faultgouge.analysis import Contacts, find_onset, spectrum, stiffness_matrix
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate
+from faultgouge.pywrap.equilibria import EquilibriumPath, next_equilibrium
 from faultgouge.pywrap.newton_matrix import factored
 from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.pywrap.stages import EquilibriumPath, next_equilibrium
 from faultgouge.pywrap.trial import Trial
 
 FX = 0.01

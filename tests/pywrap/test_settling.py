@@ -13,7 +13,7 @@ from faultgouge.analysis import MindlinLaw, Packing, spectrum, stiffness_matrix,
 from faultgouge.pywrap import NoEquilibriumError, Scene, settle, settling
 from faultgouge.pywrap.quasistatic import rounding_floor
 from faultgouge.pywrap.settling import minimized
-from faultgouge.pywrap.stages import ACCURATE_SHARE, time_step
+from faultgouge.pywrap.undamped import ACCURATE_SHARE, time_step
 
 BIN = Path(sys.executable).parent
 SCENE = {"packing": {"disks": 400, "width": 24.0, "seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}

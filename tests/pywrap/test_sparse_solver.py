@@ -7,8 +7,7 @@ from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
 
 from faultgouge.analysis import stiffness_matrix
-from faultgouge.pywrap.elimination import elimination_order
-from faultgouge.pywrap.sparse_solver import ACCURATE, SparseSolver
+from faultgouge.pywrap.linear import ACCURATE, SparseSolver, elimination_order
 from faultgouge.studies.stability_cases.packings import crystal
 
 

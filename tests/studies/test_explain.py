@@ -32,6 +32,8 @@ BROUGHT = {
     },
     "periodicity": {"periodic x"},
     "dynamic friction": {"part weaken.in", "fix weaken", "compute velocity"},
+    "dashpots": {"part dashpots.in", "fix dashpots", "array f_dashpots (6 columns)"},
+    "drag": {"part drag.in"},
     "perturbation": {"part push.in", "fix push"},
     "compensated coordinates": {"fix low", "array f_floor (8 columns)", "array f_low (5 columns)"},
     "dumps": {"part write.in", "file run.1.contacts", "file run.1.disks", "file run.1.params"},
@@ -72,7 +74,7 @@ def test_what_each_part_brings(paper, frictionless):
 
 def test_what_is_left_out_is_not_loaded(frictionless):
     loaded = set(frictionless.loaded.everything)
-    for name in ("tangential history", "dynamic friction", "perturbation"):
+    for name in ("tangential history", "dynamic friction", "dashpots", "drag", "perturbation"):
         assert not BROUGHT[name] & loaded, name
     assert frictionless.loaded.parts == ("system.in", "undamped.in")
 
@@ -139,7 +141,7 @@ def test_a_wrong_claim_is_found_out(run, tmp_path):
     """A push that is said to touch nobody, and one that is said to leave the motion."""
     nobody = np.zeros(len(run.packing), dtype=bool)
     pushed = replace(run, push=Push(1.0, 1.0, None))
-    with run.started(MPI.COMM_SELF, tmp_path / "log") as engine:
+    with run.started(MPI.COMM_SELF, tmp_path / "log") as (engine, _):
         loaded = Loaded.of(engine, tmp_path / "log")
     for touched, moves in ((nobody, True), (run.packing.top, False)):
         part = _switched(Feature("push", "", run, pushed, touched, moves), loaded, 50, tmp_path)

@@ -81,9 +81,9 @@ def test_numpy_integrates_what_lammps_integrates():
 def test_the_three_disks_slide_stick_and_turn():
     packing = trajectory.three_disks()
     most, normals = np.zeros(4), []
-    with Engine(packing) as engine, engine.undamped(2.5e-3):
+    with Engine(packing) as engine, engine.undamped(2.5e-3) as dynamics:
         for _ in range(40):
-            engine.advance(20)
+            dynamics.advance(20)
             now = engine.packing
             share = np.abs(now.contacts.slip) / now.law.slip_limit(now.geometry.overlap)
             most = np.maximum(most, share)

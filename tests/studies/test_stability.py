@@ -114,7 +114,7 @@ def test_outcome_of_a_refusal():
 
 def faultgouge(folder, *arguments, ranks=1):
     command = [BIN / "mpiexec", "-n", str(ranks), BIN / "faultgouge", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=3600)
 
 
 @pytest.mark.slow

@@ -1,0 +1,106 @@
+"""The contacts of a packing and their slips, in one canonical order."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arrays import Floats, Indices, floats, frozen, integers, same_bits
+
+FLOOR = -1
+"""The index that stands for the floor as the second partner of a contact."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """The contacts of a packing and their slips, kept in one canonical order.
+
+    Whatever the order given, a pair is stored with i < j (the slip is even under the exchange), pairs stand
+    in lexicographic order, and contacts with the floor follow all pairs, by disk.
+
+    Parameters
+    ----------
+    i : array_like of int, shape (C,)
+        First partner.
+    j : array_like of int, shape (C,)
+        Second partner; -1 is the floor.
+    slip : array_like, shape (C,)
+        Slip of each contact along tau, length.
+    slip_low : array_like, shape (C,), optional
+        Low parts of the slips, length; none by default.
+
+    Raises
+    ------
+    ValueError
+        If the arrays differ in shape, an index is negative, a slip is not finite, a disk touches itself, or a
+        contact is listed twice.
+    """
+
+    i: Indices
+    j: Indices
+    slip: Floats
+    slip_low: Floats | None = None
+
+    def __post_init__(self) -> None:
+        i, j = integers("i", self.i), integers("j", self.j)
+        slip = floats("slip", self.slip, np.shape(i))
+        if i.shape != j.shape:
+            raise ValueError(f"The contact arrays i and j have different shapes, {i.shape} and {j.shape}.")
+        if np.any(i < 0) or np.any(j < FLOOR):
+            raise ValueError("A contact has a negative disk index; only j may be -1, for the floor.")
+        if np.any(i == j):
+            raise ValueError(f"Disk {i[i == j][0]} is listed as touching itself.")
+        low = None if self.slip_low is None else floats("slip_low", self.slip_low, i.shape)
+        if not _canonical(i, j):
+            i, j, order = _ordered(i, j)
+            slip, low = slip[order], None if low is None else low[order]
+        for name, value in (("i", i), ("j", j), ("slip", slip)):
+            object.__setattr__(self, name, frozen(value))
+        if low is not None:
+            object.__setattr__(self, "slip_low", frozen(low))
+
+    def __len__(self) -> int:
+        return len(self.i)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether partners and slips are the same to the bit."""
+        return same_bits(self, other) if isinstance(other, Contacts) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((len(self), self.slip.tobytes()))
+
+    def __repr__(self) -> str:
+        return f"<Contacts: {int((~self.floor).sum())} between disks, {int(self.floor.sum())} with the floor>"
+
+    @property
+    def floor(self) -> NDArray[np.bool_]:
+        """Which contacts are with the floor, shape (C,)."""
+        return self.j == FLOOR
+
+    def slipped(self, slip: ArrayLike, slip_low: ArrayLike | None = None) -> "Contacts":
+        """The same contacts with other slips, whose order is the one here; length, shape (C,)."""
+        other = object.__new__(Contacts)
+        low = None if slip_low is None else frozen(floats("slip_low", slip_low, self.i.shape))
+        other.__dict__.update(i=self.i, j=self.j, slip=frozen(floats("slip", slip, self.i.shape)), slip_low=low)
+        return other
+
+
+def _canonical(i: Indices, j: Indices) -> bool:
+    """Whether contacts are in the order in which they are kept, each of them once."""
+    floor, disks = j == FLOOR, int(i.max(initial=0)) + int(j.max(initial=0)) + 2
+    place = np.where(floor, disks * disks, disks * i + j) + np.where(floor, i, 0)
+    return bool(np.all((i < j) | floor) and np.all(place[1:] > place[:-1]))
+
+
+def _ordered(i: Indices, j: Indices) -> tuple[Indices, Indices, Indices]:
+    """Contacts in the order in which they are kept, and where each was."""
+    floor = j == FLOOR
+    first = np.where(floor, i, np.minimum(i, j))
+    second = np.where(floor, FLOOR, np.maximum(i, j))
+    order = np.lexsort((second, first, floor))
+    first, second = first[order], second[order]
+    twice = (np.diff(first) == 0) & (np.diff(second) == 0)
+    if np.any(twice):
+        k = np.flatnonzero(twice)[0]
+        raise ValueError(f"The contact ({first[k]}, {second[k]}) is listed twice.")
+    return first, second, order

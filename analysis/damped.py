@@ -1,0 +1,334 @@
+r"""The onset with dissipation: windows of loads on which some motion grows, solved for and not scanned.
+
+With dashpots and drag the eigenvalues s of :math:`s^2 M + s C + K` lie to the left of the imaginary axis as long as
+the packing is stable. It becomes unstable where one of them crosses the axis: at a Hopf point if Im s is not zero,
+where Re s goes through zero along a straight line, at a steady one otherwise. No two eigenvalues meet there, and the
+crossing is the simple root of a smooth function of the load. **Dashpots may destabilise**: the load of the crossing is
+in general below the undamped onset, however weak the dashpots are (Ziegler, Ing.-Arch. 20, 49 (1952); Bottema, Indag.
+Math. 18, 403 (1956); Kirillov and Verhulst, arXiv:0906.1650; :mod:`~faultgouge.analysis.weak_damping`).
+
+**Between two loads** every mode is known at both ends with its slope. A mode whose Re s has another sign at the other
+end has an edge in between: the mode is followed to it by itself (:mod:`~faultgouge.analysis.damped_modes`), and five
+points close to it give the last digits and say how many there are (:func:`~faultgouge.analysis.onset.smooth_root`).
+
+**Windows narrower than the increment** are where two modes nearly meet. What both may do in between is told from the
+ends (:mod:`~faultgouge.analysis.damped_step`). Where that has another number of growing modes than the ends, an
+operator is computed at that load and both halves are examined again, until no window wider than a stated width can
+hide. Undamped windows are looked into besides: between their edges the growth without dissipation is largest.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .damped_modes import DampedMode, DampedModes, Pencil
+from .damped_step import Step, excursion
+from .errors import FaultgougeError, NoEquilibriumError
+from .onset import smooth_root
+from .onset.limits import LIMITS
+from .onset.windows import increasing
+from .packing import Packing
+from .stiffness import Form
+
+STEADY = 1e-9
+"""|Im s| below this share of the largest |s| counts as zero."""
+
+Kind = Literal["hopf", "steady", "contact change", "start"]
+
+
+class DampedOnsetError(FaultgougeError):
+    """No motion grows on the given loads."""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where a mode begins to grow, or ends to."""
+
+    fx: float
+    error: float
+    frequency: float
+    kind: Kind
+
+
+@dataclass(frozen=True)
+class DampedWindow:
+    """An interval of loads on which one motion grows.
+
+    Attributes
+    ----------
+    fx_onset : float
+        Load at which Re s becomes positive, force per top disk.
+    fx_end : float or None
+        Load at which it is negative again; None if it grows at the largest load.
+    frequency : float
+        Im s at the onset, radian / time.
+    error : float
+        Uncertainty of fx_onset: twice the scatter of Re s over its slope, or the bracket, and what the residual of the
+        equilibria amounts to, as of :class:`~faultgouge.analysis.Window`.
+    kind : {"hopf", "steady", "contact change", "start"}
+        What begins the window: Re s that goes through zero with Im s or without, a jump of the equilibrium, or nothing:
+        the motion grows at the smallest load.
+    """
+
+    fx_onset: float
+    fx_end: float | None
+    frequency: float
+    error: float
+    kind: Kind
+
+    def as_dict(self) -> dict[str, Any]:
+        """The keys of the JSON contract."""
+        names = ("fx_onset", "fx_end", "frequency", "error", "kind")
+        return {name: getattr(self, name) for name in names}
+
+
+def damped_windows(
+    equilibrium: Callable[[float], Packing],
+    forces: ArrayLike,
+    *,
+    form: Form = "consistent",
+    narrowest: float | None = None,
+    look: Iterable[float] = (),
+    first: bool = False,
+    watch: Callable[[str], None] = lambda says: None,
+) -> tuple[DampedWindow, ...]:
+    """The windows of loads on which some motion of a packing with dashpots or drag grows.
+
+    Parameters
+    ----------
+    equilibrium : callable
+        fx -> Packing in equilibrium with its dashpots and drag, as in :func:`~faultgouge.analysis.find_onset`.
+    forces : array_like, shape (S,)
+        The increasing loads of the ramp, force per top disk.
+    form : {"consistent", "paper"}
+        As in :func:`~faultgouge.analysis.stiffness_matrix`.
+    narrowest : float, optional
+        Windows narrower than this are not looked for, force; 1e-7 of the largest |load| by default.
+    look : iterable of float, optional
+        Further loads to be looked at, as those of undamped windows.
+    first : bool
+        Go no farther than the increment in which the first window begins.
+    watch : callable, optional
+        Told in words what is being looked at.
+
+    Returns
+    -------
+    tuple of DampedWindow
+        By increasing onset; may be empty. All modes of the packing are computed at every load: 2 s for 100 disks, eight
+        times as much for 200.
+
+    Raises
+    ------
+    ValueError
+        If the loads are not at least two increasing numbers, or the packing has no dissipation.
+    """
+    loads = increasing(forces)
+    start = equilibrium(float(loads[0]))
+    if not start.law.damped and start.drag_time is None:
+        raise ValueError("The packing has no dissipation: find_onset is what it needs.")
+    return growing_windows(lambda fx: Pencil.of(equilibrium(fx), form), loads, narrowest, look, first, watch)
+
+
+def growing_windows(
+    pencil: Callable[[float], Pencil],
+    forces: ArrayLike,
+    narrowest: float | None = None,
+    look: Iterable[float] = (),
+    first: bool = False,
+    watch: Callable[[str], None] = lambda says: None,
+) -> tuple[DampedWindow, ...]:
+    """The same of a family of pencils s^2 + s G + A, in coordinates that do not depend on the load.
+
+    Parameters
+    ----------
+    pencil : callable
+        fx -> Pencil.
+    forces, narrowest, look, first, watch
+        As of `damped_windows`.
+    """
+    loads = increasing(forces)
+    narrowest = 1e-7 * float(np.abs(loads).max()) if narrowest is None else narrowest
+    walk = _Walk(pencil, narrowest)
+    here = DampedModes.of(pencil(float(loads[0])))
+    walk.begin(here)
+    between = [float(fx) for fx in look if loads[0] < fx < loads[-1]]
+    for load in np.unique(np.concatenate([loads[1:], between])):
+        watch(f"damped modes at F_x = {load:.6g}")
+        there = DampedModes.of(pencil(float(load)))
+        walk.go(here, there)
+        here = there
+        if first and (walk.open or walk.closed):
+            break
+    return walk.windows()
+
+
+class _Walk:
+    """Goes along the loads, with as many in between as it takes to be sure."""
+
+    def __init__(self, pencil: Callable[[float], Pencil], narrowest: float) -> None:
+        self.pencil, self.narrowest = pencil, narrowest
+        self.open: dict[int, Crossing] = {}  # by the index of the growing mode at the load reached so far
+        self.closed: list[DampedWindow] = []
+
+    def begin(self, modes: DampedModes) -> None:
+        """Open the windows of the modes that grow at the smallest load."""
+        for k in modes.growing:
+            self.open[int(k)] = Crossing(modes.fx, 0.0, float(modes.rates[k].imag), "start")
+
+    def windows(self) -> tuple[DampedWindow, ...]:
+        """All windows by increasing onset."""
+        still = [_window(edge, None) for edge in self.open.values()]
+        return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
+
+    def go(self, here: DampedModes, there: DampedModes) -> None:
+        """Go from one load to the next."""
+        step, middle = Step.of(here, there), 0.5 * (here.fx + there.fx)
+        divisible = there.fx - here.fx > self.narrowest
+        look = None if not divisible else middle if step.lost else self.unclear(step)
+        crossings: dict[tuple[int, int], Crossing] = {}
+        for pair in [] if look is not None else step.edges:
+            crossing = self.crossing(here.mode(pair[0]), there.mode(pair[1]))
+            if crossing is not None:
+                crossings[pair] = crossing
+            elif divisible:
+                look = middle
+                break
+        between = None if look is None else self.between(here.fx, look, there.fx)
+        if between is None:
+            self.advance(step, crossings)
+            return
+        self.go(here, between)
+        self.go(between, there)
+
+    def unclear(self, step: Step) -> float | None:
+        """A load at which all modes have to be looked at, as a pair grows there or cannot be followed; else None."""
+        for pair in step.suspects(self.narrowest):
+            here = [step.here.mode(k) for k in pair]
+            there = [step.there.mode(int(step.forward[k])) for k in pair]
+            fx = self.inspected(here, there)
+            if fx is not None:
+                return fx
+        return None
+
+    def inspected(self, here: list[DampedMode], there: list[DampedMode]) -> float | None:
+        """The same for one pair: it is followed to where the cubics see it grow, and from there to either side."""
+        span = there[0].fx - here[0].fx
+        slopes = [mode.change(there[0].pencil) for mode in here], [-mode.change(here[0].pencil) for mode in there]
+        width, at = excursion([mode.rate for mode in here], slopes[0], [mode.rate for mode in there], slopes[1])
+        if width * span <= self.narrowest:
+            return None
+        fx = here[0].fx + float(at) * span
+        try:
+            pencil = self.pencil(fx)
+        except NoEquilibriumError:
+            return fx
+        found = [mode.at(pencil) for mode in (here if at < 0.5 else there)]
+        modes = [mode for mode in found if mode is not None]
+        if len(modes) < 2 or modes[0].same(modes[1]):
+            return fx
+        ends = [sorted(mode.growing for mode in each) for each in (here, there)]
+        if sorted(mode.growing for mode in modes) not in ends:
+            return fx
+        return self.inspected(here, modes) or self.inspected(modes, there)
+
+    def between(self, below: float, middle: float, above: float) -> DampedModes | None:
+        """The modes at a load in between, or at one beside it where that has no equilibrium."""
+        for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
+            try:
+                return DampedModes.of(self.pencil(fx))
+            except NoEquilibriumError:
+                continue
+        return None
+
+    def crossing(self, here: DampedMode, there: DampedMode) -> Crossing | None:
+        """Where a mode crosses the axis between two loads; None if it cannot be followed or jumps."""
+        known = {here.fx: here, there.fx: there}
+
+        def mode(fx: float) -> DampedMode:
+            if fx not in known:
+                pencil = self.pencil(fx)
+                for near in sorted(known, key=lambda each: abs(each - fx)):
+                    found = known[near].at(pencil)
+                    if found is not None:
+                        known[fx] = found
+                        return found
+                raise _LostError
+            return known[fx]
+
+        try:
+            return _root(mode, here.fx, there.fx)
+        except (_LostError, NoEquilibriumError):
+            return None
+
+    def advance(self, step: Step, crossings: dict[tuple[int, int], Crossing]) -> None:
+        """Carry the windows over a step; what could not be solved for begins and ends halfway."""
+        half = 0.5 * (step.there.fx - step.here.fx)
+        growing_here, growing_there = set(step.here.growing.tolist()), set(step.there.growing.tolist())
+        now: dict[int, Crossing] = {}
+        for k in growing_here:
+            image = int(step.forward[k])
+            if image in growing_there:
+                now[image] = self.open[k]
+                continue
+            halfway = Crossing(step.here.fx + half, half, float(step.here.rates[k].imag), "contact change")
+            self.closed.append(_window(self.open[k], crossings.get((k, image), halfway)))
+        for image in growing_there - set(now):
+            halfway = Crossing(step.here.fx + half, half, float(step.there.rates[image].imag), "contact change")
+            before = np.flatnonzero(step.forward == image)
+            now[image] = crossings.get((int(before[0]), image), halfway) if len(before) else halfway
+        self.open = now
+
+
+class _LostError(FaultgougeError):
+    """A mode that can be followed no further."""
+
+
+def _root(mode: Callable[[float], DampedMode], below: float, above: float) -> Crossing:
+    """The root of Re s, or a bracket where Re s jumps."""
+
+    def rate(fx: float) -> float:
+        return mode(fx).rate.real
+
+    root = smooth_root(rate, below, above)
+    if root is not None:
+        middle = mode(float(root.loads[2]))
+        steady = middle.rate.imag <= STEADY * float(np.sqrt(np.abs(middle.pencil.stiffness).max()))
+        kind: Kind = "steady" if steady else "hopf"
+        return Crossing(root.fx, root.error + middle.pencil.balance, middle.rate.imag, kind)
+    left, right = below, above
+    while right - left > max(LIMITS.jump * (above - below), 4 * float(np.spacing(abs(right)))):
+        middle_fx = 0.5 * (left + right)
+        left, right = (middle_fx, right) if rate(middle_fx) * rate(below) > 0 else (left, middle_fx)
+    across = mode(left).at(mode(right).pencil)
+    if across is None or (across.rate.real > 0) != (mode(right).rate.real > 0):
+        raise _LostError  # the equilibrium does not jump there: it is the mode that has become another one
+    return Crossing(0.5 * (left + right), 0.5 * (right - left), mode(right).rate.imag, "contact change")
+
+
+def _window(onset: Crossing, end: Crossing | None) -> DampedWindow:
+    return DampedWindow(onset.fx, None if end is None else end.fx, onset.frequency, onset.error, onset.kind)
+
+
+def dissipating(
+    equilibrium: Callable[[float], Packing], cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None
+) -> Callable[[float], Packing]:
+    """The same equilibria with dashpots and drag: dissipation has no part in where a packing rests.
+
+    Parameters
+    ----------
+    equilibrium : callable
+        fx -> Packing.
+    cn, ct : float
+        Dashpots of every contact, as of :class:`~faultgouge.analysis.MindlinLaw`.
+    drag_time : float, optional
+        tau of the drag, time; none by default.
+    """
+
+    def packing(fx: float) -> Packing:
+        found = equilibrium(fx)
+        return replace(found, law=replace(found.law, cn=cn, ct=ct), drag_time=drag_time)
+
+    return packing

@@ -1,0 +1,127 @@
+"""Where contacts are and how they stand, in a box that may be periodic; definitions as of `packing`."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from .arrays import Floats, floats
+from .compensated import Pair, exact_sum, normalized, overlap_and_distance, separation
+from .contacts import FLOOR, Contacts
+
+
+class ContactGeometry(NamedTuple):
+    """Where each contact is and how it stands; arrays over contacts, read-only.
+
+    Attributes
+    ----------
+    normal : ndarray, shape (C, 2)
+        Unit vector n towards i.
+    tangent : ndarray, shape (C, 2)
+        Unit vector tau = (-n_y, n_x).
+    distance : ndarray, shape (C,)
+        Length r of the branch vector; for the floor the height y.
+    overlap : ndarray, shape (C,)
+        delta = R_i + R_j - r, or R - y for the floor; length.
+    """
+
+    normal: Floats
+    tangent: Floats
+    distance: Floats
+    overlap: Floats
+
+
+def measured(
+    position: Floats, low: Floats | None, radius: Floats, contacts: Contacts, box_length: float | None
+) -> tuple[ContactGeometry, Pair, Pair]:
+    """The geometry of contacts, and the branch vectors and overlaps with their low parts.
+
+    Parameters
+    ----------
+    position, low, radius, contacts, box_length
+        As of :class:`~faultgouge.analysis.Packing`; low is its position_low.
+
+    Raises
+    ------
+    ValueError
+        If two disks in contact have the same centre.
+    """
+    i, j, floor = contacts.i, contacts.j, contacts.floor
+    low_i, low_j = (None, None) if low is None else (low[i], low[j])
+    branch = separation(position[i], low_i, position[j], low_j, box_length)
+    foot = np.zeros((floor.sum(), 2))
+    branch[0][floor] = foot + position[i[floor]] * (0.0, 1.0)
+    branch[1][floor] = foot if low is None else low[i[floor]] * (0.0, 1.0)
+    reach = exact_sum(radius[i], np.where(floor, 0.0, radius[j]))
+    overlap, distance = overlap_and_distance(branch, reach)
+    distance[floor] = branch[0][floor, 1]  # signed: a centre below the floor is pushed up all the same
+    height = exact_sum(radius[i[floor]], -distance[floor])
+    overlap[0][floor], overlap[1][floor] = normalized(height[0], height[1] - branch[1][floor, 1])
+    if np.any(distance[~floor] == 0):
+        k = np.flatnonzero(~floor & (distance == 0))[0]
+        raise ValueError(f"Disks {i[k]} and {j[k]} have the same centre, so that their contact has no direction.")
+    normal = np.empty_like(branch[0])
+    normal[~floor] = branch[0][~floor] / distance[~floor, None]
+    normal[floor] = (0.0, 1.0)
+    tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
+    geometry = ContactGeometry(normal=normal, tangent=tangent, distance=distance, overlap=overlap[0])
+    for array in geometry:
+        array.flags.writeable = False
+    return geometry, branch, overlap
+
+
+def nearest_image(difference: Floats, box_length: float | None) -> Floats:
+    """Coordinate differences, shape (..., 2), brought to the nearest periodic image along x; a new array."""
+    difference = np.array(difference, dtype=np.float64)
+    if box_length is not None:
+        difference[..., 0] -= box_length * np.round(difference[..., 0] / box_length)
+    return difference
+
+
+def touching(position: ArrayLike, radius: ArrayLike, box_length: float | None = None) -> Contacts:
+    """Every contact that positions alone imply, with zero slips.
+
+    Parameters
+    ----------
+    position : array_like, shape (N, 2)
+        Centres, length.
+    radius : array_like, shape (N,)
+        Radii, length.
+    box_length : float, optional
+        Period along x.
+
+    Returns
+    -------
+    Contacts
+        All pairs with positive overlap, and all disks that reach below y = 0.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, shapes do not fit, or the box is narrower than two largest diameters.
+    """
+    radius = floats("radius", radius, np.shape(radius))
+    position = floats("position", position, (len(radius), 2))
+    check_box(radius, box_length)
+    wrapped = position.copy()
+    if box_length is not None:
+        wrapped[:, 0] %= box_length
+        wrapped[wrapped[:, 0] >= box_length, 0] = 0.0  # a tiny negative x modulo L rounds to L
+    tree = cKDTree(wrapped, boxsize=None if box_length is None else [box_length, 0.0])
+    i, j = tree.query_pairs(2 * radius.max(), output_type="ndarray").T
+    branch = separation(position[i], None, position[j], None, box_length)
+    near = overlap_and_distance(branch, exact_sum(radius[i], radius[j]))[0][0] > 0
+    floor = np.flatnonzero(radius - position[:, 1] > 0)
+    return Contacts(
+        np.concatenate([i[near], floor]),
+        np.concatenate([j[near], np.full(len(floor), FLOOR)]),
+        np.zeros(near.sum() + len(floor)),
+    )
+
+
+def check_box(radius: Floats, box_length: float | None) -> None:
+    """A ValueError if the box is too narrow."""
+    # In a narrower box a disk can touch two images of one neighbour, and one slip cannot describe that.
+    if box_length is not None and box_length < 4 * radius.max():
+        raise ValueError(f"The box length {box_length} is under two largest diameters, {4 * radius.max()}.")

@@ -1,0 +1,139 @@
+"""An eigenbasis of the symmetric part of the operator, all of it at once or a slice of the spectrum after the other.
+
+In the eigenvectors X of the symmetric part of A at one load, H(F) = X^T A(F) X is nearly diagonal at the loads about
+it: the antisymmetric part is small, and the modes turn little. X is computed once and serves as long as the couplings
+are small against the spacing of the levels.
+
+Perturbation theory (:mod:`~faultgouge.analysis.onset.screening`) asks for a mode and its neighbours in the spectrum
+alone. So a large operator has a basis for each slice of its spectrum (:mod:`~faultgouge.analysis.onset.slicing`), with
+a margin on either side, and never one of all modes.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.sparse import csc_array, csr_array
+
+from ..packing import Floats, Indices
+from .limits import LIMITS, Limits
+from .screening import Cluster, Levels
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """Eigenvectors of the symmetric part of an operator, all or neighbouring ones.
+
+    Attributes
+    ----------
+    size : int
+        Coordinates of the operator.
+    active : ndarray of int, shape (E,)
+        Those whose rows are not zero.
+    values : ndarray, shape (M,)
+        Eigenvalues of the symmetric part, increasing; 1 / time^2.
+    vectors : ndarray, shape (E, M)
+        Orthonormal eigenvectors in columns.
+    own : slice
+        The modes that belong to this basis, and to that of no other slice; the rest are margins.
+    limits : Limits
+    """
+
+    size: int
+    active: Indices = field(repr=False)
+    values: Floats = field(repr=False)
+    vectors: Floats = field(repr=False)
+    own: slice
+    limits: Limits = field(default=LIMITS, repr=False)
+
+    @classmethod
+    def of(cls, matrix: csr_array, limits: Limits = LIMITS) -> "Basis":
+        """All modes, by LAPACK: the one expensive step, some 10 E^3 operations."""
+        active = np.flatnonzero(np.diff(matrix.indptr))
+        dense = matrix[active][:, active].toarray()
+        dense += dense.T.copy()
+        dense *= 0.5
+        values, vectors = eigh(dense, driver="evd", overwrite_a=True, check_finite=False)
+        return cls(matrix.shape[0], active, values, vectors, slice(0, len(values)), limits)
+
+    @classmethod
+    def slices(cls, matrix: csr_array, workers: int, modes: tuple[int, int], limits: Limits) -> "Iterator[Basis]":
+        """Bases whose own modes are, together, those of these numbers; all in one for a small operator.
+
+        Parameters
+        ----------
+        matrix : scipy.sparse.csr_array, shape (n, n)
+            The operator, 1 / time^2.
+        workers : int
+            Threads.
+        modes : tuple of (int, int)
+            Numbers of the first mode that is wanted and of the first that is not, the lowest being 0.
+        limits : Limits
+        """
+        active = np.flatnonzero(np.diff(matrix.indptr))
+        if len(active) <= limits.one_basis:
+            yield replace(cls.of(matrix, limits), own=slice(*modes))
+            return
+        from .slicing import slices  # with libraries that nothing else needs
+
+        inner = matrix[active][:, active]
+        for part in slices(csc_array(0.5 * (inner + inner.T)), limits.margin + limits.beyond, workers, modes, limits):
+            yield cls(matrix.shape[0], active, part.values, part.vectors, part.own, limits)
+
+    @property
+    def clusters(self) -> list[Cluster]:
+        """Overlapping clusters whose cores cover all modes of its own."""
+        core, margin, found = self.limits.core, self.limits.margin, []
+        for first in range(self.own.start, self.own.stop, core):
+            start, stop = max(0, first - margin), min(len(self.values), first + core + margin)
+            found.append(Cluster(slice(start, stop), (first - start, min(first + core, self.own.stop) - 1 - start)))
+        return found
+
+    def covers(self, matrix: csr_array) -> bool:
+        """Whether an operator acts on the same coordinates."""
+        return np.array_equal(np.flatnonzero(np.diff(matrix.indptr)), self.active)
+
+    def levels(self, matrix: csr_array) -> Levels:
+        """X^T A X of an operator on the same coordinates."""
+        inner, count, chunk = matrix[self.active][:, self.active], len(self.values), self.limits.chunk
+        coupling = np.empty((count, count), dtype=np.float32)
+        diagonal = np.empty(count)
+        for start in range(0, count, chunk):
+            columns = slice(start, start + chunk)
+            image = inner @ self.vectors[:, columns] - self.vectors[:, columns] * self.values[columns]
+            diagonal[columns] = np.sum(self.vectors[:, columns] * image, axis=0)
+            coupling[:, columns] = self._rough.T @ image.astype(np.float32)
+        np.fill_diagonal(coupling, 0.0)
+        return Levels(self.values + diagonal, coupling)
+
+    def change(self, levels: Levels, change: csr_array) -> Levels:
+        """Levels of an operator that differs a little from one whose levels are known, in single precision."""
+        inner = change[self.active][:, self.active].astype(np.float32)
+        coupling = self._rough.T @ (inner @ self._rough)
+        diagonal = levels.diagonal + np.diag(coupling)
+        np.fill_diagonal(coupling, 0.0)
+        coupling += levels.coupling
+        return Levels(diagonal, coupling)
+
+    @cached_property
+    def _rough(self) -> NDArray[np.float32]:
+        """The vectors in single precision."""
+        return self.vectors.astype(np.float32)
+
+    def mixing(self, levels: Levels) -> list[float]:
+        """The typical coupling over the spacing in each cluster: |off-diagonal|_F over the cluster's width."""
+        found = []
+        for cluster in self.clusters:
+            block = levels.block(cluster)
+            width = max(np.ptp(self.values[cluster.modes]), np.finfo(np.float64).tiny)
+            found.append(float(np.linalg.norm(block - np.diag(np.diag(block))) / width))
+        return found
+
+    def lifted(self, modes: slice | Indices, vectors: Floats | None = None) -> Floats:
+        """Modes of the basis, or combinations of them in columns, as vectors in the coordinates of the operator."""
+        full = np.zeros((self.size, 2))
+        full[self.active] = self.vectors[:, modes] if vectors is None else self.vectors[:, modes] @ vectors
+        return full

@@ -1,0 +1,145 @@
+"""Every size, share and tolerance of the search for complex pairs, with its reason."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the search takes for small, near, many and long.
+
+    The defaults are meant for packings. Tests choose others to lead a small family of matrices down the way of a large
+    one.
+    """
+
+    # Sizes at which the way changes
+
+    all_windows: int = 300
+    """Disks up to which all windows are sought, from all eigenvalues: a decomposition takes a second there, and grows
+    with the cube of the number. Beyond, the first window is sought in slices of the spectrum."""
+    dense_factors: int = 600
+    """Coordinates up to which A - sigma is factorised as a dense matrix, which is faster there than sparse factors."""
+    all_modes: int = 900
+    """Coordinates up to which a pair that cannot be continued is looked for among all modes: a second there."""
+    one_basis: int = 1000
+    """Coordinates up to which the basis is one dense decomposition: less than a second. Beyond, it comes in slices."""
+
+    # The operator
+
+    unknown_force: float = 10.0
+    """A contact counts from a force of so many times the packing's imbalance: ten, for a disk between two contacts
+    without force, whose forces cancel in part."""
+    small_force: float = 1e-6
+    """And in any case from this share of the largest force, so that a packing out of balance keeps its contacts."""
+
+    # Windows between two loads
+
+    narrowest: float = 1e-7
+    """Narrowest window that is looked for, in units of the largest load, where the caller names none: the pair would
+    grow more slowly than any run can show."""
+    bend: float = 0.05
+    """Curvature of the operator that two values and slopes of D do not show, as a share of the smaller value of D: more
+    than enough for loads between which modes are recognised at all."""
+
+    # The edge of a window
+
+    root: float = 1e-7
+    """Width to which the root of D is bracketed, in increments: a tenth of the distance of the five points whose
+    parabola gives the last digits."""
+    jump: float = 1e-9
+    """Width to which a jump of the equilibrium is bracketed, in increments. The place of a jump depends on the path,
+    and with the path on the increment, by far more."""
+    shortest: float = 2.0**-6
+    """Shortest steps, in shares of the straight line from one operator to another, in which a pair is followed."""
+
+    # Inverse iteration of a pair
+
+    steps: int = 40
+    """Iterations before a shift is given up: a solution costs a hundredth of a dense decomposition."""
+    steps_on: int = 12
+    """The same with the factors of a neighbour: four solutions a step, against the hundred that a factorisation
+    costs."""
+    pace: int = 5
+    """Steps by which the pace is judged: the iteration slows down while farther modes go, and then keeps its pace."""
+    offsets: tuple[float, ...] = (1.0, -1.0, 0.1, -0.1)
+    """Distances of the shift from the mean of the pair, in units of its spread, tried in turn. A third eigenvalue may
+    be closer than the spread; a tenth of the spread costs the second direction no more than a digit."""
+    residual: float = 100.0
+    """Residual of an accepted plane, in units of u |A|_F; LAPACK's own are some 10."""
+
+    # Screening by perturbation theory
+
+    slack: float = 0.05
+    """How far levels and couplings may leave the straight line between two loads, in units of their change. In packings
+    of 100 disks and increments of 1e-3 it is 1.3e-3 in the median, and grows with the increment."""
+    few: int = 3
+    """Pairs that are examined one by one; where more are named, a decomposition costs no more."""
+    core: int = 20
+    """Modes that a cluster owns."""
+    margin: int = 20
+    """Further modes of a cluster on either side, coupled to its own in all orders."""
+    beyond: int = 10
+    """Modes of a slice on either side beyond those of its clusters, in second order. What is farther away changes
+    levels by less than (coupling / spacing)^2 / 30 of their spacing."""
+    mixing: float = 0.1
+    """Typical coupling within clusters, in level spacings, up to which a basis is used: with the modes outside at least
+    `margin` spacings away, (mixing / margin)^2 = 2.5e-5 of the coupling is what the second order leaves out."""
+
+    # Slices of the spectrum
+
+    own: int = 120
+    """Eigenvalues of a slice. Fewer cost more factorisations, more cost more orthogonalisation."""
+    coarse: int = 960
+    """Eigenvalues between two places at which they are counted; shifts are interpolated in between."""
+    block: int = 8
+    """Vectors that are solved for at a time: 2 ms each at 30,000 coordinates, against 6 ms one by one."""
+    first_look: int = 38
+    """Blocks of a Krylov space before its eigenvalues are looked at."""
+    looks: int = 2
+    """Blocks between two looks."""
+    last_look: int = 200
+    """Blocks at the most."""
+    drift: float = 1e-14
+    """Product of a new vector with the first block from which on blocks are made orthogonal twice. It is rounding at
+    first, 1e-16, and grows once an eigenvector has been found to all digits; the product with that eigenvector is
+    larger by the root of their number and seen a few blocks late. The vectors of a slice are orthogonal to some 1e-12,
+    and to 1.2e-11 at the worst (77 slices of seven matrices of 400 to 29,000 coordinates)."""
+    accurate: float = 1e-2
+    """Residual of the eigenvectors of a slice, in mean distances of eigenvalues. It is asked for in the inverse, in
+    which modes far from the shift weigh less: with S itself up to 0.2 was measured (29,000 coordinates). It enters an
+    eigenvalue as its square over the distance of modes outside, ten such distances and more: 4e-6 at the most was
+    measured. An eigenvalue may be off its Rayleigh quotient with S by as much."""
+
+    # The search in slices
+
+    reach: float = 0.1
+    """Share of an increment by which clusters are extrapolated, so that a pair that they have turn complex a little
+    late is found in time. Clusters are trusted as long as they are right to twice that."""
+    finest: float = 1e-3
+    """Narrowest windows of clusters that are looked for, in increments: the clusters' own error is larger."""
+    excess: float = 0.2
+    """What is added to the antisymmetric couplings of a cluster, in units of mixing^2 times the spacing of its levels.
+    Whether two modes turn complex is decided by the difference of their symmetric and antisymmetric coupling, which may
+    be far smaller than both. Modes beyond a slice, and the third order, change the difference by about a tenth of that
+    unit (360 disks, mixing of 0.17: 0.02 where the unit is 0.37). So pairs are announced from a little before, and the
+    operator decides."""
+    dips: int = 12
+    """Loads at which the discriminant of an announced pair is looked at before its sign is in doubt. One or two tell of
+    an avoided crossing."""
+    parts: int = 4
+    """Parts of an increment on which clusters have been wrong: four cost little more than two while a basis passes
+    by."""
+    depth: int = 2
+    """How often parts are divided again; the finest are a sixteenth."""
+    near: int = 12
+    """Modes among which a pair is looked for that clusters announce where the operator has another pair."""
+    kept: float = 3e8
+    """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision; a larger
+    basis never exists as a whole."""
+    ahead: int = 2
+    """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
+    chunk: int = 512
+    """Columns of a basis that are projected at a time, for memory."""
+
+
+LIMITS = Limits()
+"""The defaults."""

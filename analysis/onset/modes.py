@@ -1,0 +1,158 @@
+r"""All modes of a packing at one load, and which of them is which at the next.
+
+The operator is :math:`A = M^{-1/2} K M^{-1/2}`, with right vectors x and left vectors y. Contacts whose force is
+unknown are left out, see `force_bearing`.
+
+Modes at neighbouring loads a, b are assigned by :math:`|x_a^H x_b|\,|y_a^H y_b|` over unit vectors, so modes that cross
+do not swap names. (:math:`|y_a^H x_b|`, the obvious weight, vanishes at an exceptional point, where it is needed most.)
+"""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from scipy.linalg import eig
+from scipy.optimize import linear_sum_assignment
+from scipy.sparse import csr_array
+
+from ..packing import Floats, Indices, Packing
+from ..spectrum import Complexes, believable, mass_weighted, unit_rounding
+from ..stiffness import stiffness_matrix
+from .limits import LIMITS, Limits
+from .pair import Pair
+
+Members = tuple[int, int]
+"""The numbers of the two modes of a pair."""
+
+Operator: TypeAlias = Floats | csr_array
+
+
+def full_operator(packing: Packing, limits: Limits = LIMITS) -> csr_array:
+    """A = M^(-1/2) K M^(-1/2) of the contacts that bear a force, shape (3N, 3N), with its zero rows; 1 / time^2."""
+    packing = force_bearing(packing, limits)
+    return mass_weighted(stiffness_matrix(packing), packing)
+
+
+def force_bearing(packing: Packing, limits: Limits = LIMITS) -> Packing:
+    """The packing without the contacts whose force is no more than the packing's own imbalance.
+
+    A disk that only such contacts hold comes to rest just about touching. Its overlap is rounding noise, and with the
+    overlap its stiffness, of order (residual / k_n)^(1/3): large enough to move eigenvalues.
+    """
+    largest = packing.normal_force.max(initial=0.0)
+    return packing.loaded(min(limits.unknown_force * packing.residual, limits.small_force * largest))
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The modes of the operator at one load.
+
+    Attributes
+    ----------
+    fx : float
+        The load.
+    matrix : scipy.sparse.csr_array, shape (n, n)
+        The operator A, 1 / time^2.
+    values : ndarray of complex, shape (E,)
+        Eigenvalues by real part, then imaginary part. Complex pairs that are rounding noise have lost their
+        imaginary parts.
+    right, left : ndarray of complex, shape (n, E)
+        Unit vectors in columns.
+    partner : ndarray of int, shape (E,)
+        Index of the complex conjugate; -1 for a real eigenvalue.
+    """
+
+    fx: float
+    matrix: csr_array
+    values: Complexes
+    right: Complexes
+    left: Complexes
+    partner: Indices
+
+    @classmethod
+    def of(cls, fx: float, matrix: Operator) -> "Modes":
+        """Solve the dense eigenproblem, without the coordinates whose rows are zero."""
+        sparse = csr_array(matrix)
+        active = np.flatnonzero(np.diff(sparse.indptr))
+        size, count = sparse.shape[0], len(active)
+        right, left = np.zeros((2, size, count), dtype=np.complex128)
+        if count == 0:
+            return cls(fx, sparse, np.zeros(0, complex), right, left, np.zeros(0, int))
+        inner = sparse[active][:, active].toarray()
+        values, y, x = eig(inner, left=True, right=True, overwrite_a=True, check_finite=False)
+        order = np.lexsort((values.imag, values.real))
+        values, right[active], left[active] = values[order], x[:, order], y[:, order]
+        rounding = unit_rounding(sparse.data)
+        partner = np.full(count, -1)
+        for k in np.flatnonzero(values.imag > 0):
+            conjugate = int(np.argmin(np.abs(values - values[k].conj())))
+            if believable(values[k], abs(np.vdot(left[:, k], right[:, k])), rounding):
+                partner[k], partner[conjugate] = conjugate, k
+            else:
+                values[[k, conjugate]] = values[k].real
+        return cls(fx, sparse, values, right, left, partner)
+
+    @property
+    def complex_pairs(self) -> list[Members]:
+        """The members of each complex pair, that with the positive imaginary part first."""
+        return [(int(k), int(self.partner[k])) for k in np.flatnonzero(self.values.imag > 0)]
+
+    def pair(self, members: Members) -> Pair:
+        """The pair of two modes."""
+        two = list(members)
+        return Pair(self.fx, self.matrix, span(self.right[:, two]), span(self.left[:, two]))
+
+    def nearest(self, pair: Pair) -> Members:
+        """The two modes that lie closest to the planes of a pair at a neighbouring load."""
+        weight = np.linalg.norm(pair.right.T @ self.right, axis=0) * np.linalg.norm(pair.left.T @ self.left, axis=0)
+        first, second = np.argsort(weight)[-2:]
+        return int(first), int(second)
+
+    def about(self, eigenvalue: float) -> Members:
+        """The two modes whose eigenvalues are closest to a real number."""
+        first, second = np.argsort(np.abs(self.values - eigenvalue))[:2]
+        return int(first), int(second)
+
+
+def assign(here: Modes, there: Modes) -> Indices:
+    """Which mode there each mode here has become.
+
+    Parameters
+    ----------
+    here, there : Modes
+        Modes at two neighbouring loads.
+
+    Returns
+    -------
+    ndarray of int, shape (E,)
+        Index there; -1 where there are fewer modes there. The assignment maximises the sum of |x^H x'| |y^H
+        y'|.
+    """
+    weight = products(here.right, there.right) * products(here.left, there.left)
+    partner = np.full(len(here.values), -1)
+    best = weight.argmax(axis=1) if weight.size else partner
+    if weight.size and len(np.unique(best)) == len(best):
+        partner = best  # every mode has its best match: no other assignment has a larger sum
+    else:
+        rows, columns = linear_sum_assignment(weight, maximize=True)
+        partner[rows] = columns
+    # Members of one pair have the same weights: let the one above the axis stay above.
+    for up, down in here.complex_pairs:
+        if partner[up] >= 0 and there.partner[partner[up]] == partner[down] and there.values[partner[up]].imag < 0:
+            partner[[up, down]] = partner[[down, up]]
+    return partner
+
+
+def products(a: Complexes, b: Complexes) -> Floats:
+    """|a_j^H b_k| over columns: in real arithmetic, but for the few columns that have imaginary parts."""
+    p, q = np.flatnonzero(np.any(a.imag, axis=0)), np.flatnonzero(np.any(b.imag, axis=0))
+    products = np.abs(np.ascontiguousarray(a.real).T @ np.ascontiguousarray(b.real))
+    products[p] = np.abs(a[:, p].conj().T @ b)
+    products[:, q] = np.abs(a.conj().T @ b[:, q])
+    return products
+
+
+def span(vectors: Complexes) -> Floats:
+    """Orthonormal real basis, shape (n, 2), of the plane of two real or two complex conjugate vectors."""
+    real_plane = np.hstack([vectors.real, vectors.imag])
+    return np.linalg.svd(real_plane, full_matrices=False)[0][:, :2]

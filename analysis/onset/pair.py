@@ -1,0 +1,257 @@
+r"""A pair of eigenvalues, and how it is followed from operator to operator without the others.
+
+**The pair.** On the invariant subspace of two modes the operator A is a 2 x 2 block :math:`B = (U^T V)^{-1} U^T A V`,
+with orthonormal bases V, U of the right and of the left subspace. V, U, half the trace and the *discriminant*
+
+.. math:: D = (\lambda_1 - \lambda_2)^2 = (B_{11} - B_{22})^2 + 4 B_{12} B_{21}
+
+are smooth functions of the load where the two eigenvectors become parallel, at an exceptional point (Kato,
+*Perturbation Theory for Linear Operators*, 1966, II.1). D > 0 is a pair of real eigenvalues, D < 0 a complex pair.
+
+**Continuation.** The bases of a neighbouring operator are improved by inverse iteration,
+:math:`V \leftarrow (A - \sigma)^{-1} V`, :math:`U \leftarrow (A - \sigma)^{-T} U`, with one factorisation for all
+steps. The error falls by :math:`|\lambda - \sigma| / |\lambda_3 - \sigma|` a step, :math:`\lambda_3` the closest of the
+other eigenvalues. The shift stands off the pair by the size of B - mean: closer to a coalescence the common eigenvector
+would dominate the inverse, and rounding would drown the second direction. A third eigenvalue may be closer to that
+shift than the pair is; then shifts on the other side and nearer by are tried. A complex pair is also found by its
+eigenvectors, with its own eigenvalue as the shift: no other eigenvalue is nearer than the real axis.
+
+**Acceptance.** The residuals :math:`A V - V (V^T A V)`, and those on the left, must be at the level of rounding. Then V
+and U belong to an operator that differs from A by no more; and as B takes both, the error of D is the product of the
+two residuals over the distance of the other modes. The planes must also be those of the pair that is followed.
+
+**Large operators.** There a factorisation costs as much as a hundred solutions. The factors P of a neighbour serve as
+well in *residual inverse iteration* (Neumaier, SIAM J. Numer. Anal. 22, 914 (1985)),
+
+.. math:: V \leftarrow V - P^{-1} (A V - V (V^T A V)) ,
+
+which is inverse iteration where :math:`P = A - \sigma` and ends at an invariant subspace of A whatever P is. So sparse
+factors need no pivoting.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+from scipy.sparse import csc_array, csr_array, eye_array
+
+from ..packing import Floats
+from ..sparse_lu import SingularMatrixError, symmetric_lu
+from ..spectrum import Complexes, believable, unit_rounding
+from .limits import LIMITS, Limits
+
+Planes = tuple[Floats, Floats]
+
+
+class Place(NamedTuple):
+    """A load and the operator there."""
+
+    fx: float
+    matrix: csr_array
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two modes of the operator at one load.
+
+    Attributes
+    ----------
+    fx : float
+        The load.
+    matrix : scipy.sparse.csr_array, shape (n, n)
+        The operator A, 1 / time^2.
+    right, left : ndarray, shape (n, 2)
+        Orthonormal bases V and U of the invariant planes.
+    inverse : Inverse or None
+        Sparse factors with which the planes were found; they may serve for a neighbour as well.
+    """
+
+    fx: float
+    matrix: csr_array = field(repr=False)
+    right: Floats = field(repr=False)
+    left: Floats = field(repr=False)
+    inverse: "Inverse | None" = field(default=None, repr=False)
+
+    @cached_property
+    def entries(self) -> Floats:
+        """The block B, shape (2, 2), 1 / time^2."""
+        return np.linalg.solve(self.left.T @ self.right, self.left.T @ (self.matrix @ self.right))
+
+    @cached_property
+    def mean(self) -> float:
+        """Half the trace, 1 / time^2."""
+        return float(0.5 * np.trace(self.entries))
+
+    @cached_property
+    def discriminant(self) -> float:
+        """D = (lambda_1 - lambda_2)^2, 1 / time^4."""
+        b = self.entries
+        return float((b[0, 0] - b[1, 1]) ** 2 + 4 * b[0, 1] * b[1, 0])
+
+    @cached_property
+    def spread(self) -> float:
+        """Frobenius norm of B - mean, 1 / time^2."""
+        return float(np.linalg.norm(self.entries - self.mean * np.eye(2)))
+
+    @cached_property
+    def overlap(self) -> float:
+        """The smaller |y^H x| of unit left and right eigenvectors; zero at an exceptional point."""
+        values, z = np.linalg.eig(self.entries)
+        if values[0] == values[1]:
+            return 0.0
+        # x = V z and y = U (U^T V)^-T w, of the eigenvectors z, w of the block
+        y = np.linalg.solve(self.right.T @ self.left, np.linalg.inv(z).conj().T)
+        return float(np.min(1.0 / (np.linalg.norm(y, axis=0) * np.linalg.norm(z, axis=0))))
+
+    @property
+    def definite(self) -> bool:
+        """Whether the pair is real, or complex, by more than rounding."""
+        split = complex(self.mean, 0.5 * np.sqrt(abs(self.discriminant)))
+        return believable(split, self.overlap, unit_rounding(self.matrix.data))
+
+    def slope(self, change: csr_array) -> float:
+        """First-order change of the discriminant with a change of the operator, 1 / time^4."""
+        b = self.entries
+        db = np.linalg.solve(self.left.T @ self.right, self.left.T @ (change @ self.right))
+        # The planes turn in first order, which changes invariants of the block in second order only.
+        return float(2 * (b[0, 0] - b[1, 1]) * (db[0, 0] - db[1, 1]) + 4 * (db[0, 1] * b[1, 0] + b[0, 1] * db[1, 0]))
+
+    def same_planes(self, other: "Pair") -> bool:
+        """Whether both pairs have the same planes rather than not: all principal angles below 60 degrees."""
+        right = np.linalg.svd(self.right.T @ other.right, compute_uv=False)
+        left = np.linalg.svd(self.left.T @ other.left, compute_uv=False)
+        return bool(min(right[-1], left[-1]) > 0.5)
+
+    def closest(self, others: "Iterable[Pair]") -> "Pair | None":
+        """Of the others with the same planes, that with the closest eigenvalues."""
+        same = [other for other in others if self.same_planes(other)]
+        return min(same, key=lambda other: abs(other.mean - self.mean), default=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Inverse:
+    """The inverse of A - sigma, or of a matrix like it.
+
+    Attributes
+    ----------
+    solve : callable
+        (vectors, transposed) -> the product of the inverse, or of its transpose, with vectors.
+    exact : bool
+        False for sparse factors, which are of another operator or without pivoting: residuals make up for that.
+    """
+
+    solve: Callable[[Any, bool], Any]
+    exact: bool
+
+    def step(self, matrix: csr_array, basis: Floats, transposed: bool) -> Floats:
+        """One step of (residual) inverse iteration for an operator, or for the transpose that is handed over."""
+        if self.exact:
+            return np.asarray(self.solve(basis, transposed))
+        return basis - np.asarray(self.solve(_beyond(matrix, basis), transposed))
+
+
+def inverse_of(matrix: csr_array, shift: complex, limits: Limits = LIMITS) -> Inverse | None:
+    """The inverse of A - shift; None if that is singular."""
+    shifted = csc_array(matrix - shift * eye_array(matrix.shape[0]))
+    if matrix.shape[0] > limits.dense_factors:
+        try:
+            sparse = symmetric_lu(shifted)
+        except SingularMatrixError:
+            return None
+        return Inverse(lambda b, turned: sparse.solve(np.ascontiguousarray(b), trans="T" if turned else "N"), False)
+    dense = lu_factor(shifted.toarray(), check_finite=False)
+    if not np.all(np.diag(dense[0])):
+        return None
+    return Inverse(lambda b, turned: lu_solve(dense, b, trans=int(turned), check_finite=False), True)
+
+
+def continued(pair: Pair, fx: float, matrix: csr_array, limits: Limits = LIMITS) -> Pair | None:
+    """What a pair has become in a neighbouring operator.
+
+    Parameters
+    ----------
+    pair : Pair
+        The pair in one operator, or a guess of it.
+    fx, matrix
+        The neighbouring load and the operator there.
+    limits : Limits
+
+    Returns
+    -------
+    Pair or None
+        None if the iteration does not converge to these planes: other modes are too close, or the neighbour is too far.
+    """
+    for planes, inverse, most in _iterations(pair, replace(pair, fx=fx, matrix=matrix), limits):
+        found = _invariant(matrix, planes, most, limits)
+        if found is not None:
+            image = Pair(fx, matrix, *found, inverse)
+            if image.same_planes(pair):
+                return image
+    return None
+
+
+def _iterations(pair: Pair, guess: Pair, limits: Limits) -> Iterator[tuple[Iterator[Planes], Inverse | None, int]]:
+    """Ways to the planes, cheapest first: the iteration, its factors where they may serve again, its longest length."""
+    if pair.inverse is not None:
+        yield _planes(guess, pair.inverse), pair.inverse, limits.steps_on
+    scale = max(pair.spread, 1e3 * np.finfo(np.float64).eps * abs(pair.mean))
+    for turn, offset in enumerate(limits.offsets):
+        inverse = inverse_of(guess.matrix, guess.mean + offset * scale, limits)
+        if inverse is not None:
+            yield _planes(guess, inverse), None if inverse.exact else inverse, limits.steps
+        if turn == 0 and pair.discriminant < 0 and guess.discriminant < 0:
+            eigenvalue = complex(guess.mean, 0.5 * np.sqrt(-guess.discriminant))
+            inverse = inverse_of(guess.matrix, eigenvalue, limits)
+            if inverse is not None:
+                yield _complex_planes(guess, inverse), None, limits.steps
+
+
+def _planes(guess: Pair, inverse: Inverse) -> Iterator[Planes]:
+    """Inverse iteration of both planes, good through a coalescence."""
+    v, u, transposed = guess.right, guess.left, guess.matrix.T
+    while True:
+        v = np.linalg.qr(inverse.step(guess.matrix, v, False))[0]
+        u = np.linalg.qr(inverse.step(transposed, u, True))[0]
+        yield v, u
+
+
+def _complex_planes(guess: Pair, inverse: Inverse) -> Iterator[Planes]:
+    """Inverse iteration of the eigenvectors of a complex pair, whatever real eigenvalue is close to it."""
+    metric = guess.left.T @ guess.right
+    x = guess.right @ _upper(guess.entries)
+    y = guess.left @ _upper(np.linalg.solve(metric.T, (metric @ guess.entries).T))  # A^T y = lambda y
+    while True:
+        x, y = (each / np.linalg.norm(each) for each in (inverse.solve(x, False), inverse.solve(y, True)))
+        v, u = (np.linalg.qr(np.column_stack([each.real, each.imag]))[0] for each in (x, y))
+        yield v, u
+
+
+def _upper(entries: Floats) -> Complexes:
+    """The eigenvector of a 2 x 2 matrix whose eigenvalue has the positive imaginary part."""
+    values, vectors = np.linalg.eig(entries)
+    return np.asarray(vectors[:, np.argmax(values.imag)])
+
+
+def _invariant(matrix: csr_array, planes: Iterator[Planes], most: int, limits: Limits) -> Planes | None:
+    """The first planes whose residuals are rounding; None once the pace says that there will be none in time."""
+    level = limits.residual * unit_rounding(matrix.data)
+    transposed, residuals = matrix.T, []
+    for v, u in planes:
+        residuals.append(max(float(np.linalg.norm(_beyond(*each))) for each in ((matrix, v), (transposed, u))))
+        if residuals[-1] < level:
+            return v, u
+        left = most - len(residuals)
+        if len(residuals) > min(2 * limits.pace, most // 2):
+            gain = residuals[-1] / residuals[-1 - limits.pace]
+            if left <= 0 or not residuals[-1] * gain ** (left / limits.pace) < level:
+                return None
+    return None
+
+
+def _beyond(matrix: csr_array, basis: Floats) -> Floats:
+    """A V - V (V^T A V)."""
+    image = matrix @ basis
+    return np.asarray(image - basis @ (basis.T @ image))

@@ -1,0 +1,260 @@
+"""What a user asks for: the onset along a ramp, the windows of a family of matrices, a scan, modes in columns."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
+
+from ..errors import FaultgougeError
+from ..packing import Packing
+from ..spectrum import Complexes
+from .all_modes import Step
+from .edge import Family
+from .limits import LIMITS, Limits
+from .modes import Modes, Operator, assign, full_operator
+from .screened import all_windows
+from .sliced import FirstWindow, Watch, first_window
+from .windows import Ledger, Window, increasing
+
+
+class OnsetError(FaultgougeError):
+    """No complex pair appears on the given loads."""
+
+    @classmethod
+    def among(
+        cls, modes: tuple[int, int] | None, last: float, doubtful: tuple[tuple[float, float], ...]
+    ) -> "OnsetError":
+        """The sentence for some modes, or all, up to the last load."""
+        which = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
+        if not doubtful:
+            return cls(f"No pair of eigenvalues{which} becomes complex up to fx = {last:.17g}: raise the largest load.")
+        below, above = doubtful[0]
+        return cls(
+            f"No pair of eigenvalues{which} was found to become complex up to fx = {last:.17g}, but one was expected "
+            f"between {below:.10g} and {above:.10g}: take smaller increments, or raise the largest load."
+        )
+
+
+@dataclass(frozen=True)
+class Onset:
+    """The windows of complex eigenvalues along a ramp.
+
+    Attributes
+    ----------
+    windows : tuple of Window
+        By increasing onset; at least one.
+    complete : bool
+        Whether these are all up to the largest load. Of a large packing only the first is sought.
+    doubtful : tuple of (float, float)
+        Of a large packing, increments before the onset in which a pair was expected and not found: an earlier window
+        may hide there, which smaller increments would tell.
+    modes : tuple of (int, int) or None
+        Modes among which the onset was sought; None for all.
+    """
+
+    windows: tuple[Window, ...]
+    complete: bool = True
+    doubtful: tuple[tuple[float, float], ...] = ()
+    modes: tuple[int, int] | None = None
+
+    @property
+    def fx_c(self) -> float:
+        """F_x^c, the first onset, force per top disk."""
+        return self.windows[0].fx_onset
+
+    @property
+    def error(self) -> float:
+        """Uncertainty of fx_c."""
+        return self.windows[0].error
+
+    def as_dict(self) -> dict[str, Any]:
+        """{"fx_c", "error", "windows": [...], "doubtful": [[from, to], ...], "modes"} of plain numbers, for JSON."""
+        return {
+            "fx_c": self.fx_c,
+            "error": self.error,
+            "windows": [window.as_dict() for window in self.windows],
+            "doubtful": [list(increment) for increment in self.doubtful],
+            "modes": None if self.modes is None else list(self.modes),
+        }
+
+
+def seeks_all(packing: Packing, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
+    """Whether `find_onset` seeks all windows, at all loads; else it asks for loads up to the first window."""
+    return modes is None and len(packing) <= limits.all_windows
+
+
+def complex_windows(
+    operator: Callable[[float], Operator],
+    forces: ArrayLike,
+    *,
+    narrowest: float | None = None,
+    limits: Limits = LIMITS,
+) -> tuple[Window, ...]:
+    """All windows of complex eigenvalues of a one-parameter family of matrices.
+
+    Parameters
+    ----------
+    operator : callable
+        fx -> ndarray or sparse array, shape (n, n), in coordinates that do not depend on fx. Zero rows are left
+        out.
+    forces, narrowest, limits
+        As in :func:`find_onset`.
+
+    Returns
+    -------
+    tuple of Window
+        By increasing onset; may be empty.
+
+    Raises
+    ------
+    ValueError
+        If the loads are not at least two increasing numbers.
+    """
+    loads = increasing(forces)
+    narrowest = limits.narrowest * float(np.abs(loads).max()) if narrowest is None else narrowest
+    return all_windows(Family(operator, narrowest, limits), loads)
+
+
+def find_onset(
+    equilibrium: Callable[[float], Packing],
+    forces: ArrayLike,
+    *,
+    narrowest: float | None = None,
+    modes: tuple[int, int] | None = None,
+    watch: Watch = lambda says: None,
+    limits: Limits = LIMITS,
+) -> Onset:
+    """The windows of complex eigenvalues between the smallest and the largest load.
+
+    Of a packing of up to `Limits.all_windows` disks these are all windows. Of a larger packing it is the first, and
+    loads beyond it are not asked for.
+
+    Parameters
+    ----------
+    equilibrium : callable
+        fx -> Packing in equilibrium. It is called with the given loads in increasing order, and between calls
+        for the loads a and b with loads between a and b, in any order; there it best starts from its
+        equilibrium at a. Where there is none in between it may raise a NoEquilibriumError: the search then closes
+        in on it from either side, and an edge in what is left is known to half its width. All other errors reach the
+        caller.
+    forces : array_like, shape (S,)
+        The increasing loads of the ramp, force per top disk.
+    narrowest : float, optional
+        Windows narrower than this are not looked for, force; 1e-7 of the largest |load| by default. Such a
+        pair would grow more slowly than any run can show. Of a large packing it is no less than a thousandth of an
+        increment.
+    modes : tuple of (int, int), optional
+        Search these modes alone, and for their first window: numbers of the first one and of the first one beyond, by
+        frequency, the lowest being 0. The modes of the symmetric part are counted, at the load where the search
+        stands. Parts of a spectrum that are searched apart, on machines of their own, have together the same first
+        window as all of it.
+    watch : callable, optional
+        Told in words what is being looked at in a large packing.
+    limits : Limits, optional
+        Sizes and tolerances of the search.
+
+    Returns
+    -------
+    Onset
+
+    Raises
+    ------
+    OnsetError
+        If all eigenvalues are real at every load.
+    LostPairError, SliceError
+        Of a large packing, if a pair cannot be followed, or a part of the spectrum is not found.
+    ValueError
+        If the loads are not at least two increasing numbers, or the packing has none of the modes.
+    """
+    loads = increasing(forces)
+    start = equilibrium(float(loads[0]))
+    unbalanced: dict[float, float] = {}
+
+    def operator(fx: float) -> csr_array:
+        packing = start if fx == loads[0] else equilibrium(fx)
+        unbalanced[fx] = packing.residual / float(np.sqrt(max(1, packing.top.sum())))
+        return full_operator(packing, limits)
+
+    complete = seeks_all(start, modes, limits)
+    if complete:
+        windows, first = complex_windows(operator, loads, narrowest=narrowest, limits=limits), FirstWindow(None)
+    else:
+        first = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch)
+        windows = () if first.window is None else (first.window,)
+    if not windows:
+        raise OnsetError.among(modes, float(loads[-1]), first.doubtful)
+    return Onset(tuple(_with_imbalance(window, unbalanced) for window in windows), complete, first.doubtful, modes)
+
+
+def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:
+    """A window whose errors have the imbalance of the equilibria next to its edges added, as a shift of the load."""
+
+    def at(edge: float) -> float:
+        return unbalanced[min(unbalanced, key=lambda known: abs(known - edge))]
+
+    end = window.fx_end
+    return replace(
+        window,
+        error=window.error + at(window.fx_onset),
+        end_error=None if end is None else (window.end_error or 0.0) + at(end),
+    )
+
+
+def scan_windows(packings: Sequence[Packing]) -> tuple[Window, ...]:
+    """Windows that stored equilibria show by themselves, each edge uncertain by half its increment.
+
+    Parameters
+    ----------
+    packings : sequence of Packing
+        Equilibria of increasing fx, at least two.
+
+    Returns
+    -------
+    tuple of Window
+        Edges are midpoints between the last equilibrium on one side and the first on the other; kind is
+        "scan". Windows between two equilibria are missed, which is what :func:`find_onset` is for.
+
+    Raises
+    ------
+    ValueError
+        If the loads do not increase.
+    """
+    increasing([packing.fx for packing in packings])
+    states = [Modes.of(packing.fx, full_operator(packing)) for packing in packings]
+    ledger = Ledger()
+    ledger.begin(states[0].pair(members) for members in states[0].complex_pairs)
+    for here, there in pairwise(states):
+        step = Step(here, there)
+        ledger.carry(step.courses(lambda step, _, image: step.halfway(step.there.pair(image), "scan"), "scan"))
+    return ledger.all()
+
+
+def follow(packings: Iterable[Packing]) -> Complexes:
+    """Eigenvalues along a ramp, each mode in a column of its own.
+
+    Parameters
+    ----------
+    packings : iterable of Packing
+        Equilibria along a ramp, close enough for modes to be recognised.
+
+    Returns
+    -------
+    ndarray of complex, shape (S, E)
+        Column k follows the k-th lowest eigenvalue of the first packing; nan from where a mode is gone.
+    """
+    rows: list[Complexes] = []
+    before: Modes | None = None
+    for packing in packings:
+        modes = Modes.of(packing.fx, full_operator(packing))
+        if before is None:
+            columns = np.arange(len(modes.values))
+        else:
+            partner = assign(before, modes)
+            columns = np.where(columns >= 0, partner[columns], -1)
+        rows.append(np.where(columns >= 0, modes.values[columns], np.nan))
+        before = modes
+    return np.array(rows)

@@ -1,0 +1,364 @@
+r"""The search for the first window of a large packing: the oracle that looks at slices of the spectrum.
+
+A dense decomposition takes a second at 300 disks and grows with the cube of their number. But modes mix with their
+neighbours in the spectrum only. In the eigenbasis of one load, slice by slice
+(:mod:`~faultgouge.analysis.onset.basis`),
+
+1. perturbation theory names the pairs that may meet (:mod:`~faultgouge.analysis.onset.screening`), few of thousands;
+2. the cluster of neighbouring modes about each of these, interpolated between two loads, is searched for all of its
+   windows as a small packing is: these say where to look;
+3. what clusters announce is confirmed with the operator itself, whose pair is followed to the edges.
+
+So an edge is as certain, and has the same digits, as in the search among all modes. That the window is the first rests
+on two things. No mode is missing, which the inertia tells (:mod:`~faultgouge.analysis.onset.slicing`). And the clusters
+are right: their onsets were within a tenth of an increment of the confirmed ones (packings of 1,000 disks, increments
+of 1e-3). A pair that is complex by less than their error, or for less than `Limits.finest` of an increment, may be
+missed.
+
+**Where the clusters are wrong.** Between two loads the projected operator is taken to be a straight line, which it is
+not where contacts open, close or slide. What the operator has instead shows it: the announced pair is not there, cannot
+be followed, or turns complex elsewhere. The walker then divides the increment. What is in doubt even in the finest
+parts is handed out with the result.
+
+**Edges.** A real pair may exchange partners with a third mode within an increment. A complex pair is the only one of
+its kind, so a pair is followed from inside of its window to the edge.
+"""
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import ArpackError
+
+from ..errors import FaultgougeError, NoEquilibriumError
+from ..packing import Floats
+from ..sparse_lu import SingularMatrixError
+from .basis import Basis
+from .dip import dip_between
+from .edge import Edge, Family, LostPairError, complex_pair_near, edge_from_inside, leads_back
+from .modes import Members, Modes
+from .pair import Pair, Place, continued
+from .screened import all_windows
+from .screening import Cluster, Levels, may_meet
+from .walk import walk
+from .windows import Window
+
+Watch = Callable[[str], None]
+
+At = tuple[float, Levels]
+"""A load and the operator there in a basis."""
+
+
+@dataclass(frozen=True)
+class FirstWindow:
+    """What is found of the first window.
+
+    Attributes
+    ----------
+    window : Window or None
+        None if all eigenvalues are real. Its fx_end is None if the pair is complex at the load above the onset, of the
+        finest increments that were made.
+    doubtful : tuple of (float, float)
+        The finest increments on which clusters announce a pair that the operator was not seen to have: an earlier
+        window may hide there.
+    """
+
+    window: Window | None
+    doubtful: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """The planes of a pair that turns complex in its cluster: from where on, and a load at which it still is."""
+
+    onset: float
+    inside: float
+    right: Floats
+    left: Floats
+
+
+class DoubtError(FaultgougeError):
+    """The clusters announce what the operator does not have."""
+
+
+class Sliced:
+    """The oracle; its places are operators, and what it is sure of is a window."""
+
+    def __init__(self, family: Family, modes: tuple[int, int] | None = None, watch: Watch = lambda says: None) -> None:
+        self.family, self.limits, self.modes, self.watch = family, family.limits, modes, watch
+        self.first: Window | None = None
+        self.doubtful: list[tuple[float, float]] = []
+        self._passed: list[Place] = []
+        self._kept: list[Basis] = []
+
+    @property
+    def finished(self) -> bool:
+        """Whether the first window has been found."""
+        return self.first is not None
+
+    def record(self, sure: Window) -> None:
+        """Take down a window; the one with the smaller onset is the first."""
+        if self.first is None or sure.fx_onset < self.first.fx_onset:
+            self.first = sure
+
+    def candidates(self, places: Sequence[Place]) -> list[list[Candidate]]:
+        """The pairs that turn complex in their clusters on each increment, by increasing onset."""
+        found: list[list[Candidate]] = [[] for _ in places[1:]]
+        first, stop = self.range(places[0].matrix)
+        done = 0
+        for basis, before in self.bases(places[0].matrix):
+            done += basis.own.stop - basis.own.start
+            self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {done} of {stop - first} modes")
+            for announced, (here, there) in zip(found, pairwise(places), strict=True):
+                after = basis.change(before, there.matrix - here.matrix)
+                announced.extend(self._announced(basis, (here.fx, before), (there.fx, after)))
+                before = after
+        return [sorted(each, key=lambda candidate: candidate.onset) for each in found]
+
+    def confirm(
+        self, candidates: list[Candidate], here: Place, there: Place, depth: int
+    ) -> tuple[Window | None, list[Place]]:
+        """The first window that one of the candidates has become; parts of the increment where that is in doubt."""
+        if not self._passed or self._passed[-1].fx != here.fx:
+            self._passed.append(here)
+        finest = depth == self.limits.depth
+        window, doubt = self._earliest(candidates, there, finest)
+        between = self._parts(here, there) if doubt and not finest else []
+        if doubt and not between:
+            self.doubtful.append((here.fx, there.fx))
+        return window, between
+
+    def _parts(self, here: Place, there: Place) -> list[Place]:
+        """Where an increment is divided; nowhere if one of the parts has no equilibrium at its end."""
+        loads = here.fx + (there.fx - here.fx) * np.arange(1, self.limits.parts) / self.limits.parts
+        try:
+            return [self.family.at(load) for load in loads]
+        except NoEquilibriumError:
+            return []
+
+    def _earliest(self, candidates: list[Candidate], there: Place, finest: bool) -> tuple[Window | None, bool]:
+        """The first window of the operator itself, and whether that is in doubt.
+
+        At the first doubt the search ends, except on the finest increments. There an error, of a complex pair that
+        cannot be followed or a load without equilibrium, is raised if no window has been found beside it.
+        """
+        here, reach = self._passed[-1], 2 * self.limits.reach
+        first: Window | None = None
+        lost: Exception | None = None
+        doubt = False
+        for candidate in candidates:
+            # Clusters are off by a share of the way from here: one that is far beyond cannot be first.
+            if first is not None and candidate.onset - here.fx > (1 + reach) * (first.fx_onset - here.fx):
+                break
+            try:
+                window = self._confirmed(candidate, there, first)
+            except (NoEquilibriumError, LostPairError, DoubtError, SingularMatrixError, ArpackError) as error:
+                window, doubt = None, True
+                lost = lost if isinstance(error, DoubtError) else error
+            if window is not None:
+                late = abs(window.fx_onset - candidate.onset) > reach * (there.fx - here.fx)
+                doubt = doubt or (late and window.fx_onset > here.fx)
+                if first is None or window.fx_onset < first.fx_onset:
+                    first = window
+            if doubt and not finest:
+                break
+        if finest and first is None and lost is not None:
+            raise lost
+        return first, doubt
+
+    # The bases
+
+    def range(self, matrix: csr_array) -> tuple[int, int]:
+        """Numbers of the first mode that is looked at and of the first that is not."""
+        count = int(np.count_nonzero(np.diff(matrix.indptr)))
+        first, stop = self.modes or (0, count)
+        if not 0 <= first < min(stop, count):
+            raise ValueError(f"modes {first}:{stop} is no part of the {count} modes of this packing, 0:{count}")
+        return first, min(stop, count)
+
+    def keeps(self, matrix: csr_array) -> bool:
+        """Whether the basis is kept from increment to increment."""
+        first, stop = self.range(matrix)
+        limits = self.limits
+        margins = 2 * (limits.margin + limits.beyond) * max(1, round((stop - first) / limits.own))
+        return (stop - first + margins) * matrix.shape[0] <= limits.kept
+
+    def bases(self, matrix: csr_array) -> Iterable[tuple[Basis, Levels]]:
+        """Bases of all modes that are looked at, those of an earlier load as long as they serve, and the operator."""
+        known = self._serving(matrix)
+        if known:
+            return known
+        bases: Iterable[Basis] = Basis.slices(matrix, _cores(), self.range(matrix), self.limits)
+        if self.keeps(matrix):
+            self._kept = []  # its memory is free before that for the next ones is taken
+            bases = self._kept = list(bases)
+        return ((basis, basis.levels(matrix)) for basis in bases)
+
+    def _serving(self, matrix: csr_array) -> list[tuple[Basis, Levels]]:
+        """The bases that are kept and the operator in them; none if they do not serve."""
+        if not all(basis.covers(matrix) for basis in self._kept):
+            return []
+        known = [(basis, basis.levels(matrix)) for basis in self._kept]
+        mixing = [each for basis, levels in known for each in basis.mixing(levels)]
+        return known if known and np.median(mixing) < self.limits.mixing else []
+
+    # What clusters announce
+
+    def _announced(self, basis: Basis, here: At, there: At) -> Iterator[Candidate]:
+        """The pairs of a basis that turn complex in their clusters."""
+        named = may_meet(here[1], here[1].beyond(there[1], 1 + self.limits.reach), self.limits.slack)
+        for cluster in basis.clusters:
+            first, last = (cluster.modes.start + end for end in cluster.core)
+            if np.any((named >= first) & (named <= last)):
+                yield from self._searched(basis, cluster, here, there)
+
+    def _searched(self, basis: Basis, cluster: Cluster, here: At, there: At) -> Iterator[Candidate]:
+        """The windows of one cluster, with its blocks interpolated between two loads."""
+        increment, limits = there[0] - here[0], self.limits
+        before, after = (levels.block(cluster) for _, levels in (here, there))
+        if len(before) < len(basis.active):
+            before, after = (_exceeding(block, limits.excess) for block in (before, after))
+
+        def block(fx: float) -> Floats:
+            share = (fx - here[0]) / increment
+            return (1 - share) * before + share * after
+
+        reach = there[0] + limits.reach * increment
+        family = Family(block, max(self.family.narrowest, limits.finest * increment), limits)
+        for window in all_windows(family, np.array([here[0], reach])):
+            end = reach if window.fx_end is None else window.fx_end
+            inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
+            modes = Modes.of(inside, block(inside))
+            pair = modes.pair(_nearest(modes, window.eigenvalue))
+            if cluster.owns(pair.right):
+                right, left = (basis.lifted(cluster.modes, plane) for plane in (pair.right, pair.left))
+                yield Candidate(window.fx_onset, min(inside, there[0]), right, left)
+
+    # What the operator has
+
+    def _confirmed(self, candidate: Candidate, there: Place, first: Window | None) -> Window | None:
+        """The window of the operator itself in place of that of a cluster; None if it is none, or not the first."""
+        self.watch(f"a pair that turns complex about F_x = {candidate.onset:.6g}: its onset")
+        inside = self._complex_pair(candidate, there)
+        if inside is None or (first is not None and self._later(inside, first)):
+            return None
+        above = inside if inside.fx == there.fx else self.family.followed(inside, there)
+        end = edge_from_inside(self.family, above, inside) if above.discriminant > 0 else None
+        for place in reversed(self._passed):
+            below = inside if inside.fx == place.fx else self.family.followed(inside, place)
+            if below.discriminant > 0:
+                return Window.between(edge_from_inside(self.family, below, inside), end)
+            inside = below
+        return Window.between(Edge.start(inside), end)
+
+    def _later(self, inside: Pair, first: Window) -> bool:
+        """Whether a pair is still real where the first window so far opens."""
+        if inside.fx <= first.fx_onset:
+            return False
+        below = self.family.followed(inside, self.family.at(first.fx_onset))
+        return below.discriminant > 0 and leads_back(self.family, below, inside)
+
+    def _complex_pair(self, candidate: Candidate, there: Place) -> Pair | None:
+        """The pair at a load where it is complex; None if it is surely real, or not before these loads are passed."""
+        place = there if candidate.inside == there.fx else self.family.at(candidate.inside)
+        guess = Pair(*place, candidate.right, candidate.left)
+        pair = continued(guess, *place, self.limits) or complex_pair_near(guess, self.limits)
+        if pair is not None and pair.discriminant < 0:
+            return pair
+        if candidate.onset > there.fx:
+            return None  # it is looked for on the next increment
+        if pair is None:
+            raise DoubtError
+        try:
+            return self._dipping(pair, there)
+        except LostPairError as error:
+            raise DoubtError from error
+
+    def _dipping(self, start: Pair, there: Place) -> Pair | None:
+        """A pair where it is complex, from a load where it is real; None if it surely is so on all of the increment."""
+        here, limits = self._passed[-1], self.limits
+        narrowest = max(self.family.narrowest, limits.finest * (there.fx - here.fx))
+        pairs = [start, *(self.family.followed(start, place) for place in (here, there) if place.fx != start.fx)]
+        for _ in range(limits.dips):
+            complex_ones = [pair for pair in pairs if pair.discriminant < 0]
+            if complex_ones:
+                return complex_ones[0]
+            pairs.sort(key=lambda pair: pair.fx)
+            width, fx = max(dip_between(below, above, limits) for below, above in pairwise(pairs))
+            if width <= narrowest:
+                return None
+            nearest = min(pairs, key=lambda pair: abs(pair.fx - fx))
+            pairs.append(self.family.followed(nearest, self.family.at(fx)))
+        raise DoubtError
+
+
+def first_window(
+    family: Family,
+    loads: Floats,
+    modes: tuple[int, int] | None = None,
+    watch: Watch = lambda says: None,
+) -> FirstWindow:
+    """The first window of complex eigenvalues of a family of large matrices, without all their eigenvalues.
+
+    `loads` increase. Those beyond the one above the onset are not asked for, except those of `Limits.ahead` increments;
+    `modes` and `watch` are those of :func:`~faultgouge.analysis.find_onset`.
+
+    Raises
+    ------
+    NoEquilibriumError
+        If the operator raises it at one of the loads, and no window has been found before.
+    LostPairError
+        If a complex pair cannot be followed to its onset, not even in the finest parts of its increment, and no other
+        window is found there.
+    SliceError
+        If a part of the spectrum is not found.
+    ValueError
+        If the packing has none of these modes.
+    """
+    oracle = Sliced(family, modes, watch)
+    here = family.at(loads[0])
+    ahead = 1 if oracle.keeps(here.matrix) else family.limits.ahead
+    done = 1
+    while done < len(loads) and not oracle.finished:
+        places = [here, *_reached(family, loads[done : done + ahead])]
+        walk(oracle, places)
+        here = places[-1]
+        done += len(places) - 1
+    first = oracle.first
+    doubtful = (each for each in oracle.doubtful if first is None or each[0] < first.fx_onset)
+    return FirstWindow(first, tuple(doubtful))
+
+
+def _reached(family: Family, loads: Floats) -> list[Place]:
+    """The operator at loads as far as there are equilibria; the error if there is none at the first."""
+    places: list[Place] = []
+    for load in loads:
+        try:
+            places.append(family.at(load))
+        except NoEquilibriumError:
+            if not places:
+                raise
+            break
+    return places
+
+
+def _nearest(modes: Modes, eigenvalue: float) -> Members:
+    """The complex pair, or failing that the two modes, closest to a real eigenvalue."""
+    pairs = modes.complex_pairs or [modes.about(eigenvalue)]
+    return min(pairs, key=lambda members: abs(modes.values[members[0]].real - eigenvalue))
+
+
+def _exceeding(block: Floats, excess: float) -> Floats:
+    """The operator in a cluster with its antisymmetric couplings enlarged by what they may be in error."""
+    levels = np.diag(block)
+    width = max(float(np.ptp(levels)), np.finfo(np.float64).tiny)
+    mixing = float(np.linalg.norm(block - np.diag(levels))) / width
+    return block + excess * mixing**2 * width / len(levels) * np.sign(block - block.T)
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

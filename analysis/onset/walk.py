@@ -1,0 +1,68 @@
+"""The walk along the ramp: announce, confirm, subdivide.
+
+The walker knows loads and nothing of matrices. For each increment it asks an *oracle*
+
+1. which pairs may change between the two loads (`candidates`): cheap, and rather too many than too few;
+2. what they do (`confirm`): with the operator itself, edges solved for;
+3. where to look in between, should the oracle not be sure of it. The walker then goes through the parts of the
+   increment in the same way, and only what is sure is recorded.
+
+Three oracles are asked. In the search for all windows `Screened` (:mod:`~faultgouge.analysis.onset.screened`) confirms
+the few pairs that perturbation theory names by following each of them, and hands an increment that needs more to
+`AllModes` (:mod:`~faultgouge.analysis.onset.all_modes`), which has all modes at both loads. `Sliced`
+(:mod:`~faultgouge.analysis.onset.sliced`) finds the first window of a large packing in slices of its spectrum.
+"""
+
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import Protocol, TypeVar
+
+At = TypeVar("At")
+"""What an oracle has of a load: the operator, or all of its modes."""
+
+Announced = TypeVar("Announced")
+"""What an oracle announces of an increment."""
+
+Sure = TypeVar("Sure")
+"""What an oracle is sure of."""
+
+
+class Oracle(Protocol[At, Announced, Sure]):
+    """Who can tell what happens between two loads."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether all that is sought has been found."""
+
+    def candidates(self, places: Sequence[At]) -> Iterable[Announced]:
+        """What may happen on each of the increments between neighbouring places."""
+
+    def confirm(self, candidates: Announced, here: At, there: At, depth: int) -> tuple[Sure | None, Sequence[At]]:
+        """What does happen on one increment, to be recorded, and where to divide the increment if that is in doubt.
+
+        `depth` is how often the increment has been divided already.
+        """
+
+    def record(self, sure: Sure) -> None:
+        """Take down what is sure of an increment; increments come in order."""
+
+
+def walk(oracle: Oracle[At, Announced, Sure], places: Sequence[At], depth: int = 0) -> None:
+    """Go from the first to the last of several places, or to where the oracle has found what it seeks.
+
+    Parameters
+    ----------
+    oracle : Oracle
+    places : sequence
+        At increasing loads, two at least.
+    depth : int
+        How often the increment has been divided of which these are the parts.
+    """
+    for (here, there), candidates in zip(pairwise(places), oracle.candidates(places), strict=True):
+        sure, between = oracle.confirm(candidates, here, there, depth)
+        if between:
+            walk(oracle, [here, *between, there], depth + 1)
+        if sure is not None:
+            oracle.record(sure)
+        if oracle.finished:
+            return

@@ -1,0 +1,139 @@
+"""Windows, intervals of the load on which a pair is complex, and the ledger of those that are open."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import FaultgougeError
+from .edge import Edge, Kind
+from .pair import Pair
+
+
+@dataclass(frozen=True)
+class Window:
+    """An interval of loads on which one pair of eigenvalues is complex.
+
+    Attributes
+    ----------
+    fx_onset : float
+        Load at which the pair becomes complex, force per top disk.
+    fx_end : float or None
+        Load at which it is real again; None if it is complex at the largest load that was looked at.
+    eigenvalue : float
+        The double eigenvalue at the onset (the real part of the pair if it does not coalesce there), 1 /
+        time^2.
+    error : float
+        Uncertainty of fx_onset: twice the scatter of the discriminant over its slope for a coalescence, the
+        bracket otherwise; and what the equilibria's residual r amounts to. A packing out of balance by r is
+        the exact equilibrium of other loads, and if the discriminant is as sensitive to any force as to those
+        of the n top disks, fx is uncertain by r / n^(1/2). How the path of equilibria depends on the
+        increments is not in it.
+    end_error : float or None
+        The same for fx_end.
+    overlap : float
+        Smallest |y^H x| met at the onset; it vanishes at an exceptional point, to the root of the rounding
+        error.
+    kind : {"coalescence", "contact change", "start", "scan"}
+        What begins the window: two real eigenvalues that meet; a jump of the equilibrium; nothing, as the
+        pair is complex at the smallest load; or unknown, in a scan.
+    """
+
+    fx_onset: float
+    fx_end: float | None
+    eigenvalue: float
+    error: float
+    end_error: float | None
+    overlap: float
+    kind: Kind
+
+    @classmethod
+    def between(cls, onset: Edge, end: Edge | None) -> "Window":
+        """The window from one edge to another, or to none."""
+        return cls(
+            fx_onset=onset.fx,
+            fx_end=None if end is None else end.fx,
+            eigenvalue=onset.eigenvalue,
+            error=onset.error,
+            end_error=None if end is None else end.error,
+            overlap=onset.overlap,
+            kind=onset.kind,
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """The keys of the JSON contract: fx_onset, fx_end, lambda, error, kind."""
+        return {
+            "fx_onset": self.fx_onset,
+            "fx_end": self.fx_end,
+            "lambda": self.eigenvalue,
+            "error": self.error,
+            "kind": self.kind,
+        }
+
+
+Course = tuple[Pair | None, Pair | None, Edge | None]
+"""A pair over an increment: at the lower and at the upper load, where it is complex, and the edge in between if it is
+complex at one of them alone."""
+
+
+class LostTrackError(FaultgougeError):
+    """The complex pairs of one increment are not those of the increment before."""
+
+
+class Ledger:
+    """The windows that are open at the load reached so far, by their pairs there; and the closed ones."""
+
+    def __init__(self) -> None:
+        self.open: list[tuple[Pair, Edge]] = []
+        self.closed: list[Window] = []
+        self.begun = False
+
+    def begin(self, complex_pairs: Iterable[Pair]) -> None:
+        """Open the windows of the pairs that are complex at the smallest load; later calls say nothing new."""
+        if not self.begun:
+            self.open = [(each, Edge.start(each)) for each in complex_pairs]
+            self.begun = True
+
+    def carry(self, courses: Iterable[Course]) -> None:
+        """Go on over an increment, whose courses are those of all pairs that are complex at either end.
+
+        Raises
+        ------
+        LostTrackError
+            If they are not the pairs of the open windows.
+        """
+        now: list[tuple[Pair, Edge]] = []
+        for before, after, edge in courses:
+            onset = edge if before is None else self._taken(before)
+            assert onset is not None
+            if after is None:
+                self.closed.append(Window.between(onset, edge))
+            else:
+                now.append((after, onset))
+        if self.open:
+            raise LostTrackError
+        self.open = now
+
+    def _taken(self, pair: Pair) -> Edge:
+        """The onset of the open window of a pair, which is taken out."""
+        known = pair.closest(each for each, _ in self.open)
+        if known is None:
+            raise LostTrackError
+        (onset,) = (edge for each, edge in self.open if each is known)
+        self.open = [(each, edge) for each, edge in self.open if each is not known]
+        return onset
+
+    def all(self) -> tuple[Window, ...]:
+        """All windows by increasing onset."""
+        still = [Window.between(edge, None) for _, edge in self.open]
+        return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
+
+
+def increasing(forces: ArrayLike) -> NDArray[np.float64]:
+    """Loads as an array; ValueError if they are not at least two finite, increasing numbers."""
+    loads = np.array(forces, dtype=np.float64)
+    if loads.ndim != 1 or len(loads) < 2 or not np.all(np.isfinite(loads)) or np.any(np.diff(loads) <= 0):
+        raise ValueError("The loads of a ramp must be at least two finite, increasing numbers.")
+    return loads

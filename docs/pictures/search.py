@@ -1,0 +1,95 @@
+"""The picture of docs/search.md: the discriminant of four pairs over one increment of the load.
+
+python docs/pictures/search.py
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from faultgouge.analysis import complex_windows
+from faultgouge.analysis.onset import Modes
+from faultgouge.analysis.onset.dip import dip_between
+from faultgouge.figures.style import INK, STYLE
+
+Operator = Callable[[float], np.ndarray]
+
+THIRD = 40.0
+"""A third eigenvalue, far away."""
+
+
+def crossing(product: float, jump: float = 2.0) -> Operator:
+    """Two levels that pass each other at F = 0.45, by the product of their couplings; from `jump` on they are apart."""
+
+    def operator(fx: float) -> np.ndarray:
+        gap, coupling = fx - 0.45 + 0.3 * (fx > jump), abs(product) ** 0.5
+        return np.array([[10 + gap, coupling, 0], [np.copysign(coupling, product), 10 - gap, 0], [0, 0, THIRD]])
+
+    return operator
+
+
+def turning(fx: float) -> np.ndarray:
+    """A pair whose discriminant goes through zero once, at F = 0.6, and not along a straight line."""
+    return np.array([[10, 1, 0], [(0.6 - fx) * (0.35 + 0.2 * fx), 10, 0], [0, 0, THIRD]])
+
+
+def discriminant(operator: Operator, fx: float) -> float:
+    """D of the two modes next to 10."""
+    modes = Modes.of(fx, operator(fx))
+    return modes.pair(modes.about(10.0)).discriminant
+
+
+def draw(axes: Axes, operator: Operator, title: str, says: str) -> None:
+    """D over the increment from 0 to 1, with what the search knows of it and what it finds."""
+    loads = np.linspace(0, 1, 801)
+    values = np.array([discriminant(operator, float(fx)) for fx in loads])
+    pieces = np.flatnonzero(np.abs(np.diff(values)) > 0.1) + 1
+    for part, d in zip(np.split(loads, pieces), np.split(values, pieces), strict=True):
+        axes.plot(part, d, color="C0")
+    axes.axhline(0, color=INK, linewidth=0.5)
+    axes.fill_between(loads, 0, values, where=values < 0, color="C3", alpha=0.3, linewidth=0)
+    ends = [modes.pair(modes.about(10.0)) for modes in (Modes.of(fx, operator(fx)) for fx in (0.0, 1.0))]
+    change = ends[1].matrix - ends[0].matrix
+    for pair in ends:
+        reach = np.array([-0.09, 0.09])
+        axes.plot(pair.fx + reach, pair.discriminant + pair.slope(change) * reach, color="C1", linewidth=1.6)
+        axes.plot(pair.fx, pair.discriminant, "o", color="C1")
+    if ends[0].discriminant * ends[1].discriminant > 0:
+        width, middle = dip_between(*ends)
+        if width > 0:
+            axes.plot([middle - width / 2, middle + width / 2], [-0.16, -0.16], color="C1", linewidth=2.5)
+    for window in complex_windows(operator, [0.0, 1.0]):
+        for edge in (window.fx_onset, window.fx_end):
+            if edge is not None:
+                axes.plot(edge, 0, "s", color="C3", markersize=3.5)
+    axes.set_title(title, loc="left", fontsize=8)
+    axes.text(0.5, 0.93, says, transform=axes.transAxes, ha="center", va="top", fontsize=7.5)
+    axes.set(xlim=(-0.1, 1.1), xticks=[0, 1], xticklabels=["$a$", "$b$"])
+
+
+@matplotlib.rc_context(fname=STYLE)
+def search_figure() -> Figure:
+    """Four pairs: they avoid each other, meet in a narrow window, coalesce once, and are torn apart by a jump."""
+    figure = Figure(figsize=(6.8, 3.9), layout="constrained")
+    (one, two), (three, four) = figure.subplots(2, 2)
+    draw(one, crossing(0.002), "(a) avoided crossing", "a dip is possible:\nlooked at, no window")
+    draw(
+        two, crossing(-0.012), "(b) window within the increment", "a dip is possible:\nlooked at, two edges solved for"
+    )
+    draw(three, turning, "(c) coalescence", "the sign changes:\nthe root is solved for")
+    draw(four, crossing(-0.012, 0.4), "(d) jump of the equilibrium", "the window ends\nwhere a contact changes")
+    for axes, top in ((one, 2.2), (two, 2.2), (four, 3.4)):
+        axes.set_ylim(-0.3, top)
+    for axes in (one, three):
+        axes.set_ylabel(r"$D = (\lambda_1 - \lambda_2)^2$")
+    for axes in (three, four):
+        axes.set_xlabel("$F_x$")
+    return figure
+
+
+if __name__ == "__main__":
+    search_figure().savefig(Path(__file__).with_suffix(".png"), dpi=150)

@@ -1,0 +1,266 @@
+r"""A mode of a packing: arrows for the displacement of the disks, colour for their rotation.
+
+A real mode moves all disks along fixed lines, in phase. The disks of a complex mode go round ellipses, and two moments
+a quarter of a period apart show it. The phase of a vector is free: it is turned so that the first of the two moments is
+the one with the largest displacement.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from faultgouge.analysis import BadInputError, Eigenpairs, Packing, closest_to_meeting
+
+from .packing import WIDTH, PackingArtist, View
+from .style import EDGE, INK, figure_of, styled
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+LONGEST = 1.6
+"""Length of the longest arrow, in units of the largest radius."""
+
+SYMMETRIC = 1e-6
+"""Cosine of two modes up to which they are taken for orthogonal: far above rounding, and an epsilon that no coalescence
+is near."""
+
+
+class ModeError(BadInputError):
+    """A mode that a packing does not have, in one sentence."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """A mode of a packing.
+
+    Attributes
+    ----------
+    number : int
+        Which, counted by the real part of the eigenvalue from 0.
+    eigenvalue : complex
+        lambda, 1 / time^2.
+    displacement : ndarray of complex, shape (3, N)
+        x, y and R theta of every disk, the longest displacement in the plane one; its phase is turned as the module
+        says.
+    participation, rotation : float
+        Participation ratio, and share of rotation in the kinetic energy.
+    """
+
+    number: int
+    eigenvalue: complex
+    displacement: Complexes
+    participation: float
+    rotation: float
+
+    @classmethod
+    def of(cls, packing: Packing, modes: Eigenpairs, number: int) -> "Mode":
+        """One of the modes of a packing."""
+        mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
+        vector = modes.right[:, number] / np.sqrt(mass)
+        vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
+        moved = vector.reshape(3, -1)
+        largest = np.sqrt(np.sum(np.abs(moved[:2]) ** 2, axis=0)).max()
+        return cls(
+            number,
+            complex(modes.values[number]),
+            moved / largest,
+            float(modes.participation[number]),
+            float(modes.rotation[number]),
+        )
+
+    @property
+    def is_complex(self) -> bool:
+        """Whether it grows with its partner, the complex conjugate."""
+        return self.eigenvalue.imag != 0
+
+    def at(self, phase: float) -> Floats:
+        """The displacement at a phase of the oscillation, growth left out; shape (3, N)."""
+        return np.real(self.displacement * np.exp(1j * phase))
+
+    @property
+    def plain(self) -> str:
+        """The same as `words`, for a terminal."""
+        sign = f" +- {abs(self.eigenvalue.imag):.6g} i" if self.is_complex else ""
+        return (
+            f"mode {self.number}: lambda = {self.eigenvalue.real:.8g}{sign}, participation ratio "
+            f"{self.participation:.3f}, rotation {100 * self.rotation:.1f} % of the kinetic energy"
+        )
+
+    @property
+    def words(self) -> str:
+        """Eigenvalue, participation ratio and share of rotation, for a caption."""
+        sign = rf" \pm {abs(self.eigenvalue.imag):.4g}\,i" if self.is_complex else ""
+        return (
+            rf"mode {self.number}: $\lambda = {self.eigenvalue.real:.6g}{sign}$"
+            f"\nparticipation ratio {self.participation:.2f}, "
+            f"rotation {100 * self.rotation:.0f} % of the kinetic energy"
+        )
+
+
+def unstable_pair(packing: Packing, modes: Eigenpairs, believed: Sequence[complex]) -> tuple[list[Mode], str]:
+    """The modes that make a packing unstable, or are about to.
+
+    Parameters
+    ----------
+    packing : Packing
+        The packing.
+    modes : Eigenpairs
+        All its modes.
+    believed : sequence of complex
+        Eigenvalues of the complex pairs that are no rounding noise, fastest growing first, as of
+        :func:`~faultgouge.analysis.spectrum`.
+
+    Returns
+    -------
+    modes : list of Mode
+        The member with positive imaginary part of the fastest growing pair; without one, the two real modes that are
+        closest to a coalescence.
+    words : str
+        What they are.
+
+    Raises
+    ------
+    ModeError
+        If all modes are orthogonal, so that no two are about to meet.
+    """
+    if len(believed):
+        number = int(np.argmin(np.abs(modes.values - believed[0])))
+        mode = Mode.of(packing, modes, number)
+        return [mode], "the complex pair: two moments, a quarter of a period apart"
+    first, second, cosine = closest_to_meeting(modes)
+    if cosine < SYMMETRIC:
+        raise ModeError(
+            f"at F_x = {packing.fx:g} all modes are orthogonal to {SYMMETRIC:g}, so that no two of them are about to "
+            "meet: take a later --frame, or a mode by its number"
+        )
+    words = f"the two real modes closest to meeting: the cosine between them is {cosine:.4f}"
+    return [Mode.of(packing, modes, number) for number in (first, second)], words
+
+
+class ModeArtist:
+    """A mode on axes, whose phase can be changed from frame to frame.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where.
+    packing : Packing
+        The packing at rest.
+    mode : Mode
+        The mode.
+    points : float, optional
+        Points per unit of length; as the axes stand now by default.
+    moves : bool
+        Whether disks move; otherwise arrows show how they would.
+    """
+
+    def __init__(
+        self, axes: Axes, packing: Packing, mode: Mode, points: float | None = None, moves: bool = False
+    ) -> None:
+        self.mode, self.moves = mode, moves
+        self.reach = LONGEST * packing.radius.max() * (0.3 if moves else 1.0)
+        self.artist = PackingArtist(
+            axes, packing, view=View.of(packing, margin=self.reach if moves else 0.0), points=points
+        )
+        disk = self.artist.view.disk
+        chains = self.artist.chains
+        chains.set(color=EDGE, linewidth=0.4 if moves else 0.0, zorder=2)
+        self.artist.disks.set(array=np.zeros(len(disk)), cmap="RdBu_r", norm=Normalize(-1, 1))
+        self.arrows = None
+        if not moves:
+            still = np.zeros(len(disk))
+            self.arrows = axes.quiver(
+                *self.artist.view.place.T, still, still, angles="xy", scale_units="xy", scale=1, color=INK, width=0.005
+            )
+            self.arrows.set(zorder=5)
+        self.rotates = np.abs(mode.displacement[2]).max() or 1.0
+
+    def show(self, phase: float) -> None:
+        """Draw the mode at a phase."""
+        moved = self.mode.at(phase)
+        disk = self.artist.view.disk
+        self.artist.disks.set_array(moved[2, disk] / self.rotates)
+        if self.arrows is None:
+            self.artist.move(self.reach * moved[:2].T)
+        else:
+            self.arrows.set_UVC(*(self.reach * moved[:2, disk]))
+
+
+@styled
+def draw_mode(packing: Packing, mode: Mode, axes: Axes | None = None, phase: float = 0.0) -> Figure:
+    """One mode at one phase.
+
+    Parameters
+    ----------
+    packing : Packing
+        The packing.
+    mode : Mode
+        The mode.
+    axes : Axes, optional
+        Where to draw; a figure of its own, with a scale and a caption, by default.
+    phase : float
+        Phase of the oscillation, radian.
+
+    Returns
+    -------
+    Figure
+        Arrows are displacements, red disks turn anticlockwise, blue ones clockwise.
+    """
+    if axes is None:
+        return draw_modes(packing, [mode], mode.words.split("\n")[0], phases=(phase,))
+    ModeArtist(axes, packing, mode).show(phase)
+    return figure_of(axes)
+
+
+@styled
+def draw_modes(packing: Packing, modes: Sequence[Mode], words: str, phases: Sequence[float] | None = None) -> Figure:
+    """Modes side by side, with their numbers below.
+
+    Parameters
+    ----------
+    packing : Packing
+        The packing.
+    modes : sequence of Mode
+        One or two.
+    words : str
+        What they are, a line above.
+    phases : sequence of float, optional
+        Phases at which each mode is drawn, radian; by default 0 for real modes, 0 and a quarter of a period for a
+        complex one.
+
+    Returns
+    -------
+    Figure
+    """
+    panels = [(mode, phase) for mode in modes for phase in phases or ((0.0, np.pi / 2) if mode.is_complex else (0.0,))]
+    figure, axes, points = side_by_side(packing, len(panels))
+    for one, (mode, phase) in zip(axes, panels, strict=True):
+        ModeArtist(one, packing, mode, points).show(phase)
+        one.set_title(mode.words if len(modes) > 1 or one is axes[0] else "a quarter of a period later\n", fontsize=7)
+    finish(figure, axes, packing, words)
+    return figure
+
+
+def side_by_side(packing: Packing, count: int) -> tuple[Figure, list[Axes], float]:
+    """A figure with axes for the same packing, and points per unit of length in them."""
+    view = View.of(packing)
+    across = WIDTH - 0.1
+    height = across * (view.ceiling - view.bottom) / (view.right - view.left)
+    figure = Figure(figsize=(WIDTH * count, height + 1.1), layout="constrained")
+    axes = figure.subplots(1, count, squeeze=False)[0]
+    return figure, list(axes), 72 * across / (view.right - view.left)
+
+
+def finish(figure: Figure, axes: Sequence[Axes], packing: Packing, words: str) -> None:
+    """The line above and the scale of rotation below."""
+    figure.suptitle(f"$F_x = {packing.fx:.6g}$: {words}", fontsize=8)
+    scale = ScalarMappable(Normalize(-1, 1), "RdBu_r")
+    bar = figure.colorbar(scale, ax=list(axes), location="bottom", aspect=50, shrink=0.6, pad=0.02)
+    bar.set_ticks([-1, 0, 1], labels=["clockwise", "rotation", "anticlockwise"])
+    bar.outline.set_linewidth(0.4)

@@ -1,0 +1,328 @@
+r"""A packing: disks to scale, force chains, load, floor and periodic images.
+
+The disks of the upper layer are yellow, rattlers hollow, the floor is red. A bar joins the centres of each contact; the
+width of the bar is proportional to the normal force :math:`f_n`, and its colour is one of
+
+- ``mobilised``, :math:`|f_t|/(\mu f_n)`: the share of the Coulomb limit that the contact uses, one where it slides,
+- ``slip``, :math:`|s|/t^*`: the share of the slip at which it slides,
+- ``force``, :math:`f_n` itself,
+- ``none``: ink.
+
+Most contacts of a stable packing are far below the Coulomb limit, so that both shares stand on a logarithmic scale.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.colors import Colormap, LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from faultgouge.analysis import Packing
+
+from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER, figure_of, styled
+
+Floats = NDArray[np.float64]
+
+LEAST_SHARE = 1e-4
+"""Lower end of the scale of mobilised friction and slip."""
+
+WIDTH = 3.4
+"""Width of a figure that holds one packing, inch."""
+
+
+def _slip_share(packing: Packing) -> Floats:
+    limit = packing.law.slip_limit(packing.geometry.overlap)
+    return np.divide(np.abs(packing.contacts.slip), limit, out=np.zeros(len(limit)), where=limit > 0)
+
+
+def _mobilised(packing: Packing) -> Floats:
+    limit = packing.law.mu * packing.normal_force
+    return np.divide(np.abs(packing.tangential_force), limit, out=np.zeros(len(limit)), where=limit > 0)
+
+
+def _share_scale(_: Floats) -> Normalize:
+    return LogNorm(LEAST_SHARE, 1)
+
+
+def _force_scale(values: Floats) -> Normalize:
+    return Normalize(0, values.max(initial=0.0) or 1.0)
+
+
+COLOURS: dict[str, tuple[str, Callable[[Packing], Floats], Callable[[Floats], Normalize], str | Colormap]] = {
+    "mobilised": (r"mobilised friction $|f_t|/(\mu f_n)$", _mobilised, _share_scale, MOBILIZATION),
+    "slip": ("slip / slip limit", _slip_share, _share_scale, MOBILIZATION),
+    "force": ("normal force $f_n$", lambda packing: packing.normal_force, _force_scale, "viridis_r"),
+}
+"""What the bars of the contacts may show: label, values of the contacts, scale, colours."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Which images of the disks a picture shows, and its edges.
+
+    Attributes
+    ----------
+    left, right, bottom, ceiling : float
+        Edges, length.
+    disk : ndarray of int, shape (n,)
+        The disk of each image.
+    place : ndarray, shape (n, 2)
+        Its centre, length.
+    contact : ndarray of int, shape (c,)
+        The contact of each bar.
+    start, end : ndarray, shape (c, 2)
+        Where the bar begins and ends, length.
+    """
+
+    left: float
+    right: float
+    bottom: float
+    ceiling: float
+    disk: NDArray[np.int64]
+    place: Floats
+    contact: NDArray[np.int64]
+    start: Floats
+    end: Floats
+
+    @classmethod
+    def of(cls, packing: Packing, margin: float = 0.0) -> "View":
+        """Every image of every disk and contact that reaches to within a margin of the box; length."""
+        x, y = packing.position.T
+        largest, length = packing.radius.max(), packing.box_length
+        if length is None:
+            images = packing.position[None]
+            left, right = float((x - packing.radius).min()), float((x + packing.radius).max())
+        else:
+            images = np.column_stack([x % length, y]) + np.array([[[shift * length, 0.0]] for shift in (-1, 0, 1)])
+            left, right = 0.0, length
+        near = images[..., 0]
+        image, disk = np.nonzero((near + packing.radius > left - margin) & (near - packing.radius < right + margin))
+        start = images[:, packing.contacts.i]
+        end = start - packing.geometry.distance[:, None] * packing.geometry.normal
+        ends = np.stack([start[..., 0], end[..., 0]])
+        bar, contact = np.nonzero((ends.max(axis=0) > left - margin) & (ends.min(axis=0) < right + margin))
+        ceiling = float((y + packing.radius).max() + (1.5 if packing.fx or packing.fy else 0.3) * largest)
+        return cls(
+            left,
+            right,
+            float(-0.3 * largest),
+            ceiling,
+            disk,
+            images[image, disk],
+            contact,
+            start[bar, contact],
+            end[bar, contact],
+        )
+
+    def points(self, axes: Axes) -> float:
+        """Points per unit of length, so that widths of lines are to scale; as the axes stand now."""
+        box = axes.get_window_extent()
+        scale = min(box.width / (self.right - self.left), box.height / (self.ceiling - self.bottom))
+        return float(72 / figure_of(axes).dpi * scale)
+
+
+class PackingArtist:
+    """A packing on axes, whose disks and bars can be moved from frame to frame.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where.
+    packing : Packing
+        What.
+    color : str
+        A key of `COLOURS`, or "none".
+    view : View, optional
+        Edges and images; all that a still picture needs by default.
+    points : float, optional
+        Points per unit of length; as the axes stand now by default.
+
+    Attributes
+    ----------
+    disks : EllipseCollection
+        Every image of every disk.
+    chains : LineCollection
+        Every image of every contact.
+    """
+
+    def __init__(
+        self, axes: Axes, packing: Packing, color: str = "none", view: View | None = None, points: float | None = None
+    ) -> None:
+        self.packing, self.view = packing, view or View.of(packing)
+        axes.set(aspect="equal", xlim=(self.view.left, self.view.right), ylim=(self.view.bottom, self.view.ceiling))
+        axes.set_axis_off()
+        self.points = self.view.points(axes) if points is None else points
+        self.disks = self._disks(axes)
+        self.widest = 0.5 * packing.radius.min() * self.points
+        self.chains = self._chains(axes, color)
+        sides = [self.view.left, self.view.right]
+        axes.fill_between(sides, self.view.bottom, 0, color=FLOOR, linewidth=0, zorder=4, label="floor")
+        if packing.box_length is not None:
+            axes.vlines(sides, 0, self.view.ceiling, colors=INK, linewidths=0.8, linestyles=(0, (3, 3)))
+
+    def move(self, displacement: Floats) -> None:
+        """Draw disks and contacts displaced from where the packing has them; length, shape (N, 2)."""
+        view, contacts = self.view, self.packing.contacts
+        self.disks.set_offsets(view.place + displacement[view.disk])
+        i, j = contacts.i[view.contact], contacts.j[view.contact]
+        along_floor = displacement[i] * np.array([1.0, 0.0])
+        far = np.where((j < 0)[:, None], along_floor, displacement[j])
+        self.chains.set_segments(list(np.stack([view.start + displacement[i], view.end + far], axis=1)))
+
+    @staticmethod
+    def faces(packing: Packing) -> NDArray[np.str_]:
+        """Colours of the disks, shape (N,)."""
+        hollow = np.isin(np.arange(len(packing)), packing.rattlers)
+        return np.where(hollow, "white", np.where(packing.top, UPPER, BULK))
+
+    def _disks(self, axes: Axes) -> EllipseCollection:
+        packing, disk = self.packing, self.view.disk
+        hollow = np.isin(np.arange(len(packing)), packing.rattlers)
+        faces = self.faces(packing)
+        edges = np.where(packing.top & hollow, UPPER, EDGE)
+        diameter = 2 * packing.radius[disk]
+        disks = EllipseCollection(
+            diameter,
+            diameter,
+            np.zeros(len(disk)),
+            units="xy",
+            offsets=self.view.place,
+            offset_transform=axes.transData,
+            facecolors=faces[disk],
+            edgecolors=edges[disk],
+            linewidths=min(0.6, 0.05 * self.points),
+            zorder=1,
+            label="disks",
+        )
+        axes.add_collection(disks)
+        return disks
+
+    def _chains(self, axes: Axes, color: str) -> LineCollection:
+        packing, view = self.packing, self.view
+        force = packing.normal_force
+        style: dict[str, Any] = {"colors": INK}
+        if color != "none":
+            _, values_of, scale_of, colours = COLOURS[color]
+            values = values_of(packing)
+            if values.any():
+                style = {"array": values[view.contact], "cmap": colours, "norm": scale_of(values)}
+        chains = LineCollection(
+            list(np.stack([view.start, view.end], axis=1)),
+            linewidths=self.widest * (force / force.max(initial=np.finfo(float).tiny))[view.contact],
+            capstyle="round",
+            zorder=3,
+            label="contacts",
+            **style,
+        )
+        axes.add_collection(chains)
+        return chains
+
+
+@styled
+def draw_packing(packing: Packing, axes: Axes | None = None, color: str = "mobilised", caption: bool = False) -> Figure:
+    """A packing with its force chains (the paper's figure 1).
+
+    Parameters
+    ----------
+    packing : Packing
+        Any configuration.
+    axes : Axes, optional
+        Where to draw; a figure of its own, with a legend, by default.
+    color : {"mobilised", "slip", "force", "none"}
+        What the colour of a contact shows, see the module. Arrows show where the load acts, not its size.
+    caption : bool
+        Whether load and numbers of contacts stand above, in a figure of its own.
+
+    Returns
+    -------
+    Figure
+        The one that holds the axes.
+    """
+    if color != "none" and color not in COLOURS:
+        raise ValueError(f"color = {color!r} is none of {', '.join(COLOURS)}, none.")
+    if axes is not None:
+        artist = PackingArtist(axes, packing, color)
+        _draw_load(axes, artist)
+        return figure_of(axes)
+    view = View.of(packing)
+    across = WIDTH - (0.1 if color == "none" else 0.72)  # the scale of colours takes the rest
+    height = across * (view.ceiling - view.bottom) / (view.right - view.left)
+    figure = Figure(figsize=(WIDTH, height + (0.85 if caption else 0.52)), layout="constrained")
+    if caption:
+        load, _, numbers = in_words(packing).partition(": ")
+        figure.suptitle(f"{load.replace('F_x', '$F_x$').replace('F_y', '$F_y$')}\n{numbers}", fontsize=7.5)
+    axes = figure.add_subplot()
+    artist = PackingArtist(axes, packing, color, view, points=72 * across / (view.right - view.left))
+    _draw_load(axes, artist)
+    if artist.chains.get_array() is not None:
+        bar = figure.colorbar(artist.chains, ax=axes, shrink=0.7, aspect=28, pad=0.03)
+        bar.set_label(COLOURS[color][0])
+        bar.outline.set_linewidth(0.4)
+    _add_key(figure, artist)
+    return figure
+
+
+def in_words(packing: Packing) -> str:
+    """Load, contacts, rattlers, and how many contacts slide."""
+    sliding = int(np.count_nonzero(_slip_share(packing) >= 1))
+    return (
+        f"F_x = {packing.fx:g}, F_y = {packing.fy:g}: {len(packing)} disks, {len(packing.contacts)} contacts "
+        f"({sliding} slide), {len(packing.rattlers)} rattlers"
+    )
+
+
+def _add_key(figure: Figure, artist: PackingArtist) -> None:
+    """What yellow, hollow and wide mean."""
+    packing, handles = artist.packing, []
+    if packing.top.any():
+        handles.append(Patch(facecolor=UPPER, edgecolor=EDGE, linewidth=0.6, label="upper layer"))
+    if len(packing.rattlers):
+        handles.append(Patch(facecolor="white", edgecolor=EDGE, linewidth=0.6, label="rattler (no contact)"))
+    if handles:
+        below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "ncols": 2}
+        figure.axes[0].legend(handles=handles, handlelength=1.0, handleheight=1.0, **below)
+    largest = packing.normal_force.max(initial=0.0)
+    if largest:
+        unit = 10.0 ** np.floor(np.log10(largest))
+        values = [part * unit for part in (0.5, 1, 2, 5) if part * unit <= largest]
+        bars: list[Any] = [Line2D([], [], color=INK, linewidth=artist.widest * value / largest) for value in values]
+        names = [f"$f_n = {values[0]:g}$", *(f"${value:g}$" for value in values[1:])]
+        figure.legend(bars, names, loc="outside lower center", ncols=len(values), columnspacing=1.2)
+
+
+def _draw_load(axes: Axes, artist: PackingArtist) -> None:
+    """Arrows down onto the upper layer, and one along x above it."""
+    packing, view = artist.packing, artist.view
+    if not packing.top.any():
+        return
+    x, y = packing.position[packing.top].T
+    x = x if packing.box_length is None else x % packing.box_length
+    crest = y + packing.radius[packing.top]
+    length = 1.2 * packing.radius.max()
+    style: dict[str, Any] = {
+        "angles": "xy",
+        "scale_units": "xy",
+        "scale": 1,
+        "zorder": 5,
+        "color": INK,
+        "width": 0.006,
+        "clip_on": False,
+        "in_layout": False,
+    }
+    middle = 0.5 * (view.left + view.right)
+    if packing.fy:
+        axes.quiver(x, crest + length, np.zeros_like(x), np.full_like(x, -length), **style)
+        # the label stands beside the arrow in the middle of the left half: away from the borders and from F_x
+        named = np.argmin(np.abs(x - 0.5 * (view.left + middle)))
+        axes.text(x[named] + 0.15 * length, crest[named] + 0.55 * length, "$F_y$", va="center", zorder=6)
+    if packing.fx:
+        height = view.ceiling - 0.3 * length
+        axes.quiver([middle], [height], [np.sign(packing.fx) * 2 * length], [0.0], **style)
+        axes.text(middle - 0.2 * length, height, "$F_x$", ha="right", va="center")

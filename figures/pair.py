@@ -1,0 +1,125 @@
+r"""A pair of eigenvalues over F_x: real parts that coalesce, imaginary parts that bifurcate (the paper's figure 3)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from .style import INK, styled
+
+INSET_POINTS = 8
+"""Loads beyond the onset that the inset shows."""
+
+
+@dataclass(frozen=True, eq=False)
+class PairCurve:
+    """A tracked pair of eigenvalues along a ramp.
+
+    Attributes
+    ----------
+    mu : float
+        Friction coefficient.
+    fx : ndarray, shape (n,)
+        Force on each disk of the upper layer, increasing.
+    eigenvalues : ndarray of complex, shape (n, 2)
+        Both members of the pair, 1 / time^2: two real numbers, or two complex conjugates; nan where the pair is not
+        known.
+    fx_c : float or None
+        Onset, the force at which they coalesce; None if they do not.
+    """
+
+    mu: float
+    fx: NDArray[np.float64]
+    eigenvalues: NDArray[np.complex128]
+    fx_c: float | None
+
+    @property
+    def real(self) -> NDArray[np.float64]:
+        """Real parts, the smaller one first, shape (n, 2)."""
+        return np.sort(self.eigenvalues.real, axis=1)
+
+    @property
+    def imaginary(self) -> NDArray[np.float64]:
+        """Imaginary parts, the negative one first, shape (n, 2)."""
+        return np.sort(self.eigenvalues.imag, axis=1)
+
+
+@styled
+def draw_pair(curves: Sequence[PairCurve], axes: tuple[Axes, Axes] | None = None) -> Figure:
+    """Real parts that coalesce and imaginary parts that bifurcate as F_x grows.
+
+    Parameters
+    ----------
+    curves : sequence of PairCurve
+        One for each friction coefficient. The inset shows the first one about its onset, if it has one.
+    axes : tuple of (Axes, Axes), optional
+        Where to draw real and imaginary parts; a figure of its own by default.
+
+    Returns
+    -------
+    Figure
+        Panel (a) real, panel (b) imaginary parts, both branches of a pair in one colour, dotted lines at the onsets.
+    """
+    if axes is None:
+        figure = Figure(figsize=(3.4, 4.4), layout="constrained")
+        real, imaginary = figure.subplots(2, 1, sharex=True)
+    else:
+        real, imaginary = axes
+        figure = real.get_figure(root=True)  # type: ignore[assignment]  # axes in a figure have one
+    for number, curve in enumerate(curves):
+        colour = f"C{number}"
+        real.plot(curve.fx, curve.real, color=colour)
+        imaginary.plot(curve.fx, curve.imaginary, color=colour)
+        where = "" if curve.fx_c is None else f", $F_x^c = {curve.fx_c:.5g}$"
+        real.plot([], [], color=colour, label=rf"$\mu = {curve.mu:g}${where}")
+        if curve.fx_c is not None:
+            for panel in (real, imaginary):
+                panel.axvline(curve.fx_c, color=colour, linewidth=0.6, linestyle=":")
+    real.set_ylim(_limits(curves))
+    real.legend(loc="best")
+    real.set_ylabel(r"$\mathrm{Re}\,\lambda$")
+    imaginary.set_ylabel(r"$\mathrm{Im}\,\lambda$")
+    imaginary.set_xlabel("$F_x$")
+    for panel, name in ((real, "(a)"), (imaginary, "(b)")):
+        panel.set_xlim(min(curve.fx[0] for curve in curves), max(curve.fx[-1] for curve in curves))
+        panel.set_title(name, loc="left", fontsize=8.5, pad=3)
+    imaginary.margins(y=0.1)
+    if curves[0].fx_c is not None:
+        _magnify_onset(imaginary, curves[0], curves[0].fx_c)
+    return figure
+
+
+def _limits(curves: Sequence[PairCurve]) -> tuple[float, float] | tuple[None, None]:
+    """Range of the real parts up to the onsets and while the pairs are complex: what comes after may go anywhere."""
+    shown = [
+        curve.real[(curve.fx <= (np.inf if curve.fx_c is None else curve.fx_c)) | (curve.imaginary[:, 1] > 0)]
+        for curve in curves
+    ]
+    values = np.concatenate([each.ravel() for each in shown])
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return None, None
+    margin = 0.1 * (np.ptp(values) or 1.0)
+    return float(values.min() - margin), float(values.max() + margin)
+
+
+def _magnify_onset(axes: Axes, curve: PairCurve, fx_c: float) -> None:
+    """Inset with the imaginary parts about the onset, counted from it in a power of ten."""
+    beyond = curve.fx[curve.fx > fx_c][:INSET_POINTS]
+    if not len(beyond):
+        return
+    reach = beyond[-1] - fx_c
+    near = np.abs(curve.fx - fx_c) <= 1.05 * reach
+    power = int(np.floor(np.log10(reach)))
+    from_onset = (curve.fx[near] - fx_c) / 10.0**power
+    inset = axes.inset_axes((0.13, 0.66, 0.36, 0.31))
+    inset.plot(from_onset, curve.imaginary[near], color="C0", marker="o", markersize=2, linewidth=0.7)
+    inset.axvline(0, color=INK, linewidth=0.6, linestyle=":")
+    inset.set_xlim(-1.05 * reach / 10.0**power, 1.05 * reach / 10.0**power)
+    inset.locator_params(nbins=4)
+    inset.tick_params(labelsize=6.5, pad=2)
+    inset.set_xlabel(rf"$(F_x - F_x^c)\,/\,10^{{{power}}}$", fontsize=7, labelpad=1)
+    inset.set_ylabel(r"$\mathrm{Im}\,\lambda$", fontsize=7, labelpad=1)

@@ -1,0 +1,72 @@
+"""A quantity over time, such as the mean square displacement D(t), which spans many decades."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
+from numpy.typing import ArrayLike, NDArray
+
+from .style import figure_of, panel, styled
+
+Floats = NDArray[np.float64]
+
+
+@styled
+def draw_series(
+    time: ArrayLike,
+    values: ArrayLike,
+    axes: Axes | None = None,
+    *,
+    label: str | None = None,
+    ylabel: str = "$D(t)$",
+    color: str = "C1",
+    linewidth: float = 0.8,
+) -> Figure:
+    """A positive quantity over time, on a logarithmic axis; what is not positive is not drawn.
+
+    Parameters
+    ----------
+    time, values : array_like, shape (n,)
+        The series.
+    axes : Axes, optional
+        Where to draw; a figure of its own by default.
+    label : str, optional
+        Name in the legend.
+    ylabel : str
+        Name of the quantity.
+    color : str
+        Colour of the line.
+    linewidth : float
+        Width of the line, points.
+
+    Returns
+    -------
+    Figure
+    """
+    axes = panel(axes)
+    time, values = positive(time, values, times=False)
+    axes.set_yscale("log")
+    axes.plot(time, values, color=color, linewidth=linewidth, label=label)
+    axes.set(xlabel="$t$", ylabel=ylabel)
+    axes.margins(x=0)
+    return figure_of(axes)
+
+
+def positive(x: ArrayLike, y: ArrayLike, times: bool = True) -> tuple[Floats, Floats]:
+    """The points that logarithmic axes can show; with times = False the first axis is linear."""
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    seen = ((x > 0) | (not times)) & (y > 0)
+    return x[seen], y[seen]
+
+
+def few_decades(axes: Axes, count: int = 7) -> None:
+    """Ticks at decades that have room, on the axes that are logarithmic."""
+    for axis in (axes.xaxis, axes.yaxis):
+        if axis.get_scale() == "log":
+            axis.set_major_locator(LogLocator(numticks=count))
+
+
+def scientific(value: float, digits: int = 1) -> str:
+    """1.2 x 10^-3 for mathtext."""
+    exponent = int(np.floor(np.log10(value)))
+    return rf"{value / 10.0**exponent:.{digits}f} \times 10^{{{exponent}}}"

@@ -1,0 +1,73 @@
+"""One look for every figure: the style sheet, the colours that carry a meaning, and files that repeat to the byte.
+
+Figures have a white ground of their own, also where the page around them is dark.
+"""
+
+from importlib.resources import files
+from pathlib import Path
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+
+STYLE = str(files(__package__) / "faultgouge.mplstyle")
+
+BULK, UPPER, EDGE, FLOOR, INK = "#dfe5ea", "#f2c14e", "#8a949c", "#c0392b", "#333333"
+
+MOBILIZATION = LinearSegmentedColormap.from_list("mobilization", ["#14213d", "#3d6a9e", "#b56576", "#f07d1a"])
+
+styled = matplotlib.rc_context(fname=STYLE)
+"""Decorator: what the function draws is drawn in the style, and no setting leaks out."""
+
+
+def panel(axes: Axes | None, **size: tuple[float, float]) -> Axes:
+    """The axes that were given, or those of a new figure.
+
+    Parameters
+    ----------
+    axes : Axes or None
+        Where to draw.
+    **size
+        figsize of a new figure, inches.
+    """
+    if axes is not None:
+        return axes
+    return Figure(layout="constrained", **size).add_subplot()  # type: ignore[arg-type]
+
+
+def figure_of(axes: Axes) -> Figure:
+    """The figure, itself or through subfigures, that holds the axes."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    return figure
+
+
+@styled
+def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
+    """Write a figure as PNG (200 dots an inch) and SVG, the same bytes for the same figure.
+
+    Parameters
+    ----------
+    figure : Figure
+        What to write.
+    stem : str or Path
+        Path without ending; its folder exists.
+
+    Returns
+    -------
+    tuple of Path
+        The PNG and the SVG.
+    """
+    stem = Path(stem)
+    png, svg = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".svg")
+    for path in (png, svg):
+        save_as(figure, path)
+    return png, svg
+
+
+@styled
+def save_as(figure: Figure, path: Path) -> None:
+    """Write a figure in the format that its name ends in: png, svg or pdf; the same bytes for the same figure."""
+    dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+    figure.savefig(path, metadata=dates.get(path.suffix.lower()))

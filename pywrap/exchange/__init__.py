@@ -1,0 +1,25 @@
+"""Packings from and to other codes: LAMMPS, GSD, extended XYZ, CSV, VTK.
+
+`readers` says which module reads which file. A reader returns `Disks`, plain columns; `packing_of` makes a packing of
+them, `upper_layer` finds the layer that carries the load, `resting` brings to rest what is out of balance. `writers`
+says which module writes which file.
+"""
+
+from .disks import Disks, Slips, packing_of
+from .layer import upper_layer
+from .quantities import ModeVectors
+from .readers import format_of, known_formats, read_disks
+from .writers import WRITERS, write_packing
+
+__all__ = [
+    "WRITERS",
+    "Disks",
+    "ModeVectors",
+    "Slips",
+    "format_of",
+    "known_formats",
+    "packing_of",
+    "read_disks",
+    "upper_layer",
+    "write_packing",
+]

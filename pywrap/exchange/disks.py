@@ -1,0 +1,307 @@
+"""Disks as a file of another code has them, and the packing that they are under a law and a load.
+
+Readers find columns; `of_columns` gives them their meaning, whatever the format calls them. What a file does not say
+is taken as follows: mass 1, angle 0, slips 0, open sides. Numbers that no packing has are refused here, once for all
+formats: disks out of the plane, below the floor, or with a centre inside of another disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ...analysis import FLOOR, BadInputError, Contacts, MindlinLaw, Packing, PackingFileError, nearest_image, touching
+
+Floats = NDArray[np.float64]
+T = TypeVar("T")
+
+FLAT = 1e-6
+"""Spread of z up to which disks lie in a plane, in smallest radii: text with seven digits, or float32, leaves less."""
+
+NAMES = {
+    "x": ("x", "xu"),
+    "y": ("y", "yu"),
+    "radius": ("radius", "r"),
+    "mass": ("mass", "m"),
+    "angle": ("angle", "theta", "d_theta"),
+    "type": ("type",),
+    "id": ("id",),
+    "top": ("top",),
+}
+"""What a column may be called; further ones (diameter, density, x_low, y_low) have one name alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class Slips:
+    """Slips of contacts, by the IDs of their disks.
+
+    Attributes
+    ----------
+    first, second : ndarray of int, shape (C,)
+        IDs; a second ID of 0 is the floor.
+    slip : ndarray, shape (C,)
+        Along tau, length.
+    low : ndarray, shape (C,), or None
+        Their low parts.
+    complete : bool
+        Whether these are all contacts. Otherwise all that touches is in contact, and what is not listed has no slip.
+    """
+
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+    slip: Floats
+    low: Floats | None = None
+    complete: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Disks:
+    """What a file says about disks, sorted by ID.
+
+    Attributes
+    ----------
+    source : str
+        The file, and where in it.
+    position : ndarray, shape (N, 2)
+        Centres, length.
+    radius : ndarray, shape (N,)
+        Radii, length.
+    id : ndarray of int, shape (N,)
+        IDs, as the file has them; else from 1.
+    mass, angle, kind, top, position_low : ndarray or None
+        Mass, orientation, type, whether a disk is of the upper layer, low parts of the centres; None if not there.
+    box_length : float or None
+        Period along x; None where the sides are open.
+    slips : Slips or None
+        None if the file has none.
+    given : mapping
+        Law, load and inertia, as far as the file has them: kn, kt, mu, exponent, cn, ct, tau, fx, fy, inertia_factor.
+    groups : mapping
+        Groups of disks by name, as booleans.
+    remark : str
+        What the format has lost; empty for nothing.
+    """
+
+    source: str
+    position: Floats
+    radius: Floats
+    id: NDArray[np.int64]
+    mass: Floats | None = None
+    angle: Floats | None = None
+    kind: NDArray[np.int64] | None = None
+    top: NDArray[np.bool_] | None = None
+    position_low: Floats | None = None
+    box_length: float | None = None
+    slips: Slips | None = None
+    given: Mapping[str, float] = field(default_factory=dict)
+    groups: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    remark: str = ""
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    def above(self, floor: float) -> Disks:
+        """The disks with a floor at another height moved to y = 0."""
+        return self if floor == 0 else replace(self, position=self.position - (0.0, floor))
+
+
+def of_columns(source: str, columns: Mapping[str, Floats], **more: object) -> Disks:
+    """Disks from columns of numbers.
+
+    Parameters
+    ----------
+    source : str
+        The file, and where in it, for messages.
+    columns : mapping of ndarray, each of shape (N,)
+        By the names of `NAMES`; diameter stands for radius, and density is that of a sphere, as in LAMMPS.
+    **more
+        Further fields of :class:`Disks`.
+
+    Raises
+    ------
+    PackingFileError
+        If a column is missing, or holds what it cannot hold.
+    """
+    found = {name: next((columns[each] for each in names if each in columns), None) for name, names in NAMES.items()}
+    if found["radius"] is None and "diameter" in columns:
+        found["radius"] = 0.5 * columns["diameter"]
+    for name in ("x", "y", "radius"):
+        if found[name] is None:
+            has = ", ".join(columns) or "none"
+            also = " or diameter" if name == "radius" else ""
+            raise PackingFileError(f"{source} has no column {name}{also} (its columns: {has}): write it with one.")
+    count = len(_there(found["x"]))
+    ids = np.arange(1, count + 1) if found["id"] is None else _whole(source, "id", found["id"])
+    _check_numbers(source, columns, ids)
+    _check_plane(source, columns, _there(found["radius"]))
+    order = np.argsort(ids, kind="stable")
+    ids = ids[order]
+    twice = ids[1:][ids[1:] == ids[:-1]]
+    if len(twice):
+        raise PackingFileError(f"{source} has disk {twice[0]} twice: give each disk an ID of its own.")
+    sorted_ = {name: None if column is None else column[order] for name, column in found.items()}
+    mass = sorted_["mass"]
+    if mass is None and "density" in columns:
+        mass = columns["density"][order] * sphere_volume(_there(sorted_["radius"]))
+    low = None
+    if "x_low" in columns and "y_low" in columns:
+        low = np.column_stack([columns["x_low"], columns["y_low"]])[order]
+    kind, top = sorted_["type"], sorted_["top"]
+    return Disks(
+        source,
+        np.column_stack([_there(sorted_["x"]), _there(sorted_["y"])]),
+        _there(sorted_["radius"]),
+        ids,
+        mass,
+        sorted_["angle"],
+        None if kind is None else _whole(source, "type", kind),
+        None if top is None else top != 0,
+        low,
+        **more,  # type: ignore[arg-type]
+    )
+
+
+def sphere_volume(radius: Floats) -> Floats:
+    """Volume of a sphere in the very order of LAMMPS's operations, so that masses are those of LAMMPS to the bit."""
+    return 4.0 * np.pi / 3.0 * radius * radius * radius
+
+
+def packing_of(
+    disks: Disks,
+    law: MindlinLaw,
+    top: NDArray[np.bool_],
+    *,
+    fx: float = 0.0,
+    fy: float = 0.0,
+    inertia_factor: float = 1.0,
+    drag_time: float | None = None,
+) -> Packing:
+    """The packing that disks are under a law and a load.
+
+    Parameters
+    ----------
+    disks : Disks
+        From a reader.
+    law : MindlinLaw
+        Of all contacts.
+    top : ndarray of bool, shape (N,)
+        The upper layer.
+    fx, fy, inertia_factor, drag_time : float
+        As of :class:`~faultgouge.analysis.Packing`.
+
+    Raises
+    ------
+    PackingFileError
+        If the disks lie below the floor or in one another, or form no packing.
+    """
+    _check_places(disks)
+    try:
+        return Packing(
+            position=disks.position,
+            radius=disks.radius,
+            contacts=_contacts(disks, law),
+            law=law,
+            angle=disks.angle,  # type: ignore[arg-type]  # None is the default
+            mass=disks.mass,  # type: ignore[arg-type]
+            inertia_factor=inertia_factor,
+            box_length=disks.box_length,
+            top=top,
+            fx=fx,
+            fy=fy,
+            position_low=disks.position_low,
+            drag_time=drag_time,
+        )
+    except ValueError as error:
+        raise PackingFileError(f"{disks.source} describes no possible packing: {error}") from error
+
+
+def _contacts(disks: Disks, law: MindlinLaw) -> Contacts:
+    near = touching(disks.position, disks.radius, disks.box_length)
+    slips = disks.slips
+    if slips is None or not law.frictional:
+        return near
+    i, j = (_index(disks, each) for each in (slips.first, slips.second))
+    i, j = np.where(i == FLOOR, j, i), np.where(i == FLOOR, i, j)
+    listed = Contacts(i, j, slips.slip, slips.low)
+    if slips.complete:
+        return listed
+    known = {pair: k for k, pair in enumerate(zip(listed.i.tolist(), listed.j.tolist(), strict=True))}
+    where = [known.get(pair, -1) for pair in zip(near.i.tolist(), near.j.tolist(), strict=True)]
+    return near.slipped(np.where(np.array(where) >= 0, np.append(listed.slip, 0.0)[where], 0.0))
+
+
+def _index(disks: Disks, ids: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Indices of IDs; 0 is the floor."""
+    where = np.minimum(np.searchsorted(disks.id, ids), len(disks) - 1)
+    strange = (disks.id[where] != ids) & (ids != 0)
+    if strange.any():
+        raise PackingFileError(f"{disks.source}: a contact names disk {ids[strange][0]}, which is not there.")
+    return np.where(ids == 0, FLOOR, where)
+
+
+def _check_numbers(source: str, columns: Mapping[str, Floats], ids: NDArray[np.int64]) -> None:
+    for name, column in columns.items():
+        odd = ~np.isfinite(column)
+        if odd.any():
+            raise PackingFileError(f"{source}: {name} of disk {ids[odd][0]} is {column[odd][0]:g}, which is no number.")
+    for name in ("radius", "r", "diameter", "mass", "density"):
+        odd = columns.get(name, np.ones(1)) <= 0
+        if odd.any():
+            value = f"{columns[name][odd][0]:g}"
+            raise PackingFileError(f"{source}: {name} of disk {ids[odd][0]} is {value}: it must be above 0.")
+
+
+def _check_plane(source: str, columns: Mapping[str, Floats], radius: Floats) -> None:
+    z = columns.get("z", columns.get("zu"))
+    if z is not None and len(z) and np.ptp(z) > FLAT * radius.min():
+        raise PackingFileError(
+            f"{source} is of three dimensions: z goes from {z.min():g} to {z.max():g}, and disks lie in a plane; "
+            "give a run of dimension 2."
+        )
+
+
+def _check_places(disks: Disks) -> None:
+    below = disks.position[:, 1] <= 0
+    if below.any():
+        raise PackingFileError(
+            f"{disks.source}: the centre of disk {disks.id[below][0]} is at y = {disks.position[below][0, 1]:g}, and "
+            "the floor is y = 0: say with --floor at which y it is."
+        )
+    pairs = _near(disks)
+    apart = nearest_image(disks.position[pairs[:, 0]] - disks.position[pairs[:, 1]], disks.box_length)
+    distance = np.hypot(*apart.T)
+    inside = distance < np.maximum(*disks.radius[pairs].T)
+    if inside.any():
+        a, b = disks.id[pairs[inside][0]]
+        raise PackingFileError(
+            f"{disks.source}: disks {a} and {b} are {distance[inside][0]:g} apart, so that the centre of one lies in "
+            "the other: the law is that of small overlaps; separate them."
+        )
+
+
+def _near(disks: Disks) -> NDArray[np.int64]:
+    """Pairs of centres that are closer than the largest radius, shape (P, 2)."""
+    place = disks.position.copy()
+    box = None
+    if disks.box_length is not None:
+        place[:, 0] %= disks.box_length
+        place[place[:, 0] >= disks.box_length, 0] = 0.0
+        box = [disks.box_length, 0.0]
+    return np.asarray(cKDTree(place, boxsize=box).query_pairs(float(disks.radius.max()), output_type="ndarray"))
+
+
+def _whole(source: str, name: str, column: Floats) -> NDArray[np.int64]:
+    if not np.array_equal(column, np.rint(column)) or (name == "id" and np.any(column < 1)):
+        raise PackingFileError(f"{source}: the column {name} must hold whole numbers{' from 1' * (name == 'id')}.")
+    return column.astype(np.int64)
+
+
+def _there(value: T | None) -> T:
+    if value is None:
+        raise BadInputError("a column is missing.")
+    return value

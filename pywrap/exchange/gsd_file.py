@@ -1,0 +1,111 @@
+"""GSD, HOOMD's format, in and out, by the library gsd.
+
+GSD keeps positions, diameters, masses and orientations in float32, too coarse for overlaps. An export has them in
+float64 besides, among the logged quantities (``log/particles/faultgouge/...``), which `import` prefers; other readers
+see float32. The y axis of a GSD box has its middle at zero; an export says where the floor is.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...analysis import Packing, PackingFileError
+from .disks import Disks, of_columns
+from .needs import needed_library
+from .quantities import ModeVectors, disk_force, disk_mobilised, disk_pressure
+from .record import contact_rows, given, scalars, slips_of
+
+OWN = "particles/faultgouge/"
+CONTACTS = "faultgouge/contacts"
+SINGLE = "GSD keeps positions and radii in float32, about 1e-7 of a coordinate: overlaps are lost below that"
+
+
+def read_gsd(path: Path, frame: int | None = None) -> Disks:
+    """A frame of a GSD file; the last one by default, if all are of as many disks."""
+    hoomd = needed_library("gsd.hoomd", path)
+    try:
+        with hoomd.open(str(path), "r") as file:
+            counts = [file[k].particles.N for k in (range(len(file)) if frame is None else ())]
+            if len(set(counts)) > 1:
+                raise PackingFileError(
+                    f"{path} has frames with {min(counts)} and {max(counts)} disks: choose one with --frame."
+                )
+            wanted = -1 if frame is None else frame
+            if not -len(file) <= wanted < len(file):
+                raise PackingFileError(f"{path} has {len(file)} frames; there is no --frame {wanted}.")
+            return _disks(path, file[wanted % len(file)])
+    except (OSError, RuntimeError) as error:
+        raise PackingFileError(f"{path} is no readable GSD file: {error}.") from error
+
+
+def _disks(path: Path, frame: Any) -> Disks:
+    log, particles, box = frame.log, frame.particles, frame.configuration.box
+    own = {key.removeprefix(OWN): np.asarray(value) for key, value in log.items() if key.startswith(OWN)}
+    if "x" in own:
+        columns = {name: array.astype(np.float64) for name, array in own.items()}
+        values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
+        period = values.get("box_length")
+        rows = np.asarray(log[CONTACTS], dtype=np.float64).reshape(-1, 4 if "x_low" in columns else 3)
+        return of_columns(
+            str(path),
+            columns,
+            box_length=None if period is None else float(period),
+            given=given(values),
+            slips=slips_of(rows[rows[:, 0] > 0]),
+        )
+    if particles.diameter is None or not particles.N:
+        raise PackingFileError(f"{path} has no disks with diameters.")
+    place = np.asarray(particles.position, dtype=np.float64)
+    turn = np.asarray(particles.orientation, dtype=np.float64)
+    columns = dict(zip("xyz", place.T, strict=True)) | {
+        "diameter": np.asarray(particles.diameter, dtype=np.float64),
+        "mass": np.asarray(particles.mass, dtype=np.float64),
+        "type": 1.0 + np.asarray(particles.typeid, dtype=np.float64),
+        "angle": 2 * np.arctan2(turn[:, 3], turn[:, 0]),
+    }
+    return of_columns(str(path), columns, box_length=float(box[0]), remark=SINGLE)
+
+
+def write_gsd(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
+    """A GSD file with one frame; what is in it, in words."""
+    hoomd = needed_library("gsd.hoomd", path)
+    frame, n, force = hoomd.Frame(), len(packing), disk_force(packing)
+    x, y = packing.position.T
+    box = packing.box_length
+    width = box if box is not None else 2 * (np.abs(x).max() + packing.radius.max())
+    height = 2 * (y + packing.radius).max()  # so that y = 0 is in the middle, and the floor stays there
+    frame.configuration.box = [width, height, 0, 0, 0, 0]
+    frame.configuration.dimensions = 2
+    particles = frame.particles
+    particles.N, particles.types = n, ["bed", "top"]
+    shifted = x - width * np.floor(x / width + 0.5) if box is not None else x
+    particles.position = np.column_stack([shifted, y, np.zeros(n)])
+    particles.diameter, particles.mass = 2 * packing.radius, packing.mass
+    particles.typeid = packing.top.astype(np.uint32)
+    half = 0.5 * packing.angle
+    particles.orientation = np.column_stack([np.cos(half), np.zeros((n, 2)), np.sin(half)])
+    particles.moment_inertia = np.column_stack(
+        [np.zeros((n, 2)), packing.inertia_factor * packing.mass * packing.radius**2]
+    )
+    columns = {"x": x, "y": y, "radius": packing.radius, "mass": packing.mass, "angle": packing.angle}
+    columns |= {"top": packing.top.astype(np.float64)}
+    if packing.position_low is not None:
+        columns |= {"x_low": packing.position_low[:, 0], "y_low": packing.position_low[:, 1]}
+    frame.log = {OWN + name: np.ascontiguousarray(column, dtype=np.float64) for name, column in columns.items()}
+    # gsd has no empty arrays: a row of zeros stands for no contact
+    rows = contact_rows(packing)
+    frame.log[CONTACTS] = rows if len(rows) else np.zeros((1, 4 if packing.compensated else 3))
+    numbers = scalars(packing) | ({} if box is None else {"box_length": box})
+    frame.log |= {f"faultgouge/{key}": np.array([value], dtype=np.float64) for key, value in numbers.items()}
+    frame.log["particles/net_force"] = np.ascontiguousarray(np.column_stack([force[:, :2], np.zeros(n)]))
+    frame.log["particles/normal_force"] = disk_pressure(packing)
+    frame.log["particles/mobilised"] = disk_mobilised(packing)
+    for mode in modes:
+        frame.log[f"particles/{mode.name}"] = np.ascontiguousarray(mode.displacement.real.T)
+        frame.log[f"particles/{mode.name}_imag"] = np.ascontiguousarray(mode.displacement.imag.T)
+    with hoomd.open(str(path), "w") as file:
+        file.append(frame)
+    return f"{SINGLE}; the logged quantities have all of the packing in float64, and import takes these"

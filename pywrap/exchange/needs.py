@@ -1,0 +1,24 @@
+"""Libraries that one format needs, imported when a file of that format is met."""
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from ...analysis import BadInputError
+
+
+def needed_library(module: str, path: Path) -> Any:
+    """A module of the extra `export`.
+
+    Raises
+    ------
+    BadInputError
+        If it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        library = module.split(".")[0]
+        raise BadInputError(
+            f"{path} needs the library {library}, which is not installed: pip install 'faultgouge[export]'."
+        ) from None

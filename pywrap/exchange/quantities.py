@@ -1,0 +1,66 @@
+"""What exports show of disks and contacts beside what a packing is: forces, mobilised friction, modes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis import Packing
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ModeVectors:
+    """A mode of a packing for an export.
+
+    Attributes
+    ----------
+    name : str
+        Of its fields.
+    eigenvalue : complex
+        lambda, 1 / time^2.
+    displacement : ndarray of complex, shape (3, N)
+        x, y and R theta.
+    """
+
+    name: str
+    eigenvalue: complex
+    displacement: NDArray[np.complex128]
+
+
+def contact_force(packing: Packing) -> Floats:
+    """f_n n + f_t tau, the force on the first partner of each contact, shape (C, 2)."""
+    g = packing.geometry
+    return packing.normal_force[:, None] * g.normal + packing.tangential_force[:, None] * g.tangent
+
+
+def contact_mobilised(packing: Packing) -> Floats:
+    """|f_t|/(mu f_n) of each contact, shape (C,); zero without friction."""
+    limit = packing.law.mu * packing.normal_force
+    return np.divide(np.abs(packing.tangential_force), limit, out=np.zeros_like(limit), where=limit > 0)
+
+
+def disk_force(packing: Packing) -> Floats:
+    """Net force on each disk, load included, and torque over radius, shape (N, 3)."""
+    return packing.net_force.reshape(3, -1).T
+
+
+def disk_pressure(packing: Packing) -> Floats:
+    """Sum of the normal forces on each disk, shape (N,)."""
+    total = np.zeros(len(packing))
+    pair = ~packing.contacts.floor
+    np.add.at(total, packing.contacts.i, packing.normal_force)
+    np.add.at(total, packing.contacts.j[pair], packing.normal_force[pair])
+    return total
+
+
+def disk_mobilised(packing: Packing) -> Floats:
+    """The largest |f_t|/(mu f_n) of the contacts of each disk, shape (N,)."""
+    largest = np.zeros(len(packing))
+    pair, share = ~packing.contacts.floor, contact_mobilised(packing)
+    np.maximum.at(largest, packing.contacts.i, share)
+    np.maximum.at(largest, packing.contacts.j[pair], share[pair])
+    return largest

@@ -1,0 +1,109 @@
+"""Which reader takes which file, by its suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import NamedTuple
+
+from ...analysis import PackingFileError
+from .disks import Disks
+
+
+class Format(NamedTuple):
+    """A format that is read.
+
+    Attributes
+    ----------
+    words : str
+        What it is.
+    module, reader : str
+        The module of this package, and the function in it.
+    frames : bool
+        Whether a file may hold several frames.
+    """
+
+    words: str
+    module: str
+    reader: str
+    frames: bool
+
+
+DATA = Format("LAMMPS data (atom style sphere)", "data", "read_data", False)
+DUMP = Format("LAMMPS dump", "dump", "read_custom_dump", True)
+RESTART = Format("LAMMPS restart", "restart", "read_restart", False)
+OTHER = Format("what MDAnalysis reads with radii", "universe", "read_universe", True)
+
+FORMATS: dict[str, Format] = {
+    ".disks": Format("dumps of the decks", "dump", "read_deck_dump", True),
+    ".data": DATA,
+    ".dump": DUMP,
+    ".lammpstrj": DUMP,
+    ".restart": RESTART,
+    ".csv": Format("CSV", "table", "read_table", False),
+    ".xyz": Format("extended XYZ", "xyz", "read_xyz", True),
+    ".extxyz": Format("extended XYZ", "xyz", "read_xyz", True),
+    ".json": Format("packing.json", "json_file", "read_json", False),
+    ".gsd": Format("GSD", "gsd_file", "read_gsd", True),
+}
+"""By suffix. LAMMPS has no suffixes of its own: data.NAME, dump.NAME and restart.NAME are known as well."""
+
+
+def known_formats() -> str:
+    """All formats that are read, in words."""
+    words: dict[str, list[str]] = {}
+    for suffix, each in FORMATS.items():
+        words.setdefault(each.words, []).append(suffix)
+    listed = [f"{what} ({', '.join(suffixes)})" for what, suffixes in words.items()]
+    return ", ".join([*listed, "run.h5", f"and {OTHER.words} (pip install 'faultgouge[export]')"])
+
+
+def format_of(path: Path) -> Format:
+    """The format of a file, by its suffix, or by its beginning as LAMMPS's users name files.
+
+    Raises
+    ------
+    PackingFileError
+        If no reader takes it.
+    """
+    from .restart import is_restart
+
+    if path.suffix.lower() in FORMATS:
+        return FORMATS[path.suffix.lower()]
+    begin = path.name.split(".")[0].lower()
+    if is_restart(path):
+        return RESTART
+    if begin in ("data", "dump"):
+        return DATA if begin == "data" else DUMP
+    from .universe import known
+
+    if path.suffix and known(path):
+        return OTHER
+    raise PackingFileError(f"{path} is of no format that is read: give {known_formats()}.")
+
+
+def read_disks(path: Path, frame: int | None = None) -> Disks:
+    """Disks of a file of another code.
+
+    Parameters
+    ----------
+    path : Path
+        The file; see `known_formats`.
+    frame : int, optional
+        Which of several frames; negative ones count from the last.
+
+    Raises
+    ------
+    PackingFileError
+        If the file is missing, is of no known format, or does not hold disks in a plane.
+    """
+    if not path.is_file():
+        raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
+    found = format_of(path)
+    reader: Callable[..., Disks] = getattr(import_module(f".{found.module}", __package__), found.reader)
+    if found.frames:
+        return reader(path, frame)
+    if frame not in (None, 0, -1):
+        raise PackingFileError(f"{path} has one frame; there is no --frame {frame}.")
+    return reader(path)

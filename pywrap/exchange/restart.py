@@ -1,0 +1,72 @@
+"""LAMMPS restart files, read by LAMMPS itself: disks, their masses, types and groups.
+
+Slips are not taken: another pair style's are of another law, and those of a deck's own restart are in the dumps that
+write.in makes.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ...analysis import PackingFileError
+from ..instance import lammps_instance
+from .disks import Disks, of_columns
+
+MAGIC = b"LammpS RestartT"
+
+
+def is_restart(path: Path) -> bool:
+    """Whether a file begins as LAMMPS restarts do."""
+    try:
+        with path.open("rb") as stream:
+            return stream.read(len(MAGIC)) == MAGIC
+    except OSError:
+        return False
+
+
+def read_restart(path: Path) -> Disks:
+    """Disks of a restart."""
+    if not is_restart(path):
+        raise PackingFileError(f"{path} is no LAMMPS restart file, or cannot be read.")
+    lammps = lammps_instance(MPI.COMM_SELF, None)
+    try:
+        lammps.command("atom_modify map yes")
+        lammps.command(f'read_restart "{path}"')
+    except Exception as error:  # the LAMMPS module raises plain Exception
+        says = str(error).splitlines()[0].removeprefix("ERROR: ")
+        lammps.close()
+        raise PackingFileError(f"{path} is not read by LAMMPS {_version()}: {says}.") from error
+    try:
+        count = lammps.extract_global("nlocal")
+        per_disk = {"id": "id", "type": "type", "radius": "radius", "mass": "rmass"}
+        found = {name: lammps.numpy.extract_atom(atom) for name, atom in per_disk.items()}
+        if found["radius"] is None or found["mass"] is None:
+            raise PackingFileError(f"{path} has no radii: it must be of a run with atom_style sphere.")
+        columns = {name: np.array(column[:count], dtype=np.float64).ravel() for name, column in found.items()}
+        place = np.array(lammps.numpy.extract_atom("x")[:count], dtype=np.float64)
+        columns |= dict(zip("xyz", place.T, strict=True))
+        low, high, _, _, _, periodic, _ = lammps.extract_box()
+        groups = _groups(lammps, np.argsort(columns["id"]))
+        return of_columns(str(path), columns, box_length=high[0] - low[0] if periodic[0] else None, groups=groups)
+    finally:
+        lammps.close()
+
+
+def _groups(lammps: Any, order: NDArray[np.intp]) -> dict[str, NDArray[np.bool_]]:
+    """Members of the groups, sorted by ID."""
+    groups = {}
+    for name in filter(None, lammps.available_ids("group")):
+        lammps.command(f"variable member atom gmask({name})")
+        groups[name] = np.array(lammps.extract_variable("member"))[: len(order)][order] != 0
+    return groups
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("lammps")

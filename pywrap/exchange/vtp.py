@@ -1,0 +1,120 @@
+"""VTK PolyData (.vtp), for ParaView: disks as vertices, contacts as lines, modes as vectors; full precision.
+
+Points are the N centres, and behind them two ends for each contact: the centre of its first disk, and that of the
+second one's nearest image, or the foot on the floor. So a contact across the periodic boundary is a short line, and not
+one across the box. Cells are N vertices, then the lines. What a point or a cell has no value for is nan, and the radius
+of an end is 0. The file is XML with arrays in base64 (VTK file formats, "XML file formats", header type UInt64).
+"""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis import Packing
+from .quantities import ModeVectors, contact_force, contact_mobilised, disk_force, disk_mobilised, disk_pressure
+from .record import scalars
+
+Element = ElementTree.Element
+
+TYPES = {"f": "Float64", "i": "Int64"}
+
+
+def write_vtp(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
+    """A .vtp file; what is in it, in words."""
+    n, count = len(packing), len(packing.contacts)
+    root = Element("VTKFile", type="PolyData", version="1.0", byte_order="LittleEndian", header_type="UInt64")
+    data = ElementTree.SubElement(root, "PolyData")
+    fields = ElementTree.SubElement(data, "FieldData")
+    numbers = scalars(packing) | ({} if packing.box_length is None else {"box_length": packing.box_length})
+    numbers |= {f"{mode.name}_eigenvalue": mode.eigenvalue.real for mode in modes}
+    numbers |= {f"{mode.name}_eigenvalue_imag": mode.eigenvalue.imag for mode in modes}
+    for name, value in numbers.items():
+        _array(fields, name, np.array([value]))
+    sizes = {"NumberOfPoints": n + 2 * count, "NumberOfVerts": n, "NumberOfLines": count}
+    none = {"NumberOfStrips": 0, "NumberOfPolys": 0}
+    piece = ElementTree.SubElement(data, "Piece", {key: str(value) for key, value in (sizes | none).items()})
+    on_points = ElementTree.SubElement(piece, "PointData")
+    for name, values in _of_disks(packing, modes).items():
+        fill = 0.0 if name == "radius" else np.nan
+        _array(on_points, name, _padded(values, 2 * count, fill, behind=True))
+    on_cells = ElementTree.SubElement(piece, "CellData")
+    for name, values in _of_contacts(packing).items():
+        _array(on_cells, name, _padded(values, n, np.nan, behind=False))
+    _array(ElementTree.SubElement(piece, "Points"), "Points", _points(packing))
+    _cells(piece, "Verts", np.arange(n), 1)
+    _cells(piece, "Lines", n + np.arange(2 * count), 2)
+    ElementTree.ElementTree(root).write(path, xml_declaration=True, encoding="utf-8")
+    return f"{n} disks and {count} contacts, in float64"
+
+
+def _of_disks(packing: Packing, modes: list[ModeVectors]) -> dict[str, NDArray]:
+    force = disk_force(packing)
+    values = {
+        "radius": packing.radius,
+        "mass": packing.mass,
+        "angle": packing.angle,
+        "top": packing.top.astype(np.float64),
+        "net_force": _in_space(force[:, :2]),
+        "torque_over_radius": force[:, 2],
+        "normal_force": disk_pressure(packing),
+        "mobilised": disk_mobilised(packing),
+    }
+    for mode in modes:
+        for part, moved in (("", mode.displacement.real), ("_imag", mode.displacement.imag)):
+            if not part or np.any(moved):
+                values[f"{mode.name}{part}"] = _in_space(moved[:2].T)
+                values[f"{mode.name}{part}_rotation"] = moved[2]
+    return values
+
+
+def _of_contacts(packing: Packing) -> dict[str, NDArray]:
+    contacts = packing.contacts
+    return {
+        "contact_i": contacts.i.astype(np.float64),
+        "contact_j": contacts.j.astype(np.float64),
+        "contact_force": _in_space(contact_force(packing)),
+        "contact_normal_force": packing.normal_force,
+        "contact_tangential_force": packing.tangential_force,
+        "contact_slip": contacts.slip,
+        "contact_overlap": packing.geometry.overlap,
+        "contact_mobilised": contact_mobilised(packing),
+    }
+
+
+def _points(packing: Packing) -> NDArray:
+    geometry, i = packing.geometry, packing.contacts.i
+    first = packing.position[i]
+    second = first - geometry.distance[:, None] * geometry.normal
+    return _in_space(np.concatenate([packing.position, np.stack([first, second], axis=1).reshape(-1, 2)]))
+
+
+def _in_space(vectors: NDArray) -> NDArray:
+    return np.column_stack([vectors, np.zeros(len(vectors))])
+
+
+def _padded(values: NDArray, missing: int, fill: float, *, behind: bool) -> NDArray:
+    rows = np.full((missing, *values.shape[1:]), fill)
+    return np.concatenate([values, rows] if behind else [rows, values])
+
+
+def _cells(piece: Element, name: str, points: NDArray, size: int) -> None:
+    cells = ElementTree.SubElement(piece, name)
+    _array(cells, "connectivity", points.astype(np.int64))
+    _array(cells, "offsets", size * np.arange(1, len(points) // size + 1, dtype=np.int64))
+
+
+def _array(parent: Element, name: str, values: NDArray) -> None:
+    kind = {"type": TYPES[values.dtype.kind], "Name": name, "format": "binary"}
+    if values.ndim > 1:
+        kind["NumberOfComponents"] = str(values.shape[1])
+    if parent.tag == "FieldData":
+        kind["NumberOfTuples"] = str(len(values))
+    content = np.ascontiguousarray(values, dtype="<f8" if values.dtype.kind == "f" else "<i8").tobytes()
+    size = np.array([len(content)], dtype="<u8").tobytes()
+    # one base64 text of size and content
+    ElementTree.SubElement(parent, "DataArray", kind).text = base64.b64encode(size + content).decode()

@@ -1,0 +1,5 @@
+"""``python -m faultgouge``."""
+
+from .cli import main
+
+main()

@@ -1,0 +1,197 @@
+"""Eigenvalues of a packing, and where they become complex: spectrum, onset."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..ranks import is_root
+from .terminal import AsJson, ScenePath, print_json, read_scene, say, status, stored_packing
+
+if TYPE_CHECKING:
+    from ..analysis import Packing, Window
+    from ..pywrap import Scene
+
+app = typer.Typer()
+
+
+@app.command(epilog="Example: [bold]faultgouge spectrum run.h5 --json[/bold]")
+def spectrum(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.")],
+    frame: Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")] = -1,
+    as_json: AsJson = False,
+) -> None:
+    """Eigenvalues of a stored packing, its complex pairs and its rattlers."""
+    from faultgouge.analysis import spectrum as eigenvalues_of
+
+    packing = stored_packing(file, frame)
+    result = eigenvalues_of(packing)
+    gain = _gain_of(packing)
+    pairs: list[dict[str, Any]] = [
+        {
+            "eigenvalue": [pair.eigenvalue.real, pair.eigenvalue.imag],
+            "condition": pair.condition,
+            "overlap": pair.overlap,
+            "growth_rate": pair.growth_rate,
+            "frequency": pair.frequency,
+            "participation": pair.participation,
+            "rotation": pair.rotation,
+        }
+        for pair in result.pairs
+    ]
+    if as_json:
+        print_json(
+            {
+                "eigenvalues": [[value.real, value.imag] for value in result.eigenvalues.tolist()],
+                "pairs": pairs,
+                "rattlers": result.rattlers.tolist(),
+                "fx": packing.fx,
+                "residual": packing.residual,
+                "noise_pairs": result.noise_pairs,
+                "transient_gain": gain,
+            }
+        )
+        return
+    real = result.eigenvalues.real
+    print(
+        f"F_x = {packing.fx:g}: {len(real)} eigenvalues from {real.min():.6g} to {real.max():.6g}, "
+        f"{len(result.rattlers)} rattlers left out"
+    )
+    for pair in pairs:
+        print(
+            f"complex pair {pair['eigenvalue'][0]:.10g} +- {pair['eigenvalue'][1]:.10g} i: "
+            f"D grows as exp({pair['growth_rate']:.6g} t), |y^H x| = {pair['overlap']:.2g}"
+        )
+    if not pairs:
+        print("no complex pair: linearly stable")
+    if gain is not None:
+        print(
+            f"a start at rest grows by up to {gain['displacement']:.6g} times in |q|^2, within t = {gain['time']:.6g} "
+            f"(by up to {gain['energy']:.6g} in energy); disk {gain['disk']} is the worst to push"
+            if gain["displacement"] > 1
+            else "no start grows before it comes back"
+        )
+    if result.noise_pairs:
+        print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
+
+
+def _gain_of(packing: Packing) -> dict[str, Any] | None:
+    """The transient gains of a stable packing; None of an unstable one, and of one that is too large."""
+    from faultgouge.analysis.transient import MOST_DISKS, NoGainError, transient_gain
+
+    if len(packing) > MOST_DISKS:
+        return None
+    try:
+        displacement = transient_gain(packing)
+        energy = transient_gain(packing, "energy")
+    except NoGainError:
+        return None
+    return {
+        "displacement": displacement.gain,
+        "energy": energy.gain,
+        "time": displacement.time,
+        "window": displacement.window,
+        "bound": displacement.bound,
+        "disk": displacement.disk,
+        "direction": displacement.direction.tolist(),
+    }
+
+
+@app.command(epilog="Example: [bold]faultgouge onset paper.toml --json[/bold]")
+def onset(
+    scene: ScenePath,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Also write the JSON to this file.")] = None,
+    modes: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FIRST:STOP",
+            help="Search these modes alone, counted by frequency from 0: of 100,000 disks a part is what one has time "
+            "for. 0:600 are the 600 lowest.",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """The onset F_x^c and the windows of complex eigenvalues, for each friction coefficient of the scene.
+
+    With a section [damping]: the windows in which some motion grows in spite of
+    the dissipation, or because of it, and beside them the undamped onset.
+    """
+    from faultgouge.analysis.wholefile import check_folder, write_text
+    from faultgouge.studies.digits import with_uncertainty
+    from faultgouge.studies.onsets import onset_run
+
+    wanted, part = read_scene(scene, "onset"), None if modes is None else _modes(modes)
+    if output:
+        check_folder(output)
+    found: list[dict[str, Any]] = []
+    if wanted.damping is not None:
+        if part is not None:
+            raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
+        found = [_damped_onset(wanted, mu) for mu in wanted.law.mus]
+    for mu in wanted.law.mus if not found else ():
+        with status(f"mu = {mu:g}") as show:
+            run = onset_run(wanted, mu, modes=part, watch=partial(_under_way, show, f"mu = {mu:g}"))
+        found.append({"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond})
+        among = "" if part is None else f" among the modes {part[0]}:{part[1]}"
+        say(f"mu = {mu:g}: F_x^c = {with_uncertainty(run.onset.fx_c, run.onset.error)}{among}")
+        _show_windows(run.onset.windows)
+        for below, above in run.onset.doubtful:
+            say(
+                f"a pair was expected to become complex between F_x = {below:.6g} and {above:.6g}, and was not found: "
+                "an earlier onset may hide there; take smaller increments to be sure"
+            )
+    result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
+    if output and is_root():
+        write_text(output, json.dumps(result, indent=1) + "\n")
+    if as_json:
+        print_json(result)
+
+
+def _damped_onset(scene: Scene, mu: float) -> dict[str, Any]:
+    """The onset of a scene with dissipation, as its JSON; and what a user reads of it."""
+    from faultgouge.studies.damped_onset import damped_onset_run
+
+    with status(f"mu = {mu:g}") as show:
+        run = damped_onset_run(scene, mu, watch=partial(_under_way, show, f"mu = {mu:g}"))
+    first = run.windows[0]
+    say(
+        f"mu = {mu:g}: with dissipation F_x^c = {run.fx_c:.12g} +- {run.error:.1g} ({first.kind}, "
+        f"omega = {first.frequency:.6g})"
+    )
+    without = "none on this ramp" if run.undamped is None else f"F_x^c = {run.undamped.fx_c:.12g}"
+    say(f"mu = {mu:g}: without dissipation {without}")
+    return {"mu": mu} | run.as_dict()
+
+
+def _show_windows(windows: Sequence[Window]) -> None:
+    """The windows of complex eigenvalues as a table, on standard error."""
+    if not is_root():
+        return
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("from F_x", "to F_x", "eigenvalue", "begins with", box=box.SIMPLE_HEAD)
+    for each in windows:
+        until = "the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}"
+        table.add_row(f"{each.fx_onset:.10g}", until, f"{each.eigenvalue:.6g}", each.kind)
+    Console(stderr=True, highlight=False).print(table)
+
+
+def _under_way(show: Callable[[str], None], what: str, now: str) -> None:
+    show(f"{what}: {now}")
+
+
+def _modes(text: str) -> tuple[int, int]:
+    """FIRST:STOP as numbers."""
+    first, _, stop = text.partition(":")
+    if not (first.isdecimal() and stop.isdecimal() and int(first) < int(stop)):
+        raise typer.BadParameter(
+            f"--modes {text}: give the first mode and the first one beyond, as in --modes 0:600 for the 600 lowest"
+        )
+    return int(first), int(stop)

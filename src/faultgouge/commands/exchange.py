@@ -1,0 +1,236 @@
+"""Packings from and to other codes: import, export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..guard import keeps
+from ..ranks import is_root
+from .terminal import say, status, stored_packing
+
+if TYPE_CHECKING:
+    from faultgouge.analysis import Packing
+    from faultgouge.pywrap import Scene
+    from faultgouge.pywrap.exchange import Disks, ModeVectors
+
+app = typer.Typer()
+
+
+@app.command(
+    "import",
+    epilog="Example: [bold]faultgouge import pour.data --top 12 --kn 2e5 --fy 3 --relax -o packing.h5[/bold]",
+)
+def import_(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, packing.json, "
+            "or what MDAnalysis reads with radii.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The run.h5 to write.")] = Path("packing.h5"),
+    top: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LAYER",
+            help="The upper layer: a count of the highest, type:2, ids:1,4,7-9, ids:@FILE, group:NAME of a restart, or "
+            "a region such as 'y>10 and x<5'. By default what the file says.",
+        ),
+    ] = None,
+    scene: Annotated[
+        Path | None, typer.Option(help="Law, load, damping and inertia of this scene.", show_default=False)
+    ] = None,
+    kn: Annotated[float | None, typer.Option(help="Normal stiffness, without a scene.", show_default=False)] = None,
+    kt: Annotated[str | None, typer.Option(help="Tangential stiffness: a number, or '2/7 kn'.")] = None,
+    mu: Annotated[float | None, typer.Option(help="Friction coefficient; 1 by default.", show_default=False)] = None,
+    exponent: Annotated[float | None, typer.Option(help="1.5 (Hertz, the default) or 1.", show_default=False)] = None,
+    fy: Annotated[float | None, typer.Option(help="Load on each disk of the layer.", show_default=False)] = None,
+    fx: Annotated[float | None, typer.Option(help="Shear force on each of them; 0 by default.")] = None,
+    inertia: Annotated[float | None, typer.Option(help="I_0 in I = I_0 m R^2; 1 by default.")] = None,
+    floor: Annotated[float, typer.Option(help="y of the floor in the file; it is moved to 0.")] = 0.0,
+    width: Annotated[
+        str | None, typer.Option(metavar="L|open", help="Period along x, or open sides; else what the file says.")
+    ] = None,
+    contacts: Annotated[
+        Path | None, typer.Option(help="Slips: CSV with id1, id2 (0: the floor), slip; or a LAMMPS dump local.")
+    ] = None,
+    frame: Annotated[int | None, typer.Option(help="Which of several frames; negative ones from the last.")] = None,
+    relax: Annotated[bool, typer.Option("--relax", help="Bring to rest what is out of balance.")] = False,
+) -> None:
+    """Take a packing of another code, as run.h5 for draw, spectrum, and \\[packing] file of a scene.
+
+    A packing in balance is taken as it is, to the bit. With --relax one out of balance
+    comes to rest under law and load: without friction, which then begins with zero
+    slips; with friction if the file has slips. What moved is said.
+    """
+    from faultgouge.analysis.wholefile import check_folder
+
+    if output.exists():
+        raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
+    check_folder(output)
+    disks = _placed(file, frame, floor, width, contacts)
+    laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
+    packing = _packing(disks, top, scene, laws, {"fy": fy, "fx": fx, "inertia_factor": inertia})
+    if disks.remark:
+        say(f"{file}: {disks.remark}")
+    keeps(f"nothing has been written to {output} yet")
+    packing = _in_balance(file, packing, relax)
+    if is_root():
+        _store(output, packing)
+    contacts_of = f"{len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers"
+    say(
+        f"{len(packing)} disks, {int(packing.top.sum())} of them the upper layer, {contacts_of}; residual "
+        f"{packing.residual:.2g}; written to {output}"
+    )
+
+
+@app.command(epilog="Example: [bold]faultgouge export run.h5 --mode pair -o packing.vtp[/bold]")
+def export(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.", show_default=False)
+    ],
+    frame: Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")] = -1,
+    mode: Annotated[
+        str | None,
+        typer.Option("--mode", metavar="pair|N", help="Also a mode as vectors, as of `faultgouge draw`."),
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The file: .vtp, .xyz, .data or .gsd.")] = Path(
+        "packing.vtp"
+    ),
+) -> None:
+    """Write a stored packing for ParaView (.vtp), OVITO (.xyz), LAMMPS (.data) or HOOMD (.gsd).
+
+    Disks with radii, net forces and mobilised friction; contacts with forces and
+    slips (in .vtp as lines); modes as vectors (not in .data). `faultgouge import`
+    takes .xyz, .data and .gsd back to the bit. A .gsd needs pip install
+    'faultgouge\\[export]'.
+    """
+    from faultgouge.pywrap.exchange.writers import check_writer, write_packing
+
+    check_writer(output, mode is not None)
+    packing = stored_packing(file, frame)
+    if not is_root():
+        return
+    vectors = [] if mode is None else _vectors(packing, mode)
+    words = write_packing(output, packing, vectors)
+    say(f"F_x = {packing.fx:g}: {words}; written to {output}")
+
+
+def _vectors(packing: Packing, mode: str) -> list[ModeVectors]:
+    from faultgouge.pywrap.exchange import ModeVectors
+
+    from .pictures import modes_of
+
+    return [
+        ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes_of(packing, mode)[0]
+    ]
+
+
+def _placed(file: Path, frame: int | None, floor: float, width: str | None, contacts: Path | None) -> Disks:
+    """The disks of the file, with what options say instead of it."""
+    from dataclasses import replace
+
+    from faultgouge.pywrap.exchange import read_disks
+    from faultgouge.pywrap.exchange.table import read_slips
+
+    disks = read_disks(file, frame).above(floor)
+    if width is not None:
+        disks = replace(disks, box_length=_width(width))
+    return disks if contacts is None else replace(disks, slips=read_slips(contacts))
+
+
+def _width(text: str) -> float | None:
+    if text == "open":
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not value > 0:
+        raise typer.BadParameter(f"--width {text}: give the period along x, above 0, or open")
+    return value
+
+
+def _number_or_text(text: str | None) -> float | str | None:
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return text
+
+
+def _packing(
+    disks: Disks, top: str | None, scene: Path | None, laws: dict[str, Any], loads: dict[str, float | None]
+) -> Packing:
+    """The packing under the law and the load of the scene, of the options, or of the file."""
+    from faultgouge.pywrap.bed import drag_time, law_of
+    from faultgouge.pywrap.exchange import packing_of, upper_layer
+
+    layer = upper_layer(disks, top)
+    options = {key: value for key, value in {**laws, **loads}.items() if value is not None}
+    if scene is not None and options.keys() - {"fx"}:
+        raise typer.BadParameter(f"--{min(options)} cannot stand beside --scene, which decides it: leave one out")
+    values = {**disks.given, **options}
+    wanted = _scene(scene, disks, values)
+    inertia = wanted.inertia_factor if scene else values.get("inertia_factor", 1.0)
+    return packing_of(
+        disks,
+        law_of(wanted, wanted.law.mus[0]),
+        layer,
+        fx=options.get("fx", 0.0) if scene else values.get("fx", 0.0),
+        fy=wanted.load.fy,
+        inertia_factor=inertia,
+        drag_time=drag_time(wanted),
+    )
+
+
+def _scene(scene: Path | None, disks: Disks, values: dict[str, Any]) -> Scene:
+    """The scene, or one that says what options and file say."""
+    from faultgouge.pywrap.scene import Scene
+
+    if scene is not None:
+        return Scene.from_toml(scene, packing={})
+    for key, what in (("kn", "the normal stiffness"), ("fy", "the load on each disk of the upper layer")):
+        if key not in values:
+            raise typer.BadParameter(f"{disks.source} does not say {what}: add --{key}, or --scene with a scene")
+    damping = {key: values[key] for key in ("cn", "ct", "tau") if key in values}
+    sections = {
+        "packing": {},
+        "law": {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values},
+        "load": {"fy": values["fy"]},
+    }
+    return Scene.from_mapping(sections | ({"damping": damping} if damping else {}))
+
+
+def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
+    """The packing if it is in balance, else brought to rest if that is wanted."""
+    from faultgouge.analysis import PackingFileError
+    from faultgouge.pywrap.bed import OUT_OF_BALANCE
+    from faultgouge.pywrap.exchange.resting import at_rest
+
+    if len(packing.contacts) and packing.residual <= OUT_OF_BALANCE * packing.fy:
+        return packing
+    if not relax:
+        feels = f"a disk feels {packing.residual:.3g}" if len(packing.contacts) else "no disk touches another"
+        raise PackingFileError(
+            f"{file} is not in balance under fy = {packing.fy:g}: {feels}; check law and load, or let it come to rest "
+            "with --relax."
+        )
+    with status("coming to rest") as show:
+        rest = at_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
+    say(rest.words)
+    return rest.equilibrium.packing
+
+
+def _store(output: Path, packing: Packing) -> None:
+    from faultgouge.analysis import RunFile
+    from faultgouge.pywrap.quasistatic import rounding_floor
+
+    with RunFile.create(output, packing, {"task": "import"}) as file:
+        file.append(packing, floor=rounding_floor(packing), evaluations=0)
+        with file.change():
+            file.complete = True

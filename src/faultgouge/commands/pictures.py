@@ -1,0 +1,164 @@
+"""Packings, modes and runs to look at: draw, movie."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..ranks import is_root
+from .terminal import progress, say, stored_packing
+
+if TYPE_CHECKING:
+    from faultgouge.analysis import Packing
+    from faultgouge.figures.film import Film
+    from faultgouge.figures.mode import Mode
+
+app = typer.Typer()
+
+
+class Colour(str, Enum):
+    """What the colour of a contact shows."""
+
+    MOBILISED = "mobilised"
+    SLIP = "slip"
+    FORCE = "force"
+    NONE = "none"
+
+
+PackingFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.", show_default=False)
+]
+Frame = Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")]
+WhichMode = Annotated[
+    str | None,
+    typer.Option(
+        "--mode",
+        metavar="pair|N",
+        help="The unstable pair, or before the onset the two modes closest to meeting; or mode N, counted by its "
+        "eigenvalue from 0.",
+    ),
+]
+WhichColour = Annotated[
+    Colour, typer.Option(help="Of the contacts: |f_t|/(mu f_n), slip over its limit, f_n, or none of these.")
+]
+
+
+@app.command(epilog="Example: [bold]faultgouge draw run.h5 --mode pair -o mode.svg[/bold]")
+def draw(
+    file: PackingFile,
+    frame: Frame = -1,
+    mode: WhichMode = None,
+    color: WhichColour = Colour.MOBILISED,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="The picture: .png, .svg or .pdf.", show_default=True)
+    ] = Path("picture.png"),
+) -> None:
+    """Draw a stored packing, with its force chains or with one of its modes.
+
+    Disks are to scale: the upper layer is yellow, rattlers are hollow. Bars are
+    contacts: their width is the normal force. Of a mode, arrows are displacements
+    and colours rotations; participation ratio and share of rotation stand above.
+    """
+    if output.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
+    packing = stored_packing(file, frame)
+    if not is_root():
+        return
+    from faultgouge.figures import draw_packing
+    from faultgouge.figures.mode import draw_modes
+    from faultgouge.figures.packing import in_words
+    from faultgouge.figures.style import save_as
+
+    if mode is None:
+        figure, words = draw_packing(packing, color=color.value, caption=True), in_words(packing)
+    else:
+        modes, what = modes_of(packing, mode)
+        figure = draw_modes(packing, modes, what)
+        words = "; ".join([f"F_x = {packing.fx:g}: {what}", *(each.plain for each in modes)])
+    save_as(figure, output)
+    say(f"{words}; written to {output}")
+
+
+@app.command(epilog="Example: [bold]faultgouge movie perturb.h5 -o eruption.gif[/bold]")
+def movie(
+    file: PackingFile,
+    mode: WhichMode = None,
+    frame: Frame = -1,
+    color: WhichColour = Colour.MOBILISED,
+    seconds: Annotated[float, typer.Option(min=0.1, max=600, help="Length of the film.")] = 10.0,
+    rate: Annotated[float, typer.Option(min=1, max=60, help="Frames a second.")] = 20.0,
+    span: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="T0 T1", help="Times of the run between which it is shown; all by default."),
+    ] = None,
+    dots: Annotated[int, typer.Option(min=30, max=400, help="Dots an inch; a film is some five inches wide.")] = 130,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The film: .gif or .mp4.")] = Path("film.gif"),
+) -> None:
+    """Make a film of an undamped run, of a mode, or of a ramp.
+
+    Of perturb.h5 with its trajectory ([output] trajectory = true): the run, with
+    displacements times a power of ten that is written on the film and falls in
+    steps, and D(t) beside it. With --mode: the motion of a mode, growth left out. Of
+    run.h5: the ramp, and F_x over the displacement of the upper layer. An .mp4 needs
+    pip install 'faultgouge\\[movie]'.
+    """
+    from faultgouge.figures.writers import check_name, write_film
+
+    check_name(output)
+    count = max(2, round(seconds * rate))
+    if not is_root():
+        return
+    film = (
+        _film_of_mode(file, frame, mode, count, seconds, dots)
+        if mode
+        else _film_of_file(file, count, color.value, span, dots)
+    )
+    write_film(film, output, rate, lambda frames, total: progress(frames, "frames", total))
+    width, height = film.size
+    say(f"{count} frames of {width} x {height} dots; written to {output}")
+
+
+def _film_of_mode(file: Path, frame: int, mode: str, count: int, seconds: float, dots: int) -> Film:
+    from faultgouge.figures.film import ModeFilm
+
+    packing = stored_packing(file, frame)
+    modes, what = modes_of(packing, mode)
+    return ModeFilm(packing, modes, what, count, periods=max(1, round(seconds / 2)), dots=dots)
+
+
+def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int) -> Film:
+    """The run if the file has its trajectory, else its ramp."""
+    from faultgouge.analysis import PackingFileError, RunFile
+    from faultgouge.figures.film import Motion, RampFilm, RunFilm
+
+    if file.suffix == ".disks":
+        raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
+    with RunFile(file) as run:
+        motion = Motion.read(run)
+        packings = [] if motion is not None else [run.packing(k) for k in range(len(run))]
+    if motion is not None:
+        return RunFilm(motion if span is None else motion.between(*span), count, dots=dots)
+    if len(packings) < 2:
+        raise PackingFileError(
+            f"{file} has one equilibrium and no trajectory: ask for a mode with --mode, or run `faultgouge perturb` "
+            "with trajectory = true under [output]"
+        )
+    return RampFilm(packings, count, color, dots=dots)
+
+
+def modes_of(packing: Packing, which: str) -> tuple[list[Mode], str]:
+    """The modes that --mode asks for, and what they are."""
+    from faultgouge.analysis import normal_modes, spectrum
+    from faultgouge.figures.mode import Mode, ModeError, unstable_pair
+
+    modes = normal_modes(packing)
+    if which == "pair":
+        return unstable_pair(packing, modes, [pair.eigenvalue for pair in spectrum(packing).pairs])
+    if not which.isdecimal():
+        raise typer.BadParameter(f"--mode {which}: give pair, or the number of a mode, from 0")
+    if int(which) >= len(modes.values):
+        raise ModeError(f"--mode {which}: the packing has {len(modes.values)} modes, counted from 0")
+    return [Mode.of(packing, modes, int(which))], f"mode {which} of {len(modes.values)}"

@@ -1,0 +1,151 @@
+"""From a scene to run.h5: settle, ramp, perturb."""
+
+from __future__ import annotations
+
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from ..guard import keeps
+from .terminal import AsJson, Out, ScenePath, print_json, progress, read_scene, say, status
+
+if TYPE_CHECKING:
+    from faultgouge.pywrap import Equilibrium, Record, Scene
+    from faultgouge.pywrap.dynamics import Weakening
+
+app = typer.Typer()
+
+
+@app.command(epilog="Example: [bold]faultgouge settle paper.toml -o run.h5[/bold]")
+def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
+    """Settle the packing of a scene under its load, at F_x = 0."""
+    from faultgouge.pywrap import Record
+
+    wanted = read_scene(scene, "settle")
+    with Record(output, wanted, saved=keeps) as record:
+        new = record.last is None
+        packing = _settled(wanted, record).packing
+        if new:
+            record.finish()
+    assert record.last is not None
+    say(
+        f"{len(packing)} disks, {len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers; "
+        f"residual {record.last.residual:.2g} (rounding floor {record.last.floor:.2g}); written to {output}"
+    )
+
+
+@app.command(epilog="Example: [bold]mpiexec -n 2 faultgouge ramp paper.toml -o run.h5[/bold]")
+def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False) -> None:
+    """Raise F_x from equilibrium to equilibrium, each stored as it is reached."""
+    from faultgouge.pywrap import Record
+    from faultgouge.pywrap import ramp as ramp_up
+    from faultgouge.pywrap.equilibria import loads
+    from faultgouge.pywrap.refusals import needed
+
+    wanted = read_scene(scene, "ramp")
+    settings = needed(wanted.ramp, "ramp")
+    with Record(output, wanted, saved=keeps) as record:
+        start = _settled(wanted, record)
+        total, done = len(loads(settings)), round(start.fx / settings.step) + 1
+        dumps = output.with_suffix("") if wanted.output is not None and wanted.output.dumps else None
+        for equilibrium in progress(ramp_up(wanted, start, dumps=dumps), "equilibria", total, done):
+            record.append(equilibrium)
+        record.finish()
+    assert record.last is not None
+    say(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")
+    if as_json:
+        print_json({"equilibria": _equilibria(output)})
+
+
+@app.command(epilog="Example: [bold]faultgouge perturb paper.toml -o run.h5[/bold]")
+def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
+    """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t)."""
+    from faultgouge.pywrap import Record, reach
+    from faultgouge.pywrap.refusals import needed
+
+    wanted = read_scene(scene, "perturb")
+    settings = needed(wanted.perturb, "perturb")
+    with Record(output, wanted, task="perturb", saved=keeps) as record:
+        if record.last is None:
+            step = wanted.ramp.step if wanted.ramp else 1e-3  # as in `reach`
+            *_, start = progress(reach(wanted, settings.fx), "equilibria", ceil(settings.fx / step * (1 - 1e-9)) + 1)
+            _check_time(wanted, start)
+            record.append(start)
+        assert record.last is not None
+        weakening = _weakening(wanted, record)
+        run = record.undamped(wanted, record.last, weakening=weakening)
+        largest = 0.0
+        for sample in progress(run, "samples", _lines(wanted, record)):
+            last, largest = sample, max(largest, sample.msd)
+        record.finish()
+    say(f"D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}; written to {output}")
+    if as_json:
+        print_json(_series(output))
+
+
+def _series(path: Path) -> dict[str, Any]:
+    from faultgouge.analysis import RunFile
+
+    with RunFile(path) as file:
+        return {name: column.tolist() for name, column in file.series("undamped").items()}
+
+
+def _lines(scene: Scene, record: Record) -> int:
+    """Lines of the series of an undamped run."""
+    from faultgouge.pywrap.undamped import sampling
+
+    assert scene.perturb is not None
+    assert record.last is not None
+    return len(sampling(scene.perturb, record.last.packing)[1])
+
+
+def _check_time(scene: Scene, start: Equilibrium) -> None:
+    """Refuse a time step or a time that the packing does not allow, before anything is written."""
+    from faultgouge.pywrap.undamped import sampling
+
+    assert scene.perturb is not None
+    sampling(scene.perturb, start.packing)
+
+
+def _weakening(scene: Scene, record: Record) -> Weakening | None:
+    """The friction that falls with velocity, its threshold v_0 calibrated if the scene says so."""
+    from faultgouge.pywrap.undamped import unforced, weakening_of
+
+    if scene.friction is None:
+        return None
+    assert record.last is not None
+    threshold, why = 0.0, ""
+    if not isinstance(scene.friction.v0, str):
+        threshold = scene.friction.v0
+    else:
+        run = record.undamped(unforced(scene), record.last, "calibration")
+        threshold = max(abs(sample.layer_velocity) for sample in progress(run, "calibrating v0", _lines(scene, record)))
+        why = " (the largest velocity of the upper layer in an unforced run of this length: rounding noise)"
+    weakening = weakening_of(scene.friction, threshold)
+    say(f"v0 = {threshold:.3g}{why}, v_ss = {weakening.v_ss:.3g}")
+    return weakening
+
+
+def _equilibria(path: Path) -> list[dict[str, Any]]:
+    from faultgouge.analysis import RunFile
+
+    with RunFile(path) as file:
+        names = ("fx", "residual", "floor", "evaluations")
+        rows = zip(*(file.observable(name).tolist() for name in names), strict=True)
+        return [
+            dict(zip(names, row, strict=True)) | {"contacts": len(file.packing(k).contacts)}
+            for k, row in enumerate(rows)
+        ]
+
+
+def _settled(scene: Scene, record: Record) -> Equilibrium:
+    """The last equilibrium of a file; in a new one the settled packing, which is then in it."""
+    from faultgouge.pywrap import settle
+
+    if record.last is None:
+        with status("settling") as show:
+            record.append(settle(scene, watch=lambda what: show(f"settling: {what}")))
+    assert record.last is not None
+    return record.last

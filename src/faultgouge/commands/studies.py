@@ -1,0 +1,120 @@
+"""What is run for a result on paper: explain, reproduce, report, stability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import typer
+from rich.console import Console
+
+from ..guard import keeps
+from ..ranks import is_root
+from .terminal import AsJson, ScenePath, print_json, progress, read_scene, say, status
+
+T = TypeVar("T")
+
+app = typer.Typer()
+
+
+@app.command(epilog="Example: [bold]faultgouge explain paper.toml[/bold]")
+def explain(scene: ScenePath, as_json: AsJson = False) -> None:
+    """What a scene includes, what it leaves out, why, and what each part costs.
+
+    Every part is switched off, or on, in LAMMPS, and measured: ratios of times
+    with their quartiles, and whether what both compute agrees to the bit. It
+    takes some ten seconds.
+    """
+    from faultgouge.studies.explain import explain as explain_scene
+
+    wanted = read_scene(scene)
+    with status("switching features off and on"):
+        explanation = explain_scene(wanted)
+    if as_json:
+        print_json(explanation.as_dict())
+    elif is_root():
+        from faultgouge.studies.explanation_table import explanation_table
+
+        console = Console(highlight=False)
+        # a file or a pipe has no width, and a table of 80 columns is hard to read
+        Console(highlight=False, width=max(console.width, 150)).print(explanation_table(explanation))
+
+
+@app.command(epilog="Example: [bold]faultgouge reproduce -o results[/bold]")
+def reproduce(
+    scene: Annotated[
+        Path | None, typer.Argument(metavar="[SCENE]", help="Another scene than the one that ships.")
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for figures, numbers and report.")] = Path(
+        "results"
+    ),
+    ensemble: Annotated[
+        int, typer.Option(min=0, metavar="M", help="Instead, onsets and eruptions of M packings of the scene.")
+    ] = 0,
+) -> None:
+    """The paper's protocol on one packing: figures 1, 3, 4, numbers and a report.
+
+    With --ensemble M: how generic that is, from M packings that differ in their
+    seeds. An interrupted ensemble goes on, and grows with a larger M. A packing
+    takes a minute at the most on one core; of several ranks one hands out the
+    work, so that mpiexec -n 5 faultgouge reproduce --ensemble 100 keeps 4 cores
+    busy.
+    """
+    from importlib.resources import files
+
+    wanted = read_scene(scene or Path(str(files("faultgouge") / "scenes" / "paper.toml")))
+    if ensemble:
+        from faultgouge.studies.ensemble import ensemble as examine_packings
+
+        keeps(f"what {output}/results.jsonl has is kept, and the same command goes on from there")
+
+        def bar(members: Iterable[T], count: int) -> Iterator[T]:
+            for number, member in enumerate(progress(members, "packings", count), 1):
+                yield member
+                keeps(f"{output}/results.jsonl has {number} more packings; the same command goes on from there")
+
+        examine_packings(wanted, ensemble, output, say, bar)
+        say(f"written: {output}/ensemble.json")
+        return
+
+    from faultgouge.studies.reproduce import reproduce as run_protocol
+
+    keeps(f"what is in {output} so far is kept; the same command begins anew and replaces it")
+    run_protocol(wanted, output, say)
+    say(f"written: {output}/report.md")
+
+
+@app.command(epilog="Example: [bold]faultgouge report --quick -o report[/bold]")
+def report(
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for report, figures and numbers.")] = Path(
+        "report"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: a minute instead of ten.")] = False,
+) -> None:
+    """Error against run time: which method to take when, for six tasks, with figures and numbers."""
+    from faultgouge.studies.report import report as run_studies
+
+    keeps(f"{output} has the studies that were finished; the same command begins anew and replaces them")
+    run_studies(output, quick, say, lambda runs, name: progress(runs, name, len(runs)))
+    say(f"written: {output}/report.md")
+
+
+@app.command(epilog="Example: [bold]mpiexec -n 2 faultgouge stability -o stability[/bold]")
+def stability(
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for table, picture and numbers.")] = Path(
+        "stability"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="The small part of the cases.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
+    from faultgouge.studies.stability import check
+    from faultgouge.studies.stability import stability as try_cases
+
+    keeps(f"{output} has the cases that were finished; the same command begins anew and replaces them")
+    result = try_cases(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
+    say(f"{len(result['cases'])} cases tried; written: {output}/stability.md")
+    if as_json:
+        print_json(result)
+    check(result)

@@ -1,0 +1,105 @@
+"""Many scenes: sweep, merge, and the study of how generic the onset is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..ranks import is_root
+from .terminal import progress, say
+
+app = typer.Typer()
+
+Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted one is continued.")]
+
+
+@app.command(epilog="Example: [bold]mpiexec -n 5 faultgouge sweep genericity.toml -o sweep[/bold]")
+def sweep(
+    file: Annotated[Path, typer.Argument(metavar="SWEEP", help="The sweep, a TOML file.", show_default=False)],
+    output: Folder = Path("sweep"),
+    shard: Annotated[
+        str, typer.Option(metavar="K/N", help="Part K of N alone, for job arrays; each with a folder of its own.")
+    ] = "1/1",
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what there is to do and what it will cost.")] = False,
+) -> None:
+    """One task for every scene of a product of keys: results.jsonl, and the table results.csv.
+
+    A sweep names a task (onset, triggering, ...); below \\[sweep] lists of values
+    or ranges for any keys of a scene, as in "packing.seed" = "1:200"; and below
+    \\[scene.SECTION] what all scenes share. Every result is on the disk as it
+    ends, and the same command goes on where it was cut off. A scene that fails
+    is a result, too, with its sentence. Of several ranks one hands out the work:
+    mpiexec -n 5 keeps 4 cores busy.
+    """
+    from faultgouge.studies.sweep.compute import LINES, run_sweep, stored
+    from faultgouge.studies.sweep.estimate import estimate
+    from faultgouge.studies.sweep.points import Sweep
+    from faultgouge.studies.sweep.points import shard as part_of
+    from faultgouge.studies.sweep.tasks import TASKS
+
+    wanted, part = Sweep.from_toml(file, TASKS), _shard(shard)
+    if dry_run:
+        if is_root():
+            known = stored(output / LINES)
+            missing = [point for point in part_of(wanted.points, part) if point.key not in known]
+            for line in estimate(wanted.task, missing).words():
+                say(line)
+        return
+    rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count))
+    failed = sum(row["says"] is not None for row in rows)
+    say(f"{len(rows)} scenes, {failed} of them failed; written: {output}/results.csv")
+
+
+@app.command(epilog="Example: [bold]faultgouge merge shard1 shard2 shard3 -o whole[/bold]")
+def merge(
+    parts: Annotated[
+        list[Path], typer.Argument(metavar="DIR...", help="Folders of `sweep --shard`, or files of `onset --modes`.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder to write.")] = Path("merged"),
+) -> None:
+    """Shards of a sweep put together, or parts of the modes of an onset.
+
+    The table of merged shards is the one of a sweep that was never divided. Of
+    JSON files that `onset --modes FIRST:STOP -o FILE` has left, the first window
+    is taken and onset.json written.
+    """
+    from faultgouge.studies.sweep.merge import merge as merge_parts
+
+    if is_root():
+        merge_parts(parts, output, say)
+
+
+def _shard(text: str) -> tuple[int, int]:
+    """K/N as numbers."""
+    part, _, of = text.partition("/")
+    if not (part.isdecimal() and of.isdecimal() and 1 <= int(part) <= int(of)):
+        raise typer.BadParameter(f"--shard {text}: give the part and the number of parts, as in --shard 1/3")
+    return int(part), int(of)
+
+
+@app.command(epilog="Example: [bold]mpiexec -n 5 faultgouge genericity -o genericity[/bold]")
+def genericity(
+    output: Folder = Path("genericity"),
+    share: Annotated[
+        float, typer.Option(min=0.005, max=1.0, help="Share of the packings of each set; a larger one goes on.")
+    ] = 1.0,
+    page: Annotated[
+        bool, typer.Option("--page", help="Compute nothing: the page from the tables that are there.")
+    ] = False,
+) -> None:
+    """How generic the onset is, how it depends on the number of disks, and why: tables, pictures and a page.
+
+    Onsets of 200 packings for five friction coefficients, of packings of 50 to
+    3,000 disks, of random matrices and of shuffled contacts. It takes an hour or
+    two on one core, and goes on where it was cut off; --share 0.1 is done in
+    minutes.
+    """
+    from faultgouge.studies.genericity.compute import compute
+    from faultgouge.studies.genericity.page import write_page
+
+    if not page:
+        compute(output, say, lambda ended, count: progress(ended, "scenes", count), share)
+    if is_root():
+        say(f"written: {write_page(output)}")

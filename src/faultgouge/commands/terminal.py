@@ -1,0 +1,144 @@
+"""What the commands share: their common options, and how they speak.
+
+Results go to files and, with --json, to standard output; progress and messages go to standard error. Rank 0 alone
+speaks.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sized
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event, Thread
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
+from rich.console import Console
+
+from ..ranks import is_root
+
+if TYPE_CHECKING:
+    from faultgouge.analysis import Packing
+    from faultgouge.pywrap import Scene
+    from faultgouge.pywrap.estimate import Task
+
+T = TypeVar("T")
+
+EVERY = 60.0
+"""Seconds between two lines of progress off a terminal."""
+
+ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)]
+Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted one is continued.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+
+def read_scene(path: Path, task: Task | None = None) -> Scene:
+    """The scene of a TOML file; if its task is long, what is to be done and how long it takes is said."""
+    from faultgouge.pywrap.estimate import foreseen
+    from faultgouge.pywrap.scene import Scene
+
+    scene = Scene.from_toml(path)
+    ahead = foreseen(scene, task) if task is not None else ""
+    if ahead:
+        say(ahead)
+    return scene
+
+
+def stored_packing(file: Path, frame: int = -1) -> Packing:
+    """A packing of a run.h5, or of the dumps that decks write."""
+    from faultgouge.analysis import RunFile, read_dump
+
+    if file.suffix == ".disks":
+        return read_dump(file, frame=frame)
+    with RunFile(file) as run:
+        if not run.complete:
+            say(f"{file} is of a run that is not finished: {len(run)} equilibria, up to F_x = {run.fx[-1]:g}")
+        return run.packing(frame)
+
+
+def print_json(value: dict[str, Any]) -> None:
+    """The result on standard output."""
+    if is_root():
+        print(json.dumps(value, indent=1))
+
+
+def say(message: str) -> None:
+    """A line on standard error."""
+    if is_root():
+        print(message, file=sys.stderr)
+
+
+class Minutes:
+    """A line on standard error every minute, off a terminal; a context manager.
+
+    A thread says the lines: work may be within one call for longer than a minute.
+
+    Parameters
+    ----------
+    message : str
+        The line, until there is another.
+    """
+
+    def __init__(self, message: str) -> None:
+        self._message, self._ended = message, Event()
+        self._thread = Thread(target=self._speak, daemon=True)
+
+    def now(self, message: str) -> None:
+        """Another line from now on."""
+        self._message = message
+
+    def _speak(self) -> None:
+        while not self._ended.wait(EVERY):
+            say(self._message)
+
+    def __enter__(self) -> Minutes:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+
+@contextmanager
+def status(what: str) -> Iterator[Callable[[str], None]]:
+    """A line on a terminal while something is under way; what is yielded replaces its text.
+
+    Off a terminal it is a line of the log, every minute.
+    """
+    console = Console(stderr=True)
+    if not is_root():
+        yield lambda what: None
+    elif console.is_terminal:
+        with console.status(what) as line:
+            yield line.update
+    else:
+        with Minutes(what) as minutes:
+            yield minutes.now
+
+
+def progress(items: Iterable[T], what: str, total: int | None = None, done: int = 0) -> Iterator[T]:
+    """The items, with a progress bar on a terminal; off a terminal with a line a minute."""
+    console = Console(stderr=True)
+    if total is None and isinstance(items, Sized):
+        total = len(items)
+    if not is_root():
+        yield from items
+        return
+    if not console.is_terminal:
+        among = "" if total is None else f" of {total}"
+        with Minutes(f"{what}: {done}{among}") as minutes:
+            for number, item in enumerate(items, done + 1):
+                minutes.now(f"{what}: {number}{among}")
+                yield item
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(what, total=total, completed=done)
+        for item in items:
+            bar.advance(task)
+            yield item

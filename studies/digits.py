@@ -1,0 +1,33 @@
+"""Numbers with as many digits as their uncertainty allows."""
+
+import math
+
+
+def with_uncertainty(value: float, error: float) -> str:
+    """A number and its uncertainty in units of its last digit, as in 0.02150746(3).
+
+    The uncertainty is rounded up, to one digit; a first digit of 1 is followed by another.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    error : float
+        Its uncertainty, in the same unit. Where it is 0 the number has all its digits.
+    """
+    if not math.isfinite(value) or not 0 < error < math.inf:
+        return f"{value:.17g}"
+    places = 1 - _exponent(2 * error) if _first(error) < 2 else -_exponent(error)
+    units = math.ceil(error * 10.0**places * (1 - 1e-9))
+    if places <= 0:
+        scale = 10 ** (-places)
+        return f"{round(value / scale) * scale:d}({units * scale:d})"
+    return f"{value:.{places}f}({units:d})"
+
+
+def _exponent(error: float) -> int:
+    return int(f"{error:e}".partition("e")[2])
+
+
+def _first(error: float) -> float:
+    return float(f"{error:e}".partition("e")[0])

@@ -1,0 +1,291 @@
+r"""How large: undamped runs from rest at many loads, until they are over.
+
+Above its onset a packing at rest is unstable. The rounding of the coordinates is perturbation enough: D grows from it
+at the rate :math:`2 |\mathrm{Im}\,\omega|` of the spectrum, by ten and more decades, and then levels off. The largest D
+is the size of the eruption at that load.
+
+**Over** is a run at time t when the largest D of its second half, (t/2, t], is at most 1.5 times that of the quarter
+before, (t/4, t/2], and when D has had the time to grow by `DECADES` decades at the spectrum's rate. A stable packing
+is watched for `QUIET` times and then said to be stable. A run that is not over in the time of the scene is cut off,
+and its size is a lower bound. A layer that has slid by the diameter of a disk *flows*.
+
+**What ends the growth** is what has happened by the time at which D first reaches a tenth of its largest value. The
+contacts are looked at in each sample: *opens* if a contact of the start has opened by then, *slides* if none has, but
+one slides at its Coulomb bound that did not at the start, and *law* if neither has: then the growth ends by the
+curvature of the contact law alone. A contact that opens and closes between two samples is missed.
+
+**Energy.** No potential belongs to the tangential force, so nothing is conserved but the balance of work: the kinetic
+energy changes by the work of all forces, load included. Each run ends with `WORK_STEPS` steps in which this work is
+added up; the balance is off by the order of the time step squared. The noise floor is the largest D of the first time
+unit, before anything could grow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from mpi4py import MPI
+from threadpoolctl import threadpool_limits
+
+from ...analysis import Packing, mean_square_displacement, nearest_image, spectrum
+from ...analysis.packing import Floats
+from ...pywrap import Engine
+from ...pywrap.dynamics import Dynamics, Motion
+from ...pywrap.undamped import time_step
+
+DECADES = 24.0
+"""Decades of D between its noise, 1e-27 in the first steps, and the square of a tenth of an overlap."""
+
+QUIET = 50.0
+"""Time for which a stable packing is watched."""
+
+SAMPLES = 400
+"""Looks at disks and contacts in a run of the full time, and at least so many in a shorter one."""
+
+OVER = 1.5
+"""Largest growth of D, from the second quarter to the second half, of a run that is over: D of disks that wander about
+at random would double."""
+
+TENTH = 0.1
+"""Share of the largest D at which the growth counts as ended."""
+
+WORK_STEPS = 2000
+"""Steps over which work is added up: some thirty periods of the fastest mode."""
+
+Ends = Literal["opens", "slides", "law", "flows", "stable", "cut off"]
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where a run begins, and how long it may take.
+
+    Attributes
+    ----------
+    packing : Packing
+        The equilibrium.
+    residual : float
+        Its largest force on a disk: contacts that carry less do not count.
+    time : float
+        Length of the run at the most, time.
+    damped : bool
+        Whether the packing has dashpots or drag.
+    """
+
+    packing: Packing
+    residual: float
+    time: float
+    damped: bool = False
+
+
+@dataclass(frozen=True)
+class Look:
+    """A packing in the course of a run.
+
+    Attributes
+    ----------
+    time, msd, slip, kinetic_energy : float
+        Time, D, mean displacement of the upper layer along x, kinetic energy of translation and rotation.
+    lost, gained, sliding : int
+        Contacts of the start that are open, contacts that are new, and contacts of the start that slide and did not.
+    """
+
+    time: float
+    msd: float
+    slip: float
+    kinetic_energy: float
+    lost: int
+    gained: int
+    sliding: int
+
+
+@dataclass(frozen=True)
+class Eruption:
+    """A run until it was over.
+
+    Attributes
+    ----------
+    fx : float
+        Load, force on each disk of the upper layer.
+    damped : bool
+        Whether with dashpots or drag.
+    rate : float
+        Growth rate of D from the spectrum of the undamped packing, 1 / time.
+    time : float
+        When the run was over.
+    msd, kinetic_energy : float
+        The largest D, length^2, and the largest kinetic energy.
+    slip : float
+        Largest displacement of the upper layer along x, length.
+    lost, gained, sliding : int
+        Most contacts, in any look, that were open, new, or slid.
+    ended : float or None
+        When D first reached a tenth of its largest value, time; None if it did not grow.
+    ends : str
+        What ended the growth.
+    noise : float
+        Largest D of the first time unit.
+    balance : float
+        Kinetic energy less work, in units of the larger of the two and of the kinetic energy.
+    series : dict
+        The looks as columns.
+    """
+
+    fx: float
+    damped: bool
+    rate: float
+    time: float
+    msd: float
+    kinetic_energy: float
+    slip: float
+    lost: int
+    gained: int
+    sliding: int
+    ended: float | None
+    ends: Ends
+    noise: float
+    balance: float
+    series: dict[str, list[float]] = field(repr=False)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def erupt(start: Start) -> Eruption:
+    """A run from rest until it is over, on this process alone."""
+    with threadpool_limits(1):
+        rate = spectrum(start.packing).growth_rate()
+        dt = time_step(start.packing)
+        looks: list[Look] = []
+        with Engine(start.packing, MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
+            watch = _Watch(start)
+            for time, motion in _course(dynamics, dt, start.time):
+                looks.append(watch.look(time, motion, engine.packing))
+                if _over(looks, rate) or _flows(looks, start.packing):
+                    break
+            balance = _balance(dynamics, start.packing)
+    return _eruption(start, looks, rate, balance)
+
+
+def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[float, Motion]]:
+    """Looks that are close together at first and further apart later, each at a step of its own."""
+    last = int(longest / dt)
+    early = np.geomspace(min(100, last), last, SAMPLES).astype(np.int64)
+    steps = np.union1d(early, np.linspace(min(100, last), last, SAMPLES).astype(np.int64))
+    done = 0
+    for step in steps.tolist():
+        yield step * dt, dynamics.advance(step - done)
+        done = step
+
+
+def _over(looks: list[Look], rate: float) -> bool:
+    """Whether a run is over, see the module."""
+    t = looks[-1].time
+    if rate == 0:
+        return t >= QUIET
+    if t < DECADES * np.log(10) / rate:
+        return False
+    quarter = max((each.msd for each in looks if t / 4 < each.time <= t / 2), default=0.0)
+    half = max(each.msd for each in looks if each.time > t / 2)
+    return half <= OVER * quarter
+
+
+def _flows(looks: list[Look], packing: Packing) -> bool:
+    return abs(looks[-1].slip) > 2 * packing.radius.max()
+
+
+class _Watch:
+    """What has become of disks and contacts since the start."""
+
+    def __init__(self, start: Start) -> None:
+        self._start, self._position = start, start.packing.position
+        self._moved = np.zeros_like(start.packing.position)
+        carrying = start.packing.loaded(start.residual)
+        self._contacts = _pairs(carrying)
+        self._slid = _sliding(carrying)
+
+    def look(self, time: float, motion: Motion, now: Packing) -> Look:
+        """The packing at one time."""
+        first = self._start.packing
+        step = motion.position - self._position
+        step[:, 0] = nearest_image(step[:, 0], first.box_length)
+        self._moved, self._position = self._moved + step, motion.position
+        pairs = _pairs(now)
+        return Look(
+            time=time,
+            # from step to step, disks move less than half a box; for small D, the difference itself has more digits
+            msd=float(
+                mean_square_displacement(
+                    motion.position, first.position, first.box_length, motion.position_low, first.position_low
+                )
+            )
+            if abs(self._moved).max() < 0.25 * (first.box_length or np.inf)
+            else float(np.mean(np.sum(self._moved**2, axis=1))),
+            slip=float(self._moved[first.top, 0].mean()),
+            kinetic_energy=_kinetic_energy(first, motion),
+            lost=len(self._contacts - pairs),
+            gained=len(pairs - _pairs(first)),
+            sliding=len((_sliding(now) - self._slid) & self._contacts),
+        )
+
+
+def _pairs(packing: Packing) -> set[tuple[int, int]]:
+    return set(zip(packing.contacts.i.tolist(), packing.contacts.j.tolist(), strict=True))
+
+
+def _sliding(packing: Packing) -> set[tuple[int, int]]:
+    """Contacts at their Coulomb bound; slips are clamped to it, so that they reach it but for a rounding."""
+    if not packing.law.frictional:
+        return set()
+    contacts = packing.contacts
+    at = np.abs(contacts.slip) >= packing.law.slip_limit(packing.geometry.overlap) * (1 - 1e-9)
+    return set(zip(contacts.i[at].tolist(), contacts.j[at].tolist(), strict=True))
+
+
+def _kinetic_energy(packing: Packing, motion: Motion) -> float:
+    inertia = packing.inertia_factor * packing.mass * packing.radius**2
+    return float(0.5 * (packing.mass @ np.sum(motion.velocity**2, axis=1) + inertia @ motion.spin**2))
+
+
+def _balance(dynamics: Dynamics, packing: Packing) -> float:
+    """Change of the kinetic energy less work, relative."""
+    before = _kinetic_energy(packing, dynamics.advance(0))
+    motion, work = dynamics.work(WORK_STEPS)
+    after = _kinetic_energy(packing, motion)
+    return float(abs(after - before - work) / max(abs(work), after, before))
+
+
+def _eruption(start: Start, looks: list[Look], rate: float, balance: float) -> Eruption:
+    columns: dict[str, Floats] = {name: np.array([getattr(each, name) for each in looks]) for name in vars(looks[0])}
+    time, msd = columns["time"], columns["msd"]
+    ended: float | None = None
+    ends: Ends = "stable"
+    if rate > 0:
+        place = int(np.argmax(msd >= TENTH * msd.max()))
+        ended = float(time[place])
+        upto = slice(0, place + 1)
+        ends = "opens" if columns["lost"][upto].any() else "slides" if columns["sliding"][upto].any() else "law"
+        if not _over(looks, rate):
+            ends = "cut off"
+    if _flows(looks, start.packing):
+        ends = "flows"
+    return Eruption(
+        fx=start.packing.fx,
+        damped=start.damped,
+        rate=rate,
+        time=float(time[-1]),
+        msd=float(msd.max()),
+        kinetic_energy=float(columns["kinetic_energy"].max()),
+        slip=float(np.abs(columns["slip"]).max()),
+        lost=int(columns["lost"].max()),
+        gained=int(columns["gained"].max()),
+        sliding=int(columns["sliding"].max()),
+        ended=ended,
+        ends=ends,
+        noise=float(msd[time <= 1].max(initial=float(msd[0]))),
+        balance=balance,
+        series={name: column.tolist() for name, column in columns.items()},
+    )

@@ -1,0 +1,88 @@
+"""Pictures of the sizes of eruptions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.figure import Figure
+
+from ...figures.series import few_decades, positive
+from ...figures.style import INK, save, styled
+
+MARKERS = {"opens": "o", "slides": "s", "law": "D", "flows": "^", "cut off": "x", "stable": "."}
+WORDS = {
+    "opens": "a contact opens",
+    "slides": "a contact slides",
+    "law": "curvature of the law",
+    "flows": "the layer flows",
+    "cut off": "not over yet",
+    "stable": "stable: no growth",
+}
+
+
+def figures(result: dict[str, Any], series: dict[float, dict[str, list[float]]], output: Path) -> None:
+    """Both figures, from what eruptions.json holds and the looks of the undamped runs by F_x."""
+    save(size_figure(result["runs"]), output / "sizes")
+    if series:
+        save(course_figure(series), output / "courses")
+
+
+@styled
+def size_figure(runs: list[dict[str, Any]]) -> Figure:
+    """Sizes over the load.
+
+    Parameters
+    ----------
+    runs : list of dict
+        Those of eruptions.json.
+
+    Returns
+    -------
+    Figure
+        The largest D, the largest displacement of the layer squared, and contacts that are open or slide at the most,
+        over F_x. The markers of D say what ended the growth; open ones are damped runs.
+    """
+    figure = Figure(figsize=(3.4, 4.2), layout="constrained")
+    sizes, contacts = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    for ends, marker in MARKERS.items():
+        for damped in (False, True):
+            rows = [row for row in runs if row["ends"] == ends and row["damped"] == damped]
+            if rows:
+                sizes.plot(
+                    [row["fx"] for row in rows],
+                    [row["msd"] for row in rows],
+                    marker,
+                    color="C0",
+                    markerfacecolor="white" if damped else "C0",
+                    label=WORDS[ends] + (" (damped)" if damped else ""),
+                )
+    free = [row for row in runs if not row["damped"]]
+    fx = np.array([row["fx"] for row in free])
+    sizes.plot(fx, [row["slip"] ** 2 for row in free], "_", color="C1", label="(slip of the layer)$^2$")
+    sizes.plot(fx, [row["noise"] for row in free], ":", color=INK, linewidth=0.7, label="noise of doubles")
+    sizes.set(yscale="log", ylabel="largest $D$")
+    few_decades(sizes, 8)
+    sizes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    for key, colour, name in (("lost", "C0", "open"), ("sliding", "C2", "slide"), ("gained", "C3", "new")):
+        contacts.plot(fx, [row[key] for row in free], ".-", color=colour, linewidth=0.6, label=name)
+    contacts.set(xlabel="$F_x$", ylabel="contacts", xscale="log")
+    contacts.legend()
+    return figure
+
+
+@styled
+def course_figure(series: dict[float, dict[str, list[float]]]) -> Figure:
+    """D(t) of the undamped runs, coloured by their load."""
+    figure = Figure(figsize=(3.4, 2.5), layout="constrained")
+    axes = figure.add_subplot(xscale="log", yscale="log", xlabel="$t$", ylabel="$D(t)$")
+    order = sorted(series)
+    for k, fx in enumerate(order):
+        time, msd = positive(series[fx]["time"], series[fx]["msd"])
+        colour = colormaps["viridis"](0.9 * k / max(1, len(order) - 1))
+        axes.plot(time, msd, color=colour, linewidth=0.7, label=f"{fx:g}")
+    few_decades(axes, 8)
+    axes.legend(title="$F_x$", ncols=1 + len(order) // 12, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure

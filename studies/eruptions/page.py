@@ -1,0 +1,29 @@
+"""The page of the sizes of eruptions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..pages import render
+from .compute import DECADES, OVER, QUIET
+from .draw import WORDS
+
+
+def page(result: dict[str, Any]) -> str:
+    """The page, in Markdown, from what eruptions.json holds."""
+    runs = result["runs"]
+    grown = [run["msd"] for run in runs if run["ends"] != "stable"]
+    return render(
+        __package__ or "",
+        "eruptions.md.j2",
+        runs=runs,
+        units=result["units"],
+        fy=result["scene"]["load"]["fy"],
+        words=WORDS,
+        decades=float(np.log10(max(grown) / min(grown))) if grown else 0.0,
+        noise=(min(run["noise"] for run in runs), max(run["noise"] for run in runs)),
+        balance=max(run["balance"] for run in runs),
+        criterion=(OVER, DECADES, QUIET),
+    )

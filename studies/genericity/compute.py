@@ -1,0 +1,57 @@
+"""Compute the sweeps of the study, round by round; each in a folder of its own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from importlib.metadata import version
+from pathlib import Path
+
+from mpi4py import MPI
+
+from ...analysis.wholefile import write_text
+from ...pywrap.sections import Law
+from ..sweep.compute import LINES, Progress, Say, run_sweep, stored
+from .sets import SHARES, sets
+
+
+def compute(output: Path, say: Say = print, progress: Progress = lambda rows, _: rows, share: float = 1.0) -> None:
+    """Compute what is missing of all sweeps.
+
+    Parameters
+    ----------
+    output : Path
+        The folder.
+    say, progress
+        As of `run_sweep`.
+    share : float
+        Of the packings of each set.
+    """
+    harmonic = "exponent" in Law.model_fields
+    for part in [*(each for each in SHARES if each < share), share]:
+        for name, sweep in sets(part, harmonic).items():
+            say(f"{name}: {100 * part:.3g} % of the packings")
+            run_sweep(sweep, output / name.replace(" ", "_"), say=say, progress=progress)
+        if MPI.COMM_WORLD.rank == 0:
+            record(output)
+
+
+def record(output: Path) -> None:
+    """made.json: with which version the tables were made, and what they cost."""
+    rows = [row for path in output.glob(f"*/{LINES}") for row in stored(path).values()]
+    made = {
+        "version": version("faultgouge"),
+        "commit": _commit(),
+        "rows": len(rows),
+        "cpu_seconds": round(sum(row["cpu_seconds"] for row in rows)),
+    }
+    write_text(output / "made.json", json.dumps(made, indent=1) + "\n")
+
+
+def _commit() -> str:
+    """The commit of the sources; "unknown" outside of a repository."""
+    command = ["git", "-C", str(Path(__file__).resolve().parent), "describe", "--always", "--dirty"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, timeout=20, check=True).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"

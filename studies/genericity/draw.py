@@ -1,0 +1,138 @@
+"""The pictures of the study."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ...analysis.packing import Floats
+from ...figures.style import INK, styled
+from ..statistics import distribution
+from .numbers import STEPS
+from .sets import FRICTION
+from .tables import Table
+
+
+@styled
+def onsets_figure(onsets: Table, predicted: Floats) -> Figure:
+    """Packings without an onset up to F_x, by friction coefficient, and onsets at two of them.
+
+    Parameters
+    ----------
+    onsets : Table
+        The first set.
+    predicted : ndarray
+        F_0 of packings of 100 disks, force per disk of the layer.
+    """
+    figure = Figure(figsize=(6.8, 3.1), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for number, mu in enumerate(FRICTION):
+        part = onsets.where(law_mu=mu).settled
+        _survival(left, part.reach, part.found, rf"$\mu = {mu:g}$", f"C{number}")
+    if len(predicted):
+        fx = np.linspace(0, 0.03, 100)
+        share = np.mean(np.exp(-((fx[:, None] / predicted) ** 2)), axis=1)
+        left.plot(fx, share, ":", color=INK, label="two levels")
+    left.set(xlabel="$F_x$", ylabel="packings without an onset", xlim=(0, 0.03), ylim=(0, 1))
+    if left.lines:
+        left.legend(fontsize=7)
+    strong, weak = STEPS[0]
+    rows = {row["packing.seed"]: row for row in onsets.where(law_mu=strong).settled.rows}
+    for row in onsets.where(law_mu=weak).settled.rows:
+        other = rows.get(row["packing.seed"])
+        if other is None or (row["ends"] != "onset" and other["ends"] != "onset"):
+            continue
+        marker = "o" if row["ends"] == other["ends"] else ">" if other["ends"] != "onset" else "^"
+        same = bool(row["ancestors"]) and row["ancestors"] == other["ancestors"]
+        right.plot(float(other["reach"]), float(row["reach"]), marker, color="C0", mfc="C0" if same else "none", ms=3.5)
+    right.axline((0, 0), slope=1, color=INK, linewidth=0.6, linestyle=":")
+    right.set(xlabel=rf"$F_x^c(\mu = {strong:g})$", ylabel=rf"$F_x^c(\mu = {weak:g})$", aspect="equal")
+    right.set(xlim=(0, 0.031), ylim=(0, 0.031))
+    return figure
+
+
+@styled
+def modes_figure(onsets: Table) -> Figure:
+    """Which modes meet: participation over place in the spectrum, coloured by the share of rotation (mu = 1)."""
+    figure = Figure(figsize=(3.4, 2.6), layout="constrained")
+    axes = figure.add_subplot()
+    found = Table(tuple(row for row in onsets.where(law_mu=1.0).rows if row.get("rank")))
+    drawn = axes.scatter(
+        found.numbers("rank") / found.numbers("modes"),
+        found.numbers("participation"),
+        c=found.numbers("rotation"),
+        s=12,
+        vmin=0,
+        vmax=1,
+        cmap="viridis",
+    )
+    figure.colorbar(drawn, label="share of rotation")
+    axes.set(xlabel="share of modes below the pair", ylabel="disks that move", xlim=(0, 1), ylim=(0, None))
+    return figure
+
+
+@styled
+def size_figure(numbers: dict[str, Any]) -> Figure:
+    """The onset over the number of disks beside the prediction, and the largest growth rate over the load."""
+    figure = Figure(figsize=(6.8, 3.0), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for marker, (name, found) in zip("os", numbers["sizes"].items(), strict=True):
+        rows = [row for row in found["rows"] if row["median"][0] is not None]
+        if not rows:
+            continue
+        disks = np.array([row["disks"] for row in rows]) * (1.0 if marker == "o" else 1.04)
+        middle = np.array([row["median"][0] for row in rows])
+        low = np.array([row["median"][1] for row in rows], dtype=float)
+        high = np.array([np.nan if row["median"][2] is None else row["median"][2] for row in rows])
+        left.errorbar(disks, middle, [middle - low, np.nan_to_num(high - middle)], fmt=marker, ms=3.5, label=name)
+    levels = numbers["levels"]["rows"]
+    if levels:
+        disks = np.array([row["disks"] for row in levels])
+        left.plot(disks, [row["median"]["value"] for row in levels], ":", color=INK, label="two levels")
+    left.set(xscale="log", yscale="log", xlabel="disks", ylabel="median of $F_x^c / F_y$")
+    left.legend()
+    for number, each in enumerate(numbers["growth"]):
+        points = [point for point in each["points"] if point["median"] > 0]
+        loads = [point["load"] for point in points]
+        right.plot(
+            loads, [point["median"] for point in points], "o-", ms=2.5, color=f"C{number}", label=f"{each['disks']}"
+        )
+        right.fill_between(
+            loads, [p["low"] for p in points], [p["high"] for p in points], color=f"C{number}", alpha=0.2, linewidth=0
+        )
+    right.set(xlabel="$F_x / F_y$", ylabel="largest growth rate of $D$")
+    if right.lines:
+        right.legend(title="disks")
+    return figure
+
+
+@styled
+def mechanism_figure(found: dict[str, Any]) -> Figure:
+    """Packings without an onset beside their surrogates."""
+    figure = Figure(figsize=(3.4, 2.6), layout="constrained")
+    axes = figure.add_subplot()
+    names = {
+        "own": "the packings",
+        "linear": "straight line",
+        "random": "random matrices",
+        "shuffled": "shuffled contacts",
+    }
+    for number, (name, label) in enumerate(names.items()):
+        part = found[name]
+        _survival(axes, np.array(part["reach"]), np.array(part["is_onset"], dtype=bool), label, f"C{number}")
+    axes.set(xlabel="$F_x$", ylabel="without an onset", xlim=(0, 0.03), ylim=(0, 1))
+    axes.legend(fontsize=7)
+    return figure
+
+
+def _survival(axes: Axes, reach: Floats, found: Any, label: str, color: str) -> None:
+    """The share of packings without an onset up to F_x, of Kaplan and Meier."""
+    if not len(reach):
+        return
+    fx, probability = distribution(reach, found)
+    places = np.concatenate([[0.0], fx, [reach.max()]])
+    left = np.concatenate([[1.0], 1 - probability, [1 - probability[-1] if len(probability) else 1.0]])
+    axes.step(places, left, where="post", color=color, label=label)

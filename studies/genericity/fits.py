@@ -1,0 +1,94 @@
+r"""Fits to onsets of which some lie beyond what a ramp reached.
+
+The share of packings without an onset up to F is taken to be :math:`\exp(-(F/F_0)^k)`, Weibull's distribution; windows
+that open independently at a rate that grows linearly with the load have k = 2. Over the number of disks
+:math:`F_0 = c N^{-p}`. Parameters have the largest likelihood; an onset contributes its density and a packing without
+one the share beyond its reach. Intervals are those of 95 % of fits to packings drawn again, with replacement, within
+each size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from ...analysis.packing import Floats
+from ..statistics import Bools
+
+DRAWS = 300
+"""Fits to resampled packings: the ends of an interval are then known to a tenth of its width."""
+
+
+def weibull(reach: Floats, found: Bools) -> Floats:
+    """ln F_0 and ln k of the largest likelihood, shape (2,)."""
+    return _fit(np.zeros(len(reach)), reach, found)[[0, 2]]
+
+
+def size_law(disks: Floats, reach: Floats, found: Bools) -> dict[str, Any]:
+    """The exponent p of F_0 = c N^-p and the shape k, each with its interval.
+
+    Parameters
+    ----------
+    disks : ndarray, shape (M,)
+        N of each packing.
+    reach, found : ndarray, shape (M,)
+        As of `statistics.distribution`.
+    """
+    return _with_intervals(np.log(disks), reach, found, {"exponent": (1, -1.0), "shape": (2, None)}) | {
+        "packings": len(reach)
+    }
+
+
+def shape(reach: Floats, found: Bools) -> dict[str, Any]:
+    """F_0 and k of one size, each with its interval."""
+    names = {"f0": (0, None), "shape": (2, None)}
+    return _with_intervals(np.zeros(len(reach)), reach, found, names) | {"packings": len(reach)}
+
+
+def _with_intervals(
+    logs: Floats, reach: Floats, found: Bools, names: Mapping[str, tuple[int, float | None]]
+) -> dict[str, Any]:
+    generator = np.random.default_rng(0)
+    best = _fit(logs, reach, found)
+    groups = [np.flatnonzero(logs == value) for value in np.unique(logs)]
+    draws = []
+    for _ in range(DRAWS):
+        chosen = np.concatenate([generator.choice(group, len(group)) for group in groups])
+        if found[chosen].sum() > len(groups):
+            draws.append(_fit(logs[chosen], reach[chosen], found[chosen], best))
+    result = {}
+    for name, (k, sign) in names.items():
+        values = np.array([draw[k] for draw in [best, *draws]])
+        values = np.exp(values) if sign is None else sign * values
+        low, high = np.quantile(values[1:], [0.025, 0.975])
+        result[name] = {"value": float(values[0]), "low": float(low), "high": float(high)}
+    return result
+
+
+def _fit(logs: Floats, reach: Floats, found: Bools, start: Floats | None = None) -> Floats:
+    """(ln c, slope, ln k) of the largest likelihood, ln F_0 = ln c + slope ln N; the slope is 0 for one size.
+
+    In k, k ln c and k slope the likelihood is concave: there is one maximum.
+    """
+    log_reach = np.log(np.maximum(reach, np.finfo(float).tiny))
+    columns = np.column_stack([log_reach, -np.ones(len(logs)), -(logs - logs.mean())])
+    if np.ptp(logs) == 0:
+        columns = columns[:, :2]
+
+    def loss(parameters: Floats) -> tuple[float, Floats]:
+        if parameters[0] <= 0:
+            return np.inf, np.zeros(len(parameters))
+        z = np.minimum(columns @ parameters, 500.0)
+        slope = columns.T @ (np.exp(z) - found)
+        slope[0] -= found.sum() / parameters[0]
+        return float(np.exp(z).sum() - z[found].sum() - found.sum() * np.log(parameters[0])), slope
+
+    if start is None:
+        first = np.array([1.0, float(np.mean(log_reach)), 0.0])
+    else:
+        first = np.exp(start[2]) * np.array([1.0, start[0] + start[1] * logs.mean(), start[1]])
+    k, scale, slope = [*minimize(loss, first[: columns.shape[1]], jac=True, method="BFGS").x, 0.0][:3]
+    return np.array([(scale - slope * logs.mean()) / k, slope / k, np.log(k)])

@@ -1,0 +1,320 @@
+"""The numbers of the study from its tables, each with its interval and the number of packings."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import CensoredData, logrank
+from scipy.stats import t as student
+
+from ...analysis.packing import Floats
+from ..statistics import median_interval, quartiles, share
+from .fits import shape, size_law
+from .sets import FRICTION
+from .tables import Table
+
+LOADS = (0.005, 0.01, 0.02, 0.03)
+"""F_x below which shares of packings with an onset are given."""
+
+SAME = 1e-6
+"""Relative difference of two onsets of one packing below which they are the same: increments matter less than that
+where no contact opens, closes or slides."""
+
+STEPS = [(1.0, 0.8), (0.8, 0.6), (0.6, 0.4), (0.4, 0.2), (1.0, 0.2)]
+"""Friction coefficients between which the onset is compared."""
+
+
+def read_tables(folder: Path) -> dict[str, Table]:
+    """The tables of the study by the names of their sets."""
+    return {path.parent.name.replace("_", " "): Table.read(path) for path in sorted(folder.glob("*/results.csv"))}
+
+
+def numbers(tables: dict[str, Table]) -> dict[str, Any]:
+    """All numbers that the page states."""
+    empty = Table(())
+    onsets = tables.get("onsets", empty)
+    reference = onsets.where(law_mu=1.0)
+    return {
+        "onsets": [of_friction(onsets.where(law_mu=mu)) | {"mu": mu} for mu in FRICTION],
+        "lowered": [lowered(onsets, *pair) | {"from": pair[0], "to": pair[1]} for pair in STEPS],
+        "kinds": [kinds(onsets.where(law_mu=mu)) | {"mu": mu} for mu in FRICTION],
+        "modes": [modes(onsets.where(law_mu=mu)) | {"mu": mu} for mu in FRICTION],
+        "shape": shape(reference.settled.reach, reference.settled.found),
+        "settled": settled_with_friction(tables.get("settled with friction", empty)),
+        "halved": halved(onsets, tables.get("halved increments", empty)),
+        "harmonic": harmonic(onsets, tables.get("harmonic", empty)),
+        "sizes": {name: sizes(tables.get(name, empty), reference) for name in ("fixed force", "fixed pressure")},
+        "levels": levels(tables.get("levels", empty)),
+        "growth": growth(tables.get("growth", empty)),
+        "surrogates": surrogates(tables.get("surrogates", empty), reference),
+    }
+
+
+def of_friction(table: Table) -> dict[str, Any]:
+    """How the ramps of one friction coefficient end."""
+    good = table.settled
+    reach, found = good.reach, good.found
+    ends = good.words("ends")
+    below = []
+    for load in LOADS:
+        known = (found & (reach <= load)) | (reach >= load * (1 - 1e-9))
+        below.append({"load": load} | share(int(np.sum(found & (reach <= load))), int(np.sum(known))))
+    return {
+        "packings": len(table),
+        "failed": table.failures,
+        "until": ends.count("until"),
+        "flows": ends.count("flows"),
+        "found": share(int(found.sum()), len(good)),
+        "below": below,
+        "median": median_interval(reach, found),
+        "quartiles": quartiles(reach, found) if len(good) else [None] * 3,
+    }
+
+
+def lowered(onsets: Table, strong: float, weak: float) -> dict[str, Any]:
+    """Whether a smaller friction coefficient lowers the onset, and what is different where it does not."""
+    first, second = (_by_seed(onsets.where(law_mu=mu)) for mu in (strong, weak))
+    decided: list[tuple[bool, bool, bool, float]] = []
+    unknown = 0
+    for seed in sorted(first.keys() & second.keys()):
+        a, b = first[seed], second[seed]
+        verdict = _lowers(a, b)
+        if verdict is None:
+            unknown += 1
+        else:
+            both = a["ends"] == b["ends"] == "onset"
+            alike = bool(both and a["ancestors"] and a["ancestors"] == b["ancestors"])
+            decided.append((verdict, both, alike, float(b["reach"]) / float(a["reach"]) if both else np.nan))
+    verdicts = [each[0] for each in decided]
+    pairs = [each for each in decided if each[1]]
+    same, other = [each for each in pairs if each[2]], [each for each in pairs if not each[2]]
+    return {
+        "lowered": share(sum(verdicts), len(verdicts)),
+        "unknown": unknown,
+        "same": share(len(same), len(pairs)),
+        "lowered_same": share(sum(each[0] for each in same), len(same)),
+        "lowered_other": share(sum(each[0] for each in other), len(other)),
+        "ratio_same": _known(np.array([each[3] for each in same])),
+        "appears": sum(not each[0] and not each[1] for each in decided),
+        "vanishes": sum(each[0] and not each[1] for each in decided),
+    }
+
+
+def _lowers(strong: dict[str, str], weak: dict[str, str]) -> bool | None:
+    reach_strong, reach_weak = float(strong["reach"]), float(weak["reach"])
+    if weak["ends"] == "onset" and reach_weak < reach_strong:
+        return True
+    return False if strong["ends"] == "onset" and reach_strong <= reach_weak else None
+
+
+def _by_seed(table: Table) -> dict[int, dict[str, str]]:
+    return {int(row["packing.seed"]): row for row in table.settled.rows}
+
+
+def kinds(onsets: Table) -> dict[str, Any]:
+    """What begins the first window, of packings with one friction coefficient."""
+    words = [kind for kind in onsets.words("kind") if kind]
+    sliding = onsets.numbers("sliding")
+    changed = onsets.numbers("opened") + onsets.numbers("closed")
+    return {
+        "coalescence": share(words.count("coalescence"), len(words)),
+        "sliding": share(int(np.sum(sliding > 0)), int(np.isfinite(sliding).sum())),
+        "changed": share(int(np.sum(changed > 0)), int(np.isfinite(changed).sum())),
+    }
+
+
+def modes(onsets: Table) -> dict[str, Any]:
+    """Which modes meet, in packings with one friction coefficient."""
+    found = Table(tuple(row for row in onsets.rows if row.get("rank")))
+    place = found.numbers("rank") / found.numbers("modes")
+    neighbours = [int(pair[1]) - int(pair[0]) == 1 for pair in found.lists("ancestors")]
+    columns = {
+        "place": place,
+        "frequency": np.sqrt(found.numbers("lambda") / found.numbers("largest")),
+        "participation": found.numbers("participation"),
+        "rotation": found.numbers("rotation"),
+        "layer": found.numbers("layer"),
+        "ancestry": found.numbers("ancestry"),
+    }
+    return {
+        "onsets": len(found),
+        "lowest": share(int(np.sum(place < 1 / 3)), len(found)),
+        "neighbours": share(sum(neighbours), len(neighbours)),
+    } | {name: _known(values) for name, values in columns.items()}
+
+
+def _known(values: Floats) -> dict[str, Any]:
+    """Median with its interval, and quartiles, of numbers that are all known."""
+    found = np.ones(len(values), dtype=bool)
+    return {"median": median_interval(values, found), "quartiles": quartiles(values, found)}
+
+
+def settled_with_friction(table: Table) -> dict[str, Any]:
+    """Packings that have settled with friction: complex pairs at rest."""
+    good = table.settled
+    start = [kind == "start" for kind in good.words("kind")]
+    return {
+        "packings": len(set(table.words("packing.seed"))),
+        "rows": len(good),
+        "start": share(sum(start), len(start)),
+    }
+
+
+def halved(onsets: Table, finer: Table) -> dict[str, Any]:
+    """Onsets with increments half as large."""
+    known = {(row["packing.seed"], row["law.mu"]): row for row in onsets.settled.rows}
+    both = [(known[key], row) for row in finer.settled.rows if (key := (row["packing.seed"], row["law.mu"])) in known]
+    off = np.array(
+        [abs(float(b["reach"]) / float(a["reach"]) - 1) for a, b in both if a["ends"] == b["ends"] == "onset"]
+    )
+    return {
+        "rows": len(both),
+        "ends": share(sum(a["ends"] == b["ends"] for a, b in both), len(both)),
+        "same": share(int(np.sum(off < SAME)), len(off)),
+        "largest": float(off.max()) if len(off) else None,
+        "typical": float(np.median(off)) if len(off) else None,
+    }
+
+
+def harmonic(onsets: Table, table: Table) -> list[dict[str, Any]]:
+    """The onsets of the law with exponent 1 beside those of the same packings' seeds with 3/2."""
+    result = []
+    for mu in sorted({float(cell) for cell in table.words("law.mu")}):
+        own, other = table.where(law_mu=mu).settled, onsets.where(law_mu=mu).settled
+        result.append({"mu": mu, "harmonic": of_friction(table.where(law_mu=mu)), "p": _logrank(own, other)})
+    return result
+
+
+def sizes(table: Table, reference: Table) -> dict[str, Any]:
+    """The onset over the number of disks, in units of F_y; the packings of 100 disks are those of the first set."""
+    parts = {
+        int(disks): table.where(packing_disks=disks).settled for disks in sorted(set(table.words("packing.disks")))
+    }
+    rows, disks, reach, found = [], [], [], []
+    for number, part in sorted([*parts.items(), (100, reference.settled)]):
+        load = np.full(len(part), 3.0) if number == 100 else part.numbers("load.fy")
+        scaled = part.reach / load
+        rows.append(
+            {
+                "disks": number,
+                "packings": len(part),
+                "onsets": int(part.found.sum()),
+                "flows": part.words("ends").count("flows"),
+            }
+            | {"median": median_interval(scaled, part.found), "doubtful": int(np.sum(part.numbers("doubtful") > 0))}
+        )
+        disks.append(np.full(len(part), float(number)))
+        reach.append(scaled)
+        found.append(part.found)
+    law = size_law(np.concatenate(disks), np.concatenate(reach), np.concatenate(found)) if len(table) else None
+    return {"rows": rows, "law": law}
+
+
+def levels(table: Table) -> dict[str, Any]:
+    """Levels, couplings and the predicted scale over the number of disks, in units of F_y, and their exponents."""
+    good = table.settled
+    disks = good.numbers("packing.disks")
+    load = good.numbers("load.fy")
+    columns = {
+        "spacing": good.numbers("spacing"),
+        "ratio": good.numbers("ratio"),
+        # per force in spacings -> per F_x/F_y, 1 / time^2
+        "coupling": good.numbers("coupling") * load * good.numbers("spacing"),
+        "speed": good.numbers("speed") * load * good.numbers("spacing"),
+        "participation": good.numbers("participation"),
+        "median": good.numbers("f0") / load * np.sqrt(np.log(2)),
+    }
+    rows = []
+    for number in np.unique(disks):
+        mine = disks == number
+        rows.append(
+            {"disks": int(number), "packings": int(mine.sum())}
+            | {name: _mean(values[mine]) for name, values in columns.items()}
+        )
+    exponents = {name: _slope(disks, values) for name, values in columns.items() if name != "ratio"}
+    return {"rows": rows, "exponents": exponents, "f0": (good.numbers("f0") / load).tolist(), "disks": disks.tolist()}
+
+
+def growth(table: Table) -> list[dict[str, Any]]:
+    """Largest growth rate over the load, by number of disks: medians over packings at common loads."""
+    result = []
+    for number in sorted({float(cell) for cell in table.words("packing.disks")}):
+        part = [
+            (np.array(json.loads(row["fx"])) / float(row["load.fy"]), np.array(json.loads(row["rate"])))
+            for row in table.where(packing_disks=number).rows
+            if row.get("fx")
+        ]
+        longest = max((len(each[0]) for each in part), default=0)
+        points = []
+        for k in range(longest):
+            rates = [each[1][k] for each in part if len(each[0]) > k]
+            points.append(
+                {"load": float(next(x[0][k] for x in part if len(x[0]) > k)), "of": len(rates)} | _middle(rates)
+            )
+        result.append({"disks": int(number), "packings": len(part), "points": points})
+    return result
+
+
+def surrogates(table: Table, reference: Table) -> dict[str, Any]:
+    """Onsets of the surrogates beside those of the packings of the same seeds."""
+    seeds = set(table.words("packing.seed"))
+    own = Table(tuple(row for row in reference.rows if row["packing.seed"] in seeds)).settled
+    result: dict[str, Any] = {"packings": len(seeds), "own": _ends(own)}
+    for name in ("linear", "random", "shuffled"):
+        rows = tuple(
+            {"ends": row[f"{name}.ends"], "reach": row[f"{name}.reach"]}
+            for row in table.rows
+            if row.get(f"{name}.ends")
+        )
+        part = Table(rows)
+        result[name] = _ends(part) | {"p": _logrank(part, own)}
+    return result
+
+
+def _ends(table: Table) -> dict[str, Any]:
+    return {
+        "found": share(int(table.found.sum()), len(table)),
+        "median": median_interval(table.reach, table.found),
+        "reach": table.reach.tolist(),
+        "is_onset": table.found.tolist(),
+    }
+
+
+def _logrank(one: Table, other: Table) -> float | None:
+    """Probability of a difference as large, or larger, between two samples of one distribution."""
+    if not (one.found.any() and other.found.any()):
+        return None
+    samples = [CensoredData.right_censored(each.reach, ~each.found) for each in (one, other)]
+    return float(logrank(*samples).pvalue)
+
+
+def _middle(values: list[float]) -> dict[str, float]:
+    low, median, high = np.quantile(values, [0.25, 0.5, 0.75])
+    return {"low": float(low), "median": float(median), "high": float(high)}
+
+
+def _mean(values: Floats) -> dict[str, float | None]:
+    """The mean and half of its 95 % interval (Student's); no interval of a single value."""
+    count = len(values)
+    error = float(student.ppf(0.975, count - 1) * np.std(values, ddof=1) / np.sqrt(count)) if count > 1 else None
+    return {"value": float(np.mean(values)), "error": error}
+
+
+def _slope(disks: Floats, values: Floats) -> dict[str, float] | None:
+    """The exponent of a power law, with its 95 % interval from resampled packings within each size."""
+    sizes = np.unique(disks)
+    if len(sizes) < 2:
+        return None
+    generator = np.random.default_rng(0)
+    groups = [np.flatnonzero(disks == size) for size in sizes]
+
+    def fit(chosen: list[Any]) -> float:
+        means = [float(np.mean(np.log(values[group]))) for group in chosen]
+        return float(np.polyfit(np.log(sizes), means, 1)[0])
+
+    draws = [fit([generator.choice(group, len(group)) for group in groups]) for _ in range(1000)]
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return {"value": fit(groups), "low": float(low), "high": float(high)}

@@ -1,0 +1,170 @@
+r"""The mechanism told from a coincidence: onsets of operators that share some of a packing's properties, and not
+others.
+
+linear
+    The packing's own operator as a straight line about rest, :math:`\mathrm{diag}(e) + F (V + C)` (see
+    :mod:`~faultgouge.studies.genericity.levels`). What the onset owes to bending is missing.
+random
+    The same with everything else than its statistics taken away. Spacings are permuted among `BLOCK` neighbouring
+    levels; the elements of V and of C are permuted within blocks of `BLOCK` by `BLOCK` levels and get random signs.
+    Levels, and couplings as a function of the levels that they couple, are those of the packing; which mode lies
+    where is not.
+shuffled
+    The packing along its true ramp, but the antisymmetric part of every contact's stiffness is that of another
+    contact. With :math:`K_c \ni b\,T N^T + (f_t/r) N P^T`, it is :math:`\frac b2 (T N^T - N T^T) + \frac{f_t}{2r} (N
+    P^T - P N^T)`, and the numbers b and f_t/r of the contacts between disks at rest are permuted, the same way at all
+    loads. Contacts that close later keep their own.
+
+All are searched as the packing is, up to the same load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from scipy.sparse import coo_array, csr_array
+
+from ...analysis import NoEquilibriumError, Packing
+from ...analysis.onset import complex_windows, force_bearing
+from ...analysis.packing import Floats
+from ...analysis.spectrum import mass_weighted
+from ...analysis.stiffness import stiffness_matrix
+from ...pywrap import Engine, Scene
+from ...pywrap.equilibria import EquilibriumPath, loads
+from ..sweep.onset import Start
+from .levels import Pencil, pencil_of
+
+BLOCK = 20
+"""Levels among which spacings and couplings are permuted: their means change little over so many."""
+
+
+def surrogates(scene: Scene, start: Start) -> dict[str, Any]:
+    """The task "surrogates": how the ramps of all surrogates of a scene end, as the task "onset" has it."""
+    pencil = pencil_of(scene, start)
+    assert scene.ramp is not None
+    seed = int(getattr(scene.packing, "seed", 0))
+    drawn = randomized(pencil, np.random.default_rng(seed))
+    steps, narrowest = loads(scene.ramp), 1e-7 * scene.ramp.until
+    row = {
+        "linear": _first(lambda fx: csr_array(pencil.at(fx)), steps, narrowest),
+        "random": _first(lambda fx: csr_array(drawn.at(fx)), steps, narrowest),
+    }
+    rest = start(scene.law.mus[0])
+    shuffle = Shuffle(rest.packing, np.random.default_rng(seed))
+    with Engine(rest.packing, MPI.COMM_SELF) as engine:
+        path = EquilibriumPath(engine, rest, scene)
+        return row | {"shuffled": _first(lambda fx: shuffle(path(fx)), steps, narrowest)}
+
+
+def _first(operator: Callable[[float], csr_array], steps: Floats, narrowest: float) -> dict[str, Any]:
+    for here, there in pairwise(steps.tolist()):
+        try:
+            operator(there)
+            windows = complex_windows(operator, [here, there], narrowest=narrowest)
+        except NoEquilibriumError:
+            return {"ends": "flows", "reach": here}
+        if windows:
+            return {"ends": "onset", "reach": windows[0].fx_onset}
+    return {"ends": "until", "reach": float(steps[-1])}
+
+
+def randomized(pencil: Pencil, generator: np.random.Generator) -> Pencil:
+    """The pencil with spacings and couplings permuted among neighbouring levels, and random signs.
+
+    Parameters
+    ----------
+    pencil : Pencil
+        That of a packing.
+    generator : numpy.random.Generator
+        Decides.
+    """
+    gaps = np.diff(pencil.values)
+    blocks = [slice(k, k + BLOCK) for k in range(0, len(gaps), BLOCK)]
+    for block in blocks:
+        gaps[block] = generator.permutation(gaps[block])
+    values = pencil.values[0] + np.concatenate([[0.0], np.cumsum(gaps)])
+    symmetric = _permuted(pencil.symmetric, generator)
+    antisymmetric = _permuted(pencil.antisymmetric, generator)
+    diagonal = np.diag(pencil.symmetric).copy()
+    for k in range(0, len(diagonal), BLOCK):
+        diagonal[k : k + BLOCK] = generator.permutation(diagonal[k : k + BLOCK])
+    return Pencil(values, symmetric + symmetric.T + np.diag(diagonal), antisymmetric - antisymmetric.T, pencil.basis)
+
+
+def _permuted(matrix: Floats, generator: np.random.Generator) -> Floats:
+    """The elements above the diagonal, permuted within blocks, with random signs."""
+    upper = np.triu(matrix, 1)
+    size = len(matrix)
+    for i in range(0, size, BLOCK):
+        for j in range(i, size, BLOCK):
+            rows, columns = _above(i, j, size)
+            values = generator.permutation(upper[rows, columns])
+            upper[rows, columns] = values * generator.choice([-1.0, 1.0], len(values))
+    return upper
+
+
+def _above(i: int, j: int, size: int) -> tuple[Any, Any]:
+    """Rows and columns of the elements of a block that lie above the diagonal."""
+    rows, columns = np.meshgrid(np.arange(i, min(i + BLOCK, size)), np.arange(j, min(j + BLOCK, size)), indexing="ij")
+    above = columns > rows
+    return rows[above], columns[above]
+
+
+class Shuffle:
+    """The operator of a packing with the antisymmetric parts of its contacts permuted.
+
+    Parameters
+    ----------
+    rest : Packing
+        Whose contacts between disks are permuted.
+    generator : numpy.random.Generator
+        Decides.
+    """
+
+    def __init__(self, rest: Packing, generator: np.random.Generator) -> None:
+        names = _names(force_bearing(rest))
+        order = generator.permutation(len(names))
+        self.source = {name: names[k] for name, k in zip(names, order.tolist(), strict=True)}
+
+    def __call__(self, packing: Packing) -> csr_array:
+        """A of the packing with the permuted antisymmetric part in place of its own, 1 / time^2."""
+        packing = force_bearing(packing)
+        own = mass_weighted(stiffness_matrix(packing), packing)
+        symmetric = csr_array(0.5 * (own + own.T))
+        names = _names(packing)
+        place = {name: k for k, name in enumerate(names)}
+        source = np.array([place.get(self.source.get(name, name), k) for k, name in enumerate(names)], dtype=int)
+        every = np.concatenate([source, np.arange(len(names), len(packing.contacts))])
+        return csr_array(symmetric + mass_weighted(antisymmetric_part(packing, every), packing))
+
+
+def _names(packing: Packing) -> list[tuple[int, int]]:
+    """The contacts between disks, which come first."""
+    pairs = ~packing.contacts.floor
+    return list(zip(packing.contacts.i[pairs].tolist(), packing.contacts.j[pairs].tolist(), strict=True))
+
+
+def antisymmetric_part(packing: Packing, source: Any) -> csr_array:
+    """(K - K^T) / 2 assembled from the contacts, each with b and f_t/r of the contact `source`; force / length."""
+    normal, tangent, distance, overlap = packing.geometry
+    contacts, floor = packing.contacts, packing.contacts.floor
+    law = packing.law.derivatives(overlap, contacts.slip)
+    b = law.overlap_derivative[source]
+    turn = np.where(floor, 0.0, law.tangential_force / np.where(floor, 1.0, distance))[source]
+    zero = np.zeros((len(b), 1))
+    n, p = np.hstack([normal, zero, -normal, zero]), np.hstack([tangent, zero, -tangent, zero])
+    t = np.hstack([tangent, zero - 1, -tangent, zero - 1])
+    n[floor, 3:] = p[floor] = t[floor, 3:] = 0.0
+    blocks = b[:, None, None] * np.einsum("cp,cq->cpq", t, n) + turn[:, None, None] * np.einsum("cp,cq->cpq", n, p)
+    blocks = 0.5 * (blocks - blocks.transpose(0, 2, 1))
+    size, other = len(packing), np.where(floor, contacts.i, contacts.j)
+    place = np.stack(
+        [contacts.i, contacts.i + size, contacts.i + 2 * size, other, other + size, other + 2 * size], axis=1
+    )
+    rows, columns = np.broadcast_to(place[:, :, None], blocks.shape), np.broadcast_to(place[:, None, :], blocks.shape)
+    whole = coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * size, 3 * size))
+    return csr_array(whole.tocsr())

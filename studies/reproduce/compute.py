@@ -1,0 +1,238 @@
+r"""The paper's protocol on one packing: ramps, onsets, growth, and the numbers of its summary.
+
+Settle, raise F_x from equilibrium to equilibrium for each friction coefficient, find the onset F_x^c where two real
+eigenvalues coalesce; then start undamped dynamics from an equilibrium above the onset and compare the growth of the
+mean square displacement D(t), which starts from rounding noise, with the rate 2 |Im omega| of the spectrum. Where the
+scene asks for it, a minute perturbation just below the onset follows (`triggering`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis import (
+    Growth,
+    RunFile,
+    Spectrum,
+    discrete_frequency,
+    fit_growth,
+    spectrum,
+)
+from ...analysis.pair_form import pair_eigenvalues
+from ...figures.pair import PairCurve
+from ...pywrap import Engine, Equilibrium, Record, Sample, Scene, reach
+from ...pywrap.equilibria import next_equilibrium
+from ...pywrap.refusals import needed
+from ...pywrap.sections import Friction, Perturb
+from ...pywrap.undamped import perturb, time_step
+from ..onsets import OnsetRun, onset_run
+from ..triggering import Sensitivity, Triggering, sensitivity, trigger
+from ..triggering import summary as triggering_summary
+
+Floats = NDArray[np.float64]
+
+EFOLDS = 48.0
+"""Length of the undamped run in units of 1/rate: D grows by up to 20 decades in it."""
+
+LONGEST_RUN = 3_000_000
+"""Steps of the undamped run, at the most: about 20 s for 100 disks."""
+
+NEAR_ONSET = np.concatenate(
+    [-np.geomspace(3e-2, 1e-3, 7)[:-1], -np.geomspace(1e-3, 1e-7, 13), [0.0], np.geomspace(1e-6, 1e-3, 9)]
+)
+"""Distances from the onset at which there are further equilibria, in units of the ramp's last F_x: for figure 3, and
+below the onset for the response over the distance."""
+
+BEYOND_ONSET = np.linspace(0.0, 0.3, 76)[1:]
+"""The same beyond the onset, for figure 3 alone: there the pair turns sharply within one increment of the ramp."""
+
+NEARBY = np.concatenate([NEAR_ONSET, BEYOND_ONSET])
+
+
+@dataclass(frozen=True, eq=False)
+class GrowthRun:
+    """An undamped run above the onset.
+
+    Attributes
+    ----------
+    start : Equilibrium
+        Where it began.
+    time, msd : ndarray, shape (T,)
+        D(t).
+    spectrum : Spectrum
+        Of the equilibrium.
+    time_step : float
+        Of the run.
+    predicted : float
+        Growth rate of D from the spectrum and the time step's dispersion, 1/time.
+    measured : Growth or None
+        Fitted to D(t); None where D does not grow far enough between its noise and where it levels off.
+    """
+
+    start: Equilibrium
+    time: Floats
+    msd: Floats
+    spectrum: Spectrum
+    time_step: float
+    predicted: float
+    measured: Growth | None
+
+    @property
+    def rate(self) -> str:
+        """The measured rate in words."""
+        return "none" if self.measured is None else f"{self.measured.rate:.6g}"
+
+
+@dataclass(frozen=True, eq=False)
+class TriggeringRun:
+    """What became of the attempt to trigger.
+
+    Attributes
+    ----------
+    settings : Perturb
+        The perturbation.
+    triggering : Triggering or None
+        The undamped runs; None where there is nothing to trigger.
+    sensitive : Sensitivity or None
+        The response on the way to the onset; None likewise.
+    says : str
+        Why there is nothing to trigger; empty otherwise.
+    """
+
+    settings: Perturb
+    triggering: Triggering | None = None
+    sensitive: Sensitivity | None = None
+    says: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Numbers for summary.json."""
+        if self.triggering is None or self.sensitive is None:
+            return {"says": self.says}
+        return triggering_summary(self.triggering, self.sensitive)
+
+
+def triggering_run(
+    scene: Scene, settings: Perturb, friction: Friction, runs: list[OnsetRun], path: Path
+) -> TriggeringRun:
+    """A perturbation between the onsets of the weakened and of the static friction; the series go to run.h5."""
+    run = runs[0]
+    # exact but for the product's rounding
+    weakened = [each for each in runs if np.isclose(each.mu, run.mu * friction.mu_ss, rtol=1e-12)]
+    if weakened and settings.fx <= weakened[0].onset.fx_c:
+        says = (
+            f"F_x = {settings.fx:g} is below the onset {weakened[0].onset.fx_c:g} of the weakened friction, too: no "
+            "window between the two, and nothing to erupt."
+        )
+        return TriggeringRun(settings, says=says)
+    if settings.fx >= run.onset.fx_c:
+        says = f"F_x = {settings.fx:g} is above the onset {run.onset.fx_c:g}: nothing is stable there to be triggered."
+        return TriggeringRun(settings, says=says)
+    *_, start = reach(scene, settings.fx)  # to the bit the one of `perturb`, and so is v_0
+    control = _equilibrium_at(scene, run, max(0.0, 2 * weakened[0].onset.fx_c - settings.fx)) if weakened else None
+    return TriggeringRun(settings, trigger(scene, start, control, settings, friction, path), sensitivity(run))
+
+
+def recorded_ramp(scene: Scene, mu: float, path: Path) -> OnsetRun:
+    """Ramp and onset for one friction coefficient; every equilibrium goes to the file."""
+    one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
+    path.unlink(missing_ok=True)
+    with Record(path, one) as record:
+        return onset_run(one, mu, reached=record.append, near_onset=NEARBY * _last_load(scene))
+
+
+def _last_load(scene: Scene) -> float:
+    return needed(scene.ramp, "ramp").until
+
+
+def growth_run(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
+    """An undamped run where the ramp shows the fastest growth by one pair."""
+    candidates = [each for each in run.equilibria if each.fx > run.onset.fx_c]
+    spectra = [spectrum(each.packing) for each in candidates]
+    best = int(np.argmax([_dominance(each) for each in spectra]))
+    start, modes = candidates[best], spectra[best]
+    dt = time_step(start.packing)
+    fastest = max(modes.pairs, key=lambda pair: pair.growth_rate)
+    predicted = float(2 * np.abs(discrete_frequency(fastest.eigenvalue, dt).imag))
+    settings = Perturb(fx=start.fx, time=min(EFOLDS / predicted, LONGEST_RUN * dt), inertia_factor=scene.inertia_factor)
+    # disks that have moved by a tenth of the smallest overlap certainly move otherwise than the spectrum says
+    ceiling = (0.1 * start.packing.loaded(start.residual).geometry.overlap.min()) ** 2
+    samples: list[Sample] = []
+    with RunFile(path, "a") as file:
+        for sample in perturb(scene.model_copy(update={"perturb": settings}), start, samples=4000, early=0):
+            samples.append(sample)
+            if sample.msd > 1e6 * ceiling:
+                break
+        file.append_series("undamped", **{key: [getattr(s, key) for s in samples] for key in vars(samples[0])})
+    time, msd = np.array([s.time for s in samples]), np.array([s.msd for s in samples])
+    try:
+        measured = fit_growth(time, msd, *_growing(msd, ceiling))
+    except ValueError:
+        measured = None
+    return GrowthRun(start, time, msd, modes, dt, predicted, measured)
+
+
+def _growing(msd: Floats, ceiling: float) -> tuple[float, float]:
+    """Bounds of D between which one pair grows alone: above the noise of all modes, below where D levels off.
+
+    The noise is what D shows in the first quarter of its way to the ceiling; three decades above it, the fastest pair
+    has left the others behind. Three decades below its largest value D has not levelled off.
+    """
+    upper = min(ceiling, 1e-3 * float(msd.max()))
+    way = int(np.argmax(msd >= upper))
+    return 1e3 * float(np.median(msd[: max(way // 4, 1)])), upper
+
+
+def _dominance(modes: Spectrum) -> float:
+    """Growth rate of the fastest pair, less that of the second: how fast it gets ahead."""
+    rates = sorted((pair.growth_rate for pair in modes.pairs), reverse=True)
+    return rates[0] - (rates[1] if len(rates) > 1 else 0.0) if rates else 0.0
+
+
+def summary_of(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> dict[str, Any]:
+    """Numbers for summary.json."""
+    return {
+        "scene": scene.resolved(),
+        "ramps": [
+            {
+                "mu": run.mu,
+                "equilibria": len(run.equilibria),
+                "evaluations": [each.evaluations for each in run.equilibria],
+                "largest_residual": max(each.residual for each in run.equilibria),
+                "floor": run.equilibria[-1].floor,
+                "contacts": len(run.equilibria[0].packing.contacts),
+                "rattlers": run.equilibria[0].packing.rattlers.tolist(),
+                "flows_beyond": run.flows_beyond,
+                "onset": run.onset.as_dict(),
+            }
+            for run in runs
+        ],
+        "growth": {
+            "fx": growth.start.fx,
+            "time_step": growth.time_step,
+            "predicted_rate": growth.predicted,
+            "measured": asdict(growth.measured) if growth.measured else None,
+            "deviation": growth.measured.rate / growth.predicted - 1 if growth.measured else None,
+        },
+    }
+
+
+def pair_curve(run: OnsetRun) -> PairCurve:
+    """The pair of the first onset up to the end of its window, at the loads of the ramp and at those near the onset."""
+    first = run.onset.windows[0]
+    packings = {each.fx: each.packing for each in run.equilibria} | run.between
+    last = 2.0 * first.fx_onset if first.fx_end is None else first.fx_end
+    fx = np.array(sorted(load for load in packings if load <= last))
+    below, beyond = fx[fx <= first.fx_onset][::-1], fx[fx > first.fx_onset]
+    values = [pair_eigenvalues([packings[load] for load in side], first.eigenvalue) for side in (below, beyond)]
+    return PairCurve(run.mu, fx, np.concatenate([values[0][::-1], values[1]]), first.fx_onset)
+
+
+def _equilibrium_at(scene: Scene, run: OnsetRun, fx: float) -> Equilibrium:
+    below = max((each for each in run.equilibria if each.fx <= fx), key=lambda each: each.fx)
+    with Engine(below.packing) as engine:
+        return below if below.fx == fx else next_equilibrium(engine, below, fx, scene)

@@ -1,0 +1,89 @@
+r"""Shares and distributions of a sample, with intervals.
+
+Shares have Wilson's 95 % interval. Onsets that lie beyond what a ramp reached are right-censored; their distribution
+is that of Kaplan and Meier, in which a packing counts up to where it was seen. (That a packing that begins to flow is
+like the others is an assumption; how many there are is given with each result.)
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import CensoredData, binomtest, ecdf
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+def share(count: int, of: int) -> dict[str, Any]:
+    """count/of with Wilson's 95 % interval: {"count", "of", "share", "low", "high"}, the last three None for of = 0."""
+    if of == 0:
+        return {"count": 0, "of": 0, "share": None, "low": None, "high": None}
+    interval = binomtest(count, of).proportion_ci(0.95, method="wilson")
+    return {"count": count, "of": of, "share": count / of, "low": float(interval.low), "high": float(interval.high)}
+
+
+def distribution(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:
+    """Kaplan and Meier's distribution of F_x^c.
+
+    Parameters
+    ----------
+    reach : array_like, shape (M,)
+        The onset, or the largest F_x up to which there is none.
+    found : array_like of bool, shape (M,)
+        Whether it is the onset.
+
+    Returns
+    -------
+    fx, probability : ndarray, shape (n,)
+        Onsets, and the share of packings up to each.
+    """
+    reach, found = np.asarray(reach, dtype=float), np.asarray(found, dtype=bool)
+    if not found.any():
+        return np.empty(0), np.empty(0)
+    steps = ecdf(CensoredData.right_censored(reach, ~found)).cdf
+    rises = np.diff(steps.probabilities, prepend=0.0) > 0
+    return steps.quantiles[rises], steps.probabilities[rises]
+
+
+def quantile(fx: Floats, probability: Floats, at: float) -> float | None:
+    """A quantile of a distribution; None where it lies beyond what the ramps reached."""
+    # 3/4 from products of shares may miss 3/4 by its rounding
+    place = int(np.searchsorted(probability, at - 1e-12))
+    return float(fx[place]) if place < len(fx) else None
+
+
+def quartiles(reach: ArrayLike, found: ArrayLike) -> list[float | None]:
+    """Lower quartile, median and upper quartile of F_x^c; None where they lie beyond what the ramps reached."""
+    steps = distribution(reach, found)
+    return [quantile(*steps, at) for at in (0.25, 0.5, 0.75)]
+
+
+def median_interval(reach: ArrayLike, found: ArrayLike, draws: int = 2000, seed: int = 0) -> list[float | None]:
+    """Median of F_x^c and its 95 % interval from resampled packings; None where it lies beyond what the ramps reached.
+
+    Returns
+    -------
+    list of float or None
+        Median, lower and upper end.
+    """
+    reach, found = np.asarray(reach, dtype=float), np.asarray(found, dtype=bool)
+    ends: list[float | None] = [None, None]
+    if len(reach):
+        chosen = np.random.default_rng(seed).integers(len(reach), size=(draws, len(reach)))
+        known = np.sort(_medians(reach[chosen], found[chosen]))
+        low, high = known[int(0.025 * draws)], known[int(0.975 * draws)]
+        ends = [float(end) if np.isfinite(end) else None for end in (low, high)]
+    return [quartiles(reach, found)[1] if len(reach) else None, *ends]
+
+
+def _medians(reach: Floats, found: Bools) -> Floats:
+    """Kaplan and Meier's median of each row, as `quartiles` has it; inf where it lies beyond what was reached."""
+    order = np.lexsort((~found, reach), axis=1)  # of equal ones, onsets before packings that are lost there
+    reach, found = np.take_along_axis(reach, order, axis=1), np.take_along_axis(found, order, axis=1)
+    left = np.arange(reach.shape[1], 0, -1)
+    surviving = np.cumprod(1 - found / left, axis=1)
+    half = surviving <= 0.5 + 1e-12
+    return np.where(half.any(axis=1), np.take_along_axis(reach, half.argmax(axis=1)[:, None], axis=1)[:, 0], np.inf)

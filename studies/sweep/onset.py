@@ -1,0 +1,150 @@
+r"""The task "onset": the first window of complex eigenvalues of one scene, and which modes meet there.
+
+Up to the first window a ramp ends in one of three ways: with an *onset*; *until* the scene's last F_x without one; or
+with a packing that *flows*, because no equilibrium follows the last. The two latter say that the onset, if there is
+one, lies beyond the last equilibrium: they are right-censored observations.
+
+**The pair.** At the onset the two modes have one eigenvector v in common (mass-weighted, unit length). Disk k carries
+the weight :math:`w_k = v_{x,k}^2 + v_{y,k}^2 + v_{u,k}^2`, and :math:`1/\sum_k w_k^2` is the *participation*, the
+number of disks that move. The *rotation* is the share :math:`\sum_k v_{u,k}^2`, the *layer* that of the disks of the
+upper layer. In packings whose modes are all computed, *rank* is the number of eigenvalues below the pair, of *modes*
+in all, and *ancestors* are the two modes of the packing at rest, by number, which span most of the pair's plane, with
+their share of it in *ancestry*. At rest K does not depend on mu where the slips are zero: two onsets of one packing at
+different mu are of one pair if their ancestors are the same.
+
+**The error** is that of :func:`~faultgouge.analysis.find_onset`: of the solution for the edge and of the equilibria's
+residual. How F_x^c depends on the increments of the ramp is not in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+from mpi4py import MPI
+from scipy.linalg import eigh, eigvals
+
+from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
+from ...analysis.eigenpairs import eigenpairs
+from ...analysis.onset import force_bearing, full_operator, seeks_all
+from ...analysis.packing import Floats
+from ...pywrap import Engine, Equilibrium, Scene, SceneError
+from ...pywrap.equilibria import EquilibriumPath, loads
+from ...pywrap.refusals import needed
+
+Ends = Literal["onset", "until", "flows"]
+
+Start = Callable[[float], Equilibrium]
+"""mu -> the settled packing of the scene with this friction coefficient."""
+
+AT_LIMIT = 1 - 1e-9
+"""Share of the slip limit from which a contact slides: it is clamped to the limit, to rounding."""
+
+BESIDE = 1e-7
+"""Distance below the onset at which the pair is looked at, in units of F_x^c: its eigenvectors have an angle of about
+the root of that, and are well known."""
+
+
+def onset(scene: Scene, start: Start) -> dict[str, Any]:
+    """The first onset of a scene with one friction coefficient, as a row of a table.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no section [ramp].
+    NoEquilibriumError
+        If the packing does not settle.
+    """
+    needed(scene.ramp, "ramp")
+    if len(scene.law.mus) > 1:
+        raise SceneError('a row has one friction coefficient: give the list as "law.mu" below [sweep]')
+    rest = start(scene.law.mus[0])
+    with Engine(rest.packing, MPI.COMM_SELF) as engine:
+        path = EquilibriumPath(engine, rest, scene)
+        ends, reach, found = first_window(path, scene)
+        row: dict[str, Any] = {"ends": ends, "fx_c": None, "reach": reach}
+        row |= {"contacts": len(rest.packing.contacts), "rattlers": len(rest.packing.rattlers)}
+        if found is not None:
+            window = found.windows[0]
+            row |= {"fx_c": window.fx_onset, "error": window.error, "kind": window.kind, "lambda": window.eigenvalue}
+            row |= {"fx_end": window.fx_end, "overlap": window.overlap, "doubtful": len(found.doubtful)}
+            row |= pair(path(window.fx_onset * (1 - BESIDE)), rest.packing, window.eigenvalue)
+    return row
+
+
+def first_window(path: EquilibriumPath, scene: Scene) -> tuple[Ends, float, Onset | None]:
+    """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one."""
+    assert scene.ramp is not None
+    steps = loads(scene.ramp)
+    narrowest = 1e-7 * scene.ramp.until  # as find_onset takes it on the whole ramp
+    # increment by increment where a search looks at the whole of what it is given
+    parts = list(pairwise(steps)) if seeks_all(path.kept[0].packing) else [steps]
+    for part in parts:
+        try:
+            for fx in part if len(part) == 2 else ():
+                path(float(fx))
+            found = find_onset(path, part, narrowest=narrowest)
+        except NoEquilibriumError:
+            return "flows", path.kept[-1].fx, None
+        except OnsetError:
+            continue
+        return "onset", found.fx_c, found
+    return "until", path.kept[-1].fx, None
+
+
+def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
+    """The pair of modes that meets next to an eigenvalue, and the contacts of the packing.
+
+    Parameters
+    ----------
+    packing : Packing
+        Just below the onset.
+    rest : Packing
+        At F_x = 0.
+    eigenvalue : float
+        Where the two meet, 1 / time^2.
+    """
+    near = eigenpairs(force_bearing(packing), eigenvalue * (1 + 1e-6), 2)
+    vector = near.right[:, 0].real / np.linalg.norm(near.right[:, 0].real)
+    axes = vector.reshape(3, -1) ** 2
+    weight = axes.sum(axis=0)
+    before = {(i, j) for i, j in zip(rest.contacts.i.tolist(), rest.contacts.j.tolist(), strict=True)}
+    now = {(i, j) for i, j in zip(packing.contacts.i.tolist(), packing.contacts.j.tolist(), strict=True)}
+    slip, limit = np.abs(packing.contacts.slip), packing.law.slip_limit(packing.geometry.overlap)
+    row: dict[str, Any] = {
+        "participation": float(1 / np.sum(weight**2)),
+        "rotation": float(axes[2].sum()),
+        "layer": float(weight[packing.top].sum()),
+        "disks": np.argsort(weight)[::-1][:3].tolist(),
+        "sliding": int(np.count_nonzero(slip >= AT_LIMIT * limit)),
+        "opened": len(before - now),
+        "closed": len(now - before),
+    }
+    if seeks_all(packing):
+        row |= _among_all(packing, rest, eigenvalue, near.right.real)
+    return row
+
+
+def _among_all(packing: Packing, rest: Packing, eigenvalue: float, plane: Floats) -> dict[str, Any]:
+    """Rank of the pair, and the modes of the packing at rest that it has come from."""
+    operator = full_operator(packing)
+    active = np.flatnonzero(np.diff(operator.indptr))
+    values = np.sort(eigvals(operator[active][:, active].toarray()).real)
+    rank = int(np.count_nonzero(values < eigenvalue * (1 - 1e-6)))
+    near = values[max(0, rank - 5) : rank + 7]
+    operator = full_operator(rest)
+    active = np.flatnonzero(np.diff(operator.indptr))
+    dense = operator[active][:, active].toarray()
+    modes = eigh(0.5 * (dense + dense.T))[1]
+    weight = np.sum((modes.T @ np.linalg.qr(plane[active])[0]) ** 2, axis=1)
+    first, second = np.sort(np.argsort(weight)[-2:])
+    return {
+        "modes": len(values),
+        "rank": rank,
+        "spacing": float((near[-1] - near[0]) / (len(near) - 1)),
+        "largest": float(values[-1]),
+        "ancestors": [int(first), int(second)],
+        "ancestry": float(0.5 * weight[[first, second]].sum()),
+    }

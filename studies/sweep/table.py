@@ -1,0 +1,77 @@
+"""The table of a sweep: a row a scene in the order of the sweep, results.csv, and results.parquet if pandas is there.
+
+Columns are the swept keys, then the result's, those of dicts joined by dots, and what went wrong. Numbers have all
+their digits, so that two runs of one sweep leave the same file; wall times are in results.jsonl alone.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Iterable, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+Row = dict[str, Any]
+
+
+def flat(result: Mapping[str, Any], above: str = "") -> dict[str, Any]:
+    """The result with dicts opened, their keys joined by dots; lists stay."""
+    row: dict[str, Any] = {}
+    for name, value in result.items():
+        if isinstance(value, Mapping):
+            row |= flat(value, f"{above}{name}.")
+        else:
+            row[above + name] = value
+    return row
+
+
+def columns_of(rows: Iterable[Row], names: list[str]) -> list[str]:
+    """The names of the table's columns: swept keys, those of the results as they first appear, and `says`."""
+    found = dict.fromkeys(names)
+    for row in rows:
+        found |= dict.fromkeys(flat(row["result"]))
+    found.pop("says", None)
+    return [*found, "says"]
+
+
+def write_tables(rows: list[Row], names: list[str], folder: Path) -> None:
+    """Write results.csv, and results.parquet if pandas and a writer of Parquet are there.
+
+    Parameters
+    ----------
+    rows : list of dict
+        In the order of the table.
+    names : list of str
+        The swept keys.
+    folder : Path
+        Where.
+    """
+    columns = columns_of(rows, names)
+    table = [row["values"] | flat(row["result"]) | {"says": row["says"]} for row in rows]
+    unfinished = folder / "results.csv.part"
+    with unfinished.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows([_cell(row.get(column)) for column in columns] for row in table)
+    os.replace(unfinished, folder / "results.csv")
+    if find_spec("pandas") and find_spec("pyarrow"):
+        import pandas as pd
+
+        frame = pd.DataFrame([{column: _plain(row.get(column)) for column in columns} for row in table])
+        frame.to_parquet(folder / "results.parquet")
+
+
+def _cell(value: Any) -> Any:
+    """A value as CSV holds it: all digits of a number, lists as JSON, nothing for None."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return json.dumps(value) if isinstance(value, (list, tuple)) else repr(value) if isinstance(value, float) else value
+
+
+def _plain(value: Any) -> Any:
+    return json.dumps(value) if isinstance(value, (list, tuple)) else value

@@ -1,0 +1,245 @@
+r"""The task "triggering": onsets of one packing for several friction coefficients, and whether it erupts between them.
+
+The packing is ramped for every friction coefficient of the scene, and for :math:`\mu \mu_{ss}`, what friction weakens
+to (without [friction] in the scene the last coefficient takes its place), each as in
+:mod:`~faultgouge.studies.sweep.onset`.
+
+Weakening lowers the onset where :math:`F_x^c(\mu \mu_{ss}) < F_x^c(\mu)`, and that can be known although one of the
+two is censored. Where both are known and leave a window between them, three undamped runs from its middle tell whether
+the packing erupts (:mod:`~faultgouge.studies.triggering`): unperturbed, perturbed, perturbed with mu(v). The *rise* is
+the distance in decades between the largest D of the last two.
+
+A rise alone is no instability. As soon as mu(v) has fallen, every contact that carries tangential load carries less of
+it, and the equilibrium is elsewhere: D *jumps* to the square of that distance, in a packing that is stable with the
+weakened friction as well. How far, a *control* shows: mu(v) at a force as far below the lower onset as the middle of
+the window is above it. What tells an instability from the jump is that D goes on to *grow* after it, at the rate that
+the spectrum has there with the weakened friction, until it levels off. The pair may also be real again at
+the middle of the window, or grow too slowly for the length of the run; so the rate is kept beside all this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ...analysis import FaultgougeError, Packing, spectrum
+from ...analysis.packing import Floats
+from ...pywrap import Engine, Equilibrium, Sample, Scene
+from ...pywrap.dynamics import Weakening
+from ...pywrap.equilibria import EquilibriumPath, next_equilibrium
+from ...pywrap.refusals import needed
+from ...pywrap.sections import Friction, Perturb
+from ...pywrap.undamped import perturb, weakening_of
+from ..path_error import with_path_error
+from ..triggering import GROWTH_FACTOR, column, jump
+from .onset import Ends, Start, first_window
+
+FINEST_STEP = 1e-3
+"""Increment of F_x below which a ramp only costs: onsets are solved for, and come out the same."""
+
+LONGEST_TIME = 200.0
+"""Length of the undamped runs, time, at the most: with 100 disks, four of them take some 30 s."""
+
+
+@dataclass(frozen=True)
+class RampEnd:
+    """What a ramp of one packing met first.
+
+    Attributes
+    ----------
+    mu : float
+        Friction coefficient.
+    ends : {"onset", "until", "flows"}
+        A window of complex eigenvalues; the last F_x of the scene; no equilibrium beyond `reach`.
+    reach : float
+        Largest F_x up to which there is no window, force per disk of the upper layer: the onset, if there is one.
+    error : float or None
+        Uncertainty of the onset.
+    """
+
+    mu: float
+    ends: Ends
+    reach: float
+    error: float | None = None
+
+    @property
+    def fx_c(self) -> float | None:
+        """The onset, if there is one."""
+        return self.reach if self.ends == "onset" else None
+
+
+@dataclass(frozen=True)
+class Eruption:
+    """The runs from the middle of the window and the control, in numbers.
+
+    Attributes
+    ----------
+    fx, fx_control : float
+        The middle of the window, and the control below it, force per disk of the upper layer.
+    rate : float
+        Growth rate of D with the weakened friction at fx, from the spectrum, 1 / time; 0 if it is stable.
+    unperturbed, perturbed, weakening, control : float
+        Largest D, length^2: of the three runs at fx, and with mu(v) at fx_control.
+    jump : float
+        Largest D of the run with mu(v) in its first part, `JUMP_SHARE`.
+    """
+
+    fx: float
+    fx_control: float
+    rate: float
+    unperturbed: float
+    perturbed: float
+    weakening: float
+    control: float
+    jump: float
+
+    @property
+    def rise(self) -> float:
+        """Decades between the largest D of the perturbed run and of the one with mu(v)."""
+        return float(np.log10(self.weakening / self.perturbed))
+
+    @property
+    def control_rise(self) -> float:
+        """The same with the control in place of the run with mu(v)."""
+        return float(np.log10(self.control / self.perturbed))
+
+    @property
+    def grows(self) -> bool:
+        """Whether D goes on to grow after the jump."""
+        return self.weakening >= GROWTH_FACTOR * self.jump
+
+
+def triggering(scene: Scene, start: Start) -> dict[str, Any]:
+    """The task itself; what goes wrong is under "says", beside what was found before.
+
+    Returns
+    -------
+    dict
+        ramps : list of `RampEnd` as dicts, one for each friction coefficient, the scene's first one first and what it
+        weakens to last; lowered : whether weakening friction lowers the onset, None if that cannot be known; eruption :
+        `Eruption` as a dict, None without a window between the two onsets, or without [perturb] in the scene.
+    """
+    row: dict[str, Any] = {"ramps": [], "lowered": None, "eruption": None}
+    needed(scene.ramp, "ramp")
+    try:
+        for found in _examination(scene, start):
+            row |= found
+    except (FaultgougeError, ValueError) as error:  # ValueError: of LAPACK
+        row["says"] = str(error)
+    return row
+
+
+def _examination(scene: Scene, start: Start) -> Iterator[dict[str, Any]]:
+    """What is found in each stage, so that a stage that fails takes nothing along."""
+    ramps: list[RampEnd] = []
+    paths: list[tuple[Equilibrium, ...]] = []
+    for mu in frictions(scene):
+        end, path = first_onset(scene, mu, start)
+        paths.append(path)
+        ramps.append(end)
+        yield {"ramps": [asdict(each) for each in ramps]}
+    if len(ramps) < 2:
+        return
+    strong, weak = ramps[0], ramps[-1]
+    lowered = lowers(strong, weak)
+    yield {"lowered": lowered}
+    if lowered and strong.fx_c is not None and scene.perturb is not None and scene.friction is not None:
+        window = weak.reach, strong.fx_c
+        yield {"eruption": asdict(_eruption(scene, paths[0], window, scene.perturb, scene.friction))}
+
+
+def frictions(scene: Scene) -> tuple[float, ...]:
+    """The scene's friction coefficients, the one that weakens first and what it weakens to last."""
+    if scene.friction is None:
+        return scene.law.mus
+    weak = scene.friction.mu_ss * scene.law.mus[0]
+    # 0.8 * 0.7 is not 0.56 to the last bit
+    return (*(mu for mu in scene.law.mus if not np.isclose(mu, weak, rtol=1e-12, atol=0.0)), weak)
+
+
+def first_onset(scene: Scene, mu: float, start: Start) -> tuple[RampEnd, tuple[Equilibrium, ...]]:
+    """Where the ramp of a scene first has a complex pair for one friction coefficient, and its equilibria up to
+    there."""
+    rest = start(mu)
+    with Engine(rest.packing, MPI.COMM_SELF) as engine:
+        path = EquilibriumPath(engine, rest, scene)
+        ends, reach, found = first_window(path, scene)
+        if found is None:
+            return RampEnd(mu, ends, reach), tuple(path.kept)
+        whole = with_path_error(found, engine, path, scene)
+        return RampEnd(mu, ends, whole.fx_c, whole.error), tuple(path.kept)
+
+
+def economical(scene: Scene) -> Scene:
+    """The scene with increments and undamped runs that take seconds a packing, see `FINEST_STEP` and `LONGEST_TIME`."""
+    changes: dict[str, Any] = {}
+    if scene.ramp is not None:
+        step = min(max(scene.ramp.step, FINEST_STEP), scene.ramp.until)
+        changes["ramp"] = scene.ramp.model_copy(update={"step": step})
+    if scene.perturb is not None:
+        changes["perturb"] = scene.perturb.model_copy(update={"time": min(scene.perturb.time, LONGEST_TIME)})
+    return scene.model_copy(update=changes)
+
+
+def lowers(strong: RampEnd, weak: RampEnd) -> bool | None:
+    """Whether the onset with weakened friction is the lower one; None if both may be."""
+    if weak.fx_c is not None and weak.reach < strong.reach:
+        return True
+    # the weak one has none up to there, or a later one
+    return False if strong.fx_c is not None and strong.reach <= weak.reach else None
+
+
+def _eruption(
+    scene: Scene,
+    path: tuple[Equilibrium, ...],
+    window: tuple[float, float],
+    settings: Perturb,
+    friction: Friction,
+) -> Eruption:
+    """The runs in a window between two onsets, and the control; path leads up to the upper one."""
+    middle = 0.5 * (window[0] + window[1])
+    start, below = (_equilibrium_at(scene, path, fx) for fx in (middle, max(0.0, 2 * window[0] - middle)))
+
+    def msd(start: Equilibrium, weakening: Weakening | None) -> Floats:
+        return column(_undamped(scene, settings, start, settings.amplitude, weakening), "msd")
+
+    quiet = _undamped(scene, settings, start, 0.0)
+    v0 = np.abs(column(quiet, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
+    weakening = weakening_of(friction, float(v0))
+    weakened = _undamped(scene, settings, start, settings.amplitude, weakening)
+    return Eruption(
+        fx=start.fx,
+        fx_control=below.fx,
+        rate=weakened_rate(start.packing, friction.mu_ss),
+        unperturbed=float(column(quiet, "msd").max()),
+        perturbed=float(msd(start, None).max()),
+        weakening=float(column(weakened, "msd").max()),
+        control=float(msd(below, weakening).max()),
+        jump=jump(weakened),
+    )
+
+
+def _equilibrium_at(scene: Scene, path: tuple[Equilibrium, ...], fx: float) -> Equilibrium:
+    below = max((each for each in path if each.fx <= fx), key=lambda each: each.fx)
+    with Engine(below.packing, MPI.COMM_SELF) as engine:
+        return below if below.fx == fx else next_equilibrium(engine, below, fx, scene)
+
+
+def _undamped(
+    scene: Scene, settings: Perturb, start: Equilibrium, amplitude: float, weakening: Weakening | None = None
+) -> tuple[Sample, ...]:
+    one = scene.model_copy(update={"perturb": settings.model_copy(update={"fx": start.fx, "amplitude": amplitude})})
+    return tuple(perturb(one, start, communicator=MPI.COMM_SELF, weakening=weakening))
+
+
+def weakened_rate(packing: Packing, mu_ss: float) -> float:
+    """Fastest growth rate of D with friction mu mu_ss in the same configuration, 1 / time; 0 if it is stable."""
+    law = replace(packing.law, mu=mu_ss * packing.law.mu)
+    limit = law.slip_limit(packing.geometry.overlap)
+    slip = np.clip(packing.contacts.slip, -limit, limit)
+    modes = spectrum(replace(packing, law=law, contacts=replace(packing.contacts, slip=slip)))
+    return max((pair.growth_rate for pair in modes.pairs), default=0.0)

@@ -1,0 +1,268 @@
+r"""The critical amplitude: how strong a wave must be to trigger a layer of frictional disks.
+
+Friction weakens once the mean velocity v of the upper layer exceeds v_0. In the linear regime v is proportional to the
+amplitude a of the wave :math:`a \cos\omega t`, which begins at t = 0 on a packing at rest. So the wave triggers from
+
+.. math:: a_c(\omega, F_x) = \frac{v_0}{\max_{0 \le t \le T} |v(t)|}, \qquad v(t)\ \text{for}\ a = 1,
+
+on, T being the time for which the wave lasts. v(t) follows from K, and from C and M, alone
+(:mod:`~faultgouge.analysis.forcing`), transient and all: without dissipation what the beginning of the wave has set
+off never dies, and where the wave is slow nearly all of v is such free motion.
+
+In LAMMPS, the same wave triggers or does not; a bisection in the amplitude finds where. Nothing of the linear theory is
+in these runs. The wave is a force on each disk of the upper layer, or an acceleration of the floor.
+
+v_0 is the user's. The paper takes the largest velocity of the run that nobody perturbs, which is rounding noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from mpi4py import MPI
+from threadpoolctl import threadpool_limits
+
+from ...analysis import Packing, spectrum
+from ...analysis.forcing import floor_force, impulse_response
+from ...analysis.packing import Floats
+from ...analysis.response import layer_force
+from ...pywrap import Engine, Scene, SceneError
+from ...pywrap.bed import settle
+from ...pywrap.equilibria import EquilibriumPath, loads
+from ...pywrap.study_sections import Trigger
+from ...pywrap.undamped import time_step
+from ...pywrap.units import RealUnits
+
+COUNT = 24
+"""Frequencies of a map whose scene names none."""
+
+FIRST_BRACKET = 0.05
+"""Relative distance from the prediction at which the bisection begins."""
+
+WIDEN = 1.5
+"""Factor by which a bracket that does not hold is widened on the wrong side."""
+
+MOST = 24
+"""Runs of a bisection at the most: brackets over six decades."""
+
+CLOSE = 1e-2
+"""Relative width at which the bisection ends: its middle is then within half a percent."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wave:
+    """A wave on a packing, but for its amplitude.
+
+    Attributes
+    ----------
+    packing : Packing
+        The equilibrium.
+    distance : float
+        1 - F_x/F_x^c.
+    omega : float
+        Angular frequency, 1 / time.
+    time : float
+        How long it lasts.
+    on : {"layer", "floor"}
+        What it moves.
+    v0 : float
+        The threshold v_0, velocity.
+    predicted : float
+        a_c from K.
+    """
+
+    packing: Packing
+    distance: float
+    omega: float
+    time: float
+    on: str
+    v0: float
+    predicted: float
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """a_c of one frequency at one distance.
+
+    Attributes
+    ----------
+    fx, distance, omega : float
+        F_x, 1 - F_x/F_x^c, and the angular frequency, 1 / time.
+    predicted : float
+        a_c: a force, or an acceleration of the floor.
+    stationary : float
+        What it were, v_0/|H(omega)|, without a transient.
+    reached : float
+        When the layer is fastest, time.
+    """
+
+    fx: float
+    distance: float
+    omega: float
+    predicted: float
+    stationary: float
+    reached: float
+
+
+@dataclass(frozen=True)
+class Measured:
+    """a_c of one frequency at one distance, bisected in LAMMPS.
+
+    Attributes
+    ----------
+    fx, distance, omega : float
+        As of `Prediction`.
+    below, above : float
+        The strongest wave that did not trigger, and the weakest that did.
+    runs : int
+        Runs of the bisection.
+    reached : float
+        When the weakest one triggered, time.
+    """
+
+    fx: float
+    distance: float
+    omega: float
+    below: float
+    above: float
+    runs: int
+    reached: float
+
+    @property
+    def amplitude(self) -> float:
+        """The middle of the bracket."""
+        return float(np.sqrt(self.below * self.above))
+
+
+def threshold(scene: Scene) -> float:
+    """v_0 of the scene.
+
+    Raises
+    ------
+    SceneError
+        If the scene does not say it.
+    """
+    if scene.friction is None:
+        raise SceneError("the scene has no section [friction]: add it, with v0, the velocity at which friction weakens")
+    v0 = scene.friction.v0
+    if isinstance(v0, str) or v0 == 0:
+        raise SceneError(
+            f"friction.v0 = {v0!r} gives no threshold to exceed, since the velocity of a run that nobody perturbs is "
+            "rounding noise: give a velocity above 0"
+        )
+    return v0
+
+
+def settings(scene: Scene) -> Trigger:
+    """The section [trigger], or its defaults."""
+    return scene.trigger if scene.trigger is not None else Trigger.model_validate({})
+
+
+def equilibria(scene: Scene, fx: Iterable[float]) -> dict[float, Packing]:
+    """The packings in equilibrium at some loads, along the ramp of the scene."""
+    assert scene.ramp is not None
+    wanted = sorted(fx)
+    start = settle(scene, communicator=MPI.COMM_SELF)
+    with Engine(start.packing, MPI.COMM_SELF) as engine:
+        path = EquilibriumPath(engine, start, scene)
+        for load in loads(scene.ramp):
+            if start.fx < load <= wanted[-1]:
+                path(float(load))
+        return {each: path(each) for each in wanted}
+
+
+def frequencies(packing: Packing, wanted: Trigger) -> Floats:
+    """The angular frequencies of the map, 1 / time; of a scene that names none, from the modes of a packing."""
+    if wanted.omega is not None:
+        return np.array(sorted(wanted.omega))
+    modes = np.sqrt(np.abs(spectrum(packing).eigenvalues))
+    slowest = modes[modes > 1e-3 * modes.max()].min()  # one without a restoring force has no frequency
+    return np.geomspace(0.1 * slowest, modes.max(), COUNT)
+
+
+def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats) -> list[Prediction]:
+    """a_c at one distance from K, C and M."""
+    wanted, v0 = settings(scene), threshold(scene)
+    force = layer_force(packing, 1.0) if wanted.on == "layer" else floor_force(packing)
+    response = impulse_response(packing, force)
+    velocity, when = response.largest(omegas, wanted.time)
+    stationary = np.abs(response.transfer(omegas))
+    return [
+        Prediction(packing.fx, distance, *(float(x) for x in row))
+        for row in zip(omegas, v0 / velocity, v0 / stationary, when, strict=True)
+    ]
+
+
+def chosen(predicted: list[Prediction], runs: int) -> list[Prediction]:
+    """So many of the map, spread over its distances and its frequencies."""
+    distances = sorted({each.distance for each in predicted}, reverse=True)
+    rows = [sorted((p for p in predicted if p.distance == d), key=lambda p: p.omega) for d in distances]
+    share = [runs // len(rows) + (k < runs % len(rows)) for k in range(len(rows))]
+    picked = []
+    for k, (row, count) in enumerate(zip(rows, share, strict=True)):
+        # from row to row the places move on by a part of their own distance, so that all frequencies have their turn
+        places = (np.arange(count) + (k + 0.5) / len(rows)) * len(row) / max(1, count)
+        picked += [row[place] for place in sorted({min(int(p), len(row) - 1) for p in places})]
+    return picked
+
+
+def bisected(wave: Wave) -> Measured:
+    """a_c in LAMMPS, on this process alone."""
+    with threadpool_limits(1):
+        below, above, runs, reached = _bracket(wave)
+        while above / below > 1 + CLOSE and runs < MOST:
+            middle = float(np.sqrt(below * above))
+            time = _triggers(wave, middle)
+            runs += 1
+            if time is None:
+                below = middle
+            else:
+                above, reached = middle, time
+    return Measured(wave.packing.fx, wave.distance, wave.omega, below, above, runs, reached)
+
+
+def _bracket(wave: Wave) -> tuple[float, float, int, float]:
+    """An amplitude that does not trigger, one that does, runs, and when the latter triggered."""
+    below, above = wave.predicted * (1 - FIRST_BRACKET), wave.predicted * (1 + FIRST_BRACKET)
+    runs = 1
+    while (reached := _triggers(wave, above)) is None and runs < MOST:
+        below, above, runs = above, above * WIDEN, runs + 1
+    if reached is None:
+        raise SceneError(f"no wave up to {above:.3g} triggers at omega = {wave.omega:g}: lower friction.v0")
+    if below < wave.predicted:
+        runs += 1
+        while (time := _triggers(wave, below)) is not None and runs < MOST:
+            below, above, reached, runs = below / WIDEN, below, time, runs + 1
+    return below, above, runs, reached
+
+
+def _triggers(wave: Wave, amplitude: float) -> float | None:
+    """When a wave brings the layer above v_0; None if it does not."""
+    dt = time_step(wave.packing)
+    steps = int(wave.time / dt)
+    target = None if wave.on == "layer" else range(len(wave.packing))
+    with (
+        Engine(wave.packing, MPI.COMM_SELF) as engine,
+        engine.undamped(dt, amplitude, wave.omega, target) as dynamics,
+        dynamics.halted(wave.v0),
+    ):
+        dynamics.advance(steps)
+        return dynamics.steps * dt if dynamics.steps < steps else None
+
+
+def in_si(real: RealUnits, found: Prediction, on: str) -> dict[str, float]:
+    """A prediction in real units: frequency, ground velocity and strain of the wave, and the ratio of stresses."""
+    velocity = real.ground_velocity(found.predicted, found.omega, on)
+    return {
+        "frequency_Hz": real.frequency(found.omega),
+        "ground_velocity_m_per_s": velocity,
+        "strain": velocity / real.shear_wave,
+        "stress_ratio": found.fx / real.fy,
+    }
+
+
+def as_row(found: Prediction | Measured) -> dict[str, float]:
+    """For JSON."""
+    return asdict(found)

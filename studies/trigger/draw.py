@@ -1,0 +1,116 @@
+"""Pictures of the map of waves that trigger."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from ...analysis.packing import Floats
+from ...figures.style import INK, save, styled
+
+WAVE = {"layer": "amplitude of the force $a$", "floor": "acceleration of the floor $a$"}
+
+
+def figures(result: dict[str, Any], output: Path) -> None:
+    """Both figures, from what trigger.json holds."""
+    save(map_figure(result), output / "map")
+    save(threshold_figure(result), output / "thresholds")
+
+
+@styled
+def map_figure(result: dict[str, Any]) -> Figure:
+    """The critical amplitude over frequency and distance from the onset.
+
+    Parameters
+    ----------
+    result : dict
+        What trigger.json holds.
+
+    Returns
+    -------
+    Figure
+        Colours from K; circles where LAMMPS was asked, in the colour of its own answer.
+    """
+    distance, omega, amplitude = _grid(result["map"])
+    figure = Figure(figsize=(3.4, 2.6), layout="constrained")
+    axes = figure.add_subplot(xscale="log", yscale="log", xlabel=r"frequency $\omega$", ylabel="$1 - F_x/F_x^c$")
+    norm = LogNorm(np.nanmin(amplitude), np.nanmax(amplitude))
+    colours = axes.pcolormesh(_edges(omega), _edges(distance), amplitude, norm=norm, cmap="viridis_r")
+    runs = [row for row in result["map"] if row["measured"] is not None]
+    axes.scatter(
+        [row["omega"] for row in runs],
+        [row["distance"] for row in runs],
+        c=[row["measured"] for row in runs],
+        norm=norm,
+        cmap="viridis_r",
+        s=22,
+        edgecolors="white",
+        linewidths=0.9,
+    )
+    axes.minorticks_off()
+    bar = figure.colorbar(colours, ax=axes)
+    bar.set_label(rf"{WAVE[result['on']]}$_c$ that triggers")
+    return figure
+
+
+@styled
+def threshold_figure(result: dict[str, Any]) -> Figure:
+    """The critical amplitude over the frequency, a curve for each distance from the onset.
+
+    Parameters
+    ----------
+    result : dict
+        What trigger.json holds.
+
+    Returns
+    -------
+    Figure
+        Lines from K with the transient, dotted ones of the stationary motion alone at the smallest distance; triangles
+        are runs of LAMMPS that did (upwards) and did not (downwards) trigger.
+    """
+    distance, omega, amplitude = _grid(result["map"])
+    figure = Figure(figsize=(3.4, 2.9), layout="constrained")
+    axes = figure.add_subplot(xscale="log", yscale="log", xlabel=r"frequency $\omega$", ylabel=WAVE[result["on"]])
+    for k, (each, curve) in enumerate(zip(distance, amplitude, strict=True)):
+        colour = f"C{k % 6}"
+        axes.plot(omega, curve, color=colour, linewidth=3.2 - 2.4 * k / len(distance), label=f"${_power(each)}$")
+        _runs(axes, [row for row in result["map"] if row["distance"] == each and row["measured"] is not None], colour)
+    nearest = [row for row in result["map"] if row["distance"] == distance[0]]
+    axes.plot([row["omega"] for row in nearest], [row["stationary"] for row in nearest], ":", color=INK, linewidth=0.8)
+    axes.legend(title="$1 - F_x/F_x^c$", ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return figure
+
+
+def _runs(axes: Axes, rows: list[dict[str, Any]], colour: str) -> None:
+    """The bracket of each bisection, so far apart that both triangles are seen."""
+    omega = [row["omega"] for row in rows]
+    axes.plot(omega, [1.12 * row["above"] for row in rows], "^", color=colour, markersize=3.5)
+    axes.plot(omega, [row["below"] / 1.12 for row in rows], "v", color=colour, markersize=3.5, markerfacecolor="white")
+
+
+def _grid(rows: list[dict[str, Any]]) -> tuple[Floats, Floats, Floats]:
+    """Distances and frequencies, increasing, and a_c of the two."""
+    distance, omega = (np.unique([row[key] for row in rows]) for key in ("distance", "omega"))
+    amplitude = np.full((len(distance), len(omega)), np.nan)
+    for row in rows:
+        amplitude[np.searchsorted(distance, row["distance"]), np.searchsorted(omega, row["omega"])] = row["predicted"]
+    return distance, omega, amplitude
+
+
+def _edges(centres: Floats) -> Floats:
+    """Borders of the cells about some values, half way on a logarithmic scale."""
+    if len(centres) == 1:
+        return centres[0] * np.array([0.8, 1.25])
+    middle = np.sqrt(centres[1:] * centres[:-1])
+    return np.concatenate([[centres[0] ** 2 / middle[0]], middle, [centres[-1] ** 2 / middle[-1]]])
+
+
+def _power(value: float) -> str:
+    """0.3 or 10^-4 for mathtext."""
+    exponent = np.log10(value)
+    return f"10^{{{round(exponent)}}}" if abs(exponent - round(exponent)) < 1e-9 and value < 0.1 else f"{value:g}"

@@ -1,0 +1,168 @@
+"""The map of waves that trigger, computed, drawn and written into a folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from ...pywrap import Scene, SceneError
+from ...pywrap.units import real_units
+from ..rows import Rows
+from ..sharing import Share, shared_out
+from . import draw, page
+from .compute import (
+    Measured,
+    Prediction,
+    Wave,
+    as_row,
+    bisected,
+    chosen,
+    equilibria,
+    frequencies,
+    in_si,
+    predictions,
+    settings,
+    threshold,
+)
+
+Say = Callable[[str], None]
+Progress = Callable[[Iterable[Any], int], Iterable[Any]]
+
+
+def trigger_map(
+    scene: Scene, output: Path, say: Say = print, progress: Progress = lambda results, _: results
+) -> dict[str, Any]:
+    """Predict and measure critical amplitudes, and leave trigger.json, pictures and a page in a folder.
+
+    Every result is a line of trigger.jsonl as soon as it is there, and lines of the same scene are not computed again.
+    Under `mpiexec -n K` all K ranks call this; one hands out the bisections, the others take them.
+
+    Parameters
+    ----------
+    scene : Scene
+        With [ramp], and [friction] with a number v0; [trigger] has the map.
+    output : Path
+        The folder, made if need be.
+    say : callable
+        Takes a line of progress.
+    progress : callable
+        Takes the bisections that end and their number, and hands them on.
+
+    Returns
+    -------
+    dict
+        What trigger.json holds; empty on ranks other than 0.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no section [ramp], or no v_0.
+    OnsetError, NoEquilibriumError
+        If the packing has no onset.
+    """
+    threshold(scene)
+    if scene.ramp is None:
+        raise SceneError("the scene has no section [ramp]: add it, with step and until")
+    with shared_out() as share:
+        if share is None:
+            return {}
+        output.mkdir(parents=True, exist_ok=True)
+        rows = Rows(output / "trigger.jsonl", scene, beside="output")
+        fx_c, error = _onset(scene, rows, say)
+        predicted = _predicted(scene, rows, fx_c, say)
+        measured = _measured(scene, rows, predicted, share, say, progress)
+    result = summary(scene, fx_c, error, predicted, measured)
+    (output / "trigger.json").write_text(json.dumps(result, indent=1) + "\n")
+    draw.figures(result, output)
+    (output / "trigger.md").write_text(page.page(scene, result))
+    return result
+
+
+def summary(
+    scene: Scene, fx_c: float, error: float, predicted: list[Prediction], measured: list[Measured]
+) -> dict[str, Any]:
+    """What trigger.json holds."""
+    runs = {(each.fx, each.omega): each for each in measured}
+    real = real_units(scene)
+    rows: list[dict[str, Any]] = []
+    off = []
+    for each in sorted(predicted, key=lambda p: (-p.distance, p.omega)):
+        run = runs.get((each.fx, each.omega))
+        row: dict[str, Any] = {**as_row(each), "measured": None}
+        if run is not None:
+            more = {"below": run.below, "above": run.above, "runs": run.runs, "triggers_at": run.reached}
+            row |= {"measured": run.amplitude, **more}
+            off.append(abs(each.predicted / run.amplitude - 1))
+        rows.append(row if real is None else row | in_si(real, each, settings(scene).on))
+    return {
+        "scene": scene.resolved(),
+        "units": None if real is None else real.as_dict(),
+        "fx_c": fx_c,
+        "error": error,
+        "v0": threshold(scene),
+        "time": settings(scene).time,
+        "on": settings(scene).on,
+        "largest_deviation": max(off, default=None),
+        "map": rows,
+    }
+
+
+def _onset(scene: Scene, rows: Rows, say: Say) -> tuple[float, float]:
+    known = rows.find(kind="onset")
+    if known is None:
+        from ..onsets import onset_run
+
+        say("onset")
+        onset = onset_run(scene, scene.law.mus[0]).onset
+        known = rows.append(kind="onset", fx_c=onset.fx_c, error=onset.error)
+        say(f"F_x^c = {onset.fx_c:.10g} +- {onset.error:.1g}")
+    return known["fx_c"], known["error"]
+
+
+def _predicted(scene: Scene, rows: Rows, fx_c: float, say: Say) -> list[Prediction]:
+    """The whole map, a distance at a time."""
+    distances = sorted(settings(scene).distance, reverse=True)
+    missing = [d for d in distances if rows.find(kind="predicted", distance=d) is None]
+    packings = equilibria(scene, [fx_c * (1 - d) for d in distances]) if missing else {}
+    omegas = frequencies(packings[fx_c * (1 - distances[0])], settings(scene)) if missing else None
+    for distance in missing:
+        assert omegas is not None
+        found = predictions(scene, packings[fx_c * (1 - distance)], distance, omegas)
+        rows.append(kind="predicted", distance=distance, found=[as_row(each) for each in found])
+        weakest = min(found, key=lambda each: each.predicted)
+        say(f"at 1 - F_x/F_x^c = {distance:g}: a_c is least, {weakest.predicted:.3g}, at omega = {weakest.omega:.4g}")
+    return [
+        Prediction(**each)
+        for row in rows.rows
+        if row["kind"] == "predicted" and row["distance"] in distances
+        for each in row["found"]
+    ]
+
+
+def _measured(
+    scene: Scene, rows: Rows, predicted: list[Prediction], share: Share, say: Say, progress: Progress
+) -> list[Measured]:
+    """The bisections, those that are in the file already and those that are not."""
+    wanted = chosen(predicted, settings(scene).runs)
+    known = [rows.find(kind="measured", fx=each.fx, omega=each.omega) for each in wanted]
+    missing = [each for each, row in zip(wanted, known, strict=True) if row is None]
+    if len(missing) < len(wanted):
+        say(f"{len(wanted) - len(missing)} of {len(wanted)} bisections are in {rows.path} already")
+    if missing:
+        packings = equilibria(scene, {each.fx for each in missing})
+        wave, v0 = settings(scene), threshold(scene)
+        waves = [
+            Wave(packings[each.fx], each.distance, each.omega, wave.time, wave.on, v0, each.predicted)
+            for each in missing
+        ]
+        for found in progress(share(bisected, waves), len(waves)):
+            rows.append(kind="measured", **as_row(found))
+            say(f"omega = {found.omega:.4g} at {found.distance:g}: triggers from {found.amplitude:.4g} on in LAMMPS")
+    names = Measured.__dataclass_fields__
+    return [
+        Measured(**{key: row[key] for key in names})
+        for each in wanted
+        if (row := rows.find(kind="measured", fx=each.fx, omega=each.omega)) is not None
+    ]

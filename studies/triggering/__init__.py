@@ -1,0 +1,25 @@
+"""Remote triggering: what is computed, drawn and said of it. See `compute` for the physics."""
+
+from .compute import (
+    ABOVE_NOISE,
+    GROWTH_FACTOR,
+    Sensitivity,
+    Triggering,
+    column,
+    jump,
+    sensitivity,
+    summary,
+    trigger,
+)
+
+__all__ = [
+    "ABOVE_NOISE",
+    "GROWTH_FACTOR",
+    "Sensitivity",
+    "Triggering",
+    "column",
+    "jump",
+    "sensitivity",
+    "summary",
+    "trigger",
+]

@@ -1,0 +1,242 @@
+r"""Remote triggering: a linearly stable packing just below its onset that erupts once friction weakens with velocity.
+
+Between the onsets of two friction coefficients, mu mu_ss and mu, a packing is stable with the larger and unstable with
+the smaller one. Three undamped runs from the same equilibrium show what a minute perturbation a cos(omega t) does
+there: nothing without it; a small bounded response with it; and an eruption where it sets the upper layer into motion
+that is fast enough to weaken the friction, mu(v), of all contacts.
+
+A rise of D alone is no instability. As soon as mu(v) has fallen, every contact that carries tangential load carries
+less of it, and the equilibrium is elsewhere: D *jumps* to the square of that distance, in a packing that is stable with
+the weakened friction as well. A control run says how far: mu(v) at a force as far below the onset of the weakened
+friction as the run is above it. What tells an instability from the jump is that D *grows* on after it.
+
+Closer and closer to the onset, the response of the pair that is about to coalesce grows as
+:math:`\epsilon^{-1/2}`, and damping cuts it off where its time tau falls below :math:`\tau_d`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis import RunFile
+from ...analysis.pair_form import PairForm, pair_forms
+from ...analysis.power_law import PowerLaw, fit_power_law
+from ...analysis.response import Response, layer_force, linear_response
+from ...pywrap import Equilibrium, Sample, Scene
+from ...pywrap.dynamics import Weakening
+from ...pywrap.sections import Friction, Perturb
+from ...pywrap.undamped import perturb, time_step, weakening_of
+from ..onsets import OnsetRun
+
+Floats = NDArray[np.float64]
+
+EARLY = 2000
+"""Samples of each run at times that grow geometrically: the layer passes the velocities over which the friction falls
+early in a run, within a small share of its length."""
+
+SENSITIVE = 1e-2
+"""Largest distance 1 - F_x/F_x^c at which the response is compared with its power law: further off, the pair is no
+longer the whole of it."""
+
+JUMP_SHARE = 0.05
+"""Share of the run with mu(v) that shows the jump: 10 of 200 time units, where the slowest modes of 100 disks have
+periods of 6, and the fastest pairs have just begun to stand out."""
+
+GROWTH_FACTOR = 2.0
+"""Factor from the jump to the largest D from which on D has grown. Without an instability, the phases in which many
+modes happen to meet change the maximum by some ten percent."""
+
+ABOVE_NOISE = 1e3
+"""How much stronger the perturbation is that is compared with the linear response: a million times in D."""
+
+COMPARED_TIME = 50.0
+"""Length of that run, time: a few hundred periods of the pair."""
+
+
+@dataclass(frozen=True, eq=False)
+class Triggering:
+    """Three undamped runs from one equilibrium.
+
+    Attributes
+    ----------
+    start : Equilibrium
+        Linearly stable.
+    weakening : Weakening
+        mu(v), with v_0 the largest velocity of the unperturbed run.
+    unperturbed, perturbed, erupting : tuple of Sample
+        Without perturbation, with it, and with it and mu(v).
+    control : tuple of Sample or None
+        As the last, at a force where the packing is stable with the weakened friction, too; None if none is known.
+    strong : tuple of Sample
+        With a perturbation `ABOVE_NOISE` as strong, for a shorter time: its D stands out of the noise of doubles and is
+        compared with the linear response.
+    response : Response
+        Of the linearised packing to that perturbation, time step included.
+    """
+
+    start: Equilibrium
+    weakening: Weakening
+    unperturbed: tuple[Sample, ...]
+    perturbed: tuple[Sample, ...]
+    erupting: tuple[Sample, ...]
+    control: tuple[Sample, ...] | None
+    strong: tuple[Sample, ...]
+    response: Response
+
+    @property
+    def deviation(self) -> float:
+        """Largest difference between D of the strong run and of the linear response, in units of the largest D."""
+        msd = column(self.strong, "msd")
+        return float(np.abs(msd - self.response.msd).max() / msd.max())
+
+    @property
+    def rise(self) -> float:
+        """Decades between the largest D of the perturbed run and of the one with mu(v)."""
+        return float(np.log10(column(self.erupting, "msd").max() / column(self.perturbed, "msd").max()))
+
+    @property
+    def crossing(self) -> float | None:
+        """The time at which the layer of the run with mu(v) first exceeds v_0, or None."""
+        faster = np.abs(column(self.erupting, "layer_velocity")) > self.weakening.v0
+        return float(column(self.erupting, "time")[np.argmax(faster)]) if faster.any() else None
+
+    @property
+    def grows(self) -> bool:
+        """Whether D goes on to grow after its jump."""
+        return bool(column(self.erupting, "msd").max() >= GROWTH_FACTOR * jump(self.erupting))
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Response of the pair that is about to coalesce, over the distance from the onset.
+
+    Attributes
+    ----------
+    distance : ndarray, shape (n,)
+        1 - F_x/F_x^c.
+    pairs : tuple of PairForm
+        The pair at these distances.
+    fit : PowerLaw
+        Of the undamped amplitude over the distance.
+    """
+
+    distance: Floats
+    pairs: tuple[PairForm, ...]
+    fit: PowerLaw
+
+    @property
+    def amplitude(self) -> Floats:
+        """Undamped amplitudes in units of the start, shape (n,)."""
+        return np.array([pair.amplitude() for pair in self.pairs])
+
+
+def column(samples: tuple[Sample, ...], name: str) -> Floats:
+    """One quantity of a time series, shape (T,)."""
+    return np.array([getattr(sample, name) for sample in samples])
+
+
+def jump(samples: tuple[Sample, ...]) -> float:
+    """The largest D in the first `JUMP_SHARE` of a run, length^2."""
+    time, msd = column(samples, "time"), column(samples, "msd")
+    return float(msd[time <= JUMP_SHARE * time[-1]].max())
+
+
+def trigger(
+    scene: Scene,
+    start: Equilibrium,
+    below: Equilibrium | None,
+    settings: Perturb,
+    friction: Friction,
+    path: Path,
+) -> Triggering:
+    """The runs, written to run.h5 as they end, and the linear response beside the last.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    start : Equilibrium
+        At settings.fx.
+    below : Equilibrium or None
+        Where the control starts.
+    settings : Perturb
+        The perturbation and the length of the runs.
+    friction : Friction
+        mu(v).
+    path : Path
+        run.h5 of the ramp; gets the series unperturbed, perturbed, erupting, control and strong.
+    """
+
+    def run(
+        name: str,
+        amplitude: float,
+        weakening: Weakening | None = None,
+        time: float = settings.time,
+        start: Equilibrium = start,
+        early: int = EARLY,
+    ) -> tuple[Sample, ...]:
+        one = settings.model_copy(update={"amplitude": amplitude, "time": time})
+        samples = tuple(perturb(scene.model_copy(update={"perturb": one}), start, early=early, weakening=weakening))
+        with RunFile(path, "a") as file:
+            file.append_series(name, **{key: column(samples, key) for key in vars(samples[0])})
+        return samples
+
+    unperturbed = run("unperturbed", 0.0, early=200)  # as `perturb` calibrates v_0
+    v0 = np.abs(column(unperturbed, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
+    weakening = weakening_of(friction, float(v0))
+    perturbed = run("perturbed", settings.amplitude)
+    erupting = run("erupting", settings.amplitude, weakening)
+    control = None if below is None else run("control", settings.amplitude, weakening, start=below)
+    amplitude = ABOVE_NOISE * settings.amplitude
+    strong = run("strong", amplitude, time=min(settings.time, COMPARED_TIME))
+    packing = start.packing
+    response = linear_response(
+        packing,
+        column(strong, "time"),
+        force=layer_force(packing, amplitude),
+        omega=settings.omega or 0.0,
+        dt=time_step(packing, settings.time_step),
+    )
+    return Triggering(start, weakening, unperturbed, perturbed, erupting, control, strong, response)
+
+
+def sensitivity(run: OnsetRun) -> Sensitivity:
+    """The pair of the first onset, at the equilibria that the run has just below it."""
+    first = run.onset.windows[0]
+    below = sorted((fx for fx in run.between if fx < first.fx_onset), reverse=True)
+    # nearer than a hundred times the onset's own error, the distance is not known
+    nearest, furthest = 100 * first.error, SENSITIVE * first.fx_onset
+    below = [fx for fx in below if nearest < first.fx_onset - fx < furthest]
+    pairs = tuple(pair_forms([run.between[fx] for fx in below], first.eigenvalue))
+    distance = 1 - np.array(below) / first.fx_onset
+    return Sensitivity(distance, pairs, fit_power_law(distance, [pair.amplitude() for pair in pairs]))
+
+
+def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
+    """Numbers for summary.json."""
+    largest = {
+        name: float(column(getattr(triggering, name), "msd").max()) for name in ("unperturbed", "perturbed", "erupting")
+    }
+    return {
+        "fx": triggering.start.fx,
+        "v0": triggering.weakening.v0,
+        "v_ss": triggering.weakening.v_ss,
+        "largest_D": largest,
+        "rise_in_decades": triggering.rise,
+        "jump": jump(triggering.erupting),
+        "grows_after_the_jump": triggering.grows,
+        "largest_D_of_the_control": None
+        if triggering.control is None
+        else float(column(triggering.control, "msd").max()),
+        "linear_response_deviation": triggering.deviation,
+        "smallest_mu": float(column(triggering.erupting, "friction").min()),
+        "amplitude_exponent": sensitive.fit.exponent,
+        "amplitude_exponent_error": sensitive.fit.error,
+        "distances": [float(sensitive.distance.min()), float(sensitive.distance.max())],
+        "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in sensitive.pairs],
+    }

@@ -1,0 +1,42 @@
+"""The section of a report on remote triggering."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...pywrap.sections import Perturb
+from ..pages import render
+from .compute import ABOVE_NOISE, Sensitivity, Triggering, column, jump, summary
+
+
+def section(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, mu: float) -> str:
+    """The section, in Markdown.
+
+    Parameters
+    ----------
+    triggering, sensitive
+        What was found.
+    settings : Perturb
+        The perturbation.
+    mu : float
+        Static friction coefficient.
+    """
+    first, largest = jump(triggering.erupting), float(column(triggering.erupting, "msd").max())
+    return render(
+        __package__ or "",
+        "triggering.md.j2",
+        triggering=triggering,
+        sensitive=sensitive,
+        settings=settings,
+        mu=mu,
+        weak=triggering.weakening,
+        largest=summary(triggering, sensitive)["largest_D"],
+        lowest_mu=float(column(triggering.erupting, "friction").min()),
+        highest_speed=float(np.abs(column(triggering.erupting, "layer_velocity")).max()),
+        jump=first,
+        jumped=float(np.log10(first / column(triggering.perturbed, "msd").max())),
+        control=None if triggering.control is None else float(column(triggering.control, "msd").max()),
+        grown=largest / first,
+        above_noise=ABOVE_NOISE,
+        half_gain=float(np.mean([pair.half_gain_time() / pair.tau_d for pair in sensitive.pairs])),
+    )

@@ -1,0 +1,219 @@
+"""The first window of complex eigenvalues in slices of the spectrum, and what is in doubt about it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from families import DIGITS, crossing, normal_form
+from scipy.linalg import eig, eigvals
+from scipy.sparse import csr_array
+
+from faultgouge.analysis import Contacts, NoEquilibriumError, OnsetError, Packing, complex_windows, find_onset
+from faultgouge.analysis.onset import (
+    LIMITS,
+    Family,
+    FirstWindow,
+    Limits,
+    LostPairError,
+    Pair,
+    continued,
+    first_window,
+    full_operator,
+)
+from faultgouge.analysis.onset.sliced import Sliced
+
+
+def searched(operator, loads, limits=LIMITS):
+    return first_window(Family(operator, 0.0, limits), np.array(loads))
+
+
+def test_large_packings_are_searched_for_the_searched(ramp):
+    path = ramp(1.0, 1e-3, 22)
+    every = find_onset(path, path.grid[12:])
+    assert every.complete
+    limits = Limits(all_windows=50)
+    first = find_onset(path, path.grid[12:], limits=limits)
+    assert not first.complete
+    assert len(first.windows) == 1
+    # Two ways to the same root, each with its error.
+    assert abs(first.fx_c - every.fx_c) < first.error + every.error
+    with pytest.raises(OnsetError, match="raise the largest load"):
+        find_onset(path, path.grid[:4], limits=limits)
+
+
+def test_parts_of_the_spectrum_have_together_the_windows_of_all(ramp):
+    path = ramp(1.0, 1e-3, 22)
+    every = find_onset(path, path.grid[12:])
+    found = []
+    for modes in ((0, 100), (100, 200), (200, 285)):
+        try:
+            onset = find_onset(path, path.grid[12:], modes=modes)
+        except OnsetError as error:
+            assert f"among the modes {modes[0]}:{modes[1]}" in str(error)  # noqa: PT017, some have none
+        else:
+            assert onset.as_dict()["modes"] == list(modes)
+            found.append(onset)
+    first = min(found, key=lambda onset: onset.fx_c)
+    assert abs(first.fx_c - every.fx_c) < first.error + every.error
+    for onset in found:
+        assert min(abs(onset.fx_c - window.fx_onset) for window in every.windows) < onset.error + every.error
+    with pytest.raises(ValueError, match="modes 285:300 is no part of the 285 modes of this packing"):
+        find_onset(path, path.grid[12:], modes=(285, 300))
+
+
+@pytest.mark.parametrize("half_width", [0.2, 0.03])
+def test_first_window_that_ends_within_its_increment(half_width):
+    window = searched(crossing(0.47, -(half_width**2)), [0.0, 1.0, 2.0]).window
+    assert window.kind == "coalescence"
+    assert window.fx_onset == pytest.approx(0.47 - half_width, abs=DIGITS)
+    assert window.fx_end == pytest.approx(0.47 + half_width, abs=DIGITS)
+
+
+def test_first_window_of_real_eigenvalues_or_from_the_start():
+    assert searched(crossing(0.37, 1e-3), np.linspace(0, 1, 4)) == FirstWindow(None)
+    window = searched(normal_form(0.1), [0.2, 0.3]).window
+    assert (window.kind, window.fx_onset, window.fx_end) == ("start", 0.2, None)
+
+
+def test_first_window_where_the_operator_is_no_straight_line():
+    """Levels that cross at 0.906 of an increment, and at 0.5 of the straight line between its ends."""
+    found = searched(lambda f: crossing(0.0, -0.0025)(2 * f**7 - 1), [0.0, 1.0])
+    window = found.window
+    assert window.fx_onset == pytest.approx((0.5 - 0.025) ** (1 / 7), abs=DIGITS)
+    assert window.fx_end == pytest.approx((0.5 + 0.025) ** (1 / 7), abs=DIGITS)
+    assert found.doubtful == ()
+
+
+@pytest.mark.parametrize("ahead", [1, 2, 3])
+def test_load_without_equilibrium_ends_the_search_for_the_first_window(ahead):
+    """As it does where all eigenvalues are computed, and not before what lies below it has been looked at."""
+
+    def ending(operator):
+        def until(f):
+            if f > 1.5:
+                raise NoEquilibriumError("no equilibrium")
+            return operator(f)
+
+        return until
+
+    limits = Limits(kept=0, ahead=ahead)
+    with pytest.raises(NoEquilibriumError, match="no equilibrium"):
+        complex_windows(ending(crossing(0.37, 1e-3)), [0.0, 1.0, 2.0])
+    with pytest.raises(NoEquilibriumError, match="no equilibrium"):
+        searched(ending(crossing(0.37, 1e-3)), [0.0, 1.0, 2.0], limits)
+    window = searched(ending(crossing(0.5, -0.04)), [0.0, 1.0, 2.0], limits).window
+    assert window.fx_onset == pytest.approx(0.3, abs=DIGITS)
+
+
+def test_pair_that_cannot_be_followed_is_not_lost_silently():
+    """A pair that ARPACK has complex, and whose planes are never good enough."""
+    with pytest.raises(LostPairError, match="take smaller increments"):
+        searched(crossing(0.47, -0.04), [0.0, 1.0], Limits(residual=0.0))
+
+
+def jumping(f):
+    """Two levels that exchange their places at a jump, and are real at all loads: a straight line has them meet."""
+    return crossing(0.0, -0.04)(-1.0 if f < 0.47 else 1.0)
+
+
+def test_pair_that_is_announced_and_not_found_is_told_of():
+    """Clusters that announce a pair of which the operator knows nothing: the shortest increment about it is named."""
+    found = searched(jumping, [0.0, 1.0], Limits(dips=2))
+    assert found == FirstWindow(None, ((7 / 16, 8 / 16),))
+    # with as many looks as it takes D is seen to keep its sign on either side of the jump
+    assert searched(jumping, [0.0, 1.0]) == FirstWindow(None)
+
+
+def test_doubtful_increments_come_with_the_onset(ramp):
+    """Couplings so much enlarged that clusters announce pairs that stay real, and nobody looks at these."""
+    path = ramp(1.0, 1e-3, 22)
+    limits = Limits(all_windows=50, excess=200.0, dips=0)
+    found = find_onset(path, path.grid[20:], limits=limits)
+    (below, above), *_ = found.as_dict()["doubtful"]
+    assert path.grid[20] <= below < above < found.fx_c
+    with pytest.raises(OnsetError, match=r"expected between 0\.\d+ and 0\.\d+: take smaller increments"):
+        find_onset(path, path.grid[20:22], limits=limits)
+
+
+def test_basis_is_given_up_where_modes_mix_or_disks_move_in(ramp):
+    path = ramp(1.0, 1e-3, 22)
+    matrix = full_operator(path(0.0))
+    noise = np.random.default_rng(1).normal(size=(300, 300)) * 20.0
+    other = matrix + csr_array(
+        noise * (matrix.toarray() != 0).any(axis=1)[:, None] * (matrix.toarray() != 0).any(axis=0)
+    )
+    more = csr_array(matrix + csr_array(([1.0], ([58], [58])), shape=matrix.shape))
+    search = Sliced(Family(lambda _: matrix, 0.0))
+
+    def basis(operator):
+        ((part, _),) = search.bases(operator)
+        return part
+
+    first = basis(matrix)
+    assert basis(full_operator(path(0.001))) is first
+    for unlike in (csr_array(other), more):
+        assert basis(unlike) is not first
+        first = basis(matrix)
+
+
+@pytest.mark.parametrize("mu", [1.0, 0.8])
+def test_first_window_of_the_reference(ramp, mu):
+    path = ramp(mu, 1e-3, 22)
+    window = searched(lambda fx: full_operator(path(fx)), path.grid[12:21] if mu == 0.8 else path.grid[12:]).window
+    assert window.kind == "coalescence"
+    assert window.fx_onset == pytest.approx({1.0: 0.0218330564080, 0.8: 0.0191432059561}[mu], rel=1e-9)
+
+
+def tiled(cell: Packing, copies: int) -> Packing:
+    """Copies of a periodic packing side by side, in balance as it is, with masses that make them differ."""
+    n, contacts = len(cell), cell.contacts
+    index = np.arange(copies)[:, None]
+    image = np.where(
+        contacts.floor,
+        0,
+        np.round((cell.position[contacts.i, 0] - cell.position[contacts.j, 0]) / cell.box_length).astype(int),
+    )
+    j = np.where(contacts.floor, -1, contacts.j + n * ((index + image) % copies))
+    shift = np.column_stack([cell.box_length * np.arange(copies), np.zeros(copies)])
+    return replace(
+        cell,
+        position=(cell.position + shift[:, None]).reshape(-1, 2),
+        radius=np.tile(cell.radius, copies),
+        angle=np.tile(cell.angle, copies),
+        mass=np.random.default_rng(3).uniform(0.7, 1.3, n * copies),
+        top=np.tile(cell.top, copies),
+        box_length=copies * cell.box_length,
+        contacts=Contacts((contacts.i + n * index).ravel(), j.ravel(), np.tile(contacts.slip, copies)),
+    )
+
+
+@pytest.mark.slow
+def test_first_window_of_a_thousand_disks(ramp):
+    """Against all eigenvalues by LAPACK, at the loads before it, just below and just above it."""
+    path = ramp(1.0, 1e-3, 22)
+
+    def operator(fx):
+        return full_operator(tiled(path(fx), 10))
+
+    window = searched(operator, path.grid).window
+    assert window.kind == "coalescence"
+    assert window.error < 1e-9
+    distance = 1e-6
+    before = [fx for fx in path.grid if fx < window.fx_onset][-2:]
+    for fx in [*before, window.fx_onset - distance]:
+        matrix = operator(fx)
+        values = eigvals(matrix.toarray(), check_finite=False)
+        # A double eigenvalue is uncertain by the root of u |A| times its coupling.
+        assert np.abs(values.imag).max() < 1e-4
+    matrix = operator(window.fx_onset + distance)
+    values, left, right = eig(matrix.toarray(), left=True, right=True, check_finite=False)
+    (k,) = np.flatnonzero(values.imag > 1e-4)
+    assert values[k].real == pytest.approx(window.eigenvalue, abs=1e-2)
+    bases = (np.linalg.qr(np.column_stack([each[:, k].real, each[:, k].imag]))[0] for each in (right, left))
+    fx = window.fx_onset + distance
+    pair = continued(Pair(fx, matrix, *bases), fx, matrix)
+    # The imaginary part has condition 1/|y^H x|.
+    condition = 1 / abs(np.vdot(left[:, k], right[:, k]))
+    rounding = 0.5 * np.finfo(float).eps * np.linalg.norm(matrix.data)
+    assert np.sqrt(-pair.discriminant) / 2 == pytest.approx(values[k].imag, abs=50 * condition * rounding)
+    assert pair.mean == pytest.approx(values[k].real, abs=50 * condition * rounding)

@@ -1,0 +1,92 @@
+"""Pairs that are continued without the other eigenvalues: against dense LAPACK."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+from faultgouge.analysis.onset import Limits, Modes, Pair, continued, full_operator
+from faultgouge.analysis.onset.pair import inverse_of
+
+
+def dense_pair(matrix, reference):
+    """The pair of the two modes that lie closest to the planes of another one, from all eigenvectors."""
+    modes = Modes.of(0.0, matrix)
+    return modes.pair(modes.nearest(reference))
+
+
+def pair_of(packing):
+    (pair,) = (modes := Modes.of(packing.fx, full_operator(packing))).complex_pairs
+    return modes.pair(pair)
+
+
+@pytest.mark.parametrize("factors", ["dense", "sparse", "of a neighbour"])
+@pytest.mark.parametrize("fx", [0.0218, 0.0218330564, 0.021833056408868, 0.0219, 0.022])
+def test_continued_pair_is_that_of_lapack(ramp, fx, factors):
+    """From real through double to complex, from a load at which the pair is complex."""
+    path = ramp(1.0, 1e-3, 22)
+    matrix = full_operator(path(fx))
+    start = pair_of(path(0.022))
+    limits = Limits() if factors == "dense" else Limits(dense_factors=0)
+    if factors == "of a neighbour":
+        start = continued(start, 0.0221, full_operator(path(0.0221)), limits)
+    found, expected = continued(start, fx, matrix, limits), dense_pair(matrix, start)
+    assert (found.inverse is not None) == (factors != "dense")
+    if factors == "of a neighbour":
+        assert found.inverse is start.inverse
+    rounding = 0.5 * np.finfo(float).eps * np.linalg.norm(matrix.data)
+    # D is in error by its coefficients, the entries of B - mean, times some ten of the operator's rounding.
+    assert found.mean == pytest.approx(expected.mean, abs=50 * rounding)
+    assert found.discriminant == pytest.approx(expected.discriminant, abs=200 * rounding * expected.spread)
+    if abs(expected.discriminant) > 1e-8:
+        # the overlap goes as the root of D
+        error = 100 * rounding * expected.spread / abs(expected.discriminant)
+        assert found.overlap == pytest.approx(expected.overlap, rel=1e-4 + error)
+    assert found.same_planes(expected)
+
+
+def test_continuation_is_refused_rather_than_wrong(ramp):
+    """Planes of two unrelated modes belong to no pair that inverse iteration can reach."""
+    path = ramp(1.0, 1e-3, 22)
+    matrix = full_operator(path(0.022))
+    modes = Modes.of(0.022, matrix)
+    apart = modes.pair((30, 200))
+    wrong = replace(apart, right=np.eye(300)[:, [7, 107]], left=np.eye(300)[:, [7, 107]])
+    assert continued(wrong, 0.022, matrix) is None
+
+
+def test_overlap_of_a_block_is_that_of_the_eigenvectors(ramp):
+    packing = ramp(1.0, 1e-3, 22)(0.022)
+    modes = Modes.of(0.022, full_operator(packing))
+    (pair,) = modes.complex_pairs
+    expected = abs(np.vdot(modes.left[:, pair[0]], modes.right[:, pair[0]]))
+    assert modes.pair(pair).overlap == pytest.approx(expected, rel=1e-8)
+
+
+def test_factors_of_a_distant_neighbour_are_given_up(ramp):
+    """Those of another spectrum, nowhere near the pair: its own are made."""
+    limits = Limits(dense_factors=0)
+    path = ramp(1.0, 1e-3, 22)
+    matrix = full_operator(path(0.022))
+    start = pair_of(path(0.0219))
+    far = inverse_of(matrix, 10 * start.mean, limits)
+    found = continued(replace(start, inverse=far), 0.022, matrix, limits)
+    assert found.inverse is not far
+    assert found.discriminant == pytest.approx(continued(start, 0.022, matrix, limits).discriminant, rel=1e-9)
+
+
+@pytest.mark.parametrize("fx", [0.0215, 0.0218330564, 0.022])
+def test_slope_of_the_discriminant(ramp, fx):
+    """Against the difference of two blocks, from real through double to complex."""
+    path, step = ramp(1.0, 1e-3, 22), 1e-6
+    below, middle, above = (full_operator(path(fx + offset * step)) for offset in (-1, 0, 1))
+    pair = dense_pair(middle, pair_of(path(0.022)))
+    slope = (continued(pair, fx, above).discriminant - continued(pair, fx, below).discriminant) / 2
+    assert pair.slope((above - below) / 2) == pytest.approx(slope, rel=1e-5)
+
+
+def test_pair_without_coupling_of_unit_overlap():
+    matrix = csr_array(np.diag([1.0, 2.0, 5.0]))
+    pair = Pair(0.0, matrix, np.eye(3)[:, :2], np.eye(3)[:, :2])
+    assert (pair.mean, pair.discriminant, pair.overlap) == (1.5, 1.0, 1.0)

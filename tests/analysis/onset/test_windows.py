@@ -1,0 +1,313 @@
+"""Windows of complex eigenvalues, on families of matrices whose windows are known, and along a ramp."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from families import DIGITS, OTHERS, crossing, embedded, normal_form
+
+from faultgouge.analysis import (
+    Contacts,
+    NoEquilibriumError,
+    OnsetError,
+    complex_windows,
+    find_onset,
+    follow,
+    scan_windows,
+    spectrum,
+)
+from faultgouge.analysis.onset import Family, Modes, assign, force_bearing, full_operator
+from faultgouge.analysis.onset.dip import deepest_dip
+from faultgouge.analysis.onset.screened import Screen, all_windows
+
+
+@pytest.mark.parametrize("d", [0.01, 0.3])
+@pytest.mark.parametrize("points", [2, 5, 40])
+def test_normal_form(d, points):
+    (window,) = complex_windows(normal_form(d), np.linspace(0, 2.2 * d, points))
+    assert window.kind == "coalescence"
+    assert window.fx_onset == pytest.approx(d, abs=DIGITS)
+    assert window.fx_end is None
+    assert window.eigenvalue == pytest.approx(1, abs=DIGITS)
+    assert window.error < DIGITS
+    # |y^H x| = (1 - (e/d)^2)^(1/2) in an orthonormal basis, at the closest of the points that were evaluated.
+    assert window.overlap < 1e-2
+
+
+@pytest.mark.parametrize("half_width", [2e-1, 1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("place", [0.31, 0.5, 0.77])
+def test_window_narrower_than_the_increment(half_width, place):
+    """An increment of 1 that shows real eigenvalues at either end, and a window of any width inside."""
+    operator = crossing(place, -(half_width**2))
+    assert not np.iscomplex(np.linalg.eigvals(operator(0.0)[1:13, 1:13])).any()
+    assert not np.iscomplex(np.linalg.eigvals(operator(1.0)[1:13, 1:13])).any()
+    (window,) = complex_windows(operator, [-1.0, 0.0, 1.0, 2.0])
+    assert window.kind == "coalescence"
+    # At the edges the slope of D and its noise are both proportional to the coupling, which is half_width.
+    assert window.fx_onset == pytest.approx(place - half_width, abs=DIGITS)
+    assert window.fx_end == pytest.approx(place + half_width, abs=DIGITS)
+
+
+@pytest.mark.parametrize("half_width", [1e-2, 1e-5])
+def test_narrow_windows_of_curved_levels(half_width):
+    """Levels that bend, in a basis that turns: nothing that the prediction assumes holds exactly."""
+
+    def operator(f):
+        turn = np.eye(15)
+        turn[1:3, 1:3] = [[np.cos(f), np.sin(f)], [-np.sin(f), np.cos(f)]]
+        bent = crossing(0.4, -(half_width**2))(np.sin(f) + 0.4 - np.sin(0.4))
+        return turn.T @ bent @ turn
+
+    (window,) = complex_windows(operator, [0.0, 1.0])
+    edges = [np.arcsin(np.sin(0.4) + sign * half_width) for sign in (-1, 1)]
+    assert [window.fx_onset, window.fx_end] == pytest.approx(edges, abs=DIGITS)
+
+
+@pytest.mark.parametrize("product", [0.0, 1e-12, 1e-4, 0.3])
+def test_crossings_are_no_windows(product):
+    assert complex_windows(crossing(0.37, product), np.linspace(0, 1, 4)) == ()
+
+
+def test_gap_inside_a_window_is_seen():
+    """A pair that is complex at both ends of an increment and real in between: two windows."""
+
+    def operator(f):
+        return embedded([[10, f - 0.35], [0.55 - f, 10]])
+
+    first, second = complex_windows(operator, [0.0, 1.0])
+    assert (first.kind, first.fx_onset) == ("start", 0.0)
+    assert first.fx_end == pytest.approx(0.35, abs=DIGITS)
+    assert second.fx_onset == pytest.approx(0.55, abs=DIGITS)
+    assert second.fx_end is None
+
+
+def test_jump_is_no_coalescence():
+    def operator(f):
+        return embedded([[10, 1.0], [-0.3 if f > 0.321 else 0.3, 10]])
+
+    (window,) = complex_windows(operator, [0.0, 1.0])
+    assert window.kind == "contact change"
+    # Bracketed to 1e-9 of the increment; the middle of the bracket is in error by half of it.
+    assert abs(window.fx_onset - 0.321) <= window.error < 1e-9
+
+
+def test_partners_may_change():
+    """One level meets a second, parts, and meets a third: two windows of two pairs within one increment."""
+
+    def operator(f):
+        inner = np.diag([1.0 + 2 * f, 2.0, 3.0])
+        inner[0, 1], inner[1, 0] = 0.1, -0.1
+        inner[0, 2], inner[2, 0] = 0.05, -0.05
+        return inner
+
+    first, second = complex_windows(operator, [0.0, 1.5])
+    fine = np.linspace(0, 1.5, 15001)
+    split = [np.abs(np.linalg.eigvals(operator(f)).imag).max() > 1e-9 for f in fine]
+    edges = fine[np.flatnonzero(np.diff(split))]
+    found = [first.fx_onset, first.fx_end, second.fx_onset, second.fx_end]
+    np.testing.assert_allclose(found, edges, atol=1.1e-4)  # the scan's increment
+    for edge in found:  # the eigenvalues do meet there, to the root of the rounding
+        values = np.linalg.eigvals(operator(edge))
+        assert np.abs(values[:, None] - values[None, :])[np.triu_indices(3, 1)].min() < 1e-5
+
+
+@pytest.mark.parametrize("loads", [[1.0], [0.0, 0.0], [1.0, 0.0], [0.0, np.nan]])
+def test_impossible_loads(loads):
+    with pytest.raises(ValueError, match="increasing"):
+        complex_windows(normal_form(0.1), loads)
+
+
+def test_noise_loses_its_imaginary_part():
+    """A double eigenvalue in Jordan form splits by (u |A|)^(1/2), real or complex as rounding has it."""
+    split = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        basis = np.linalg.qr(rng.normal(size=(12, 12)))[0]
+        inner = np.diag(np.concatenate([[5.0, 5.0], OTHERS]))
+        inner[0, 1] = 1.0
+        matrix = basis @ inner @ basis.T
+        split += np.iscomplex(np.linalg.eigvals(matrix)).any()
+        assert not Modes.of(0.0, matrix).complex_pairs
+        inner[1, 0] = -1e-8  # imaginary parts of 1e-4
+        assert len(Modes.of(0.0, basis @ inner @ basis.T).complex_pairs) == 1
+    assert split > 0
+
+
+def test_block_of_a_pair_is_exact_on_both_sides():
+    for e in (0.29, 0.31, 0.3 * (1 - 1e-12), 0.3):
+        modes = Modes.of(e, normal_form(0.3)(e))
+        pair = tuple(np.argsort(np.abs(modes.values - 1))[:2])
+        # (1-d-1-d)^2 - 4 e^2, to the rounding of an operator of norm 100.
+        assert modes.pair(pair).discriminant == pytest.approx(4 * (0.09 - e**2), abs=1e-12)
+
+
+def test_deepest_dip_of_parabolas():
+    """(t - 0.3)^2 - w^2 from its ends: the width is 2 w, and what a twentieth of the smaller end adds."""
+    for w in (0.0, 1e-3, 0.1):
+        d0, d1 = 0.09 - w * w, 0.49 - w * w
+        width, at = deepest_dip(*(np.array([v]) for v in (d0, -0.6, d1, 1.4)), 0.05)
+        assert at[0] == pytest.approx(0.3, abs=1e-12)
+        assert width[0] == pytest.approx(2 * np.sqrt(w * w + 0.05 * d0 * 4 * 0.3 * 0.7), rel=1e-9)
+    width, _ = deepest_dip(*(np.array([v]) for v in (1.0, -0.1, 1.0, 0.1)), 0.05)
+    assert width[0] == 0
+
+
+def test_scan_agrees_within_its_increment_and_misses_what_lies_between(ramp):
+    path = ramp(1.0, 1e-3, 22)
+    solved = find_onset(path, path.grid)
+    (scanned,) = scan_windows(path.states)
+    assert scanned.kind == "scan"
+    assert scanned.error == pytest.approx(5e-4)
+    assert abs(scanned.fx_onset - solved.fx_c) < scanned.error
+    with pytest.raises(ValueError, match="increasing"):
+        scan_windows(path.states[::-1])
+
+
+def test_no_onset_is_said_so(ramp):
+    path = ramp(1.0, 1e-3, 22)
+    with pytest.raises(OnsetError, match=r"up to fx = 0\.0030"):
+        find_onset(path, path.grid[:4])
+
+
+@pytest.mark.parametrize("mu", [1.0, 0.8])
+def test_what_nothing_happens_on_is_not_decomposed(ramp, mu):
+    """The same windows as from all modes at every load, which are computed next to the edges alone."""
+    path, decomposed = ramp(mu, 1e-3, 22), []
+    family = Family(lambda fx: full_operator(path(fx)), 2.2e-9)
+
+    def counted(fx, matrix):
+        decomposed.append(fx)
+        return Modes.of(fx, matrix)
+
+    quick = all_windows(family, path.grid, decompose=counted)
+    few, decomposed[:] = len(decomposed), []
+    # nothing is known of any increment
+    every = all_windows(family, path.grid, lambda: lambda here, there: None, decompose=counted)
+    assert len(decomposed) >= 23
+    assert few <= 4 * len(quick)
+    assert len(quick) == len(every)
+    # what equilibria of a residual of 1e-10 on ten disks can tell of the load
+    for one, other in zip(quick, every, strict=True):
+        assert one.fx_onset == pytest.approx(other.fx_onset, abs=one.error + other.error + 3e-11)
+        assert (one.fx_end, one.kind) == (other.fx_end, other.kind)
+
+
+def family_with_a_long_window(f):
+    """A pair that is complex from 0.35 to 8.6, and one that is so between 5.2 and 5.3, in an orthonormal basis."""
+    matrix = np.diag(np.concatenate([[100.0, 100.0, 200.0, 200.0], 300 + 50 * OTHERS]))
+    matrix[0, 1], matrix[1, 0] = 1.0, (f - 0.35) * (f - 8.6)
+    matrix[2:4, 2:4] += [[f - 5.25, 0.05], [-0.05, 5.25 - f]]
+    return matrix
+
+
+def test_open_windows_keep_their_names_over_increments_that_are_skipped():
+    edges = [(window.fx_onset, window.fx_end) for window in complex_windows(family_with_a_long_window, np.arange(10.0))]
+    np.testing.assert_allclose(edges, [(0.35, 8.6), (5.2, 5.3)], atol=1e-9)
+
+
+def test_what_the_screening_misses_is_walked_again():
+    """A window that opens on increments said to be quiet is found as soon as anything makes us look."""
+
+    def blind():
+        screen = Screen()
+        return lambda here, there: [] if there[1, 0] > -5.0 else screen(here, there)
+
+    family = Family(lambda f: family_with_a_long_window(0.3 * f), 1e-6)
+    first = all_windows(family, np.arange(10.0), blind)[0]
+    assert first.fx_onset == pytest.approx(0.35 / 0.3, abs=1e-9)
+
+
+def test_json(ramp):
+    path = ramp(1.0, 1e-3, 22)
+    onset = find_onset(path, path.grid[20:])
+    as_dict = onset.as_dict()
+    assert as_dict["fx_c"] == onset.fx_c
+    assert as_dict["error"] == onset.error
+    assert as_dict["windows"][0].keys() >= {"fx_onset", "fx_end", "lambda", "error"}
+    assert as_dict["windows"][0]["lambda"] == onset.windows[0].eigenvalue
+
+
+def test_modes_keep_their_columns(ramp):
+    path = ramp(1.0, 1e-3, 22)
+    columns = follow(path.states)
+    assert columns.shape == (23, 285)
+    for row, packing in zip(columns, path.states, strict=True):
+        expected = spectrum(packing).eigenvalues
+        # The same solver on the same numbers, but for the order of its sums.
+        np.testing.assert_allclose(np.sort_complex(row), np.sort_complex(expected), atol=1e-7)
+
+
+def test_modes_that_cross_keep_their_names():
+    """Coupled so weakly that the levels pass each other within the increment, and strongly enough not to."""
+    for product, exchanged in ((1e-6, True), (-1e-6, True), (4.0, False)):
+        operator = crossing(0.37, product)
+        here, there = Modes.of(0.0, operator(0.0)), Modes.of(1.0, operator(1.0))
+        expected = np.arange(12)
+        if exchanged:
+            expected[:2] = 1, 0
+        np.testing.assert_array_equal(assign(here, there), expected)
+
+
+@pytest.mark.parametrize("noise", [1e-12, 1e-9, 1e-6])
+def test_error_follows_the_noise_of_the_equilibria(noise):
+    """Operators only known to `noise`, as from equilibria of finite balance: the error says what is lost."""
+    clean, d, errors, misses = normal_form(0.3), 0.3, [], []
+    for seed in range(5):
+
+        def operator(e, seed=seed):
+            rng = np.random.default_rng((abs(hash(e)) + seed) % 2**32)
+            matrix = clean(e)
+            return matrix * (1 + noise * rng.uniform(-1, 1, matrix.shape))
+
+        (window,) = complex_windows(operator, [0.0, 0.1, 0.2, 0.4, 0.5])
+        assert window.kind == "coalescence"
+        errors.append(window.error)
+        misses.append(abs(window.fx_onset - d) / window.error)
+    # Entries of 50 in a basis of condition 10: noise in D some 1e3 times that of an entry, slope 2.4.
+    assert noise < np.median(errors) < 1e4 * noise
+    # Two degrees of freedom make a single error uncertain by a factor of two or three: a median of 60 is 0.3.
+    assert np.median(misses) < 1
+
+
+def test_contacts_without_force_are_left_out(bed):
+    """A rattler brought to touch by 1e-12 of a length: a stiffness of 0.3 that no force stands for."""
+    packing = bed(1.0)
+    rattler = packing.rattlers[0]
+    gap = np.hypot(*(packing.position - packing.position[rattler]).T) - packing.radius - packing.radius[rattler]
+    gap[packing.rattlers] = np.inf
+    neighbour = int(np.argmin(gap))
+    direction = packing.position[rattler] - packing.position[neighbour]
+    direction /= np.hypot(*direction)
+    position = packing.position.copy()
+    reach = packing.radius[rattler] + packing.radius[neighbour]
+    position[rattler] = position[neighbour] + (reach - 1e-12) * direction
+    contacts = packing.contacts
+    touching = replace(
+        packing,
+        position=position,
+        contacts=Contacts(
+            np.append(contacts.i, rattler), np.append(contacts.j, neighbour), np.append(contacts.slip, 0.0)
+        ),
+    )
+    assert len(touching.rattlers) == len(packing.rattlers) - 1
+    assert touching.residual == packing.residual
+    assert len(force_bearing(touching).contacts) == len(contacts)
+    assert abs(full_operator(touching) - full_operator(packing)).max() == 0
+    # Not so where the balance is bad because the packing is none.
+    assert force_bearing(replace(touching, fx=1.0)).residual > 0.1
+    assert len(force_bearing(replace(touching, fx=1.0)).contacts) >= len(contacts)
+
+
+@pytest.mark.parametrize(("hole", "error"), [((0.49, 0.51), DIGITS), ((0.299, 0.301), 2e-3)])
+def test_loads_without_equilibrium_are_gone_around(hole, error):
+    """Where no edge lies nothing is lost; where one does it is known to about the width of the hole."""
+
+    def operator(f):
+        if hole[0] < f < hole[1]:
+            raise NoEquilibriumError("no equilibrium")
+        return crossing(0.5, -0.04)(f)
+
+    (window,) = complex_windows(operator, [0.0, 1.0])
+    assert abs(window.fx_onset - 0.3) <= window.error + DIGITS
+    assert window.error <= error
+    assert window.fx_end == pytest.approx(0.7, abs=DIGITS)

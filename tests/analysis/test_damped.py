@@ -1,0 +1,186 @@
+"""The onset with dissipation: against LAPACK's companion matrix, families with known windows, and weak damping."""
+
+import numpy as np
+import pytest
+import quasistatic
+from scipy.linalg import block_diag
+from scipy.optimize import brentq
+from scipy.sparse import csr_array
+
+from faultgouge.analysis import damping_matrix, find_onset, stiffness_matrix
+from faultgouge.analysis.damped import damped_windows, dissipating, growing_windows
+from faultgouge.analysis.damped_modes import DampedModes, Pencil
+from faultgouge.analysis.state_space import StateSpace
+from faultgouge.analysis.weak_damping import balancing_ratio, drag_onset, weak_limit
+
+RNG = np.random.default_rng(11)
+TURN = np.linalg.qr(RNG.normal(size=(8, 8)))[0]
+
+
+def family(block, damping):
+    """A 2 x 2 block of loads and its damping among six quiet modes, in a turned basis."""
+
+    def pencil(fx):
+        a = block_diag(block(fx), np.diag([30.0, 40, 50, 60, 70, 80]))
+        g = block_diag(np.diag(damping), 0.02 * np.eye(6))
+        parts = (csr_array(TURN @ each @ TURN.T) for each in (a, g))
+        return Pencil.of_system(fx, StateSpace.of_matrices(*parts, np.ones(8)), 8)
+
+    return pencil
+
+
+def growth(block, damping, fx):
+    """Largest Re s of the 2 x 2 block alone."""
+    companion = np.block([[np.zeros((2, 2)), np.eye(2)], [-block(fx), -np.diag(damping)]])
+    return np.linalg.eigvals(companion).real.max()
+
+
+def crossing(half_width, place=0.4):
+    """Two levels that pass each other, with an undamped window of this half width about the place."""
+
+    def block(fx):
+        return np.array([[10 + fx - place, half_width], [-half_width, 10 - fx + place]])
+
+    return block
+
+
+@pytest.mark.parametrize("damping", [(1e-6, 3e-6), (1e-3, 4e-3), (1e-2, 1e-2)])
+@pytest.mark.parametrize("half_width", [0.2, 1e-2, 1e-3])
+def test_windows_narrower_than_the_increment(half_width, damping):
+    """Both ends of the increment are stable; the edges are those of the block by itself."""
+    block = crossing(half_width)
+    found = growing_windows(family(block, damping), [-1.0, 0.0, 1.0, 2.0])
+    if growth(block, damping, 0.4) < 0:
+        # a coupling that feeds less than the dashpots take: no window of the pair's
+        assert half_width * 0.2 < max(damping)
+        assert found == ()
+        return
+    (window,) = found
+    reach = 0.4 + 3 * half_width + np.array([0, 10 * half_width])
+    edges = [
+        brentq(lambda fx: growth(block, damping, fx), 0.4, 0.4 + s * (reach[1] - 0.4), xtol=1e-14) for s in (-1, 1)
+    ]
+    # Re s is known to 1e-15; its slope is the damping over the width, or one where the block is nearly defective
+    digits = 1e-10 + 1e-14 * half_width / max(damping)
+    assert [window.fx_onset, window.fx_end] == pytest.approx(edges, abs=digits)
+    assert window.kind == "hopf"
+    assert window.frequency == pytest.approx(np.sqrt(10), rel=0.1)
+    assert window.error < 10 * digits
+
+
+def test_nothing_grows_where_levels_repel():
+    def block(fx):
+        return np.array([[10 + fx - 0.4, 1e-2], [1e-2, 10 - fx + 0.4]])
+
+    assert growing_windows(family(block, (1e-3, 1e-4)), [0.0, 1.0]) == ()
+
+
+def test_a_steady_loss_of_stability_is_no_hopf_point():
+    """A restoring force that vanishes: s = 0."""
+
+    def block(fx):
+        return np.diag([10 * (0.3 - fx), 12.0])
+
+    (window,) = growing_windows(family(block, (1e-2, 1e-2)), [0.0, 1.0])
+    assert window.kind == "steady"
+    assert window.fx_onset == pytest.approx(0.3, abs=1e-10)
+    assert window.fx_end is None
+
+
+def test_what_grows_from_the_beginning_says_so():
+    (window,) = growing_windows(family(crossing(0.2, place=0.0), (1e-3, 1e-3)), [0.0, 1.0])
+    assert (window.kind, window.fx_onset) == ("start", 0.0)
+    assert 0.15 < window.fx_end < 0.25
+
+
+def companion(packing):
+    """Largest Re s, from K, C and M alone."""
+    k, c = stiffness_matrix(packing).toarray(), damping_matrix(packing).toarray()
+    active = np.flatnonzero(np.any(k != 0, axis=1))
+    mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])[active]
+    inner, size = np.ix_(active, active), len(active)
+    first_order = np.zeros((2 * size, 2 * size))
+    first_order[:size, size:] = np.eye(size)
+    first_order[size:, :size], first_order[size:, size:] = -k[inner] / mass[:, None], -c[inner] / mass[:, None]
+    return np.linalg.eigvals(first_order).real.max()
+
+
+@pytest.fixture(scope="module")
+def path(ramp):
+    """Equilibria of the reference packing up to 0.0225; its undamped onset is 0.02183306."""
+    coarse = ramp(1.0, 1e-3, 22)
+    return lambda fx: coarse(fx) if fx <= 0.022 else quasistatic.equilibrium(coarse(0.022), fx)
+
+
+@pytest.mark.parametrize(("cn", "onset", "digits"), [(1.0, 0.0218328, 1e-7), (10.0, 0.02235, 1e-5)])
+def test_reference_packing_with_normal_dashpots(path, cn, onset, digits):
+    """The onsets that an independent computation had found, and LAPACK's root of the same to 1e-9."""
+    damped = dissipating(path, cn=cn)
+    window = damped_windows(damped, [0.0218, 0.0224])[0]
+    assert window.fx_onset == pytest.approx(onset, abs=digits)
+    assert window.kind == "hopf"
+    near = 1e-6
+    root = brentq(lambda fx: companion(damped(fx)), window.fx_onset - near, window.fx_onset + near, xtol=1e-13)
+    assert window.fx_onset == pytest.approx(root, abs=1e-9)
+    assert window.error < 1e-9
+
+
+@pytest.fixture(scope="module")
+def undamped(path):
+    """The first window without dissipation."""
+    return find_onset(path, [0.021, 0.022]).windows[0]
+
+
+@pytest.mark.parametrize(("cn", "ct"), [(1.0, 0.0), (0.0, 1.0)])
+def test_limit_of_weak_dashpots(path, undamped, cn, ct):
+    """From the undamped pair, and from dashpots of 1e-3."""
+    predicted = weak_limit(dissipating(path, cn, ct), [0.019, 0.02, 0.021], undamped)
+    assert predicted.fx < undamped.fx_onset
+    weak = dissipating(path, 1e-3 * cn, 1e-3 * ct)
+    measured = damped_windows(weak, [0.021, undamped.fx_onset + 1e-6])[0]
+    # what dashpots of 1e-3 do beyond the first order is of relative size 1e-6
+    assert predicted.fx == pytest.approx(measured.fx_onset, rel=1e-6)
+    assert predicted.frequency == pytest.approx(measured.frequency, rel=1e-6)
+
+
+def test_balanced_dashpots_leave_the_onset_alone(path, undamped):
+    ratio = balancing_ratio(path(undamped.fx_onset), undamped)
+    assert ratio > 0
+    balanced = weak_limit(dissipating(path, 1.0, ratio), [0.02, 0.021], undamped)
+    assert balanced.fx == pytest.approx(undamped.fx_onset, rel=1e-8)
+    off = [weak_limit(dissipating(path, 1.0, share * ratio), [0.02, 0.021], undamped).fx for share in (0.5, 2.0)]
+    assert max(off) < undamped.fx_onset - 1e-10
+
+
+def test_drag_shifts_the_onset_to_where_the_growth_exceeds_it(path, undamped):
+    """The closed form of the pair against all modes; 2 |Im omega| = 1/tau to second order."""
+    tau = 100.0
+    predicted = drag_onset(path, [0.022, 0.0224], undamped, tau)
+    assert predicted > undamped.fx_onset
+    measured = damped_windows(dissipating(path, drag_time=tau), [0.0218, 0.022])[0]
+    assert predicted == pytest.approx(measured.fx_onset, rel=1e-9)
+    rates = np.linalg.eigvals(stiffness_matrix(path(predicted)).toarray())
+    fastest = np.abs(np.sqrt(rates.astype(complex)).imag).max()
+    assert 2 * fastest == pytest.approx(1 / tau, rel=1e-4)
+
+
+def test_modes_are_those_of_the_quadratic_problem(path):
+    packing = dissipating(path, cn=3.0, ct=1.0, drag_time=30.0)(0.02)
+    modes = DampedModes.of(Pencil.of(packing))
+    a, g = modes.pencil.stiffness, modes.pencil.damping
+    residual = a @ modes.right + (g @ modes.right) * modes.rates + modes.right * modes.rates**2
+    mirror = modes.left.conj().T @ a + modes.rates[:, None] * (modes.left.conj().T @ (g + 0j))
+    mirror += modes.rates[:, None] ** 2 * modes.left.conj().T
+    assert max(np.abs(residual).max(), np.abs(mirror).max()) < 1e-9 * np.abs(a).max()
+    assert len(modes.growing) == 0
+
+
+@pytest.mark.parametrize("loads", [[0.02], [0.02, 0.01], [0.0, np.nan]])
+def test_impossible_loads(path, loads):
+    with pytest.raises(ValueError, match="increasing"):
+        damped_windows(dissipating(path, cn=1.0), loads)
+
+
+def test_a_packing_without_dissipation_is_refused(path):
+    with pytest.raises(ValueError, match="no dissipation"):
+        damped_windows(path, [0.0, 0.001])

@@ -1,0 +1,152 @@
+"""Signals, and the response of a packing to them: against the response to a cosine, which is known in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis.forcing import floor_force, impulse_response, sampled_response
+from faultgouge.analysis.response import layer_force, layer_response, linear_response
+from faultgouge.analysis.signals import Signal, SignalError, pulse, sweep
+from faultgouge.analysis.spectrum import discrete_frequency, spectrum
+
+OMEGA = 5.0
+NEAR_ONSET = 0.0218  # F_x^c = 0.021833056408
+
+
+@pytest.fixture(scope="module")
+def packing(ramp):
+    return ramp(1.0, 1e-3, 21)(NEAR_ONSET)
+
+
+@pytest.fixture(scope="module")
+def damped(packing):
+    return replace(packing, law=replace(packing.law, cn=10.0, ct=5.0), drag_time=20.0)
+
+
+def cosine(omega, duration, rows):
+    time = np.linspace(0.0, duration, rows)
+    return Signal(time, np.cos(omega * time))
+
+
+@pytest.mark.parametrize("kind", ["packing", "damped"])
+def test_sampled_cosine_gives_the_response_to_a_cosine(kind, request):
+    """Up to the chords of the cosine: (omega h)^2/8 of its height."""
+    packing, step = request.getfixturevalue(kind), 2e-3
+    force = layer_force(packing, 1.0)
+    times = 0.1 * np.arange(1, 21)
+    sampled = sampled_response(packing, cosine(OMEGA, 2.1, round(2.1 / step) + 1), times, force)
+    exact = linear_response(packing, times, force=force, omega=OMEGA)
+    for name in ("displacement", "velocity"):
+        off = np.abs(getattr(sampled, name) - getattr(exact, name)).max()
+        assert off < 2 * (OMEGA * step) ** 2 / 8 * np.abs(getattr(exact, name)).max(), name
+
+
+@pytest.mark.parametrize("kind", ["packing", "damped"])
+def test_impulse_response_gives_velocity_and_transfer_function(kind, request):
+    """Its vectors are ill-conditioned by a thousand here, which takes three of fifteen digits."""
+    packing = request.getfixturevalue(kind)
+    force, times = layer_force(packing, 1.0), np.linspace(0.1, 30.0, 50)
+    response = impulse_response(packing, force)
+    exact = linear_response(packing, times, force=force, omega=OMEGA).layer_velocity
+    assert np.abs(response.velocity(OMEGA, times) - exact).max() < 1e-10 * np.abs(exact).max()
+    omegas = np.array([0.1, 1.7, 30.0])
+    np.testing.assert_allclose(response.transfer(omegas), layer_response(packing, omegas), rtol=1e-8)
+
+
+def test_largest_velocity_is_that_of_a_fine_sampling(packing):
+    response = impulse_response(packing, layer_force(packing, 1.0))
+    omegas = np.array([0.3, 14.2, 120.0])
+    found, when = response.largest(omegas, 10.0)
+    times = np.linspace(0.0, 10.0, 200_001)
+    for omega, velocity, time in zip(omegas, found, when, strict=True):
+        sampled = np.abs(response.velocity(omega, times))
+        # between samples a 600th of the fastest period apart, the velocity rises by less than 1e-5
+        assert velocity == pytest.approx(sampled.max(), rel=1e-5)
+        assert abs(response.velocity(omega, [time])[0]) == pytest.approx(velocity, rel=1e-12)
+
+
+def test_resonance_grows_as_the_time(packing):
+    """Pushed with the frequency of a mode, the velocity is c t/2 and no quotient of nothing by nothing."""
+    response = impulse_response(packing, layer_force(packing, 1.0))
+    strongest = int(np.argmax(np.where(response.rate.imag > 0, np.abs(response.weight), 0)))
+    omega, time = float(response.rate[strongest].imag), 1e4
+    near = response.velocity(omega, time + np.linspace(0, 2 * np.pi / omega, 400))
+    assert np.abs(near).max() == pytest.approx(abs(response.weight[strongest]) * time, rel=1e-2)
+
+
+def test_frequencies_of_the_time_step(packing):
+    """A constant push makes each mode oscillate: the sampled response has the frequencies of velocity Verlet."""
+    dt = 0.1 / spectrum(packing).omega_max
+    force, times = layer_force(packing, 1.0), 0.5 * np.arange(1, 401)
+    constant = Signal([0.0, 1e3], [1.0, 1.0])
+    exact = linear_response(packing, dt * np.round(times / dt), force=force, dt=dt)
+    stepped = sampled_response(packing, constant, times, force, dt=dt)
+    without = sampled_response(packing, constant, times, force)
+    reference = linear_response(packing, times, force=force)
+    scale = np.abs(exact.layer_velocity).max()
+    assert np.abs(without.layer_velocity - reference.layer_velocity).max() < 1e-8 * scale
+    frequency = np.sqrt(spectrum(packing).eigenvalues.real.max())
+    # the fastest mode is off by half a radian at the end; with the frequencies of the step none is
+    assert (frequency - discrete_frequency(frequency**2, dt).real) * times[-1] < -0.5
+    late = slice(300, None)
+    close = np.abs(stepped.velocity[late] - _at(packing, force, times[late], dt)).max()
+    assert close < 5e-3 * np.abs(stepped.velocity).max()
+
+
+def _at(packing, force, times, dt):
+    """Velocities of velocity Verlet between its steps: a line between the two."""
+    below = np.floor(times / dt) * dt
+    share = ((times - below) / dt)[:, None]
+    one, two = (linear_response(packing, each, force=force, dt=dt).velocity for each in (below, below + dt))
+    return (1 - share) * one + share * two
+
+
+def test_moving_floor_is_a_force_on_every_disk(packing):
+    """A rigid start of all disks with a velocity is the same as a jolt of the floor the other way."""
+    jolt = Signal([0.0, 1e-5, 2e-5], [0.0, 1.0, 0.0])  # a velocity of 1e-5
+    times = 1e-4 * np.arange(1, 11)  # the fastest mode has turned by 0.02 at the first
+    moved = sampled_response(packing, jolt, times, floor_force(packing))
+    assert moved.layer_velocity[0] == pytest.approx(-1e-5, rel=1e-2)
+
+
+def test_signal_is_zero_outside_and_straight_between():
+    signal = Signal([1.0, 2.0, 4.0], [0.0, 2.0, -2.0])
+    np.testing.assert_array_equal(signal.at([0.0, 1.5, 3.0, 4.0, 5.0]), [0.0, 1.0, 0.0, -2.0, 0.0])
+    np.testing.assert_array_equal(signal.scaled(3.0, 2.0).at([3.0, 6.0]), [3.0, 0.0])
+    assert signal.shortest == 1.0
+
+
+def test_pulse_peaks_where_it_says_and_sweep_goes_from_one_frequency_to_the_other():
+    wave = pulse(3.0)
+    step = wave.time[1] - wave.time[0]
+    frequency = 2 * np.pi * np.fft.rfftfreq(1 << 16, step)
+    assert frequency[np.abs(np.fft.rfft(wave.value, 1 << 16)).argmax()] == pytest.approx(3.0, rel=1e-2)
+    assert abs(wave.value[0]) < 1e-8
+    assert wave.value.max() == pytest.approx(1.0, rel=2e-4)  # the peak lies between two rows
+    wave = sweep(2.0, 6.0, 50.0)
+    zeros = wave.time[1:][np.diff(np.sign(wave.value)) != 0]
+    half_periods = np.pi / np.diff(zeros)
+    assert half_periods[1] == pytest.approx(2.0, rel=0.1)
+    assert half_periods[-1] == pytest.approx(6.0, rel=0.1)
+
+
+def test_derivative_of_a_parabola_is_exact_inside():
+    time = np.linspace(0.0, 1.0, 11)
+    np.testing.assert_allclose(Signal(time, time**2).differentiated().value[1:-1], 2 * time[1:-1], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("time", "value", "says"),
+    [
+        ([0.0], [1.0], "two rows or more"),
+        ([0.0, 1.0], [1.0], "two columns of one length"),
+        ([0.0, 1.0], [1.0, np.nan], "row 2 of the signal has the value nan"),
+        ([0.0, np.inf], [1.0, 1.0], "row 2 of the signal has the time inf"),
+        ([0.0, 2.0, 1.0], [1.0, 1.0, 1.0], "the time 1 in row 3 of the signal is not later than the 2 before it"),
+        ([0.0, 0.0], [1.0, 1.0], "the time 0 in row 2"),
+    ],
+)
+def test_bad_signals_are_refused(time, value, says):
+    with pytest.raises(SignalError, match=says):
+        Signal(time, value)

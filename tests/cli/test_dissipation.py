@@ -1,0 +1,86 @@
+"""Commands on scenes with [damping], and what spectrum says of transient growth."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from faultgouge.analysis import RunFile
+from faultgouge.analysis.transient import transient_gain
+
+BIN = Path(sys.executable).parent
+REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
+
+SCENE = f"""
+[packing]
+file = "{REFERENCE}"
+[law]
+kn = 2e5
+[load]
+fy = 3.0
+[ramp]
+step = 1e-3
+until = 4e-3
+"""
+
+
+@pytest.fixture
+def faultgouge(tmp_path):
+    def run(*arguments):
+        command = [BIN / "faultgouge", *arguments]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600)
+
+    (tmp_path / "scene.toml").write_text(SCENE)
+    return run
+
+
+@pytest.mark.slow
+def test_spectrum_says_how_far_a_stable_packing_moves(faultgouge, tmp_path):
+    assert faultgouge("ramp", "scene.toml").returncode == 0
+    printed = json.loads(faultgouge("spectrum", "run.h5", "--json").stdout)["transient_gain"]
+    with RunFile(tmp_path / "run.h5") as file:
+        packing = file.packing()
+    displacement, energy = transient_gain(packing), transient_gain(packing, "energy")
+    assert printed["displacement"] == displacement.gain > 1
+    assert printed["time"] == displacement.time
+    assert printed["energy"] == energy.gain > 1
+    said = faultgouge("spectrum", "run.h5").stdout
+    assert f"a start at rest grows by up to {displacement.gain:.6g} times in |q|^2" in said
+    assert f"{energy.gain:.6g} in energy" in said
+
+
+@pytest.mark.slow
+def test_onset_with_dissipation_as_json(faultgouge, tmp_path):
+    """All modes at 22 loads."""
+    scene = SCENE.replace("until = 4e-3", "until = 0.022") + "[damping]\ncn = 1.0\n"
+    (tmp_path / "scene.toml").write_text(scene)
+    done = faultgouge("onset", "scene.toml", "--json")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["fx_c"] == pytest.approx(0.0218328368, abs=1e-10)
+    assert result["undamped"]["fx_c"] == pytest.approx(0.0218330564080, rel=1e-9)
+    window = result["windows"][0]
+    assert window.keys() == {"fx_onset", "fx_end", "frequency", "error", "kind"}
+    assert (window["kind"], window["fx_end"]) == ("hopf", None)
+    assert window["frequency"] == pytest.approx(45.367, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("damping", "arguments", "code", "says"),
+    [
+        ("cn = 1.0", (), 1, "No motion grows up to fx = 0.004"),
+        ("cn = -1", (), 2, "damping.cn = -1 is refused"),
+        ("tau = 0", (), 2, "damping.tau = 0 is refused"),
+        ("", (), 2, "damping"),
+        ("ct = 1.0", ("--modes", "0:10"), 2, "--modes goes without [damping]"),
+    ],
+)
+def test_what_there_is_no_onset_of(faultgouge, tmp_path, damping, arguments, code, says):
+    (tmp_path / "scene.toml").write_text(SCENE + f"[damping]\n{damping}\n")
+    done = faultgouge("onset", "scene.toml", *arguments)
+    assert done.returncode == code, done.stderr
+    assert says in done.stderr
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr

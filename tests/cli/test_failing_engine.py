@@ -1,0 +1,96 @@
+"""An engine that fails in the middle of a search: its sentence and exit code 1, at whatever call it fails."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BIN = Path(sys.executable).parent
+REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
+
+SCENE = f"""
+[packing]
+file = "{REFERENCE}"
+[law]
+kn = 2e5
+[load]
+fy = 3.0
+[ramp]
+step = 4e-3
+until = 0.024
+"""
+
+FAILING = """
+import sys
+from mpi4py import MPI
+from faultgouge.cli import main
+from faultgouge.pywrap import Engine, EngineError
+
+wanted, rank = int(sys.argv[1]), int(sys.argv[2])
+displaced, calls = Engine.displaced, 0
+
+def failing(self, *arguments):
+    global calls
+    calls += 1
+    if calls == wanted and rank in (-1, MPI.COMM_WORLD.rank):
+        raise EngineError(f"LAMMPS stopped: it was told to at call {wanted}.")
+    return displaced(self, *arguments)
+
+Engine.displaced = failing
+sys.argv = ["faultgouge", "onset", "scene.toml"]
+main()
+"""
+
+EVERY_CALL = """
+import sys
+from faultgouge.commands import program
+from faultgouge.pywrap import Engine, EngineError
+
+displaced, calls, wanted = Engine.displaced, 0, 0
+
+def failing(self, *arguments):
+    global calls
+    calls += 1
+    if calls == wanted:
+        raise EngineError("as it was told to")
+    return displaced(self, *arguments)
+
+Engine.displaced = failing
+program()(["onset", "scene.toml"], standalone_mode=False)
+total = calls
+for wanted in range(1, total + 1, int(sys.argv[1])):
+    calls = 0
+    try:
+        program()(["onset", "scene.toml"], standalone_mode=False)
+    except EngineError:
+        continue
+    sys.exit(f"no error at call {wanted} of {total}")
+print(total)
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    (tmp_path / "scene.toml").write_text(SCENE)
+    return tmp_path
+
+
+@pytest.mark.parametrize(("ranks", "rank"), [(1, -1), (2, -1), (2, 0), (2, 1)])
+@pytest.mark.parametrize("call", [1, 30])
+def test_its_sentence_reaches_the_command(scene, ranks, rank, call):
+    command = [sys.executable, "-c", FAILING, str(call), str(rank)]
+    if ranks > 1:
+        command = [BIN / "mpiexec", "-n", str(ranks), *command]
+    done = subprocess.run(command, cwd=scene, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 1
+    says = [line for line in done.stderr.splitlines() if line.startswith("Error:")]
+    assert says == [f"Error: LAMMPS stopped: it was told to at call {call}."]
+
+
+@pytest.mark.slow
+def test_no_call_is_taken_for_a_missing_onset(scene):
+    command = [sys.executable, "-c", EVERY_CALL, "1"]
+    done = subprocess.run(command, cwd=scene, capture_output=True, text=True, timeout=1200)
+    assert done.returncode == 0, done.stderr[-500:]
+    assert int(done.stdout.splitlines()[-1]) > 20

@@ -1,0 +1,129 @@
+"""draw, movie, init, --version and python -m faultgouge, as a user types them."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from faultgouge.analysis import RunFile
+from faultgouge.pywrap import Scene
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+BIN = Path(sys.executable).parent
+REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
+
+SCENE = f"""
+[packing]
+file = "{REFERENCE}"
+[law]
+kn = 2e5
+[load]
+fy = 3.0
+[ramp]
+step = 6e-3
+until = 0.024
+[perturb]
+fx = 0.024
+time = 1.0
+[output]
+trajectory = true
+"""
+
+
+def run(*arguments, cwd=None):
+    return subprocess.run([BIN / "faultgouge", *arguments], cwd=cwd, capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A ramp beyond the onset 0.0218, and an undamped run from its end."""
+    made = tmp_path_factory.mktemp("pictures")
+    (made / "scene.toml").write_text(SCENE)
+    for command in ("ramp", "perturb"):
+        done = run(command, "scene.toml", "-o", f"{command}.h5", cwd=made)
+        assert done.returncode == 0, done.stderr
+    assert "at most" in done.stderr
+    return made
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_a_packing(folder, suffix):
+    done = run("draw", "ramp.h5", "--frame", "2", "-o", f"packing.{suffix}", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "F_x = 0.012, F_y = 3: 100 disks" in done.stderr
+    assert (folder / f"packing.{suffix}").stat().st_size > 10_000
+
+
+def test_the_pair_before_and_after_the_onset(folder):
+    before = run("draw", "ramp.h5", "--frame", "3", "--mode", "pair", "-o", "before.png", cwd=folder)
+    assert before.returncode == 0, before.stderr
+    assert len(re.findall(r"mode \d+: lambda = [\d.]+, participation", before.stderr)) == 2
+    after = run("draw", "ramp.h5", "--mode", "pair", "-o", "after.png", cwd=folder)
+    assert after.returncode == 0, after.stderr
+    assert re.search(r"mode \d+: lambda = [\d.]+ \+- [\d.]+ i, participation ratio 0\.\d+, rotation", after.stderr)
+
+
+def test_films_of_a_run_a_ramp_and_a_mode(folder):
+    for name, more in (("perturb", ()), ("ramp", ()), ("ramp", ("--mode", "pair"))):
+        command = ("movie", f"{name}.h5", *more, "--seconds", "1", "--rate", "5", "--dots", "50", "-o", "film.gif")
+        done = run(*command, cwd=folder)
+        assert done.returncode == 0, done.stderr
+        with Image.open(folder / "film.gif") as gif:
+            assert gif.n_frames == 5
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        (("draw", "ramp.h5", "-o", "p.bmp"), "a .png, a .svg or a .pdf"),
+        (("draw", "ramp.h5", "--mode", "all"), "--mode all: give pair, or the number of a mode, from 0"),
+        (("draw", "ramp.h5", "--mode", "9999"), "modes, counted from 0"),
+        (("draw", "ramp.h5", "--mode", "pair", "--frame", "0"), "no two of them are about to meet"),
+        (("draw", "none.h5"), "does not exist"),
+        (("movie", "ramp.h5", "-o", "film.avi"), "a .gif or an .mp4"),
+        (("movie", "perturb.h5", "--span", "5", "6"), "its times go from 0 to"),
+    ],
+)
+def test_bad_input_is_refused_in_a_sentence(folder, command, says):
+    done = run(*command, cwd=folder)
+    assert done.returncode == 2
+    assert says in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
+
+
+def test_init_writes_a_scene_that_holds_every_key(tmp_path):
+    assert run("init", cwd=tmp_path).returncode == 0
+    text = (tmp_path / "scene.toml").read_text()
+    assert Scene.from_toml(tmp_path / "scene.toml").law.kn == 2e5
+    # without the signs of comments every key is there, and the scene is still one
+    bare = re.sub(r"^# (?=\[|[A-Za-z_0-9]+ = )", "", text, flags=re.MULTILINE)
+    keys = tomllib.loads(bare)
+    for name in ("relax", "ramp", "perturb", "friction", "output", "law", "load"):
+        section = Scene.model_fields[name].annotation
+        models = [each for each in (section, *getattr(section, "__args__", ())) if hasattr(each, "model_fields")]
+        missing = set(models[0].model_fields) - set(keys[name])
+        assert not missing, f"{name}: {missing}"
+    assert run("init", cwd=tmp_path).returncode == 2
+
+
+def test_version_in_both_ways():
+    for command in ([BIN / "faultgouge"], [sys.executable, "-m", "faultgouge"]):
+        done = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=100)
+        assert re.fullmatch(r"faultgouge \S+ \(LAMMPS \S+\)\n", done.stdout), done.stderr
+
+
+def test_a_packing_shows_itself(folder):
+    with RunFile(folder / "ramp.h5") as file:
+        packing, same, other = file.packing(1), file.packing(1), file.packing(2)
+    assert len(repr(packing)) < 200
+    assert packing._repr_png_().startswith(b"\x89PNG")
+    assert packing == same
+    assert packing != other
+    assert packing.contacts == same.contacts

@@ -1,0 +1,48 @@
+"""A packing under shear with slips, and the command."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import Packing, RunFile
+from faultgouge.pywrap import Engine, Equilibrium, equilibrate
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+BIN = Path(sys.executable).parent
+
+
+@pytest.fixture(scope="session")
+def sheared(reference_packing) -> Packing:
+    """The reference packing in equilibrium under shear, with masses and angles of its own."""
+    packing = reference_packing(1.0)
+    with Engine(packing) as engine:
+        found = equilibrate(engine, Equilibrium(packing, packing.residual, 0.0, 0), 0.01).packing
+    rng = np.random.default_rng(1)
+    n = len(packing)
+    return replace(found, mass=rng.uniform(0.5, 2, n), angle=rng.normal(size=n), inertia_factor=0.5, drag_time=10.0)
+
+
+@pytest.fixture
+def stored(tmp_path, sheared) -> Path:
+    """The packing as a run.h5."""
+    with RunFile.create(tmp_path / "run.h5", sheared) as file:
+        file.append(sheared)
+        file.complete = True
+    return tmp_path / "run.h5"
+
+
+@pytest.fixture
+def faultgouge(tmp_path) -> Callable[..., subprocess.CompletedProcess]:
+    """Runs the command in tmp_path."""
+
+    def run(*words: object) -> subprocess.CompletedProcess:
+        command = [str(BIN / "faultgouge"), *map(str, words)]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+
+    return run

@@ -1,0 +1,223 @@
+"""Packings of other codes: what is read, what is brought to rest, and what is refused in one sentence."""
+
+import json
+
+import numpy as np
+import pytest
+from comparing import same
+
+from faultgouge.analysis import BadInputError, RunFile
+from faultgouge.pywrap import Scene, SceneError, settle
+from faultgouge.pywrap.exchange import read_disks, upper_layer, write_packing
+
+LAW = ("--kn", "2e5", "--fy", "3")
+
+
+def csv(packing, names="id,x,y,radius,mass,angle,top"):
+    columns = {
+        "id": range(1, len(packing) + 1),
+        "x": packing.position[:, 0],
+        "y": packing.position[:, 1],
+        "radius": packing.radius,
+        "mass": packing.mass,
+        "angle": packing.angle,
+        "top": packing.top.astype(int),
+    }
+    rows = zip(*(np.asarray(columns[name]).tolist() for name in names.split(",")), strict=True)
+    return "\n".join([names, *(",".join(map(repr, row)) for row in rows)]) + "\n"
+
+
+def dump(packing, step=0, columns="id type x y z radius", count=None, z=0.0):
+    n = len(packing) if count is None else count
+    place, kind = packing.position.tolist(), (1 + packing.top).tolist()
+    rows = [f"{k + 1} {kind[k]} {place[k][0]} {place[k][1]} {z * k} {packing.radius[k]}" for k in range(n)]
+    head = [f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{n}\nITEM: BOX BOUNDS pp ff pp"]
+    head += [f"0 {packing.box_length}\n-1 60\n-0.5 0.5\nITEM: ATOMS {columns}"]
+    return "\n".join([*head, *rows]) + "\n"
+
+
+def test_csv_with_slips_is_the_same_packing(tmp_path, faultgouge, sheared):
+    (tmp_path / "packing.csv").write_text(csv(sheared))
+    c = sheared.contacts
+    rows = zip((c.i + 1).tolist(), (c.j + 1).tolist(), c.slip.tolist(), strict=True)
+    (tmp_path / "slips.csv").write_text("id1,id2,slip\n" + "\n".join(f"{a},{b},{s!r}" for a, b, s in rows) + "\n")
+    law = ("--kn", "2e5", "--kt", sheared.law.kt, "--fx", sheared.fx, "--fy", "3", "--inertia", "0.5")
+    words = ("packing.csv", "--width", sheared.box_length, "--contacts", "slips.csv", *law)
+    done = faultgouge("import", *words, "-o", "packing.h5")
+    assert done.returncode == 0, done.stderr
+    with RunFile(tmp_path / "packing.h5") as file:
+        found = file.packing()
+    np.testing.assert_array_equal(found.contacts.slip, sheared.contacts.slip)
+    np.testing.assert_array_equal(found.net_force, sheared.net_force)
+
+
+@pytest.mark.parametrize("names", ["x,y,radius", "radius,y,x,top"])
+@pytest.mark.parametrize("mark", [";", "\t", " "])
+def test_csv_as_others_write_it(tmp_path, sheared, names, mark):
+    (tmp_path / "packing.csv").write_text("# " * (mark == " ") + csv(sheared, names).replace(",", mark))
+    disks = read_disks(tmp_path / "packing.csv")
+    np.testing.assert_array_equal(disks.position, sheared.position)
+    np.testing.assert_array_equal(disks.radius, sheared.radius)
+
+
+def test_the_layer_may_be_said_in_six_ways(tmp_path, sheared):
+    (tmp_path / "a.dump").write_text(dump(sheared))
+    (tmp_path / "ids").write_text("1 2\n5-7\n")
+    disks = read_disks(tmp_path / "a.dump")
+    y = sheared.position[:, 1]
+    tenth = np.sort(y)[-10]
+    for says, expected in (
+        ("10", y >= tenth),
+        (10, y >= tenth),
+        ("type:2", sheared.top),
+        ("ids:1,2,5-7", np.isin(np.arange(len(y)), [0, 1, 4, 5, 6])),
+        (f"ids:@{tmp_path / 'ids'}", np.isin(np.arange(len(y)), [0, 1, 4, 5, 6])),
+        ("y>8 and x<=5", (y > 8) & (sheared.position[:, 0] <= 5)),
+    ):
+        np.testing.assert_array_equal(upper_layer(disks, says), expected)
+    for says in ("type:7", "y>1000", "0"):
+        with pytest.raises(BadInputError, match="holds no disk"):
+            upper_layer(disks, says)
+    for says in ("ids:1-1000", "ids:a", "group:upper", "y>>3", "z>3", "101", "y>e", "ids:@nowhere"):
+        with pytest.raises(BadInputError, match="--top"):
+            upper_layer(disks, says)
+
+
+def test_a_restart_has_groups_and_masses(lmp, tmp_path, sheared):
+    write_packing(tmp_path / "packing.data", sheared)
+    done = lmp(
+        "units lj\ndimension 2\nboundary p f p\natom_style sphere\nread_data packing.data\ngroup odd id 1:99:2\n"
+        "group gone id 1\ngroup upper type 2\ngroup gone delete\npair_style gran/hertz/history 2e5 NULL 50 NULL 0.5 1\n"
+        "pair_coeff * *\ncomm_modify vel yes\nrun 0\nwrite_restart packing.restart\n"
+    )
+    assert done.returncode == 0, done.stdout
+    disks = read_disks(tmp_path / "packing.restart")
+    np.testing.assert_array_equal(upper_layer(disks, "group:upper"), sheared.top)
+    np.testing.assert_array_equal(upper_layer(disks, "group:odd"), np.arange(len(sheared)) % 2 == 0)
+    np.testing.assert_array_equal(disks.position[:, 1], sheared.position[:, 1])
+    np.testing.assert_allclose(disks.mass, sheared.mass, rtol=2.3e-16)
+    assert disks.box_length == sheared.box_length
+
+
+def test_what_mdanalysis_reads_with_radii(tmp_path, sheared):
+    pytest.importorskip("MDAnalysis", reason="needs the extra export: pip install 'faultgouge[export]'")
+    rows = zip(sheared.position.tolist(), sheared.radius.tolist(), strict=True)
+    line = "ATOM {n:6d}  C   DSK A{n:4d}    {x:9.4f} {y:9.4f}   0.000  0.0000 {r:.4f}"
+    text = "\n".join(line.format(n=n, x=x, y=y, r=r) for n, ((x, y), r) in enumerate(rows, 1))
+    (tmp_path / "packing.pqr").write_text(text + "\n")
+    disks = read_disks(tmp_path / "packing.pqr")
+    np.testing.assert_allclose(disks.position, sheared.position, atol=1e-4)
+    np.testing.assert_allclose(disks.radius, sheared.radius, rtol=1e-6)
+    assert "float32" in disks.remark
+
+
+def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packing):
+    """Numbers with five digits: a hundredth of an overlap, and forces of the order of the load."""
+    packing = reference_packing(1.0)
+    (tmp_path / "rough.csv").write_text(
+        "x,y,radius,top\n"
+        + "\n".join(
+            f"{x:.3f},{y:.3f},{r},{int(t)}"
+            for (x, y), r, t in zip(packing.position, packing.radius, packing.top, strict=True)
+        )
+    )
+    words = ("import", "rough.csv", "--width", packing.box_length, *LAW, "-o", "rest.h5")
+    done = faultgouge(*words)
+    assert done.returncode == 2
+    assert "not in balance under fy = 3" in done.stderr
+    assert "--relax" in done.stderr
+    assert not (tmp_path / "rest.h5").exists()
+    done = faultgouge(*words, "--relax")
+    assert done.returncode == 0, done.stderr
+    assert "brought to rest" in done.stderr
+    with RunFile(tmp_path / "rest.h5") as file:
+        rest = file.packing()
+    assert rest.residual < 1e-9
+    assert not rest.contacts.slip.any()
+    # the packing is the one that was rounded: the reference is an equilibrium of the same law
+    moved = rest.position - packing.position
+    moved[:, 0] -= packing.box_length * np.round(moved[:, 0] / packing.box_length)
+    held = np.setdiff1d(np.arange(len(packing)), np.union1d(rest.rattlers, packing.rattlers))
+    assert np.abs(moved[held]).max() < 0.01
+
+
+def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
+    packing = reference_packing(1.0)
+    (tmp_path / "packing.csv").write_text(csv(packing, "x,y,radius"))
+    (tmp_path / "packing.dump").write_text(dump(packing))
+    (tmp_path / "packing.json").write_text(json.dumps(reference))
+    rest = {"law": {"kn": 2e5}, "load": {"fy": 3.0}}
+
+    def settled(**section):
+        return settle(Scene.from_mapping({"packing": section, **rest}, tmp_path)).packing
+
+    expected = settled(file="packing.json")
+    assert same(settled(file="packing.dump", top="type:2"), expected)
+    for section, says in (
+        ({"file": "packing.dump"}, "does not say which disks are the upper layer"),
+        ({"file": "packing.dump", "top": "type:9"}, "holds no disk"),
+        ({"file": "packing.dump", "top": 10, "frame": 3}, "no --frame 3"),
+        ({"file": "packing.doc"}, "cannot be read"),
+    ):
+        with pytest.raises(SceneError, match=says):
+            settled(**section)
+    (tmp_path / "packing.doc").write_text("?")
+    with pytest.raises(SceneError, match=r"is of no format that is read: give .*LAMMPS data .*GSD .*run\.h5"):
+        settled(file="packing.doc")
+
+
+BAD = {
+    "missing column": ("a.dump", lambda p: dump(p, columns="id type x y z size"), "no column radius or diameter"),
+    "other disks": ("a.dump", lambda p: dump(p) + dump(p, 7, count=50), "other disks at step 7 (50) than at step 0"),
+    "three dimensions": ("a.dump", lambda p: dump(p, z=0.1), "is of three dimensions: z goes from 0 to 9.9"),
+    "cut off": ("a.dump", lambda p: dump(p)[:-200], "not a complete LAMMPS text dump"),
+    "same centre": ("a.csv", lambda p: "x,y,radius\n1,1,0.5\n3,1,0.5\n1.1,1,0.5\n", "disks 1 and 3 are 0.1 apart"),
+    "below the floor": ("a.csv", lambda p: "x,y,radius\n1,-1,0.5\n3,1,0.5\n", "say with --floor"),
+    "no number": ("a.csv", lambda p: "x,y,radius\n1,one,0.5\n", "line 2: 'one' is no number"),
+    "nan": ("a.csv", lambda p: "x,y,radius\n1,nan,0.5\n", "y of disk 1 is nan"),
+    "short line": ("a.csv", lambda p: "x,y,radius\n1,1,0.5\n1,1\n", "line 3: it has 2 columns"),
+    "no radius": ("a.csv", lambda p: "x,y,radius\n1,1,0\n", "radius of disk 1 is 0"),
+    "one ID twice": ("a.csv", lambda p: "id,x,y,radius\n1,1,1,1\n1,9,1,1\n", "has disk 1 twice"),
+    "empty": ("a.csv", lambda p: "", "is no table"),
+    "no touch": ("a.csv", lambda p: "x,y,radius\n1,3,0.5\n3,3,0.5\n", "no disk touches another"),
+    "unknown suffix": ("a.doc", lambda p: "?", "is of no format that is read: give dumps of the decks (.disks)"),
+    "no data": ("a.data", lambda p: "LAMMPS\n\n3 atoms\n", "no section Atoms"),
+    "data of points": ("a.data", lambda p: "LAMMPS\n\n1 atoms\n\nAtoms # atomic\n\n1 1 1 1 0\n", "atom style atomic"),
+    "no restart": ("a.restart", lambda p: "?", "no LAMMPS restart file"),
+    "no gsd": ("a.gsd", lambda p: "?", "GSD"),
+    "plain xyz": ("a.xyz", lambda p: "1\nhello\nH 1 1 0\n", "no Properties"),
+    "xyz cut off": ("a.xyz", lambda p: "3\nProperties=pos:R:3\n1 1 0\n", "breaks off"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_refused_in_one_sentence(tmp_path, faultgouge, sheared, case):
+    name, text, says = BAD[case]
+    (tmp_path / name).write_text(text(sheared))
+    done = faultgouge("import", name, "--top", 1, *LAW)
+    assert done.returncode == 2, done.stderr
+    assert says in done.stderr
+    assert name in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "packing.h5").exists()
+
+
+def test_options_that_do_not_fit(tmp_path, faultgouge, sheared):
+    (tmp_path / "a.dump").write_text(dump(sheared))
+    (tmp_path / "scene.toml").write_text("[law]\nkn = 2e5\n[load]\nfy = 3.0\n")
+    for words, says in (
+        (("a.dump", *LAW), "does not say which disks are the upper layer: add --top"),
+        (("a.dump", "--top", "y>99", *LAW), "the upper layer holds no disk"),
+        (("a.dump", "--top", "type:2"), "add --kn"),
+        (("a.dump", "--top", "type:2", "--kn", "2e5"), "add --fy"),
+        (("a.dump", "--top", "type:2", "--kn", "-1", "--fy", "3"), "law.kn = -1.0 is refused"),
+        (("a.dump", "--top", "type:2", "--scene", "scene.toml", "--kn", "1"), "cannot stand beside --scene"),
+        (("a.dump", "--top", "type:2", *LAW, "--width", "wide"), "--width wide"),
+        (("a.dump", "--top", "type:2", *LAW, "--frame", "2"), "no --frame 2"),
+        (("b.dump", "--top", "type:2", *LAW), "does not exist"),
+        (("a.dump", "--top", "type:2", *LAW, "-o", "a.dump"), "exists"),
+    ):
+        done = faultgouge("import", *words)
+        assert done.returncode == 2, done.stderr
+        assert says in done.stderr
+        assert len(done.stderr.strip().splitlines()) == 1

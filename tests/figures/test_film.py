@@ -1,0 +1,100 @@
+"""Films: magnification in steps of ten, frames, and files that play."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from faultgouge.analysis import MindlinLaw, Packing, PackingFileError, touching
+from faultgouge.figures.film import LARGEST_SHOWN, Motion, RampFilm, RunFilm
+from faultgouge.figures.writers import FilmError, write_film
+
+REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
+
+
+@pytest.fixture(scope="module")
+def packing() -> Packing:
+    stored = json.loads(REFERENCE.read_text())
+    radius, position = np.array(stored["radius"]), np.column_stack([stored["x"], stored["y"]])
+    contacts = touching(position, radius, stored["box_length"])
+    law = MindlinLaw(stored["kn"], stored["kt"], 1.0)
+    top = np.isin(np.arange(len(radius)), stored["top"])
+    return Packing(
+        position=position, radius=radius, contacts=contacts, law=law, box_length=stored["box_length"], top=top, fy=3.0
+    )
+
+
+@pytest.fixture(scope="module")
+def motion(packing) -> Motion:
+    """Displacements that grow tenfold with every unit of time, from rest."""
+    shape = np.random.default_rng(1).standard_normal((100, 2))
+    shape /= np.linalg.norm(shape, axis=1).max()
+    time = np.linspace(0, 8, 81)
+    size = np.where(time > 0, 1e-9 * 10.0**time, 0.0)
+    return Motion(packing, time, size[:, None, None] * shape)
+
+
+def test_magnification_is_a_power_of_ten_that_only_falls(motion):
+    factor = motion.magnification()
+    np.testing.assert_allclose(np.log10(factor), np.round(np.log10(factor)), atol=1e-12)
+    assert np.all(np.diff(factor) <= 0)
+    shown = factor * np.linalg.norm(motion.displacement, axis=2).max(axis=1)
+    most = LARGEST_SHOWN * motion.packing.radius.min()
+    assert np.all(shown <= most * (1 + 1e-12))
+    assert np.all(shown[1:] > 0.1 * most * (1 - 1e-12))
+
+
+def test_displacements_are_those_of_the_nearest_image(packing):
+    position = np.stack([packing.position, packing.position + np.array([packing.box_length + 1e-3, 0.0])])
+    moved = Motion.of(packing, np.array([0.0, 1.0]), position).displacement
+    np.testing.assert_allclose(moved[1], np.tile([1e-3, 0.0], (100, 1)), atol=1e-13)
+
+
+def test_a_part_of_a_run(motion):
+    part = motion.between(2.0, 3.0)
+    assert part.time[0] >= 2.0
+    assert part.time[-1] <= 3.0
+    with pytest.raises(PackingFileError, match="its times go from 0 to 8"):
+        motion.between(9.0, 10.0)
+
+
+def test_gif_holds_every_frame(tmp_path, motion):
+    film = RunFilm(motion, 7, dots=60)
+    write_film(film, tmp_path / "run.gif", 10)
+    with Image.open(tmp_path / "run.gif") as gif:
+        assert (gif.n_frames, gif.size, gif.info["loop"], gif.info["duration"]) == (7, film.size, 0, 100)
+        for number in (0, 3, 6):
+            gif.seek(number)
+            shown = np.asarray(gif.convert("RGB")).astype(int)
+            # 63 colours stand for all shades: on the average a few steps of 255 off
+            assert np.abs(shown - film.frame(number)).mean() < 3
+
+
+def test_frames_differ_and_come_back(motion):
+    film = RunFilm(motion, 5, dots=60)
+    first, last = film.frame(0), film.frame(4)
+    assert np.any(first != last)
+    np.testing.assert_array_equal(film.frame(0), first)
+
+
+def test_a_ramp_shows_its_equilibria(packing):
+    loads = [packing.moved(packing.position + k * 1e-4, packing.angle, packing.contacts, fx=0.01 * k) for k in range(4)]
+    film = RampFilm(loads, 8, dots=60)
+    assert np.any(film.frame(0) != film.frame(7))
+    np.testing.assert_array_equal(film.frame(0), film.frame(1))  # each is shown twice
+
+
+def test_mp4_plays(tmp_path, motion):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="the extra `movie` is not installed")
+    film = RunFilm(motion, 5, dots=60)
+    write_film(film, tmp_path / "run.mp4", 10)
+    frames, seconds = ffmpeg.count_frames_and_secs(str(tmp_path / "run.mp4"))
+    assert frames == 5
+    assert seconds == pytest.approx(0.5, abs=0.11)  # a frame more or less
+
+
+def test_other_names_are_refused(tmp_path, motion):
+    with pytest.raises(FilmError, match=r"a \.gif or an \.mp4"):
+        write_film(RunFilm(motion, 2, dots=60), tmp_path / "run.avi")

@@ -1,0 +1,90 @@
+"""Modes: what takes part in them, which two are about to meet, and how they are drawn."""
+
+import numpy as np
+import pytest
+from matplotlib.collections import EllipseCollection
+from matplotlib.quiver import Quiver
+
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, closest_to_meeting, normal_modes, spectrum, touching
+from faultgouge.analysis.spectrum import participation_ratio, rotation_share
+from faultgouge.figures.mode import Mode, ModeError, draw_modes, unstable_pair
+
+
+@pytest.fixture(scope="module")
+def pyramid() -> Packing:
+    """Two disks on the floor and one on top, with slips, so that K is not symmetric."""
+    position, radius = np.array([[3.49, 0.4992], [4.51, 0.4992], [4.0, 1.3586]]), np.full(3, 0.5)
+    law = MindlinLaw(2e5, 2e5 * 2 / 7, 1.0)
+    contacts = touching(position, radius)
+    bare = Packing(
+        position=position, radius=radius, contacts=contacts, law=law, fx=0.1, fy=1.0, top=[False, False, True]
+    )
+    slip = 0.5 * law.slip_limit(bare.geometry.overlap) * np.array([1, -1, 0.3, -0.2])
+    return Packing(
+        position=position,
+        radius=radius,
+        contacts=Contacts(contacts.i, contacts.j, slip),
+        law=law,
+        fx=0.1,
+        fy=1.0,
+        top=[False, False, True],
+    )
+
+
+def test_participation_and_rotation_of_plain_motions():
+    alone, together, turning = np.zeros((3, 3, 4))
+    alone[0, 2], together[1], turning[2] = 1.0, 0.5, 0.5
+    columns = np.column_stack([each.ravel() for each in (alone, together, turning)])
+    np.testing.assert_allclose(participation_ratio(columns), [0.25, 1, 1], rtol=1e-15)
+    np.testing.assert_allclose(rotation_share(columns), [0, 0, 1], rtol=1e-15)
+
+
+def test_normal_modes_are_those_of_the_spectrum(pyramid):
+    modes = normal_modes(pyramid)
+    np.testing.assert_array_equal(modes.values.real, spectrum(pyramid).eigenvalues.real)
+    assert np.all((modes.participation >= 1 / 3) & (modes.participation <= 1 + 1e-12))
+
+
+def test_the_two_closest_to_meeting_have_the_largest_cosine(pyramid):
+    modes = normal_modes(pyramid)
+    first, second, cosine = closest_to_meeting(modes)
+    right = modes.right.real
+    others = [abs(right[:, a] @ right[:, b]) for a in range(len(right.T)) for b in range(a)]
+    assert cosine == pytest.approx(max(others), rel=1e-12)
+    assert abs(right[:, first] @ right[:, second]) == pytest.approx(cosine, rel=1e-12)
+    assert modes.values[first].real < modes.values[second].real
+
+
+def test_a_symmetric_operator_has_no_pair_that_is_about_to_meet(pyramid):
+    still = Packing(
+        position=pyramid.position,
+        radius=pyramid.radius,
+        contacts=touching(pyramid.position, pyramid.radius),
+        law=pyramid.law,
+    )
+    with pytest.raises(ModeError, match="no two of them are about to meet"):
+        unstable_pair(still, normal_modes(still), [])
+
+
+def test_a_complex_mode_is_drawn_at_two_moments(pyramid):
+    modes = normal_modes(pyramid)
+    moved = np.zeros((3, 3), dtype=complex)
+    moved[0, 2], moved[1, 2] = 1.0, 1j
+    figure = draw_modes(pyramid, [Mode(4, 10 + 2j, moved, 0.3, 0.1)], "a pair")
+    first, second = (axes.findobj(Quiver)[0] for axes in figure.axes[:2])
+    at_top = np.argmax(np.abs(first.U))
+    assert first.U[at_top] > 0
+    assert first.V[at_top] == 0
+    # a quarter of a period later exp(i pi/2) has turned x into -y
+    assert second.U[at_top] == pytest.approx(0, abs=1e-15)
+    assert second.V[at_top] == pytest.approx(-first.U[at_top], rel=1e-12)
+    assert r"\pm 2" in figure.axes[0].get_title()
+    assert len(draw_modes(pyramid, [Mode.of(pyramid, modes, k) for k in (0, 1)], "two").axes) == 3
+
+
+def test_colour_is_the_rotation(pyramid):
+    moved = np.zeros((3, 3), dtype=complex)
+    moved[0, 0], moved[2] = 1.0, [2.0, -1.0, 0.0]
+    axes = draw_modes(pyramid, [Mode(0, 1 + 0j, moved, 1.0, 0.5)], "one").axes[0]
+    (disks,) = axes.findobj(EllipseCollection)
+    np.testing.assert_allclose(disks.get_array(), [1.0, -0.5, 0.0])

@@ -1,0 +1,294 @@
+"""Dashpots and drag in LAMMPS: forces over velocities, Coulomb's bound, orders in the time step, what is refused."""
+
+import itertools
+from ctypes import c_double
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, damping_matrix, read_dump, touching
+from faultgouge.pywrap.decks import DECKS
+from faultgouge.pywrap.engine import Engine
+
+KN, KT = 2e5, 2e5 * 2 / 7
+exponents = pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
+arithmetics = pytest.mark.parametrize("compensated", [False, True], ids=["double", "compensated"])
+
+
+def damped(packing, exponent=1.5, cn=1.0, ct=1.0, compensated=False, **changes):
+    law = replace(packing.law, exponent=exponent, cn=cn, ct=ct)
+    low = np.zeros_like(packing.position) if compensated else None
+    return replace(packing, law=law, position_low=low, **changes)
+
+
+class Moving:
+    """Forces of a packing whose disks have velocities, dashpots on."""
+
+    def __init__(self, engine):
+        self.engine, self.lammps = engine, engine.lammps
+        self.radius = engine.packing.radius
+        # the integrator adds the low parts of forces
+        self.lammps.command("fix move all nve/disc 1.0 ${compensated}")
+        self.lammps.command(f"include {DECKS}/dashpots.in")
+
+    def force(self, velocity):
+        """(Fx.., Fy.., T/R..) at velocities (x.., y.., R theta..)."""
+        vx, vy, vu = velocity.reshape(3, -1)
+        zero = np.zeros_like(vx)
+        for name, rows in (("v", (vx, vy, zero)), ("omega", (zero, zero, vu / self.radius))):
+            flat = np.column_stack(rows).ravel()
+            self.lammps.scatter_atoms(name, 1, 3, (c_double * flat.size)(*flat))
+        self.lammps.command("run 0 post no")
+        return self.engine.net_force
+
+
+@exponents
+@arithmetics
+def test_matrix_is_the_derivative_of_the_forces_over_velocities(reference_packing, exponent, compensated):
+    packing = damped(reference_packing(1.0), exponent, cn=1.3, ct=0.7, compensated=compensated)
+    contacts = packing.contacts
+    slip = np.resize([0.1, -0.3, 0.6, 0.0], len(contacts)) * packing.law.slip_limit(packing.geometry.overlap)
+    packing = replace(packing, contacts=Contacts(contacts.i, contacts.j, slip))
+    matrix, step = damping_matrix(packing).toarray(), 2.0**-10
+    measured = np.empty_like(matrix)
+    with Engine(packing) as engine:
+        run = Moving(engine)
+        for k, unit in enumerate(np.eye(len(matrix))):
+            measured[:, k] = (run.force(-step * unit) - run.force(step * unit)) / (2 * step)
+    assert packing.contacts.floor.any()
+    # the forces are linear in the velocity; they are known to the last place of a sum of order 3, over the step
+    assert np.abs(measured - matrix).max() < 1e-9 * np.abs(matrix).max()
+
+
+@exponents
+@arithmetics
+@pytest.mark.parametrize(("cn", "ct", "mu"), [*itertools.product([0.0, 40.0], [0.0, 25.0], [0.0, 0.8])])
+def test_two_disks_and_the_floor_in_motion(exponent, compensated, cn, ct, mu):
+    """The law in ten lines, within Coulomb's bound and beyond it, sliding on and sliding back."""
+    overlap, radius = 1e-3, np.array([0.5, 0.7])
+    position = np.array([[1.0, 0.5 - overlap], [1.0 + 0.9, 0.0]])
+    position[1, 1] = position[0, 1] + np.sqrt((1.2 - overlap) ** 2 - 0.81)
+    law = MindlinLaw(KN, KT, mu, exponent, cn, ct)
+    found = touching(position, radius)
+    bare = Packing(position=position, radius=radius, law=law, contacts=found)
+    limit = law.slip_limit(bare.geometry.overlap)
+    rng = np.random.default_rng(5)
+    bare = damped(bare, exponent, cn, ct, compensated)
+    with Engine(bare) as engine:
+        run = Moving(engine)
+        for share, scale in itertools.product([-1.0, -0.5, 0.0, 0.9, 1.0], [0.0, 1e-3, 1.0]):
+            packing = replace(bare, contacts=Contacts(found.i, found.j, share * limit))
+            velocity = scale * rng.standard_normal(6)
+            engine.restore(packing)
+            force = run.force(velocity).reshape(3, 2)
+            expected = forces_of_moving_contacts(packing, ((0, 1), (0, -1)), *velocity.reshape(3, 2))
+            # overlaps are known to 1e-16 of a coordinate, 1e-13 of themselves
+            np.testing.assert_allclose(force, expected, rtol=0, atol=5e-13 * np.abs(expected).max())
+
+
+def forces_of_moving_contacts(packing, pairs, x, y, u):
+    """(F_x, F_y, T/R) of each disk from the formulas, for velocities (x, y, R theta)."""
+    law, expected = packing.law, np.zeros((3, len(packing)))
+    p, geometry = law.exponent, packing.geometry
+    for (i, j), slip, n, tau, d in zip(
+        pairs, packing.contacts.slip, geometry.normal, geometry.tangent, geometry.overlap, strict=True
+    ):
+        v = np.array([x[i], y[i]]) - (np.array([x[j], y[j]]) if j >= 0 else 0)
+        rolling = u[i] + (u[j] if j >= 0 else 0)
+        normal = KN * d**p - law.cn * d ** (p - 1) * (n @ v)
+        s = abs(slip) / (law.mu * KN / KT * d) if law.mu else 0.0
+        tangential = -KT * d ** (p - 1) * (1 + s - s * s) * slip - law.ct * d ** (p - 1) * (tau @ v - rolling)
+        tangential = min(max(tangential, -law.mu * KN * d**p), law.mu * KN * d**p)
+        expected[:, i] += *(normal * n + tangential * tau), -tangential
+        if j >= 0:
+            expected[:, j] += *(-normal * n - tangential * tau), -tangential
+    return expected
+
+
+def after(packing, dt, time):
+    """Positions and angular velocities of a run of the damped packing."""
+    with Engine(packing) as engine, engine.undamped(dt) as dynamics:
+        motion = dynamics.advance(round(time / dt))
+    return np.column_stack([motion.position, motion.velocity, packing.radius * motion.spin])
+
+
+@exponents
+@pytest.mark.parametrize(
+    "parts",
+    [{"cn": 4.0, "ct": 0.0}, {"cn": 0.0, "ct": 4.0}, {"cn": 0.0, "ct": 0.0, "drag_time": 0.5}, {"drag_time": 0.5}],
+    ids=["normal", "tangential", "drag", "all"],
+)
+def test_second_order_in_the_time_step(exponent, parts):
+    """A column of disks under a load, shaken: no contact opens, where the force of harmonic disks would have a kink."""
+    overlap = 1e-2
+    height = 0.5 - overlap + (1 - overlap) * np.arange(5)
+    position = np.column_stack([np.full(5, 2.0), height]) + 1e-4 * np.random.default_rng(2).standard_normal((5, 2))
+    law = MindlinLaw(1e4 * overlap ** (1 - exponent), 5e3 * overlap ** (1 - exponent), 50.0, exponent)
+    column = Packing(
+        position=position,
+        radius=np.full(5, 0.5),
+        law=law,
+        contacts=touching(position, np.full(5, 0.5)),
+        top=np.arange(5) == 4,
+        fx=1.0,
+        fy=float(law.normal_force(overlap)),
+    )
+    packing = damped(column, exponent, **{"cn": 40.0, "ct": 40.0, **parts})
+    found = [after(packing, dt, 0.064) for dt in (1e-3, 5e-4, 2.5e-4)]
+    coarse, fine = (np.linalg.norm(found[k] - found[k + 1]) for k in (0, 1))
+    assert 3.7 < coarse / fine < 4.3
+
+
+def test_energy_falls_as_the_matrix_says(reference_packing):
+    """Without friction there is an energy; what it loses is the integral of v C v, to second order in the step."""
+    start, errors = reference_packing(0.0), []
+    packing = damped(start, cn=20.0, ct=0.0, drag_time=3.0, fy=3.3)  # the load is raised at the start
+    n, time = len(packing), 0.064
+
+    def energy_and_loss(position, velocity):
+        now = replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
+        v = np.concatenate([*velocity.T, np.zeros(n)])
+        height = packing.fy * position[packing.top, 1].sum()
+        stored = now.law.normal_energy(now.geometry.overlap).sum() + height + 0.5 * packing.mass @ (velocity**2).sum(1)
+        return stored, v @ damping_matrix(now) @ v
+
+    assert not packing.top[packing.rattlers].any()
+    for dt in (5e-4, 2.5e-4, 1.25e-4):
+        rows = [energy_and_loss(packing.position, np.zeros((n, 2)))]
+        with Engine(packing) as engine, engine.undamped(dt) as dynamics:
+            for _ in range(round(time / dt)):
+                motion = dynamics.advance(1)
+                rows.append(energy_and_loss(motion.position, motion.velocity))
+        energy, loss = np.array(rows).T
+        lost = dt * (loss.sum() - 0.5 * (loss[0] + loss[-1]))
+        assert lost > 0.1 * np.abs(energy[0] - energy[-1]) > 0
+        errors.append(abs(energy[-1] - energy[0] + lost) / lost)
+    assert errors[2] < 1e-3
+    assert 3.4 < errors[0] / errors[1] < 4.6
+    assert 3.4 < errors[1] / errors[2] < 4.6
+
+
+MODEL = """
+variable        decks index {decks}
+variable        fx index {fx}
+variable        precision index {precision}
+include         {decks}/system.in
+{extra}
+timestep        1e-3
+"""
+
+
+@arithmetics
+def test_drag_lets_free_disks_decay(lmp, tmp_path, compensated):
+    precision = "compensated" if compensated else "double"
+    extra = (
+        "displace_atoms all move 0 5 0\nunfix load\nvelocity all set 0.3 -0.2 0.0\nset group all omega 0 0 0.5\n"
+        "pair_style mindlin/smooth 1 0 0 ${compensated}\nfix move all nve/disc 1.0 drag 0.25 ${compensated}\n"
+        "fix_modify floor mu 0\n"
+    )
+    script = MODEL.format(decks=DECKS, fx=0.0, precision=precision, extra=extra)
+    dump = "write_dump all custom end id vx vy omegaz modify sort id format float %.17g\n"
+    done = lmp(script + "neigh_modify exclude group all all\nrun 100\n" + dump)
+    assert done.returncode == 0, done.stdout[-1000:]
+    rows = np.array([line.split() for line in (tmp_path / "end").read_text().splitlines()[9:]], float)[:, 1:]
+    # two hundred rounded factors
+    np.testing.assert_allclose(rows, np.exp(-0.4) * np.tile([0.3, -0.2, 0.5], (len(rows), 1)), rtol=2e-14)
+
+
+@arithmetics
+def test_forces_after_a_run_are_those_of_the_contacts(lmp, tmp_path, compensated):
+    """single() and the floor's columns hand out the forces, dashpots included, that the disks have felt."""
+    precision = "compensated" if compensated else "double"
+    extra = "unfix load\nvariable cn index 9.0\nvariable ct index 7.0\ninclude ${decks}/dashpots.in\n"
+    extra += "velocity all create 1e-2 5 loop geom\nfix move all nve/disc 1.0 ${compensated}\n"
+    extra += "compute seen all pair/local p1 p2 p5 p6 cutoff radius\n"
+    extra += "compute ids all property/local patom1 patom2 cutoff radius\n"
+    script = MODEL.format(decks=DECKS, fx=0.0, precision=precision, extra=extra)
+    script += (
+        "dump disks all custom 50 disks id fx fy tqz radius f_floor[1] f_floor[2]\n"
+        "dump_modify disks sort id format float %.17g\n"
+        "dump pairs all local 50 pairs c_ids[1] c_ids[2] c_seen[1] c_seen[2] c_seen[3] c_seen[4]\n"
+        "dump_modify pairs format float %.17g\nrun 50\n"
+    )
+    done = lmp(script)
+    assert done.returncode == 0, done.stdout[-1000:]
+    disks, pairs = (last_snapshot(tmp_path / name) for name in ("disks", "pairs"))
+    expected = np.zeros((len(disks), 3))
+    radius, floor_n, floor_t = disks[:, 4], disks[:, 5], disks[:, 6]
+    expected += np.column_stack([-floor_t, floor_n, -radius * floor_t])
+    for i, j, fn, ft, nx, ny in pairs:
+        force = np.array([fn * nx - ft * ny, fn * ny + ft * nx])
+        for disk, sign in ((int(i) - 1, 1), (int(j) - 1, -1)):
+            expected[disk] += *(sign * force), -radius[disk] * ft
+    np.testing.assert_allclose(disks[:, 1:4], expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def last_snapshot(path):
+    lines = path.read_text().splitlines()
+    first = max(k for k, line in enumerate(lines) if line.startswith(("ITEM: ATOMS", "ITEM: ENTRIES")))
+    return np.array([line.split() for line in lines[first + 1 :]], float)
+
+
+PAIR = "pair_style mindlin/smooth 2e5 1e5 1.0 "
+FLOOR = "unfix floor\nfix floor all wall/mindlin/smooth 2e5 1e5 1.0 ylo 0.0 "
+MOVE = "\nfix move all nve/disc 1.0\n"
+
+
+@pytest.mark.parametrize(
+    ("extra", "says"),
+    [
+        (PAIR + "exponent 2", "exponent must be 1.5 or 1, not 2"),
+        (PAIR + "exponent", "exponent must be 1.5 or 1, not left out"),
+        (PAIR + "damping 1.0", "damping takes two numbers, CN CT"),
+        (PAIR + "damping -1.0 0.0", "damping CN CT must be finite and not negative (got -1.0 0.0)"),
+        (PAIR + "damping 1.0 inf", "inf"),
+        (PAIR + "dampin 1.0 1.0", "knows the keywords exponent, damping and compensated, but not dampin"),
+        (FLOOR + "exponent 1.6", "exponent must be 1.5 or 1, not 1.6"),
+        (FLOOR + "damping 1.0", "damping takes two numbers, CN CT"),
+        (FLOOR + "damping 0.0 -2", "damping CN CT must be finite and not negative (got 0.0 -2)"),
+        (FLOOR + "rubber", "knows the keywords exponent, damping and compensated, but not rubber"),
+        (FLOOR + "damping 1 1" + MOVE, "needs pair_style mindlin/smooth KN KT MU damping CN CT"),
+        ("fix_modify floor damping 1", "damping takes two numbers, CN CT, or no"),
+        ("fix move all nve/disc 1.0 drag", "drag takes a time, TAU"),
+        ("fix move all nve/disc 1.0 drag 0", "TAU must be a positive number, not 0"),
+        ("fix move all overdamped/disc 1.0 1.0 drag 5.0", "rotation yes|no and compensated, but got drag"),
+        (PAIR + "damping 1 1\nfix move all overdamped/disc 1.0 1.0", "leave the keyword damping out"),
+        (
+            "pair_style mindlin/smooth 2e5 0 0 damping 1 0\nfix_modify floor mu 0\nminimize 0 1e-6 10 10",
+            "a minimizer has no velocities",
+        ),
+        (
+            MOVE + "variable c equal 1.0\nfix less all adapt 1 pair mindlin/smooth cn * * v_c",
+            "cn",
+        ),
+    ],
+)
+def test_what_is_refused(lmp, extra, says):
+    done = lmp(MODEL.format(decks=DECKS, fx=0.0, precision="double", extra=extra) + "run 1\n")
+    assert done.returncode != 0
+    assert says in done.stdout
+
+
+def test_adapted_dashpots_are_dashpots_from_the_start(lmp, tmp_path):
+    dumps = []
+    for cn, adapt in ((4.0, ""), (1.0, "variable c equal 4.0\nfix more all adapt 1 pair mindlin/smooth cn * * v_c\n")):
+        extra = f"pair_style mindlin/smooth ${{kn}} ${{kt}} ${{mu}} damping {cn} 2.0{MOVE}{adapt}"
+        script = MODEL.format(decks=DECKS, fx=3.0, precision="double", extra=extra)
+        done = lmp(script + "run 300\nwrite_dump all custom end id x y omegaz modify sort id format float %.17g\n")
+        assert done.returncode == 0, done.stdout[-1000:]
+        dumps.append((tmp_path / "end").read_text())
+    assert dumps[0] == dumps[1]
+
+
+def test_deck_with_damping_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path):
+    written = []
+    settings = ["-var", "fx", "0.01", "-var", "time", "2.0", "-var", "amplitude", "1e-6"]
+    settings += ["-var", "cn", "2.0", "-var", "ct", "1.0", "-var", "tau", "20.0"]
+    for ranks in (1, 2):
+        done = lmp(DECKS / "perturb.in", "-var", "decks", str(DECKS), *settings, ranks=ranks)
+        assert done.returncode == 0, done.stdout[-1000:]
+        written.append((tmp_path / "perturb.end.disks").read_text())
+    assert written[0] == written[1]
+    packing = read_dump(tmp_path / "perturb.end.disks")
+    assert (packing.law.cn, packing.law.ct, packing.drag_time) == (2.0, 1.0, 20.0)

@@ -1,0 +1,99 @@
+"""A scene with [damping]: which stages it changes, and which it leaves as they are to the bit."""
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import damping_matrix, largest_damping_rate, largest_frequency, stable_timestep
+from faultgouge.pywrap import Engine, Scene, SceneError, perturb, ramp, settle
+from faultgouge.pywrap.undamped import time_step
+
+SCENE = {
+    "packing": {"disks": 20, "width": 3.6, "seed": 2},
+    "law": {"kn": 2e5},
+    "load": {"fy": 3.0},
+    "ramp": {"step": 1e-3, "until": 2e-3},
+    "perturb": {"fx": 0.0, "time": 1.0, "amplitude": 1e-6, "omega": 5.0},
+}
+DAMPING = {"cn": 30.0, "ct": 20.0, "tau": 0.2}
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Equilibria and time series without and with damping."""
+    found = []
+    for scene in (Scene.from_mapping(SCENE), Scene.from_mapping(SCENE | {"damping": DAMPING})):
+        equilibria = list(ramp(scene))
+        found.append((scene, equilibria, list(perturb(scene, equilibria[0], samples=50))))
+    return found
+
+
+def test_equilibria_are_the_same_to_the_bit(runs):
+    (_, plain, _), (_, damped, _) = runs
+    for a, b in zip(plain, damped, strict=True):
+        for name in ("position", "angle"):
+            assert np.array_equal(getattr(a.packing, name), getattr(b.packing, name))
+        assert np.array_equal(a.packing.contacts.slip, b.packing.contacts.slip)
+
+
+def test_packings_know_their_damping(runs):
+    (_, plain, _), (_, damped, _) = runs
+    assert all((e.packing.law.cn, e.packing.law.ct, e.packing.drag_time) == (30.0, 20.0, 0.2) for e in damped)
+    assert all(damping_matrix(e.packing).nnz == 0 for e in plain)
+
+
+def test_runs_are_damped(runs):
+    (_, _, plain), (_, _, damped) = runs
+    late = [np.mean([sample.kinetic_energy for sample in run[-20:]]) for run in (plain, damped)]
+    assert 0 < late[1] < 0.7 * late[0]
+
+
+def test_an_engine_goes_on_undamped(runs):
+    """Dashpots are on in dynamics alone: what the engine does after it is as if there had been none."""
+    _, equilibria, _ = runs[1]
+    packing = equilibria[1].packing
+    displacement = 1e-6 * np.random.default_rng(1).standard_normal(3 * len(packing))
+    with Engine(packing) as engine:
+        before = engine.displace(packing, displacement).position, engine.net_force
+        with engine.undamped(1e-3) as dynamics:
+            dynamics.advance(20)
+        after = engine.displace(packing, displacement).position, engine.net_force
+    assert np.array_equal(before[0], after[0])
+    assert np.array_equal(before[1], after[1])
+
+
+def test_a_run_is_continued_in_another_engine_to_the_bit(runs):
+    packing = runs[1][1][1].packing
+    ends = []
+    with Engine(packing) as engine, engine.undamped(1e-3, amplitude=1e-3, omega=5.0) as dynamics:
+        dynamics.advance(50)
+        state = dynamics.state()
+        dynamics.resume(50, state)
+        ends.append(dynamics.advance(50))
+    with Engine(packing) as engine, engine.undamped(1e-3, amplitude=1e-3, omega=5.0) as dynamics:
+        dynamics.resume(50, state)
+        ends.append(dynamics.advance(50))
+    with Engine(packing) as engine, engine.undamped(1e-3, amplitude=1e-3, omega=5.0) as dynamics:
+        straight = dynamics.advance(100)
+    for name in ("position", "velocity", "spin"):
+        assert np.array_equal(getattr(ends[0], name), getattr(ends[1], name))
+    # wrapped into the box once more: a rounding of the coordinates
+    assert np.abs(ends[0].position - straight.position).max() < 1e-13
+
+
+def test_time_step_stays_below_what_dashpots_allow(runs):
+    packing = runs[1][1][0].packing
+    rate, limit = largest_damping_rate(packing), stable_timestep(largest_frequency(packing))
+    dense = damping_matrix(packing).toarray() - np.eye(60) / packing.drag_time  # masses and I0 are 1
+    assert rate == pytest.approx(np.linalg.eigvalsh(dense).max(), rel=1e-10)
+    longest = 20 * time_step(packing)
+    assert rate * longest + (longest / limit) ** 2 == pytest.approx(1.0, rel=1e-12)
+    with pytest.raises(SceneError, match="over the limit"):
+        time_step(packing, 1.01 * longest)
+
+
+def test_harmonic_disks_settle_and_climb():
+    scene = Scene.from_mapping(SCENE | {"law": {"kn": 3e3, "exponent": 1}})
+    first = settle(scene)
+    assert first.packing.law.exponent == 1
+    for equilibrium in ramp(scene, first):
+        assert equilibrium.residual < 1e-10

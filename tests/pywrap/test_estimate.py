@@ -1,0 +1,87 @@
+"""What a scene asks for, and what is refused before any of it is done."""
+
+from copy import deepcopy
+
+import pytest
+
+from faultgouge.pywrap import Scene, SceneError
+from faultgouge.pywrap.estimate import estimated, foreseen
+
+SCENE = {
+    "packing": {"disks": 30, "top": 6, "width": 6.5, "seed": 3},
+    "law": {"kn": 2e5},
+    "load": {"fy": 3.0},
+    "ramp": {"step": 1e-3, "until": 0.01},
+    "perturb": {"fx": 2e-3, "time": 1.0},
+}
+
+
+def with_key(section, key, value):
+    scene = deepcopy(SCENE)
+    scene.setdefault(section, {})[key] = value
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value", "says"),
+    [
+        ("law", "kn", 5e-324, "law.kn = 5e-324 is refused: give a number between 1e-100 and 1e+100"),
+        ("law", "kt", 1e-320, "law.kt"),
+        ("law", "mu", 5e-324, "law.mu"),
+        ("load", "fy", 1e-300, "load.fy = 1e-300 is refused"),
+        ("load", "fy", 1e9, "presses two disks 2.9e+02 into each other, deeper than the smallest radius 0.5"),
+        ("law", "kn", 1e14, "settling takes about"),
+        ("law", "kn", 1e20, "no packing comes to rest"),
+        ("packing", "radii", [5e-324], "packing.radii"),
+        ("packing", "radii", [0.5, 1e-9], "deeper than the smallest radius"),
+        ("packing", "width", 1e10, "packing.width = 1e+10 is"),
+        ("packing", "seed", 2**64, "packing.seed"),
+        ("packing", "periodic", False, "packing.periodic = false leaves the sides open"),
+        ("ramp", "step", 1e-12, "ramp.step = 1e-12 makes 1e+10 equilibria"),
+        ("ramp", "until", 1e6, "ramp.step = 0.001 makes 1e+09 equilibria"),
+        ("perturb", "time_step", 1e-200, "perturb.time_step"),
+        ("friction", "v_ss", "1e400 v0", "friction.v_ss"),
+    ],
+)
+def test_what_no_packing_bears_is_refused(section, key, value, says):
+    with pytest.raises(SceneError) as refusal:
+        Scene.from_mapping(with_key(section, key, value))
+    assert says in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("time", 2.0**63), ("time_step", 1e-30), ("inertia_factor", 1e-50), ("time", 1e13)]
+)
+def test_runs_without_end_are_refused(key, value):
+    scene = Scene.from_mapping(with_key("perturb", key, value))
+    with pytest.raises(SceneError, match="the scene asks perturb for a year and more"):
+        foreseen(scene, "perturb")
+    assert foreseen(scene, "settle") == ""
+
+
+@pytest.mark.parametrize("changes", [("perturb", "time", 1e5), ("perturb", "time_step", 1e-8)])
+def test_long_work_is_said(changes):
+    scene = Scene.from_mapping(with_key(*changes))
+    assert foreseen(scene, "perturb").startswith("perturb: about ")
+    assert "time steps" in foreseen(scene, "perturb")
+
+
+def test_work_is_counted():
+    scene = Scene.from_mapping(SCENE)
+    work = estimated(scene, "ramp")
+    assert work.increments == pytest.approx(10)
+    assert work.seconds < 2
+    assert foreseen(scene, "ramp") == ""
+    halved = estimated(Scene.from_mapping(with_key("ramp", "step", 5e-4)), "ramp")
+    assert halved.increments == pytest.approx(2 * work.increments)
+
+
+def test_a_loop_of_links_and_deep_brackets_are_refused(tmp_path):
+    (tmp_path / "a.json").symlink_to(tmp_path / "b.json")
+    (tmp_path / "b.json").symlink_to(tmp_path / "a.json")
+    (tmp_path / "deep.json").write_text("[" * 100_000)
+    (tmp_path / "long.json").write_text('{"x": [' + "9" * 400 + '], "y": [1.0], "radius": [0.5]}')
+    for name in ("a.json", "deep.json", "long.json"):
+        with pytest.raises(SceneError, match=name):
+            Scene.from_mapping({**SCENE, "packing": {"file": name}}, tmp_path)

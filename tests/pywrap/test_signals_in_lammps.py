@@ -1,0 +1,162 @@
+"""Signals in LAMMPS: against the linear response, the same on two ranks, and refused where they make no sense."""
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis.forcing import floor_force, sampled_response
+from faultgouge.analysis.response import layer_force
+from faultgouge.analysis.signals import Signal, SignalError
+from faultgouge.pywrap import Engine, Equilibrium, Scene, SceneError, equilibrate
+from faultgouge.pywrap.decks import DECKS
+from faultgouge.pywrap.quasistatic import rounding_floor
+from faultgouge.pywrap.records import of_trace, read_signal
+from faultgouge.pywrap.undamped import time_step
+
+LEAST = {"packing": {"disks": 30, "width": 6.0}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+
+
+@pytest.fixture(scope="module")
+def packing(reference_packing):
+    """The reference packing at F_x = 0.02, nine tenths of its onset."""
+    start = reference_packing(1.0)
+    here = Equilibrium(start, start.residual, rounding_floor(start), 0)
+    with Engine(start) as engine:
+        for fx in np.linspace(0.0, 0.02, 11):
+            here = equilibrate(engine, here, float(fx))
+    return here.packing
+
+
+@pytest.mark.parametrize(("on", "scale"), [("layer", 1e-9), ("floor", 1e-10)])
+def test_record_moves_the_packing_as_linear_response_says(packing, on, scale):
+    """The example record of ObsPy, its 30 s in 6 time units, scaled so that the layer moves by 1e-9: in the linear
+    regime, and far above the noise of doubles. One percent is asked for; the time step leaves less."""
+    obspy = pytest.importorskip("obspy", reason="the extra `seismic` is not installed")
+    signal = of_trace(obspy.read()[0]).scaled(scale, 6.0 / 30)
+    assert len(signal) == 3000
+    acting = signal if on == "layer" else signal.differentiated()
+    dt, every = time_step(packing), 20
+    rows = []
+    with Engine(packing) as engine, engine.undamped(dt, signal=acting, on=on) as dynamics:
+        for _ in range(int(3.0 / dt / every)):
+            motion = dynamics.advance(every)
+            rows.append(motion.velocity[packing.top, 0].mean())
+    times = dt * every * np.arange(1, len(rows) + 1)
+    force = layer_force(packing, 1.0) if on == "layer" else floor_force(packing)
+    predicted = sampled_response(packing, acting, times, force, dt=dt).layer_velocity
+    assert np.abs(rows).max() > 1e-8  # four decades above the noise
+    assert np.abs(np.array(rows) - predicted).max() < 1e-2 * np.abs(rows).max()
+
+
+def test_deck_takes_a_table_and_is_the_same_on_two_ranks(lmp, tmp_path):
+    time = np.linspace(0.0, 0.3, 31)
+    table = tmp_path / "record.txt"
+    np.savetxt(table, np.column_stack([time, np.sin(20 * time)]), header="time value")
+    written = []
+    for ranks, on in ((1, "floor"), (2, "floor"), (1, "layer")):
+        variables = [
+            "-var",
+            "decks",
+            str(DECKS),
+            "-var",
+            "signal",
+            str(table),
+            "-var",
+            "scale",
+            "1e-6",
+            "-var",
+            "on",
+            on,
+        ]
+        done = lmp(DECKS / "perturb.in", *variables, "-var", "time", "0.2", ranks=ranks)
+        assert done.returncode == 0, done.stdout[-2000:]
+        written.append((tmp_path / "perturb.end.disks").read_text())
+    assert written[0] == written[1] != written[2]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("0 1\n1 nan\n", "something else than two numbers, time and value, in line 2"),
+        ("0 1\n2 1\n1 1\n", "not later than the one before in line 3"),
+        ("0 1\n", "fewer than two rows"),
+        ("0 1\n1 two\n", "something else than two numbers"),
+    ],
+)
+def test_lammps_refuses_a_bad_table(lmp, tmp_path, text, says):
+    (tmp_path / "bad.txt").write_text(text)
+    done = lmp(DECKS / "perturb.in", "-var", "decks", str(DECKS), "-var", "signal", "bad.txt")
+    assert done.returncode != 0
+    assert says in done.stdout + done.stderr
+
+
+def test_signal_in_pieces_is_that_of_one_run(packing):
+    signal, dt = Signal([0.0, 0.01, 0.05], [0.0, 1e-6, -1e-6]), time_step(packing)
+    ends = []
+    for pieces in ([100], [30, 70]):
+        with Engine(packing) as engine, engine.undamped(dt, signal=signal) as dynamics:
+            for steps in pieces:
+                motion = dynamics.advance(steps)
+        ends.append(motion.position)
+    np.testing.assert_array_equal(*ends)
+
+
+def test_two_columns_and_records_are_read(tmp_path):
+    table = tmp_path / "table.csv"
+    table.write_text("# time, value\n0, 1.5\n\n0.5, -2 # a comment\n")
+    np.testing.assert_array_equal(read_signal(table).value, [1.5, -2.0])
+    obspy = pytest.importorskip("obspy", reason="the extra `seismic` is not installed")
+    path = tmp_path / "record.mseed"
+    obspy.read().write(str(path), format="MSEED")
+    with pytest.raises(SignalError, match=r"it has the traces BW\.RJOB\.\.EHZ"):
+        read_signal(path)
+    assert len(read_signal(path, "EHN")) == 3000
+    with pytest.raises(SignalError, match="fits no trace of"):
+        read_signal(path, "XYZ")
+
+
+@pytest.mark.parametrize(
+    ("text", "keys", "says"),
+    [
+        (None, {}, "cannot be read (No such file or directory)"),
+        ("0 1\n1 nan\n", {}, "row 2 of the signal has the value nan"),
+        ("0 1\n2 1\n1 1\n", {}, "is not later than the 2 before it: sort the rows"),
+        ("0 1\n", {}, "two rows or more"),
+        ("0 1 2\n1 2 3\n", {}, "line 1 has something else than two numbers"),
+        ("0 1\n1 1\n", {"amplitude": 1.0}, "perturb.amplitude cannot stand beside a signal from a file"),
+        ("0 1\n1 1\n", {"quantity": "velocity"}, 'perturb.quantity belongs to on = "floor"'),
+        ("0 1\n1 1\n", {"channel": "EHZ"}, "has no channels"),
+    ],
+)
+def test_scenes_with_a_bad_signal_are_refused(tmp_path, text, keys, says):
+    if text is not None:
+        (tmp_path / "signal.txt").write_text(text)
+    perturb = {"fx": 0.0, "time": 1.0, "signal": "signal.txt", **keys}
+    with pytest.raises(SceneError) as refusal:
+        Scene.from_mapping({**LEAST, "perturb": perturb}, tmp_path)
+    assert says in str(refusal.value)
+    assert str(refusal.value).count("\n") == 0
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"signal": "pulse", "amplitude": 1.0}, "perturb.omega is missing"),
+        ({"signal": "sweep", "amplitude": 1.0, "omega": 1.0}, "perturb.omega_end is missing"),
+        ({"signal": "pulse", "omega": 1.0}, "perturb.amplitude is missing"),
+        ({"on": "floor", "amplitude": 1.0, "omega": 1.0}, "perturb.on stands without signal"),
+        ({"scale": 2.0}, "perturb.scale belongs to a signal from a file"),
+        ({"omega_end": 2.0}, 'perturb.omega_end belongs to signal = "sweep"'),
+    ],
+)
+def test_keys_that_do_not_go_together_are_refused(keys, says):
+    with pytest.raises(SceneError) as refusal:
+        Scene.from_mapping({**LEAST, "perturb": {"fx": 0.0, "time": 1.0, **keys}})
+    assert says in str(refusal.value)
+
+
+def test_rows_that_are_closer_than_the_time_step_are_refused(tmp_path):
+    (tmp_path / "signal.txt").write_text("0 1\n1e-4 1\n1 0\n")
+    scene = Scene.from_mapping({**LEAST, "perturb": {"fx": 0.0, "time": 1.0, "signal": "signal.txt"}}, tmp_path)
+    with pytest.raises(SignalError, match=r"rows that are 0\.0001 apart, and the time step is 0\.001.*stretch to 10"):
+        scene.perturb.check_samples(1e-3)
+    scene.perturb.check_samples(1e-5)

@@ -1,0 +1,36 @@
+"""As many digits as an uncertainty allows."""
+
+import math
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from faultgouge.studies.digits import with_uncertainty
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (0.0215074560477, 1.9e-12, "0.0215074560477(19)"),
+        (0.0150098, 1.04e-11, "0.015009800000(11)"),
+        (0.0215, 3e-3, "0.021(3)"),
+        (12345.0, 200.0, "12300(200)"),
+        (0.5, 9.99e-5, "0.50000(10)"),
+        (0.1, 0.0, "0.10000000000000001"),
+        (0.1, math.inf, "0.10000000000000001"),
+    ],
+)
+def test_digits(value, error, text):
+    assert with_uncertainty(value, error) == text
+
+
+@given(value=st.floats(1e-3, 1e3), error=st.floats(1e-13, 1e-1))
+def test_what_is_written_contains_the_interval(value, error):
+    shown, units = re.fullmatch(r"([\d.]+)\((\d+)\)", with_uncertainty(value, error)).groups()
+    places = len(shown.partition(".")[2])
+    allowed = int(units) * 10.0**-places
+    assert error <= allowed * (1 + 1e-6)
+    assert abs(float(shown) - value) <= 0.5 * 10.0**-places * (1 + 1e-6) + 4e-16 * value
+    assert allowed <= 2.2 * error

@@ -1,0 +1,85 @@
+"""What dissipation does to the onset and to the transient gain: README's packing, and the tables of the docs."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from faultgouge.pywrap import Scene, SceneError
+from faultgouge.studies.damped_onset import damped_onset_run, ramped
+from faultgouge.studies.dissipation import RATIOS, over_distance, over_strength, seeded, weak_cases
+
+TABLES = Path(__file__).parents[2] / "docs" / "dissipation"
+
+SCENE = Scene.from_mapping(
+    {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 1e-3, "until": 0.016}}
+)
+
+
+def table(name):
+    return [json.loads(line) for line in (TABLES / f"{name}.jsonl").read_text().splitlines()]
+
+
+@pytest.fixture(scope="module")
+def ramp():
+    with ramped(SCENE) as found:
+        yield found
+
+
+def test_weak_normal_dashpots_lower_the_onset(ramp):
+    """From 0.0150098 to between 0.0148 and 0.0149, for C_N = 0.1 and 1 alike."""
+    weak, stronger = over_strength(ramp, "cn", [0.1, 1.0], start=0.0139)
+    assert weak.undamped == pytest.approx(0.0150098323, abs=1e-10)
+    assert 0.0148 < weak.onset < stronger.onset < 0.0149
+    assert stronger.onset == pytest.approx(0.0148553091558, abs=1e-9)
+    assert weak.onset == pytest.approx(weak.predicted, rel=1e-6)
+
+
+def test_drag_raises_the_onset_to_its_crossover(ramp):
+    (found,) = over_strength(ramp, "drag", [1e-2], start=0.0139)
+    assert found.onset == pytest.approx(0.0150163, abs=1e-7)
+    assert found.onset == pytest.approx(found.predicted, rel=1e-9)
+
+
+def test_the_limit_of_weak_dashpots_is_predicted(ramp):
+    """Two ratios of one packing anew, and they are those of the table."""
+    known = {(each["cn"], each["ct"]): each for each in table("weak") if each["seed"] == 1}
+    for case in weak_cases(ramp, RATIOS[:2]):
+        assert case.predicted == pytest.approx(case.measured, rel=1e-3)
+        assert case.predicted < case.undamped
+        assert case.measured == pytest.approx(known[case.cn, case.ct]["measured"], rel=1e-8)
+
+
+def test_the_table_of_weak_dashpots():
+    """Five ratios of ten packings: predicted and measured among all modes."""
+    rows = [each for each in table("weak") if "cn" in each]
+    assert sorted((each["cn"], each["ct"]) for each in rows) == sorted(RATIOS * 10)
+    assert all(each["predicted"] <= each["undamped"] for each in rows)
+    assert max(abs(each["predicted"] / each["measured"] - 1) for each in rows) < 1e-3
+
+
+def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp):
+    far, dragged, near, _ = over_distance(ramp, [1e-2, 1e-3], [(0.0, 0.0), (0.0, 0.1)])
+    assert dragged.gain < 0.5 * far.gain
+    # the inverse of the distance, where one pair has most of it
+    assert 5 < near.gain / far.gain < 20
+    assert far.gain <= far.bound
+
+
+def test_above_the_damped_onset_there_is_no_largest_gain(ramp):
+    """1e-3 below the undamped onset weak dashpots make the packing unstable."""
+    plain, damped = over_distance(ramp, [1e-3], [(0.0, 0.0), (1.0, 0.0)])
+    assert plain.gain > 100
+    assert damped.gain is None
+
+
+def test_a_seed_is_a_packing_and_no_more():
+    assert seeded(SCENE, 3).packing.seed == 3
+    assert seeded(SCENE, 3).ramp == SCENE.ramp
+
+
+def test_scenes_without_a_section():
+    with pytest.raises(SceneError, match=r"no section \[damping\]"):
+        damped_onset_run(SCENE, 1.0)
+    with pytest.raises(SceneError, match=r"no section \[ramp\]"), ramped(SCENE.model_copy(update={"ramp": None})):
+        pass

@@ -1,0 +1,184 @@
+"""What the figures of the protocol contain: laws, runs, fits, and names on their axes."""
+
+import matplotlib
+import numpy as np
+import pytest
+
+from faultgouge.analysis.normal_form import NormalForm
+from faultgouge.analysis.power_law import PowerLaw
+from faultgouge.figures import save
+from faultgouge.studies.reproduce.draw import growth_figure
+from faultgouge.studies.triggering.draw import eruption_figure
+from faultgouge.studies.triggering.draw_friction import (
+    FrictionLaw,
+    friction_law_figure,
+    measured_friction_figure,
+    weakening_figure,
+)
+from faultgouge.studies.triggering.draw_response import (
+    AmplitudeCurve,
+    DampingCurve,
+    Displacements,
+    amplitude_figure,
+    damping_figure,
+    response_figure,
+)
+
+
+def texts(figure):
+    legends = [text.get_text() for legend in figure.legends for text in (*legend.get_texts(), legend.get_title())]
+    for axes in figure.axes:
+        legends += [text.get_text() for text in axes.texts]
+        if axes.get_legend():
+            legends += [text.get_text() for text in (*axes.get_legend().get_texts(), axes.get_legend().get_title())]
+    return " ".join(legends)
+
+
+@pytest.fixture
+def runs():
+    time = np.geomspace(0.01, 100, 300)
+    return [Displacements(time, level * (1 + np.sin(time) ** 2)) for level in (1e-25, 1e-22, 1e-10)]
+
+
+def test_friction_weakens_above_its_threshold():
+    law = FrictionLaw(mu_0=0.5, v_0=2.0, v_ss=10.0)
+    velocity = np.array([-100.0, 0.0, 2.0, 12.0, 1e6])
+    expected = 0.5 * np.array([1, 1, 1, 0.2 * np.exp(-0.4) + 0.8, 0.8])
+    np.testing.assert_allclose(law(velocity), expected, rtol=1e-15)
+
+
+def test_law_is_drawn_from_its_threshold_on():
+    axes = friction_law_figure(FrictionLaw(v_0=3.0, v_ss=7.0)).axes[0]
+    reduced, mu = axes.lines[0].get_data()
+    assert np.all(mu[reduced <= 0] == 1)
+    np.testing.assert_allclose(mu[reduced > 0], 0.2 * np.exp(-0.4 * reduced[reduced > 0]) + 0.8, rtol=1e-12)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$(v - v_0)/v_{ss}$", r"$\mu(v)$")
+    assert "B = 0.2$, $w = 0.4" in texts(axes.figure)
+
+
+def test_measured_friction_says_what_is_missing():
+    figure = measured_friction_figure()
+    open_circles, filled = figure.axes[0].lines
+    for line, mu_ss in ((open_circles, 0.78), (filled, 0.74)):
+        v, mu = line.get_data()
+        assert np.all(mu[v <= 0.05] == 1)
+        np.testing.assert_allclose(mu[v > 0.05], 0.22 * np.exp(-4 * (v[v > 0.05] - 0.05)) + mu_ss, rtol=1e-12)
+    assert "are not public and are not drawn" in texts(figure)
+    assert "w = 4" in texts(figure)
+
+
+def test_eruption_draws_three_runs_on_logarithmic_axes(runs):
+    runs[0].msd[:5] = 0.0
+    figure = eruption_figure(*runs)
+    axes, late = figure.axes
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert (late.get_xscale(), late.get_yscale()) == ("linear", "log")
+    levels = {line.get_label(): line.get_ydata() for line in axes.lines}
+    assert len(levels) == 3
+    assert len(levels[r"left alone, $\mu_0$"]) == 295
+    np.testing.assert_array_equal(levels[r"perturbed, friction $\mu(v)$"], runs[2].msd)
+    assert len({line.get_color() for line in axes.lines}) == 3
+
+
+def test_weakening_draws_the_run_over_its_law():
+    law = FrictionLaw(v_0=1e-11, v_ss=1e-9)
+    velocity = np.concatenate([np.geomspace(1e-13, 1e-6, 50), [-1e-9, 0.0]])
+    axes = weakening_figure(velocity, law(velocity), law).axes[0]
+    smooth, run = axes.lines[:2]
+    assert len(run.get_xdata()) == 50
+    np.testing.assert_array_equal(run.get_ydata(), law(velocity[:50]))
+    np.testing.assert_array_equal(smooth.get_ydata(), law(smooth.get_xdata()))
+    assert axes.get_xscale() == "log"
+    assert "$v_0$ $v_{ss}$" in texts(axes.figure)
+
+
+def test_amplitudes_carry_their_exponent():
+    distance = np.geomspace(1e-7, 1e-1, 13)
+    curve = AmplitudeCurve("pair: ", distance, 1.4 * distance**-0.5, PowerLaw(-0.49989, 3e-5, 1.4), (1e-7, 1e-3))
+    figure = amplitude_figure([curve])
+    whole, fitted, points = figure.axes[0].lines
+    assert fitted.get_xdata().tolist() == [1e-7, 1e-3]
+    np.testing.assert_allclose(fitted.get_ydata(), 1.4 * np.array([1e-7, 1e-3]) ** -0.49989)
+    assert whole.get_xdata().tolist() == [1e-7, 1e-1]
+    np.testing.assert_array_equal(points.get_ydata(), curve.amplitude)
+    assert "pair: slope $-0.49989(3)$" in texts(figure)
+
+
+@pytest.mark.parametrize(("error", "says"), [(0.0, "-0.50(0)"), (0.02, "-0.50(2)"), (0.013, "-0.50(2)")])
+def test_errors_stand_behind_their_digit(error, says):
+    distance = np.array([1.0, 2.0])
+    curve = AmplitudeCurve("pair: ", distance, distance, PowerLaw(-0.5, error, 1.0), (1.0, 2.0))
+    assert says in texts(amplitude_figure([curve]))
+
+
+def test_damping_marks_its_crossover():
+    curves = []
+    for epsilon in (1e-3, 1e-5):
+        form, tau = NormalForm(0.2, epsilon), np.geomspace(1, 1e6, 40)
+        curves.append(
+            DampingCurve(
+                epsilon=epsilon,
+                damping_time=tau,
+                amplitude=np.array([form.amplitude(t) for t in tau]),
+                undamped=form.amplitude(),
+                tau_d=form.tau_d,
+                half_time=form.half_gain_time(),
+            )
+        )
+    figure = damping_figure(curves)
+    (axes,) = figure.axes
+    for number, curve in enumerate(curves):
+        line, plateau, dot, ring = axes.lines[4 * number : 4 * number + 4]
+        np.testing.assert_array_equal(line.get_ydata(), curve.amplitude)
+        assert set(plateau.get_ydata()) == {curve.undamped}
+        assert dot.get_xdata()[0] == curve.tau_d
+        # between two of 40 points the curve bends by a few per cent
+        assert dot.get_ydata()[0] == pytest.approx(0.4155 * curve.undamped, rel=0.05)
+        assert (ring.get_xdata()[0], ring.get_ydata()[0]) == (curve.half_time, 0.5 * curve.undamped)
+    assert r"\varepsilon = 1.0 \times 10^{-3}" in texts(figure)
+
+
+def test_response_lies_over_the_run(runs):
+    run = runs[0]
+    response = Displacements(run.time, run.msd * 1.001)
+    upper, lower = response_figure(run, response).axes
+    broad, line = upper.lines
+    np.testing.assert_array_equal(broad.get_ydata(), run.msd)
+    assert broad.get_linewidth() > 3 * line.get_linewidth()
+    np.testing.assert_array_equal(line.get_ydata(), response.msd)
+    deviation = lower.lines[0].get_ydata()
+    assert deviation.max() == pytest.approx(1e-3, rel=1e-9)
+    assert lower.get_xlabel() == "$t$"
+    with pytest.raises(ValueError, match="same times"):
+        response_figure(run, Displacements(run.time[:-1], run.msd[:-1]))
+
+
+def test_the_layer_passing_its_threshold_is_marked(runs):
+    for axes in eruption_figure(*runs, crossing=2.5).axes:
+        assert 2.5 in [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2]
+
+
+def test_growth_draws_the_predicted_slope_beside_the_data():
+    time = np.linspace(0, 100, 501)
+    msd = 1e-25 * (1 + np.exp(0.4 * time))
+    msd[0] = 0.0
+    axes = growth_figure(time, msd, window=(20.0, 90.0), predicted_rate=0.4, measured_rate=0.402).axes[0]
+    data, predicted = axes.lines
+    assert (axes.get_yscale(), axes.get_xlabel(), axes.get_ylabel()) == ("log", "$t$", "$D(t)$")
+    assert len(data.get_xdata()) == 500
+    (t0, t1), (d0, d1) = predicted.get_data()
+    assert (t0, t1) == (20.0, 90.0)
+    assert np.log(d1 / d0) / (t1 - t0) == pytest.approx(0.4, rel=1e-12)  # rounding of exp and log
+    # A decade and a half above; where the floor still adds 3e-4 of D to the first point of the window.
+    assert d0 / msd[100] == pytest.approx(10**1.5, rel=1e-3)
+    says = texts(axes.figure)
+    assert "= 0.4$" in says
+    assert "= 0.402$" in says
+    assert "+0.5" in says
+
+
+def test_no_settings_leak_out_and_files_repeat(tmp_path, runs):
+    before = dict(matplotlib.rcParams)
+    first, second = (save(eruption_figure(*runs), tmp_path / name) for name in ("a", "b"))
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
+    assert dict(matplotlib.rcParams) == before

@@ -1,0 +1,72 @@
+"""The study of how generic the onset is: its fits, its theory, and that its committed tables come out again."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from faultgouge.studies.genericity.fits import size_law
+from faultgouge.studies.genericity.levels import Pencil, entry_factor
+from faultgouge.studies.genericity.sets import sets
+from faultgouge.studies.genericity.surrogates import randomized
+from faultgouge.studies.sweep.compute import computed
+from faultgouge.studies.sweep.points import Sweep
+from faultgouge.studies.sweep.tasks import TASKS
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_a_size_law_is_found_again_from_censored_onsets():
+    generator = np.random.default_rng(3)
+    disks = generator.choice([50.0, 100.0, 400.0], 900)
+    onsets = 3 / disks * generator.weibull(2, 900)
+    found = size_law(disks, np.minimum(onsets, 0.03), onsets < 0.03)
+    assert found["exponent"]["low"] < 1 < found["exponent"]["high"]
+    assert found["shape"]["low"] < 2 < found["shape"]["high"]
+
+
+def test_entries_into_the_disk_are_those_of_drawn_couplings():
+    generator = np.random.default_rng(0)
+    for ratio in (0.2, 1.0, 5.0):
+        c, v = np.abs(generator.normal(size=400_000)), ratio * generator.normal(size=400_000)
+        drawn = c * np.maximum(0, c - v)
+        assert entry_factor(np.array(ratio)) == pytest.approx(drawn.mean(), abs=5 * drawn.std() / 400_000**0.5)
+
+
+def test_random_matrices_keep_spacings_and_couplings():
+    generator = np.random.default_rng(1)
+    values = np.sort(generator.normal(size=70))
+    square = generator.normal(size=(70, 70))
+    pencil = Pencil(values, square + square.T, square - square.T, np.eye(70))
+    drawn = randomized(pencil, generator)
+    np.testing.assert_allclose(np.sort(np.diff(drawn.values)), np.sort(np.diff(values)), rtol=0, atol=1e-13)
+    np.testing.assert_array_equal(drawn.symmetric, drawn.symmetric.T)
+    np.testing.assert_array_equal(drawn.antisymmetric, -drawn.antisymmetric.T)
+    for before, after in ((pencil.symmetric, drawn.symmetric), (pencil.antisymmetric, drawn.antisymmetric)):
+        np.testing.assert_array_equal(np.sort(np.abs(before), axis=None), np.sort(np.abs(after), axis=None))
+
+
+def test_the_sweep_that_ships_is_that_of_the_study():
+    shipped = Sweep.from_toml(ROOT / "scenes" / "sweeps" / "genericity.toml", TASKS)
+    assert [point.key for point in shipped.points] == [point.key for point in sets(1.0, False)["onsets"].points]
+
+
+@pytest.mark.slow
+def test_rows_come_out_again():
+    """A random tenth of the onsets, of the packings that this build settles as the build of the tables did."""
+    with (ROOT / "docs" / "genericity" / "onsets" / "results.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    chosen = np.random.default_rng(7).choice(len(rows), max(1, len(rows) // 10), replace=False)
+    wanted = {(row["packing.seed"], float(row["law.mu"])): row for row in (rows[k] for k in chosen)}
+    named = {(str(p.values["packing.seed"]), p.values["law.mu"]): p for p in sets(1.0, False)["onsets"].points}
+    same = 0
+    for found in computed(None, "onset", [named[name] for name in wanted]):
+        row = wanted[str(found["values"]["packing.seed"]), found["values"]["law.mu"]]
+        result = found["result"]
+        if (str(result["contacts"]), str(result["rattlers"])) == (row["contacts"], row["rattlers"]):
+            same += 1
+            assert result["ends"] == row["ends"]
+            assert result["reach"] == pytest.approx(float(row["reach"]), rel=1e-6)
+    if not same:
+        pytest.skip("settling is chaotic, and this build settles every one of these seeds to another packing")

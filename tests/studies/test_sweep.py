@@ -1,0 +1,286 @@
+"""Sweeps: which scenes, what is kept, that kills, workers and shards leave the same table, and what is refused."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from faultgouge.pywrap import Scene, SceneError, settle
+from faultgouge.studies.onsets import onset_run
+from faultgouge.studies.sweep.compute import run_sweep, stored
+from faultgouge.studies.sweep.estimate import estimate
+from faultgouge.studies.sweep.merge import merge
+from faultgouge.studies.sweep.points import Sweep, shard
+from faultgouge.studies.sweep.tasks import TASKS
+
+BIN = Path(sys.executable).parent
+
+SMALL = {
+    "packing": {"disks": 30, "top": 5, "width": 6.0},
+    "law": {"kn": 2e5},
+    "load": {"fy": 3.0},
+    "ramp": {"step": 5e-3, "until": 0.025},
+}
+
+TOML = """
+task = "onset"
+[sweep]
+"packing.seed" = "1:4"
+"law.mu" = [1.0, 0.5, -1.0]
+[scene.packing]
+disks = 30
+top = 5
+width = 6.0
+[scene.law]
+kn = 2e5
+[scene.load]
+fy = 3.0
+[scene.ramp]
+step = 5e-3
+until = 0.025
+"""
+
+
+def sweep_of(axes, task="onset", **changes):
+    scene = {section: values | changes.get(section, {}) for section, values in SMALL.items()}
+    return Sweep.from_mapping({"task": task, "sweep": axes, "scene": scene}, TASKS)
+
+
+def silent(_):
+    pass
+
+
+def table(folder):
+    with (folder / "results.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_points_are_the_product_with_the_last_key_fastest():
+    sweep = sweep_of({"packing.seed": "3:4", "load.fy, ramp.until": [[3.0, 0.02], [6.0, 0.04]]})
+    values = [(p.values["packing.seed"], p.values["load.fy"], p.values["ramp.until"]) for p in sweep.points]
+    assert values == [(3, 3.0, 0.02), (3, 6.0, 0.04), (4, 3.0, 0.02), (4, 6.0, 0.04)]
+    assert [point.scene.ramp.until for point in sweep.points] == [0.02, 0.04, 0.02, 0.04]
+    assert sweep.names == ["packing.seed", "load.fy", "ramp.until"]
+
+
+def test_a_key_belongs_to_the_scene_and_not_to_the_sweep():
+    one = sweep_of({"packing.seed": [2]}).points[0]
+    other = sweep_of({"law.mu": [0.5, 1.0], "packing.seed": [1, 2]}).points[3]
+    assert one.key == other.key  # mu = 1 is the default
+    assert one.key != sweep_of({"packing.seed": [2]}, task="triggering").points[0].key
+
+
+@pytest.mark.parametrize(
+    ("axes", "changes", "shared"),
+    [
+        ({"law.mu": [0.5, 1.0]}, {}, True),
+        ({"ramp.until": [0.01, 0.02]}, {}, True),
+        ({"law.mu": [0.5, 1.0]}, {"packing": {"settle_friction": True}}, False),
+        ({"load.fy": [2.0, 3.0]}, {}, False),
+        ({"law.kn": [1e5, 2e5]}, {}, False),
+    ],
+)
+def test_what_settles_alike(axes, changes, shared):
+    first, second = sweep_of(axes, **changes).points
+    assert (first.settling == second.settling) is shared
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('task = "onest"', "give one of"),
+        ('task = "onset"\nseeds = 3', "seeds is no key of a sweep"),
+        ('task = "onset"\n[sweep]\n"packing.seed" = "5:1"', "is no range"),
+        ('task = "onset"\n[sweep]\n"packing.seed" = []', "give a list of values"),
+        ('task = "onset"\n[sweep]\n"packing.seed" = "0:999999"\n"law.mu" = [1.0, 0.5]', "are more than 1000000"),
+        ('task = "onset"\n[sweep]\n"law.kn, law.mu" = [1.0]', "names 2 keys"),
+        ('task = "onset"\n[sweep]\n"law.mo" = [1.0]\n[scene.law]\nkn = 1.0', "law.mo is no key"),
+        ('task = "onset"\nsweep = 3', "is not a section"),
+        ("task = ", "not valid TOML"),
+    ],
+)
+def test_bad_sweeps_are_refused_in_a_sentence(tmp_path, text, says):
+    (tmp_path / "sweep.toml").write_text(text)
+    with pytest.raises(SceneError, match=says):
+        Sweep.from_toml(tmp_path / "sweep.toml", TASKS)
+
+
+def test_a_stored_packing_is_found_from_another_folder(tmp_path):
+    reference = Path(__file__).parents[1] / "reference" / "packing7.json"
+    (tmp_path / "packing.json").write_bytes(reference.read_bytes())
+    mapping = {"task": "onset", "sweep": {"law.mu": [1.0]}, "scene": SMALL | {"packing": {"file": "packing.json"}}}
+    sweep = Sweep.from_mapping(mapping, TASKS, tmp_path)
+    assert Sweep.from_mapping(sweep.as_dict(), TASKS).points == sweep.points
+    assert sweep.points[0].scene.packing.file == tmp_path / "packing.json"
+
+
+def test_shards_are_a_partition_and_keep_settlings_together():
+    points = sweep_of({"packing.seed": "1:5", "law.mu": [0.5, 1.0, -1.0]}).points
+    parts = [shard(points, (k, 3)) for k in (1, 2, 3)]
+    assert sorted(p.number for part in parts for p in part) == list(range(15))
+    homes = [{p.settling for p in part if p.scene is not None} for part in parts]
+    assert not homes[0] & homes[1]
+    assert not homes[1] & homes[2]
+    assert not homes[0] & homes[2]
+
+
+def test_a_row_is_what_the_onset_of_its_scene_is(tmp_path):
+    run_sweep(sweep_of({"packing.seed": [2], "law.mu": [0.5, 1.0]}), tmp_path, say=silent)
+    rows = table(tmp_path)
+    for row, mu in zip(rows, (0.5, 1.0), strict=True):
+        scene = Scene.from_mapping(SMALL | {"packing": SMALL["packing"] | {"seed": 2}, "law": {"kn": 2e5, "mu": mu}})
+        window = onset_run(scene, mu).onset.windows[0]
+        # the run extrapolates the path's increments away, and states what that may miss; a row does not
+        assert float(row["fx_c"]) == pytest.approx(window.fx_onset, abs=window.error + float(row["error"]))
+        assert row["kind"] == window.kind == "coalescence"
+        assert 1 <= float(row["participation"]) <= 30
+        assert 0 <= float(row["rotation"]) <= 1
+    # both settled as one, and as they do alone
+    assert rows[0]["contacts"] == rows[1]["contacts"] == str(len(settle(scene).packing.contacts))
+
+
+def test_a_settled_packing_is_shared(tmp_path, monkeypatch):
+    from faultgouge.studies.sweep import compute
+
+    settled = []
+    original = compute.settled_bed
+    monkeypatch.setattr(compute, "settled_bed", lambda *given: settled.append(given) or original(*given))
+    run_sweep(sweep_of({"packing.seed": "1:2", "law.mu": [0.5, 1.0]}), tmp_path, say=silent)
+    assert len(settled) == 2
+
+
+def test_failures_are_rows_with_their_sentence(tmp_path):
+    rows = run_sweep(sweep_of({"packing.width": [1.0, 6.0], "packing.seed": [1]}), tmp_path, say=silent)
+    assert "width" in rows[0]["says"]
+    assert rows[1]["says"] is None
+    assert [row["says"] != "" for row in table(tmp_path)] == [True, False]
+
+
+def test_a_cut_line_is_computed_again_and_a_longer_sweep_goes_on(tmp_path):
+    run_sweep(sweep_of({"packing.seed": "1:1"}), tmp_path, say=silent)
+    lines = tmp_path / "results.jsonl"
+    first = lines.read_text()
+    lines.write_text(first + first[:40])
+    said = []
+    run_sweep(sweep_of({"packing.seed": "1:2"}), tmp_path, say=said.append)
+    assert said == [f"1 of 2 points are in {lines} already"]
+    assert lines.read_text().startswith(first)
+    assert [row["packing.seed"] for row in table(tmp_path)] == ["1", "2"]
+    lines.write_text("no result\n")
+    with pytest.raises(SceneError, match="line 1"):
+        stored(lines)
+
+
+def test_merge_refuses_what_does_not_belong_together(tmp_path):
+    run_sweep(sweep_of({"packing.width": [1.0, 6.0]}), tmp_path / "a", (1, 2), say=silent)
+    run_sweep(sweep_of({"packing.width": [1.0, 5.0]}), tmp_path / "b", (1, 2), say=silent)
+    with pytest.raises(SceneError, match="of another sweep"):
+        merge([tmp_path / "a", tmp_path / "b"], tmp_path / "c", silent)
+    with pytest.raises(SceneError, match="is no folder of a sweep"):
+        merge([tmp_path / "a", tmp_path], tmp_path / "c", silent)
+    said = []
+    merge([tmp_path / "a"], tmp_path / "c", said.append)
+    assert said[0].startswith("1 of 2 scenes")
+    assert len(table(tmp_path / "c")) == 1
+
+
+def part_of_modes(path, modes, fx, doubtful=()):
+    window = {"fx_onset": fx, "fx_end": None, "lambda": 1.0, "error": 1e-11, "kind": "coalescence"}
+    part = {"mu": 1.0, "fx_c": fx, "error": 1e-11, "windows": [window], "doubtful": list(doubtful), "modes": modes}
+    path.write_text(json.dumps(part))
+    return path
+
+
+def test_parts_of_the_modes_are_merged(tmp_path):
+    parts = [
+        part_of_modes(tmp_path / "b.json", [600, 1200], 0.002, [[0.0001, 0.0002], [0.0005, 0.0007]]),
+        part_of_modes(tmp_path / "a.json", [0, 600], 0.0004),
+        part_of_modes(tmp_path / "d.json", [1500, 1800], 0.003),
+    ]
+    said = []
+    merge(parts, tmp_path / "whole", said.append)
+    whole = json.loads((tmp_path / "whole" / "onset.json").read_text())
+    assert (whole["fx_c"], whole["modes"], whole["missing"]) == (0.0004, [0, 1800], [[1200, 1500]])
+    assert whole["doubtful"] == [[0.0001, 0.0002]]
+    assert [window["fx_onset"] for window in whole["windows"]] == [0.0004, 0.002, 0.003]
+    assert any("1200:1500" in line for line in said)
+
+
+def test_the_dry_run_counts_and_computes_nothing(tmp_path):
+    (tmp_path / "sweep.toml").write_text(TOML)
+    command = [BIN / "faultgouge", "sweep", "sweep.toml", "-o", "out", "--dry-run"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "8 scenes to compute, 4 packings to settle" in done.stderr
+    assert "4 points make no scene" in done.stderr
+    assert not (tmp_path / "out").exists()
+    ten, hundred = (
+        estimate("onset", sweep_of({"packing.disks": [n], "packing.width": [60.0]}).points) for n in (100, 1000)
+    )
+    assert hundred.seconds / ten.seconds == pytest.approx(10**1.6)
+
+
+@pytest.mark.slow
+def test_one_table_after_kills_on_workers_and_in_shards(tmp_path):
+    """Five kills at random moments with one process and with two workers, and three shards: one table to the byte."""
+    (tmp_path / "sweep.toml").write_text(TOML)
+    command = [BIN / "faultgouge", "sweep", "sweep.toml", "-o"]
+
+    def run(*arguments, before=()):
+        return subprocess.run(
+            [*before, *command, *arguments], cwd=tmp_path, capture_output=True, text=True, timeout=600, check=True
+        )
+
+    run("whole")
+    expected = (tmp_path / "whole" / "results.csv").read_bytes()
+    random = np.random.default_rng(5)
+    for name, before in (("one", []), ("two", [BIN / "mpiexec", "-n", "3"])):
+        lines = tmp_path / name / "results.jsonl"
+        for _ in range(5):
+            done = len(lines.read_bytes().splitlines()) if lines.exists() else 0
+            process = subprocess.Popen(
+                [*before, *command, name], cwd=tmp_path, start_new_session=True, stderr=subprocess.DEVNULL
+            )
+            deadline = time.monotonic() + 120
+            while process.poll() is None and time.monotonic() < deadline:
+                if lines.exists() and len(lines.read_bytes().splitlines()) > done:
+                    time.sleep(random.uniform(0, 0.5))
+                    break
+                time.sleep(0.05)
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        run(name, before=before)
+        assert (tmp_path / name / "results.csv").read_bytes() == expected
+    for k in (3, 1, 2):
+        run(f"part{k}", "--shard", f"{k}/3")
+    merge([tmp_path / f"part{k}" for k in (1, 2, 3)], tmp_path / "merged", silent)
+    assert (tmp_path / "merged" / "results.csv").read_bytes() == expected
+    rows = table(tmp_path / "whole")
+    assert len(rows) == 12
+    assert {row["ends"] for row in rows} >= {"onset", "until"}
+
+
+def test_trigger_and_eruptions_as_tasks(tmp_path):
+    """Rows of both studies, which come to the sections of their own in the swept scene."""
+    more = {"friction": {"v0": 1e-6, "v_ss": "10 v0"}, "trigger": {"distance": [0.1], "omega": [5.0], "runs": 0}}
+    scene = SMALL | more | {"eruptions": {"load": [0.02], "time": 1.0}}
+    for task in ("trigger", "eruptions"):
+        wanted = Sweep.from_mapping({"task": task, "sweep": {"packing.seed": [2]}, "scene": scene}, TASKS)
+        (row,) = run_sweep(wanted, tmp_path / task, say=silent)
+        assert row["says"] is None
+        if task == "eruptions":
+            (run,) = row["result"]["runs"]
+            assert run["fx"] == 0.02
+            assert run["msd"] > 0
+        else:
+            assert row["result"]["ends"] == "onset"
+            (predicted,) = row["result"]["map"]
+            assert predicted["predicted"] > 0
