@@ -37,7 +37,7 @@ fy = 3.0
 SEEDED = """
 [packing]
 disks = 30
-seed = 3
+seed = 4
 [law]
 kn = 2e5
 mu = [1.0, 0.8]

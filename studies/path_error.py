@@ -12,8 +12,8 @@ contacts on the way, the error that is left out is
 
 .. math:: F_h - F = \frac{F_{2h} - F_h}{S_{2h}/S_h - 1}, \qquad S = \sum_i h_i^3,
 
-Richardson's extrapolation, for increments that need not be equal. The onset is given at F, and twice this difference is
-its uncertainty. Where contacts change, nothing is extrapolated. The
+Richardson's extrapolation, for increments that need not be equal. The onset is given at F, and twice the largest
+difference that rounding of both onsets allows is its uncertainty. Where contacts change, nothing is extrapolated. The
 loads that are left out are then those after an increment with a change: a contact that closes there loses its slip
 over twice the increment, so that :math:`|F_{2h} - F_h|` is no smaller than the error of :math:`F_h`.
 
@@ -101,12 +101,12 @@ class PathError:
 
     @property
     def error(self) -> float:
-        """Uncertainty of the onset from its path, force."""
+        """Uncertainty of the onset from its path, force; rounding may hide two roundings of the shift."""
         if np.isnan(self.shift):
             return self.increment
+        largest = abs(self.shift) + 2 * self.rounding
         part = 1.0 if self.weight > 0 else 2.0  # the ramp is the coarser path of the two
-
-        return part * abs(self.shift) if self.changes else UNKNOWN * abs(self.shift / self.weight)
+        return part * largest if self.changes else UNKNOWN * largest / abs(self.weight)
 
 
 def with_path_error(onset: Onset, engine: Engine, path: EquilibriumPath, scene: Scene) -> Onset:
