@@ -17,8 +17,8 @@ kn = 2e5
 [load]
 fy = 3.0
 [ramp]
-step = 4e-3
-until = 0.024
+step = 7.5e-3
+until = 0.0225
 """
 
 FAILING = """
@@ -76,6 +76,7 @@ def scene(tmp_path):
     return tmp_path
 
 
+@pytest.mark.xdist_group("ranks")
 @pytest.mark.parametrize(("ranks", "rank"), [(1, -1), (2, -1), (2, 0), (2, 1)])
 @pytest.mark.parametrize("call", [1, 30])
 def test_its_sentence_reaches_the_command(scene, ranks, rank, call):

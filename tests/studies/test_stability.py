@@ -117,6 +117,7 @@ def faultgouge(folder, *arguments, ranks=1):
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=3600)
 
 
+@pytest.mark.xdist_group("ranks")
 @pytest.mark.slow
 def test_same_table_on_two_ranks(tmp_path):
     one = faultgouge(tmp_path, "stability", "--quick", "-o", "one", "--json")
@@ -128,6 +129,7 @@ def test_same_table_on_two_ranks(tmp_path):
     assert len(json.loads(one.stdout)["cases"]) == len(QUICK)
 
 
+@pytest.mark.xdist_group("ranks")
 def test_error_of_one_rank_ends_the_others(tmp_path):
     """A contact that the law does not cover is found by the rank that owns it; the other one waits for its forces."""
     (tmp_path / "scene.toml").write_text(

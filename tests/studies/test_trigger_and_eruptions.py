@@ -50,6 +50,7 @@ def test_trigger_needs_a_threshold(tmp_path, friction, says):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.xdist_group("ranks")
 @pytest.mark.slow
 def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(tmp_path):
     """Below the onset, 0.0218, nothing grows; at 0.024 D grows, but not to its end in the time that is given."""
