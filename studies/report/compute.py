@@ -31,6 +31,7 @@ from ..work_precision.relaxation import relaxation
 from ..work_precision.study import Settings, Study
 from ..work_precision.trajectory import trajectory
 from .draw import figure_of
+from .draw_coverage import coverage_figure
 from .page import report_page, stem
 
 Say = Callable[[str], None]
@@ -105,6 +106,8 @@ def report(
             found = study(settings)
             json.dumps(found.as_dict(), allow_nan=False)  # a number that is none is a failure of its study
             save(figure_of(found), output / stem(name))
+            if found.covered:
+                save(coverage_figure(found.covered), output / f"{stem(name)}-coverage")
         except Exception as error:  # whatever it is, it must not take the other studies along
             failed[name] = f"{type(error).__name__}: {(str(error).splitlines() or ['no reason given'])[0]}"
             say(f"{name}: failed: {failed[name]}")

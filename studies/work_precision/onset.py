@@ -12,8 +12,7 @@ product linearly, and the pair is believed from :math:`50\, u |A|_F` on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -23,15 +22,13 @@ from ...analysis.spectrum import SAFETY
 from ...pywrap import Engine, Equilibrium, Scene
 from ...pywrap.equilibria import EquilibriumPath
 from ..path_error import with_path_error
+from .coverage import INCREMENTS, coverage
 from .precision import compensated
 from .study import Point, Settings, Study, Theory
 from .timing import timed
 
 METHODS = ("scan, overdamped", "scan, Newton", "bisection", "root of the discriminant")
 OVERDAMPED, SCAN, BISECTION, ROOT = METHODS
-
-INCREMENTS = (2e-3, 1e-3, 5e-4, 2.5e-4)
-"""Of the ramps whose stated errors are compared with the true ones."""
 
 BEYOND = 1e-5
 """Distance beyond the onset, force, at which the pair's imaginary part and overlap are measured for the floor."""
@@ -123,55 +120,6 @@ def onset(settings: Settings) -> Study:
         return _study(settings, Ways(engine, start, settings.scene), exact)
 
 
-@dataclass(frozen=True)
-class Covered:
-    """The error that an onset states, and the one that it has.
-
-    Attributes
-    ----------
-    arithmetic : str
-        Which.
-    increment : float
-        Of the ramp, force.
-    true, stated : float
-        Force.
-    """
-
-    arithmetic: str
-    increment: float
-    true: float
-    stated: float
-
-    @property
-    def holds(self) -> bool:
-        """Whether the stated error covers the true one."""
-        return self.true <= self.stated
-
-
-def coverage(ways: Mapping[str, Ways], increments: Sequence[float], beyond: float) -> tuple[Covered, ...]:
-    """Stated and true errors of the onset just below a force, over arithmetics and increments.
-
-    The last of the ways, with half of the last increment, is the truth; its own error counts as covered.
-    """
-    *_, finest = ways.values()
-    truth = finest.whole(0.5 * increments[-1], beyond)
-    cases = []
-    for arithmetic, way in ways.items():
-        for increment in increments:
-            found = way.whole(increment, beyond)
-            cases.append(Covered(arithmetic, increment, abs(found.fx_c - truth.fx_c), found.error + truth.error))
-    return tuple(cases)
-
-
-def said(cases: Sequence[Covered]) -> tuple[str, ...]:
-    """Stated against true errors in words, the share of cases in which they cover first."""
-    listed = "; ".join(f"{c.arithmetic}, {c.increment:g}: {c.true:.0e} of {c.stated:.0e}" for c in cases)
-    return (
-        f"The error that the onset states, rounding and path together, covers the true one in "
-        f"{sum(c.holds for c in cases)} of {len(cases)} cases. True of stated error: {listed}.",
-    )
-
-
 def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     quick = settings.quick
     check, finest = (2e-3, 1e-3) if quick else (5e-4, 2.5e-4)
@@ -179,7 +127,9 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     found, _ = reference.solved(finest, guess)
     exact = found.fx_c
     reference_error = found.error + abs(reference.root(check, guess)[0] - exact)
-    covered = coverage({"doubles": ways, "compensated": reference}, (2e-3, 1e-3) if quick else INCREMENTS, guess)
+    whole = {
+        name: partial(way.whole, beyond=guess) for name, way in {"doubles": ways, "compensated": reference}.items()
+    }
     runs: list[tuple[str, float, Callable[[], tuple[float, int]]]] = []
     for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
         runs.append((OVERDAMPED, increment, partial(ways.scan, increment, "overdamped")))
@@ -211,6 +161,7 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
         f"its error is the one that it states and its difference from increments of {check:g}",
         reference_error=reference_error,
         points=points,
+        covered=coverage(whole, INCREMENTS[:2] if quick else INCREMENTS),
         advice=(
             f"Take the root of the discriminant: {best[ROOT].error:.0e} in {best[ROOT].seconds:.2g} s, with an "
             "error that it states, and windows of complex eigenvalues that are narrower than an increment are "
@@ -228,6 +179,5 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
             f"their residual {residual:.0e}, is in all ways alike.",
             f"The best scan by overdamped dynamics took {best[OVERDAMPED].seconds:.3g} s for an error of "
             f"{best[OVERDAMPED].error:.0e}. An error below the spacing of doubles, {resolution:.0e}, is shown as that.",
-            *said(covered),
         ),
     )

@@ -13,6 +13,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from ...pywrap import Equilibrium, Scene
+from .coverage import Covered
 
 T = TypeVar("T")
 Progress = Callable[[Sequence[T]], Iterable[T]]
@@ -149,6 +150,8 @@ class Study:
         Floors and curves to compare with.
     remarks : tuple of str
         What else the reader has to know, one sentence each.
+    covered : tuple of Covered
+        Stated against true errors, where the result states one.
     """
 
     name: str
@@ -164,6 +167,7 @@ class Study:
     orders: tuple[Order, ...] = ()
     theory: tuple[Theory, ...] = ()
     remarks: tuple[str, ...] = ()
+    covered: tuple[Covered, ...] = ()
 
     def of(self, method: str) -> list[Point]:
         """The points of one method."""

@@ -245,6 +245,13 @@ def test_quick_report(tmp_path):
         assert study["reference_error"] > 0
         assert all(point["error"] >= 0 and point["seconds"] > 0 for point in study["points"])
         assert (tmp_path / "report" / f"{page.stem(study['name'])}.png").stat().st_size > 10_000
+    (onset,) = (study for study in result["studies"] if study["name"] == "onset")
+    assert {(case["arithmetic"], case["increment"]) for case in onset["covered"]} == {
+        (arithmetic, increment) for arithmetic in ("doubles", "compensated") for increment in (2e-3, 1e-3)
+    }
+    assert all(case["true"] <= case["stated"] for case in onset["covered"])
+    assert "covers the true one in 4 of 4 cases" in (tmp_path / "report" / "report.md").read_text()
+    assert (tmp_path / "report" / "onset-coverage.png").stat().st_size > 10_000
     best = {
         study["name"]: {
             method: min(point["error"] for point in study["points"] if point["method"] == method)
