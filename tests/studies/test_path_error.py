@@ -57,6 +57,28 @@ def test_stated_intervals_contain_the_extrapolated_onset(mu):
             assert found.error < 1e-7
 
 
+def test_a_contact_that_slides_before_the_onset_is_covered():
+    """Of this packing a contact reaches the Coulomb bound before the onset: the error is bounded, not extrapolated."""
+    found = {}
+    for precision, increment in (("compensated", 2.5e-4), ("double", 1e-3), ("double", 5e-4)):
+        mapping = {"packing": {"disks": 100, "top": 10, "width": 11.9, "seed": 11}, "law": {"kn": 2e5, "mu": 0.2}}
+        changes = {"precision": precision, "load": {"fy": 3.0}, "ramp": {"step": increment, "until": 3e-3}}
+        scene = Scene.from_mapping(mapping | changes)
+        start = settle(scene)
+        with Engine(start.packing) as engine:
+            path = EquilibriumPath(engine, start, scene)
+            window, *_ = find_onset(path, increment * np.arange(round(3e-3 / increment) + 1)).windows
+            part = path_error(window.fx_onset, window.eigenvalue, window.error, engine, path, scene)
+        assert part.changes
+        assert part.correction == 0
+        found[precision, increment] = window.fx_onset, window.error + part.error
+    truth, least = found.pop(("compensated", 2.5e-4))
+    assert least < 1e-12
+    for fx, error in found.values():
+        assert abs(fx - truth) <= error + least
+        assert error < 1e-10
+
+
 def test_one_packing_per_seed_whatever_the_arithmetic():
     mapping = {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
     one, other = (settle(Scene.from_mapping(mapping | {"precision": p})).packing for p in ("double", "compensated"))
