@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from .packing_section import GeneratedPacking
@@ -24,7 +24,7 @@ from .refusals import SceneError
 if TYPE_CHECKING:
     from .scene import Scene
 
-Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset"]
+Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "reproduce"]
 
 EPSILON = 2.3e-16
 
@@ -48,6 +48,10 @@ SECONDS_A_SEARCH = 2.5e-7, 3e-3
 """Of the search for complex pairs in an increment: for each disk cubed up to `DENSE` disks, for each disk beyond."""
 DENSE = 300
 """Disks up to which the search takes all eigenvalues."""
+GROWTH = 300_000
+"""Steps of the undamped run in which reproduce measures a growth rate; a tenth or three times as many."""
+TRIGGERING_RUNS = 4
+"""Runs of [perturb] in the triggering part of reproduce: with and without a perturbation, an eruption, its control."""
 BYTES_KEPT = 600
 """Memory of one equilibrium that is kept, for each disk: positions, contacts, and what is computed of them once."""
 BYTES_WRITTEN = 150
@@ -120,15 +124,16 @@ def estimated(scene: Scene, task: Task) -> Estimate:
     ----------
     scene : Scene
         What is wanted.
-    task : {"settle", "ramp", "perturb", "onset"}
-        Each includes the settling; perturb the ramp up to its equilibrium, onset that up to its end.
+    task : {"settle", "ramp", "perturb", "onset", "reproduce"}
+        Each includes the settling; perturb the ramp up to its equilibrium, onset that up to its end, reproduce the
+        onset, a run whose growth is measured and, where the scene has [friction], the runs of [perturb].
     """
     disks = _disks(scene)
     steps = _settling_steps(scene) if isinstance(scene.packing, GeneratedPacking) else 0.0
     increments, kept = 0.0, 1.0
     ramp, perturb = scene.ramp, scene.perturb
     seconds = 0.0
-    if task in ("ramp", "onset") and ramp is not None:
+    if task in ("ramp", "onset", "reproduce") and ramp is not None:
         # the layer slides on whatever bears it once F_x exceeds mu F_y
         increments = min(ramp.until, max(scene.law.mus) * scene.load.fy + ramp.step) / ramp.step
     if task == "perturb" and perturb is not None:
@@ -140,7 +145,11 @@ def estimated(scene: Scene, task: Task) -> Estimate:
     if task == "perturb" and perturb is not None:
         runs = 2 if scene.friction is not None and scene.friction.v0 == "calibrated" else 1
         steps += runs * perturb.time / (perturb.time_step or _undamped_step(scene))
-    if task == "onset":
+    if task == "reproduce":
+        steps += GROWTH
+        if perturb is not None and scene.friction is not None:
+            steps += TRIGGERING_RUNS * perturb.time / (perturb.time_step or _undamped_step(scene))
+    if task in ("onset", "reproduce"):
         search = SECONDS_A_SEARCH[0] * disks**3 if disks <= DENSE else SECONDS_A_SEARCH[1] * disks
         seconds = len(scene.law.mus) * (seconds + increments * search)
         kept = increments + 1
@@ -150,15 +159,25 @@ def estimated(scene: Scene, task: Task) -> Estimate:
     return Estimate(disks, steps, increments, memory, written, seconds)
 
 
-def foreseen(scene: Scene, task: Task) -> str:
+def foreseen(scene: Scene, task: Task, packings: int = 1) -> str:
     """What a command will do and how long that takes, in a line; empty where it takes no time.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is wanted.
+    task : {"settle", "ramp", "perturb", "onset", "reproduce"}
+        As in `estimated`.
+    packings : int
+        How many packings of the scene, one after the other.
 
     Raises
     ------
     SceneError
         If it takes a year, more memory than there is, or a file that no disk holds.
     """
-    work = estimated(scene, task)
+    one = estimated(scene, task)
+    work = replace(one, steps=packings * one.steps, seconds=packings * one.seconds, disk=packings * one.disk)
     if not work.seconds < LONGEST:
         what = "a year and more"
     elif work.memory > _installed_memory():
@@ -166,7 +185,8 @@ def foreseen(scene: Scene, task: Task) -> str:
     elif work.disk > LARGEST_FILE:
         what = f"more than the {_bytes(LARGEST_FILE)} that a file may take"
     else:
-        return f"{task}: {work}" if work.seconds > WORTH_SAYING else ""
+        what = task if packings == 1 else f"{task}, {packings} packings"
+        return f"{what}: {work}" if work.seconds > WORTH_SAYING else ""
     raise SceneError(f"the scene asks {task} for {what} ({work}): {_remedy(scene, task)}")
 
 
@@ -249,7 +269,7 @@ def _undamped_step(scene: Scene) -> float:
 def _remedy(scene: Scene, task: Task) -> str:
     if task == "perturb":
         return "lower perturb.time, or raise perturb.time_step"
-    return "take a larger ramp.step, or fewer disks" if task in ("ramp", "onset") else "take fewer disks"
+    return "take a larger ramp.step, or fewer disks" if task in ("ramp", "onset", "reproduce") else "take fewer disks"
 
 
 def _installed_memory() -> float:

@@ -77,6 +77,16 @@ def test_work_is_counted():
     assert halved.increments == pytest.approx(2 * work.increments)
 
 
+def test_a_reproduction_counts_what_it_runs():
+    scene = Scene.from_mapping(SCENE)
+    one, onset = estimated(scene, "reproduce"), estimated(scene, "onset")
+    assert one.increments == onset.increments
+    assert one.steps > onset.steps + 1e5
+    assert foreseen(scene, "reproduce", 1000).startswith("reproduce, 1000 packings: about ")
+    with pytest.raises(SceneError, match="the scene asks reproduce for a year and more"):
+        foreseen(scene, "reproduce", 10**9)
+
+
 def test_a_loop_of_links_and_deep_brackets_are_refused(tmp_path):
     (tmp_path / "a.json").symlink_to(tmp_path / "b.json")
     (tmp_path / "b.json").symlink_to(tmp_path / "a.json")

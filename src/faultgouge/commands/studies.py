@@ -28,7 +28,7 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     """
     from faultgouge.studies.explain import explain as explain_scene
 
-    wanted = read_scene(scene)
+    wanted = read_scene(scene, "settle")
     with status("switching features off and on"):
         explanation = explain_scene(wanted)
     if as_json:
@@ -63,7 +63,8 @@ def reproduce(
     """
     from importlib.resources import files
 
-    wanted = read_scene(scene or Path(str(files("faultgouge") / "scenes" / "paper.toml")))
+    path = scene or Path(str(files("faultgouge") / "scenes" / "paper.toml"))
+    wanted = read_scene(path, "reproduce", max(ensemble, 1))
     if ensemble:
         from faultgouge.studies.ensemble import ensemble as examine_packings
 

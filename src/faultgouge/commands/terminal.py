@@ -34,13 +34,13 @@ Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
-def read_scene(path: Path, task: Task | None = None) -> Scene:
+def read_scene(path: Path, task: Task | None = None, packings: int = 1) -> Scene:
     """The scene of a TOML file; if its task is long, what is to be done and how long it takes is said."""
     from faultgouge.pywrap.estimate import foreseen
     from faultgouge.pywrap.scene import Scene
 
     scene = Scene.from_toml(path)
-    ahead = foreseen(scene, task) if task is not None else ""
+    ahead = foreseen(scene, task, packings) if task is not None else ""
     if ahead:
         say(ahead)
     return scene
