@@ -82,13 +82,12 @@ def spectrum(
 
 def _gain_of(packing: Packing) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None of an unstable one, and of one that is too large."""
-    from faultgouge.analysis.transient import MOST_DISKS, NoGainError, transient_gain
+    from faultgouge.analysis.transient import MOST_DISKS, NoGainError, transient_gains
 
     if len(packing) > MOST_DISKS:
         return None
     try:
-        displacement = transient_gain(packing)
-        energy = transient_gain(packing, "energy")
+        displacement, energy = transient_gains(packing)
     except NoGainError:
         return None
     return {
