@@ -157,26 +157,56 @@ class Modes:
         basis = self.basis if observed is None else observed @ self.basis
         return motion._make(part @ basis.T for part in parts)
 
-    def middle(
+    def between(
         self,
         function: Function,
         time: Floats,
-        columns: Indices,
+        left: Complexes,
+        right: Complexes,
         reach: Callable[[complex, Floats], Floats] = second_order,
     ) -> Complexes:
-        """F(t) of f(A, t) = X F(t) X^(-1) on some of the columns of X, both of a pair or none; shape (T, r, r).
+        """L F(t) R of f(A, t) = X F(t) X^(-1) for every time, shape (T, a, b).
 
-        Of what the function returns, the first array is taken; other parameters as of `apply`.
+        Parameters
+        ----------
+        function, time, reach
+            As of `apply`; of what the function returns, the first array is taken.
+        left : ndarray, shape (a, n)
+            L, a column for each column of X.
+        right : ndarray, shape (n, b)
+            R.
         """
-        found = np.zeros((len(time), len(columns), len(columns)), np.complex128)
-        place = {int(column): k for k, column in enumerate(columns)}
-        for k, column in enumerate(columns):
-            found[:, k, k] = function(self.values[column], time)[0]
+        factor = function(self.values, time[:, None])[0]
+        for column in self.blocks:
+            factor[:, column : column + 2] = 0.0
+        found = (factor[:, None, :] * left) @ right
         for column, cores in self._cores(function, time, reach):
-            if column in place:
-                rows = [place[column], place[column + 1]]
-                found[np.ix_(range(len(time)), rows, rows)] = cores[0]
-        return found
+            pair = slice(column, column + 2)
+            found += left[:, pair] @ cores[0] @ right[pair]
+        return np.asarray(found)
+
+    def some(self, columns: Indices) -> "Modes":
+        """Some of the columns of X and rows of its inverse, in ascending order, both of a pair or none."""
+        blocks = {int(np.searchsorted(columns, k)): block for k, block in self.blocks.items() if k in columns}
+        return Modes(self.basis[:, columns], self.inverse[columns], self.values[columns], blocks)
+
+    def oscillating(self) -> "Modes":
+        """The modes of the system (z, z')' = ((0, 1), (-A, 0)) (z, z'), which has the rates +-i sqrt(A)."""
+        root = 1j * np.sqrt(self.values)
+        rate, inverse = np.diag(root), np.diag(1 / root)
+        blocks = {}
+        for column, block in self.blocks.items():
+            pair = slice(column, column + 2)
+            rate[pair, pair] = blocks[column] = 1j * _root(block)
+            inverse[pair, pair] = np.linalg.inv(blocks[column])
+        turned, back = self.basis @ rate, inverse @ self.inverse
+        size = len(root)
+        return Modes(
+            np.block([[self.basis, self.basis], [turned, -turned]]),
+            0.5 * np.block([[self.inverse, back], [self.inverse, -back]]),
+            np.concatenate([root, -root]),
+            blocks | {column + size: -block for column, block in blocks.items()},
+        )
 
     def _cores(
         self, function: Function, time: Floats, reach: Callable[[complex, Floats], Floats]
@@ -195,6 +225,12 @@ class Modes:
                     for a, b in zip(mean, slope, strict=True)
                 ],
             )
+
+
+def _root(block: Complexes) -> Complexes:
+    """The square root of an upper triangular 2 x 2 matrix with eigenvalues off the negative axis."""
+    first, second = np.sqrt(np.diag(block))
+    return np.array([[first, block[0, 1] / (first + second)], [0.0, second]])
 
 
 def _split(

@@ -21,9 +21,12 @@ eigenvalues do not tell of such matrices.)
 to coalesce, :math:`|x_k| |l_k| = \kappa`: the gain is close to :math:`4\kappa^2` where their phases have come apart by
 :math:`\pi`, at the beat time :math:`\pi/(\omega_1 - \omega_2)`. It grows as the inverse of the distance from the onset,
 the amplitude and the time as its inverse root. Farther away several pairs share in it. So P is sampled on the few modes
-with large :math:`|x_k| |l_k|`, `SAMPLES` times a period, over a window of time that is stated with the result; at the
-best of these times the largest singular value of the whole propagator is found by Lanczos iteration, and its time is
-refined. What is returned has been attained by the start that is returned.
+with large :math:`|x_k| |l_k|`, `propagator.SAMPLES` times a period, over a window of time that is stated with the
+result. At the best of these times Lanczos iteration finds the largest singular value of the whole propagator.
+Times are refined on the space of these vectors, where P(t) is a small matrix: its norm is nowhere larger than that of
+P(t), and meets it at each time whose vectors are in the space, with its slope; so the vectors at its maximum join it,
+until the maximum stays (the subspace method of Kangal, Meerbergen, Mengi and Michiels, SIAM J. Matrix Anal. Appl. 39,
+48, 2018). What is returned has been attained by the start that is returned.
 
 Whether a later time has a larger gain no window tells, as the frequencies are incommensurate. But P is never larger
 than :math:`\|X S\|_2 \|S^{-1} X^{-1}\|_2` with any scaling S of the modes, since no :math:`|f_k|` exceeds 1; with the
@@ -32,74 +35,34 @@ scaling that makes :math:`|x_k| = |l_k|` the square of this, `bound`, is close t
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.sparse import csr_array
-from scipy.sparse.linalg import LinearOperator, svds
 
-from .errors import FaultgougeError
-from .matrix_functions import WELL_CONDITIONED, Modes, first_order, second_order
-from .oscillator import Oscillator
-from .packing import Floats, Indices, Packing
-from .spectrum import Complexes
-from .state_space import StateSpace, released
+from .packing import Floats, Packing
+from .propagator import ACCURACY, Motions, NoGainError, Norm, Propagator
 from .stiffness import Form
-
-Norm = Literal["displacement", "energy"]
-
-OBLIQUE = 1.1
-"""Modes with a larger |x| |l| have a part in the sampling: 1 is what a mode of a symmetric matrix has."""
-
-SHARE = 0.05
-"""And of these the ones with this share of the largest."""
-
-LEAST, MOST = 4, 16
-"""The fewest and the most modes that are sampled; with dissipation a motion is two of them."""
-
-ALONE = 100
-"""Length of the window, in periods, where the most oblique mode has no partner among these."""
-
-SAMPLES = 8
-"""Times a period: a phase between two of them is off by no more than pi/8, which costs 8 % and is refined away."""
-
-BEATS = 10
-"""Length of the window, in beats of the most oblique pair; for long beats fewer, see `PERIODS`. With dissipation the
-window ends where the bound, which falls with the slowest mode, leaves no gain."""
-
-PERIODS = 20_000
-"""The window of more than 1.5 beats has no more periods of the most oblique mode than these."""
-
-NOISE = 1e-7
-"""Growth rates and differences of frequencies below this share of the largest frequency are rounding where two modes
-are about to coalesce: the root of that of a well-conditioned eigenvalue."""
-
-SLOW = 1e-10
-"""The same with dissipation, which keeps modes from coalescing."""
 
 SYMMETRIC = 1e-6
 """An excess of the bound below this is no gain: K is symmetric, but for rounding."""
 
-ACCURACY = 1e-9
-"""Relative error of the largest singular value."""
+LOOSE = 1e-4
+"""Relative error of the norms at the best samples: what reaches them makes the first space."""
 
-CANDIDATES = 6
-"""Maxima of the sampled modes at which the whole propagator is looked at, and besides the largest of each of so many
-octaves of time: at t = 0 the whole propagator is one, but some of its modes alone make an oblique projector."""
+FINE = 1e-4
+"""Error of a refined time, in units of the time between the samples."""
 
-REFINED = 6
-"""Of these, the ones whose time is refined."""
+GRID = 9
+"""Times between two samples at which the norm on that space is looked at."""
+
+NEAR = 0.98
+"""Maxima on that space which come so close to the largest norm that was found are refined, too."""
+
+LOOKS = 12
+"""Vectors that join the space, at the most."""
 
 MOST_DISKS = 300
 """Disks up to which commands compute the gain unasked."""
-
-CHUNK = 4096
-"""Times that are sampled at once."""
-
-
-class NoGainError(FaultgougeError):
-    """A packing without a transient gain: it is unstable, or has no energy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +126,7 @@ def transient_gain(
     norm : {"displacement", "energy"}
         Displacements from rest in the norm of (x, y, R theta), or all states in the norm of the energy.
     window : float, optional
-        Search the times from 0 to this; by default `BEATS` beats of the most oblique pair.
+        Search the times from 0 to this; by default `propagator.BEATS` beats of the most oblique pair.
     form : {"consistent", "paper"}
         As in :func:`~faultgouge.analysis.stiffness_matrix`.
 
@@ -178,20 +141,28 @@ def transient_gain(
     numpy.linalg.LinAlgError
         If more than two eigenvalues coalesce.
     """
-    system = StateSpace.of(packing, form)
+    return _gain(Motions.of(packing, form), norm, window)
+
+
+def transient_gains(packing: Packing, form: Form = "consistent") -> tuple[TransientGain, TransientGain]:
+    """The gains in displacement and in energy, with the modes computed once; as of :func:`transient_gain`."""
+    motions = Motions.of(packing, form)
+    return _gain(motions, "displacement", None), _gain(motions, "energy", None)
+
+
+def _gain(motions: Motions, norm: Norm, window: float | None) -> TransientGain:
+    system, disks = motions.system, motions.disks
     if norm == "energy" and not system.positive:
         raise NoGainError("the symmetric part of K is not positive: displacements have no energy to compare with")
-    propagator = _Propagator.of(packing, system, norm)
+    propagator = Propagator.of(motions, norm)
     bound, columns = propagator.bound(), propagator.kept()
     if bound < 1 + SYMMETRIC:
-        return _nothing(len(packing), norm, 0.0, bound)
+        return _nothing(disks, norm, 0.0, bound)
     length = min(propagator.window(columns), propagator.end(bound)) if window is None else window
-    best = sorted(propagator.candidates(columns, length), key=lambda at: -propagator.largest(0.5 * sum(at))[0])
-    time = max((_refined(propagator, at) for at in best[:REFINED]), key=lambda each: each[1])[0]
-    size, start = propagator.largest(time)
+    time, size, start = _refined(propagator, propagator.candidates(columns, length))
     if size <= 1:
-        return _nothing(len(packing), norm, length, bound)
-    displacement, velocity = np.zeros((2, 3 * len(packing)))
+        return _nothing(disks, norm, length, bound)
+    displacement, velocity = np.zeros((2, 3 * disks))
     root, count = system.root_mass, len(system.active)
     if norm == "displacement":
         displacement[system.active] = start
@@ -208,137 +179,39 @@ def _nothing(disks: int, norm: Norm, window: float, bound: float) -> TransientGa
     return TransientGain(1.0, 0.0, start, rest, norm, window, bound)
 
 
-@dataclass(frozen=True, eq=False)
-class _Propagator:
-    """P(t) = O f(t) I of modes: from starts, by I, to amplitudes, and by O to what is measured."""
-
-    modes: Modes
-    outward: Complexes
-    inward: Complexes
-    function: Any
-    reach: Any
-    twofold: bool = False
-    """Whether each motion is the sum of two mirror images, of half its size."""
-
-    @classmethod
-    def of(cls, packing: Packing, system: StateSpace, norm: Norm) -> "_Propagator":
-        """That of a packing; NoGainError if it is unstable."""
-        dissipative = packing.law.damped or packing.drag_time is not None
-        second = norm == "displacement" and not dissipative
-        modes = Modes.of(system.stiffness if second else system.matrix)
-        rates = -np.abs(np.sqrt(modes.values).imag) if second else -modes.values.real
-        fastest = np.sqrt(np.abs(modes.values).max(initial=0.0)) if second else np.abs(modes.values).max(initial=0.0)
-        if np.any(rates < -(SLOW if dissipative else NOISE) * fastest):
-            raise NoGainError("the packing is unstable: some motion grows for ever, and no gain is the largest")
-        root, size = system.root_mass, len(system.active)
-        if second:
-            outward, inward = modes.basis / root[:, None], modes.inverse * root
-            return cls(modes, outward, inward, Oscillator().released, second_order)
-        outward, inward = modes.basis, modes.inverse
-        if norm == "displacement":
-            outward = (system.unweight / root[:, None]) @ outward[:size]
-            inward = inward[:, :size] @ (system.weight * root)
-        return cls(modes, outward, inward, released, first_order, norm == "displacement")
-
-    @property
-    def frequency(self) -> Floats:
-        """Of each mode, radian / time."""
-        values = self.modes.values
-        return np.abs(np.sqrt(values).real) if self.reach is second_order else np.abs(values.imag)
-
-    def kept(self) -> Indices:
-        """The columns of the modes that are sampled: the most oblique ones, and pairs that are kept together."""
-        weight = np.linalg.norm(self.outward, axis=0) * np.linalg.norm(self.inward, axis=1)
-        weight *= 2 if self.twofold else 1
-        for column in self.modes.blocks:
-            weight[[column, column + 1]] = np.inf
-        finite = weight[np.isfinite(weight)].max(initial=1.0)
-        least = max(OBLIQUE, SHARE * (finite if np.all(np.isfinite(weight)) else WELL_CONDITIONED**-1))
-        order = np.argsort(-weight, kind="stable")[:MOST]
-        return np.sort(order[(weight[order] > least) | (np.arange(len(order)) < LEAST)])
-
-    def window(self, columns: Indices) -> float:
-        """Some beats of the most oblique pair, time."""
-        frequency = self.frequency[columns]
-        shape = self.outward[:, columns] / np.linalg.norm(self.outward[:, columns], axis=0)
-        parallel = np.abs(shape.conj().T @ shape)
-        gap = np.abs(frequency[:, None] - frequency[None])
-        for column in set(self.modes.blocks) & set(columns.tolist()):
-            # a block has a basis that is not oblique: its two modes are nearly parallel
-            place = int(np.searchsorted(columns, column))
-            parallel[place, place + 1] = 1 + frequency.max() / max(gap[place, place + 1], 1e-300)
-        parallel[gap <= NOISE * frequency.max(initial=0.0)] = 0.0  # itself, and its mirror image
-        a, b = np.unravel_index(np.argmax(parallel), parallel.shape)
-        if parallel[a, b] == 0.0:
-            return float(ALONE * 2 * np.pi / frequency[a]) if frequency[a] else 1.0
-        beat, period = np.pi / gap[a, b], 2 * np.pi / frequency[a]
-        return float(max(1.5 * beat, min(BEATS * beat, PERIODS * period)))
-
-    def end(self, bound: float) -> float:
-        """A time beyond which the dissipation leaves no gain, time; inf without dissipation."""
-        slowest = 0.0 if self.reach is second_order else -float(self.modes.values.real.max(initial=-np.inf))
-        return 0.5 * float(np.log(bound)) / slowest if slowest > 0 else np.inf
-
-    def candidates(self, columns: Indices, window: float) -> list[tuple[float, float]]:
-        """The times between which P of some modes has its largest maxima."""
-        left, right = (np.linalg.qr(part)[1] for part in (self.outward[:, columns], self.inward[columns].conj().T))
-        step = 2 * np.pi / max(self.frequency[columns].max(initial=0.0), 1e-300) / SAMPLES
-        time = np.linspace(0.0, window, max(2, int(np.ceil(window / step)) + 1))
-        size = np.concatenate(
-            [
-                np.linalg.norm(
-                    left @ self.modes.middle(self.function, part, columns, self.reach) @ right.conj().T, 2, (1, 2)
-                )
-                for part in np.array_split(time, len(time) // CHUNK + 1)
-            ]
-        )
-        inner = np.flatnonzero((size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:])) + 1
-        peaks = np.concatenate([inner, [0, len(time) - 1]])
-        peaks = peaks[np.argsort(-size[peaks], kind="stable")]
-        shortest = window * 2.0**-CANDIDATES or 1.0  # an octave of its own below it; any number if all times are 0
-        octave = np.log2(max(window, shortest) / np.maximum(time[peaks], shortest)).astype(int)
-        best = np.union1d(peaks[:CANDIDATES], peaks[np.unique(octave, return_index=True)[1]])
-        return [(float(time[max(k - 1, 0)]), float(time[min(k + 1, len(time) - 1)])) for k in best]
-
-    def largest(self, time: float) -> tuple[float, Floats]:
-        """Norm of the whole P(t), and the start of norm 1 that reaches it; real."""
-        every = np.arange(len(self.modes.values))
-        core = csr_array(self.modes.middle(self.function, np.array([time]), every, self.reach)[0])
-        rows, columns = len(self.outward), self.inward.shape[1]
-        forward = LinearOperator(
-            (rows, columns),
-            matvec=lambda v: (self.outward @ (core @ (self.inward @ v))).real,
-            rmatvec=lambda u: ((u @ self.outward) @ core @ self.inward).real,
-            dtype=np.float64,
-        )
-        if min(rows, columns) < 3:
-            matrix = (self.outward @ (core @ self.inward)).real
-            _, size, right = np.linalg.svd(matrix)
-        else:
-            _, size, right = svds(forward, k=1, v0=np.ones(min(rows, columns)), tol=ACCURACY)
-        start = right[0] / np.linalg.norm(right[0])
-        return float(size[0]), start * np.sign(start[np.argmax(np.abs(start))])
-
-    def bound(self) -> float:
-        """No P(t) has a larger norm squared: that of the modes with balanced sizes."""
-        outward, inward = self.outward.copy(), self.inward.copy()
-        for column, block in self.modes.blocks.items():
-            pair = [column, column + 1]
-            _, vectors = np.linalg.eig(block)
-            if abs(np.linalg.det(vectors)) < np.finfo(float).eps:
-                return np.inf
-            outward[:, pair], inward[pair] = outward[:, pair] @ vectors, np.linalg.solve(vectors, inward[pair])
-        scale = np.sqrt(np.linalg.norm(inward, axis=1) / np.linalg.norm(outward, axis=0))
-        sizes = np.linalg.norm(outward * scale, 2), np.linalg.norm(inward / scale[:, None], 2)
-        return float(sizes[0] * sizes[1]) ** 2
-
-
-def _refined(propagator: _Propagator, between: tuple[float, float]) -> tuple[float, float]:
-    """Time and norm of the whole propagator at a maximum."""
-    a, b = between
-    if a == b:
-        return a, propagator.largest(a)[0]
-    top = minimize_scalar(
-        lambda t: -propagator.largest(float(t))[0], bounds=between, method="bounded", options={"xatol": 1e-3 * (b - a)}
+def _refined(propagator: Propagator, brackets: list[tuple[float, float]]) -> tuple[float, float, Floats]:
+    """Time, norm and start of the largest norm of the whole propagator about some maxima."""
+    grid = np.array([np.linspace(a, b, GRID) for a, b in brackets])
+    _, left, right = (
+        np.array(part).T for part in zip(*(propagator.largest(t[GRID // 2], LOOSE) for t in grid), strict=True)
     )
-    return float(top.x), float(-top.fun)
+    seen = np.zeros(len(grid))
+    best = 0.0, 0.0, right[:, 0]
+    for _ in range(LOOKS):
+        left, right = np.linalg.qr(left)[0], np.linalg.qr(right)[0]
+        small = propagator.on(left, right)
+        sizes = np.linalg.norm(small.at(grid.ravel()), 2, (1, 2)).reshape(grid.shape)
+        tops = np.where(sizes.max(axis=1) > seen * (1 + ACCURACY), sizes.max(axis=1), 0.0)
+        place = int(np.argmax(tops))
+        if tops[place] <= NEAR * best[1]:
+            break
+        top = int(np.argmax(sizes[place]))
+        time = _top(small, grid[place, max(top - 1, 0)], grid[place, min(top + 1, GRID - 1)])
+        size, out, start = propagator.largest(time)
+        seen[place] = size
+        best = max(best, (time, size, start), key=lambda each: each[1])
+        left, right = np.column_stack([left, out]), np.column_stack([right, start])
+    return best
+
+
+def _top(propagator: Propagator, a: float, b: float) -> float:
+    """The time between two others at which the norm of P(t) is largest."""
+    if a == b:
+        return a
+    top = minimize_scalar(
+        lambda t: -np.linalg.norm(propagator.at(np.array([t]))[0], 2),
+        bounds=(a, b),
+        method="bounded",
+        options={"xatol": FINE * (b - a)},
+    )
+    return float(top.x)

@@ -204,6 +204,14 @@ class RealUnits:
             return amplitude * self.length / self.time**2 / (omega / self.time)
         return self.stress(amplitude) / (self.density * self.shear_wave)
 
+    def onset(self, fx: float, omega: float) -> dict[str, float]:
+        """For JSON: the shear stress of F_x, its share of the overburden, and the frequency of what grows."""
+        return {
+            "shear_stress_Pa": self.stress(fx),
+            "stress_ratio": fx / self.fy,
+            "frequency_Hz": self.frequency(omega),
+        }
+
     def as_dict(self) -> dict[str, float]:
         """For JSON: one unit of the scene in SI, and the overburden."""
         return {

@@ -35,7 +35,7 @@ from ..pywrap.sections import Ramp
 from .costs import SHARE, TURNS, in_turns
 from .parts import FEW, Part, same_motion
 from .processors import ranks, threads
-from .switches import UNREACHED, Feature, Loaded, Push, Run, features, where
+from .switches import UNREACHED, Feature, Loaded, Push, Run, Sent, features, where
 
 LARGEST = 400
 """Disks up to which a packing is settled to be explained: half a second. Of a larger one a strip of as many is, of the
@@ -116,7 +116,7 @@ def explain(scene: Scene) -> Explanation:
         with run.started(MPI.COMM_SELF, folder / "scene.log") as (engine, _):
             loaded = Loaded.of(engine, folder / "scene.log")
         imported = tuple(package for package in HEAVY if package in sys.modules)
-        bare = replace(run, push=None, weakening=None)
+        bare = replace(run, push=None, sent=None, weakening=None)
         with bare.started(MPI.COMM_SELF) as (_, dynamics):
             steps = _steps(dynamics)
         parts = [_switched(feature, loaded, steps, folder) for feature in features(run)]
@@ -262,14 +262,16 @@ def _affordable(scene: Scene) -> tuple[Scene, str]:
 
 def _run_of(scene: Scene, packing: Packing) -> Run:
     """The scene's undamped run; friction that weakens does so beyond a threshold that is never reached."""
-    perturb, push, weakening = scene.perturb, None, None
-    if perturb and perturb.amplitude > 0:
+    perturb, push, sent, weakening = scene.perturb, None, None, None
+    if perturb:
         target = tuple(range(len(packing))) if perturb.target == "all" else perturb.target
-        push = Push(perturb.amplitude, perturb.omega or 0.0, None if target == "top" else target)
+        forced, (amplitude, omega), signal = None if target == "top" else target, perturb.cosine, perturb.forcing()
+        push = Push(amplitude, omega, forced) if amplitude > 0 else None
+        sent = Sent(signal, perturb.on or "layer", forced) if signal else None
     if scene.friction:
         law = scene.friction
         weakening = Weakening(B=law.B, w=law.w, mu_ss=law.mu_ss, v0=UNREACHED, v_ss=1.0)
-    return Run(packing, push, weakening)
+    return Run(packing, push, sent, weakening)
 
 
 def _steps(dynamics: Dynamics) -> int:

@@ -7,13 +7,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from ..analysis import Contacts, MindlinLaw, Packing, touching
+from ..analysis.signals import Signal
 from ..pywrap import Engine
 from ..pywrap.dynamics import Dynamics, Weakening
 
@@ -99,6 +100,15 @@ class Push:
 
 
 @dataclass(frozen=True)
+class Sent:
+    """A signal, as force along x on some disks, the upper layer if None, or as acceleration of the floor."""
+
+    signal: Signal
+    on: Literal["layer", "floor"]
+    target: tuple[int, ...] | None
+
+
+@dataclass(frozen=True)
 class Run:
     """An undamped run: the scene's, or one that differs from it in one feature.
 
@@ -107,6 +117,8 @@ class Run:
     packing : Packing
         Where it starts.
     push : Push or None
+    sent : Sent or None
+        The signal.
     weakening : Weakening or None
     floor : bool
         Whether the floor is there.
@@ -116,6 +128,7 @@ class Run:
 
     packing: Packing
     push: Push | None = None
+    sent: Sent | None = None
     weakening: Weakening | None = None
     floor: bool = True
     contacts: Path | None = None
@@ -127,9 +140,12 @@ class Run:
         stiffness = self.packing.law.stiffness_scale(10 * self.packing.fy)
         step = QUIET_SHARE * 0.2 / np.sqrt(12 * stiffness)
         push = self.push or Push(0.0, 0.0, None)
+        target, signal = push.target, {}
+        if self.sent:
+            target, signal = self.sent.target, {"signal": self.sent.signal, "on": self.sent.on}
         with (
             Engine(self.packing, communicator, log) as engine,
-            engine.undamped(step, push.amplitude, push.omega, push.target, self.weakening) as dynamics,
+            engine.undamped(step, push.amplitude, push.omega, target, self.weakening, **signal) as dynamics,
         ):
             if not self.floor:
                 engine.lammps.command("unfix floor")
@@ -166,7 +182,7 @@ class Feature:
 
 
 def features(run: Run) -> Iterator[Feature]:
-    """The features of an undamped run, each with two runs that differ in it and have no push and no weakening else.
+    """The features of an undamped run, each with two runs that differ in it and have no push, signal or weakening else.
 
     Parameters
     ----------
@@ -178,7 +194,7 @@ def features(run: Run) -> Iterator[Feature]:
     Feature
     """
     packing, law = run.packing, run.packing.law
-    bare = replace(run, push=None, weakening=None)
+    bare = replace(run, push=None, sent=None, weakening=None)
     on_floor = where(packing, packing.contacts.i[packing.contacts.floor])
     yield Feature(
         "floor",
@@ -229,6 +245,20 @@ def features(run: Run) -> Iterator[Feature]:
         bare,
         replace(bare, push=push),
         packing.top if push.target is None else where(packing, push.target),
+        moves=True,
+    )
+
+    sent = run.sent or Sent(Signal([0.0, 1e6], [1e-9, 1e-9]), "layer", None)
+    yield Feature(
+        "signal",
+        f"{len(sent.signal)} rows, on the {sent.on}" if run.sent else "no signal in [perturb]",
+        bare,
+        replace(bare, sent=sent),
+        np.ones(len(packing), dtype=bool)
+        if sent.on == "floor"
+        else packing.top
+        if sent.target is None
+        else where(packing, sent.target),
         moves=True,
     )
 

@@ -25,7 +25,7 @@ from ...analysis import (
 )
 from ...analysis.pair_form import pair_eigenvalues
 from ...figures.pair import PairCurve
-from ...pywrap import Engine, Equilibrium, Record, Sample, Scene, reach
+from ...pywrap import Engine, Equilibrium, Record, Sample, Scene, SceneError, reach
 from ...pywrap.equilibria import next_equilibrium
 from ...pywrap.refusals import needed
 from ...pywrap.sections import Friction, Perturb
@@ -155,6 +155,12 @@ def growth_run(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
     spectra = [spectrum(each.packing) for each in candidates]
     best = int(np.argmax([_dominance(each) for each in spectra]))
     start, modes = candidates[best], spectra[best]
+    if not modes.pairs:
+        first = run.onset.windows[0]
+        raise SceneError(
+            f"no load of the ramp lies in a window of complex eigenvalues, of which the first begins at "
+            f"F_x = {first.fx_onset:.6g}: take a smaller ramp.step, so that a run above the onset has where to start"
+        )
     dt = time_step(start.packing)
     fastest = max(modes.pairs, key=lambda pair: pair.growth_rate)
     predicted = float(2 * np.abs(discrete_frequency(fastest.eigenvalue, dt).imag))

@@ -10,6 +10,7 @@ from ..onsets import OnsetRun
 from ..pages import render
 from ..triggering.page import section
 from .compute import GrowthRun, TriggeringRun
+from .si import si_rows
 
 
 def report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, triggered: TriggeringRun | None) -> str:
@@ -40,6 +41,7 @@ def report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, triggered: Tri
         growth=growth,
         triggering=_triggering(triggered, runs[0].mu),
         assumptions=_assumptions(scene, packing),
+        si=si_rows(scene, runs, growth, triggered),
     )
 
 

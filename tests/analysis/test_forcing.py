@@ -58,12 +58,19 @@ def test_largest_velocity_is_that_of_a_fine_sampling(packing):
     response = impulse_response(packing, layer_force(packing, 1.0))
     omegas = np.array([0.3, 14.2, 120.0])
     found, when = response.largest(omegas, 10.0)
-    times = np.linspace(0.0, 10.0, 200_001)
     for omega, velocity, time in zip(omegas, found, when, strict=True):
-        sampled = np.abs(response.velocity(omega, times))
+        sampled = np.abs(_velocities(response, omega, 10.0, 448))
         # between samples a 600th of the fastest period apart, the velocity rises by less than 1e-5
         assert velocity == pytest.approx(sampled.max(), rel=1e-5)
         assert abs(response.velocity(omega, [time])[0]) == pytest.approx(velocity, rel=1e-12)
+
+
+def _velocities(response, omega, duration, count):
+    """v at count^2 times, from exponentials of `count` long steps and as many short ones."""
+    long, short = duration / count * np.arange(count), duration / count**2 * np.arange(count)
+    rate, part = response.rate, response.weight / (1j * omega - response.rate)
+    rate, part = np.append(rate, 1j * omega), np.append(-part, part.sum())
+    return np.real((np.exp(np.multiply.outer(long, rate)) * part) @ np.exp(np.multiply.outer(rate, short)))
 
 
 def test_resonance_grows_as_the_time(packing):

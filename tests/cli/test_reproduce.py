@@ -11,6 +11,9 @@ import h5py
 import numpy as np
 import pytest
 
+from faultgouge.pywrap import Scene
+from faultgouge.pywrap.units import real_units
+
 BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
@@ -32,6 +35,13 @@ amplitude = 1e-9
 omega = 0.01
 [friction]
 v_ss = "10 v0"
+[units]
+grain_diameter = "100 um"
+density = "2650 kg/m^3"
+youngs_modulus = "95 GPa"
+poisson_ratio = 0.08
+restitution = 0.9
+impact_velocity = "1 m/s"
 """
 
 FIGURES = ("figure1", "figure2", "figure3", "figure4", "figure5a", "figure5b", "figure6", "amplitude", "damping")
@@ -67,6 +77,15 @@ def test_reproduce(tmp_path):
     assert triggering["jump"] > 1e6 * triggering["largest_D"]["perturbed"]
     assert triggering["largest_D_of_the_control"] > 0
     assert triggering["smallest_mu"] == pytest.approx(0.8, abs=1e-6)
+
+    rows = {cells[1].strip(): cells[3].strip() for line in report.splitlines() if len(cells := line.split("|")) == 5}
+    real = real_units(Scene.from_toml(tmp_path / "scene.toml"))
+    assert rows["F_x^c for mu = 1, a shear stress"].startswith(f"{1e-6 * real.stress(first['onset']['fx_c']):.4g} MPa")
+    assert rows["frequency of the pair there"].endswith("Hz")
+    assert rows["dashpot C_N of the restitution"] == "0.9 at 1 m/s"
+    assert rows["amplitude of the wave, as ground velocity"] == f"{real.ground_velocity(1e-9, 0.01, 'layer'):.3g} m/s"
+    assert rows["v_0, above which friction weakens"].endswith("m/s")
+    assert rows["time in which the fastest motion grows e-fold"].endswith(" s")
 
 
 def test_a_ramp_that_is_killed_goes_on(tmp_path):

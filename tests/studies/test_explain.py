@@ -35,6 +35,7 @@ BROUGHT = {
     "dashpots": {"part dashpots.in", "fix dashpots", "array f_dashpots (6 columns)"},
     "drag": {"part drag.in"},
     "perturbation": {"part push.in", "fix push"},
+    "signal": {"part signal.in", "fix force", "compute signal"},
     "compensated coordinates": {"fix low", "array f_floor (8 columns)", "array f_low (5 columns)"},
     "dumps": {"part write.in", "file run.1.contacts", "file run.1.disks", "file run.1.params"},
     "per-contact output": {"compute contact", "dump contact"},
@@ -52,7 +53,8 @@ def paper():
 @pytest.fixture(scope="module")
 def frictionless():
     mapping = Scene.from_toml(SCENES / "frictionless.toml").resolved()
-    return explain(Scene.from_mapping(mapping | {"output": {"dumps": True, "trajectory": True}}))
+    pulse = {"fx": 0.0, "time": 1.0, "signal": "pulse", "amplitude": 1e-9, "omega": 3.0}
+    return explain(Scene.from_mapping(mapping | {"output": {"dumps": True, "trajectory": True}, "perturb": pulse}))
 
 
 def included(explanation):
@@ -62,7 +64,7 @@ def included(explanation):
 def test_what_is_in(paper, frictionless):
     always = {"floor", "periodicity"}
     assert included(paper) == always | {"tangential history", "dynamic friction", "perturbation"}
-    assert included(frictionless) == always | {"dumps", "per-contact output", "trajectory"}
+    assert included(frictionless) == always | {"signal", "dumps", "per-contact output", "trajectory"}
 
 
 def test_what_each_part_brings(paper, frictionless):
@@ -76,7 +78,7 @@ def test_what_is_left_out_is_not_loaded(frictionless):
     loaded = set(frictionless.loaded.everything)
     for name in ("tangential history", "dynamic friction", "dashpots", "drag", "perturbation"):
         assert not BROUGHT[name] & loaded, name
-    assert frictionless.loaded.parts == ("system.in", "undamped.in")
+    assert frictionless.loaded.parts == ("system.in", "undamped.in", "signal.in")
 
 
 def test_what_both_compute_agrees_to_the_bit(paper, frictionless):

@@ -82,13 +82,12 @@ def spectrum(
 
 def _gain_of(packing: Packing) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None of an unstable one, and of one that is too large."""
-    from faultgouge.analysis.transient import MOST_DISKS, NoGainError, transient_gain
+    from faultgouge.analysis.transient import MOST_DISKS, NoGainError, transient_gains
 
     if len(packing) > MOST_DISKS:
         return None
     try:
-        displacement = transient_gain(packing)
-        energy = transient_gain(packing, "energy")
+        displacement, energy = transient_gains(packing)
     except NoGainError:
         return None
     return {
@@ -136,10 +135,11 @@ def onset(
     for mu in wanted.law.mus if not found else ():
         with status(f"mu = {mu:g}") as show:
             run = onset_run(wanted, mu, modes=part, watch=partial(_under_way, show, f"mu = {mu:g}"))
-        found.append({"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond})
+        real = _in_si(wanted, [(each.fx_onset, abs(each.eigenvalue) ** 0.5) for each in run.onset.windows])
+        found.append({"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond} | real)
         among = "" if part is None else f" among the modes {part[0]}:{part[1]}"
         say(f"mu = {mu:g}: F_x^c = {with_uncertainty(run.onset.fx_c, run.onset.error)}{among}")
-        _show_windows(run.onset.windows)
+        _show_windows(run.onset.windows, real.get("si", []))
         for below, above in run.onset.doubtful:
             say(
                 f"a pair was expected to become complex between F_x = {below:.6g} and {above:.6g}, and was not found: "
@@ -165,21 +165,40 @@ def _damped_onset(scene: Scene, mu: float) -> dict[str, Any]:
     )
     without = "none on this ramp" if run.undamped is None else f"F_x^c = {run.undamped.fx_c:.12g}"
     say(f"mu = {mu:g}: without dissipation {without}")
-    return {"mu": mu} | run.as_dict()
+    real = _in_si(scene, [(each.fx_onset, each.frequency) for each in run.windows])
+    for each in real.get("si", [])[:1]:
+        stress, ratio, frequency = _columns(each)
+        say(f"mu = {mu:g}: in SI a shear stress of {stress} Pa, {ratio} of the overburden, at {frequency} Hz")
+    return {"mu": mu} | run.as_dict() | real
 
 
-def _show_windows(windows: Sequence[Window]) -> None:
-    """The windows of complex eigenvalues as a table, on standard error."""
+def _in_si(scene: Scene, windows: Sequence[tuple[float, float]]) -> dict[str, list[dict[str, float]]]:
+    """Loads at which windows begin, with frequencies, as the key si of a scene that has [units]; else nothing."""
+    from faultgouge.pywrap.units import real_units
+
+    real = real_units(scene)
+    return {} if real is None else {"si": [real.onset(fx, omega) for fx, omega in windows]}
+
+
+def _columns(si: dict[str, float]) -> list[str]:
+    """Stress, its share of the overburden, and frequency."""
+    return [f"{number:.4g}" for number in si.values()]
+
+
+def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]]) -> None:
+    """The windows of complex eigenvalues as a table, on standard error; in SI where the scene has units."""
     if not is_root():
         return
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("from F_x", "to F_x", "eigenvalue", "begins with", box=box.SIMPLE_HEAD)
-    for each in windows:
+    more = ("in Pa", "F_x/F_y", "in Hz") if si else ("eigenvalue",)
+    table = Table("from F_x", "to F_x", *more, "begins with", box=box.SIMPLE_HEAD)
+    for k, each in enumerate(windows):
         until = "the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}"
-        table.add_row(f"{each.fx_onset:.10g}", until, f"{each.eigenvalue:.6g}", each.kind)
+        more = _columns(si[k]) if si else (f"{each.eigenvalue:.6g}",)
+        table.add_row(f"{each.fx_onset:.10g}", until, *more, each.kind)
     Console(stderr=True, highlight=False).print(table)
 
 

@@ -1,0 +1,64 @@
+"""What commands say in SI: the numbers of the scene, times the units that tests/pywrap/test_units.py works out."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from faultgouge.pywrap import Scene, SceneError
+from faultgouge.pywrap.units import real_units
+from faultgouge.studies.reproduce import reproduce
+
+BIN = Path(sys.executable).parent
+SCENE = """
+[packing]
+disks = 30
+seed = 4
+[law]
+kn = 2e5
+[load]
+fy = 3.0
+[ramp]
+step = 4e-3
+until = 0.012
+[perturb]
+fx = 0.011
+time = 1.0
+amplitude = 5e-10
+omega = 0.01
+[friction]
+v_ss = "10 v0"
+[units]
+grain_diameter = "100 um"
+density = "2650 kg/m^3"
+youngs_modulus = "95 GPa"
+poisson_ratio = 0.08
+restitution = 0.9
+impact_velocity = "1 m/s"
+"""
+
+
+@pytest.mark.parametrize("damping", ["", "[damping]\ncn = 1.0\n"])
+def test_onset_in_si(tmp_path, damping):
+    (tmp_path / "scene.toml").write_text(SCENE + damping)
+    done = subprocess.run(
+        [BIN / "faultgouge", "onset", "scene.toml", "--json"], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    real = real_units(Scene.from_toml(tmp_path / "scene.toml"))
+    window = found["windows"][0]
+    omega = window["frequency"] if damping else window["lambda"] ** 0.5
+    assert found["si"][0] == real.onset(found["fx_c"], omega)
+    assert found["si"][0]["shear_stress_Pa"] == pytest.approx(found["fx_c"] / 3.0 * real.overburden, rel=1e-12)
+    for number in found["si"][0].values():
+        assert f"{number:.4g}" in done.stderr
+
+
+def test_a_ramp_that_steps_over_the_window_is_refused(tmp_path):
+    """It is narrow: from 0.01159 to 0.01217."""
+    (tmp_path / "scene.toml").write_text(SCENE.replace("step = 4e-3\nuntil = 0.012", "step = 1e-2\nuntil = 0.02"))
+    with pytest.raises(SceneError, match="no load of the ramp lies in a window"):
+        reproduce(Scene.from_toml(tmp_path / "scene.toml"), tmp_path / "out", say=lambda _: None)
