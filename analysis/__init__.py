@@ -30,7 +30,7 @@ from .spectrum import (
     spectrum,
     stable_timestep,
 )
-from .stiffness import contact_stiffness, stiffness_matrix
+from .stiffness import stiffness_matrix
 from .transient import NoGainError, TransientGain, transient_gain
 
 __all__ = [
@@ -59,7 +59,6 @@ __all__ = [
     "Window",
     "closest_to_meeting",
     "complex_windows",
-    "contact_stiffness",
     "damped_windows",
     "damping_matrix",
     "discrete_frequency",

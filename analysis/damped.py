@@ -31,7 +31,6 @@ from .onset import smooth_root
 from .onset.limits import LIMITS
 from .onset.windows import increasing
 from .packing import Packing
-from .stiffness import Form
 
 STEADY = 1e-9
 """|Im s| below this share of the largest |s| counts as zero."""
@@ -89,7 +88,6 @@ def damped_windows(
     equilibrium: Callable[[float], Packing],
     forces: ArrayLike,
     *,
-    form: Form = "consistent",
     narrowest: float | None = None,
     look: Iterable[float] = (),
     first: bool = False,
@@ -103,8 +101,6 @@ def damped_windows(
         fx -> Packing in equilibrium with its dashpots and drag, as in :func:`~faultgouge.analysis.find_onset`.
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
     narrowest : float, optional
         Windows narrower than this are not looked for, force; 1e-7 of the largest |load| by default.
     look : iterable of float, optional
@@ -129,7 +125,7 @@ def damped_windows(
     start = equilibrium(float(loads[0]))
     if not start.law.damped and start.drag_time is None:
         raise ValueError("The packing has no dissipation: find_onset is what it needs.")
-    return growing_windows(lambda fx: Pencil.of(equilibrium(fx), form), loads, narrowest, look, first, watch)
+    return growing_windows(lambda fx: Pencil.of(equilibrium(fx)), loads, narrowest, look, first, watch)
 
 
 def growing_windows(
