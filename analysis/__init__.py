@@ -16,7 +16,7 @@ from .files import read_packing
 from .geometry import ContactGeometry, nearest_image, touching
 from .growth import Growth, fit_growth, mean_square_displacement
 from .law import MindlinLaw
-from .onset import Onset, OnsetError, Window, complex_windows, find_onset, follow, scan_windows
+from .onset import Onset, OnsetError, Window, complex_windows, find_onset
 from .packing import Packing
 from .response import LinearMotion, layer_force, layer_response, linear_response
 from .runfile import RunFile
@@ -30,7 +30,7 @@ from .spectrum import (
     spectrum,
     stable_timestep,
 )
-from .stiffness import contact_stiffness, stiffness_matrix
+from .stiffness import stiffness_matrix
 from .transient import NoGainError, TransientGain, transient_gain
 
 __all__ = [
@@ -59,7 +59,6 @@ __all__ = [
     "Window",
     "closest_to_meeting",
     "complex_windows",
-    "contact_stiffness",
     "damped_windows",
     "damping_matrix",
     "discrete_frequency",
@@ -67,7 +66,6 @@ __all__ = [
     "eigenpairs",
     "find_onset",
     "fit_growth",
-    "follow",
     "growth_rate",
     "largest_damping_rate",
     "largest_frequency",
@@ -79,7 +77,6 @@ __all__ = [
     "normal_modes",
     "read_dump",
     "read_packing",
-    "scan_windows",
     "spectrum",
     "stable_timestep",
     "stiffness_matrix",

@@ -1,4 +1,8 @@
-"""Arrays as packings keep them: checked, copied and read-only."""
+"""Values as packings and other frozen data keep them: checked, converted, copied and read-only.
+
+A frozen dataclass whose fields are not what its constructor takes (arrays for lists, ones for None) has a constructor
+of its own, which converts with the functions here and hands the result to `settle`. Nothing else sets a field.
+"""
 
 from collections.abc import Iterable
 from typing import Any
@@ -26,6 +30,35 @@ def same_bits(one: Any, other: Any) -> bool:
 def frozen(array: NDArray) -> NDArray:
     """The array, read-only from now on."""
     array.flags.writeable = False
+    return array
+
+
+def settle(data: object, **values: object) -> None:
+    """Give a frozen dataclass that is being made its values, once; arrays are read-only from now on."""
+    for name, value in values.items():
+        object.__setattr__(data, name, frozen(value) if isinstance(value, np.ndarray) else value)
+
+
+def number(name: str, value: float, *, positive: bool = False) -> float:
+    """A float; a ValueError if it is not finite, or not positive where it has to be."""
+    found = float(value)
+    if not np.isfinite(found) or (positive and found <= 0):
+        raise ValueError(f"{name} = {found} is not a number that it can have.")
+    return found
+
+
+def positive_each(name: str, array: Floats) -> Floats:
+    """The array; a ValueError if one of its values, each of which is a disk's, is not positive."""
+    if np.any(array <= 0):
+        raise ValueError(f"Every {name} must be positive; disk {np.argmin(array)} has another.")
+    return array
+
+
+def booleans(name: str, value: ArrayLike, count: int) -> NDArray[np.bool_]:
+    """A copy; a ValueError if it is not so many booleans, one for each disk."""
+    array = np.array(value)
+    if array.shape != (count,) or array.dtype != np.bool_:
+        raise ValueError(f"{name} must be {count} booleans, one for each disk.")
     return array
 
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Floats, Indices, floats, frozen, integers, same_bits
+from .arrays import Floats, Indices, floats, integers, same_bits, settle
 
 FLOOR = -1
 """The index that stands for the floor as the second partner of a contact."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, init=False, eq=False)
 class Contacts:
     """The contacts of a packing and their slips, kept in one canonical order.
 
@@ -39,25 +39,22 @@ class Contacts:
     i: Indices
     j: Indices
     slip: Floats
-    slip_low: Floats | None = None
+    slip_low: Floats | None
 
-    def __post_init__(self) -> None:
-        i, j = integers("i", self.i), integers("j", self.j)
-        slip = floats("slip", self.slip, np.shape(i))
-        if i.shape != j.shape:
-            raise ValueError(f"The contact arrays i and j have different shapes, {i.shape} and {j.shape}.")
-        if np.any(i < 0) or np.any(j < FLOOR):
+    def __init__(self, i: ArrayLike, j: ArrayLike, slip: ArrayLike, slip_low: ArrayLike | None = None) -> None:
+        first, second = integers("i", i), integers("j", j)
+        if first.shape != second.shape:
+            raise ValueError(f"The contact arrays i and j have different shapes, {first.shape} and {second.shape}.")
+        if np.any(first < 0) or np.any(second < FLOOR):
             raise ValueError("A contact has a negative disk index; only j may be -1, for the floor.")
-        if np.any(i == j):
-            raise ValueError(f"Disk {i[i == j][0]} is listed as touching itself.")
-        low = None if self.slip_low is None else floats("slip_low", self.slip_low, i.shape)
-        if not _canonical(i, j):
-            i, j, order = _ordered(i, j)
-            slip, low = slip[order], None if low is None else low[order]
-        for name, value in (("i", i), ("j", j), ("slip", slip)):
-            object.__setattr__(self, name, frozen(value))
-        if low is not None:
-            object.__setattr__(self, "slip_low", frozen(low))
+        if np.any(first == second):
+            raise ValueError(f"Disk {first[first == second][0]} is listed as touching itself.")
+        slips = floats("slip", slip, first.shape)
+        low = None if slip_low is None else floats("slip_low", slip_low, first.shape)
+        if not _canonical(first, second):
+            first, second, order = _ordered(first, second)
+            slips, low = slips[order], None if low is None else low[order]
+        settle(self, i=first, j=second, slip=slips, slip_low=low)
 
     def __len__(self) -> int:
         return len(self.i)
@@ -79,10 +76,7 @@ class Contacts:
 
     def slipped(self, slip: ArrayLike, slip_low: ArrayLike | None = None) -> "Contacts":
         """The same contacts with other slips, whose order is the one here; length, shape (C,)."""
-        other = object.__new__(Contacts)
-        low = None if slip_low is None else frozen(floats("slip_low", slip_low, self.i.shape))
-        other.__dict__.update(i=self.i, j=self.j, slip=frozen(floats("slip", slip, self.i.shape)), slip_low=low)
-        return other
+        return Contacts(self.i, self.j, slip, slip_low)
 
 
 def _canonical(i: Indices, j: Indices) -> bool:

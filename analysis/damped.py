@@ -17,8 +17,9 @@ operator is computed at that load and both halves are examined again, until no w
 hide. Undamped windows are looked into besides: between their edges the growth without dissipation is largest.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -27,11 +28,10 @@ from numpy.typing import ArrayLike
 from .damped_modes import DampedMode, DampedModes, Pencil
 from .damped_step import Step, excursion
 from .errors import FaultgougeError, NoEquilibriumError
-from .onset import smooth_root
-from .onset.limits import LIMITS
+from .onset.edge import bracketed_jump, jump_width, smooth_root
+from .onset.walk import between, walk
 from .onset.windows import increasing
 from .packing import Packing
-from .stiffness import Form
 
 STEADY = 1e-9
 """|Im s| below this share of the largest |s| counts as zero."""
@@ -89,7 +89,6 @@ def damped_windows(
     equilibrium: Callable[[float], Packing],
     forces: ArrayLike,
     *,
-    form: Form = "consistent",
     narrowest: float | None = None,
     look: Iterable[float] = (),
     first: bool = False,
@@ -103,8 +102,6 @@ def damped_windows(
         fx -> Packing in equilibrium with its dashpots and drag, as in :func:`~faultgouge.analysis.find_onset`.
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
     narrowest : float, optional
         Windows narrower than this are not looked for, force; 1e-7 of the largest |load| by default.
     look : iterable of float, optional
@@ -129,7 +126,7 @@ def damped_windows(
     start = equilibrium(float(loads[0]))
     if not start.law.damped and start.drag_time is None:
         raise ValueError("The packing has no dissipation: find_onset is what it needs.")
-    return growing_windows(lambda fx: Pencil.of(equilibrium(fx), form), loads, narrowest, look, first, watch)
+    return growing_windows(lambda fx: Pencil.of(equilibrium(fx)), loads, narrowest, look, first, watch)
 
 
 def growing_windows(
@@ -151,44 +148,51 @@ def growing_windows(
     """
     loads = increasing(forces)
     narrowest = 1e-7 * float(np.abs(loads).max()) if narrowest is None else narrowest
-    walk = _Walk(pencil, narrowest)
     here = DampedModes.of(pencil(float(loads[0])))
-    walk.begin(here)
+    oracle = Growing(pencil, narrowest, here)
     between = [float(fx) for fx in look if loads[0] < fx < loads[-1]]
     for load in np.unique(np.concatenate([loads[1:], between])):
         watch(f"damped modes at F_x = {load:.6g}")
         there = DampedModes.of(pencil(float(load)))
-        walk.go(here, there)
+        walk(oracle, [here, there])
         here = there
-        if first and (walk.open or walk.closed):
+        if first and (oracle.open or oracle.closed):
             break
-    return walk.windows()
+    return oracle.windows()
 
 
-class _Walk:
-    """Goes along the loads, with as many in between as it takes to be sure."""
+Crossings = dict[tuple[int, int], Crossing]
+"""Where modes, by their numbers at both ends of an increment, cross the axis."""
 
-    def __init__(self, pencil: Callable[[float], Pencil], narrowest: float) -> None:
+
+class Growing:
+    """The oracle of growing motion; its places are all modes of a load, and it is sure of a step and its crossings."""
+
+    finished = False
+
+    def __init__(self, pencil: Callable[[float], Pencil], narrowest: float, start: DampedModes) -> None:
         self.pencil, self.narrowest = pencil, narrowest
-        self.open: dict[int, Crossing] = {}  # by the index of the growing mode at the load reached so far
+        # by the index of the growing mode at the load reached so far
+        self.open = {int(k): Crossing(start.fx, 0.0, float(start.rates[k].imag), "start") for k in start.growing}
         self.closed: list[DampedWindow] = []
-
-    def begin(self, modes: DampedModes) -> None:
-        """Open the windows of the modes that grow at the smallest load."""
-        for k in modes.growing:
-            self.open[int(k)] = Crossing(modes.fx, 0.0, float(modes.rates[k].imag), "start")
 
     def windows(self) -> tuple[DampedWindow, ...]:
         """All windows by increasing onset."""
         still = [_window(edge, None) for edge in self.open.values()]
         return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
 
-    def go(self, here: DampedModes, there: DampedModes) -> None:
-        """Go from one load to the next."""
-        step, middle = Step.of(here, there), 0.5 * (here.fx + there.fx)
+    def candidates(self, places: Sequence[DampedModes]) -> Iterator[Step]:
+        """The assignment of the modes over each increment."""
+        return (Step.of(here, there) for here, there in pairwise(places))
+
+    def confirm(
+        self, step: Step, here: DampedModes, there: DampedModes, depth: int
+    ) -> tuple[tuple[Step, Crossings] | None, list[DampedModes]]:
+        """The crossings of a step, once nothing can hide in it any more."""
+        middle = 0.5 * (here.fx + there.fx)
         divisible = there.fx - here.fx > self.narrowest
         look = None if not divisible else middle if step.lost else self.unclear(step)
-        crossings: dict[tuple[int, int], Crossing] = {}
+        crossings: Crossings = {}
         for pair in [] if look is not None else step.edges:
             crossing = self.crossing(here.mode(pair[0]), there.mode(pair[1]))
             if crossing is not None:
@@ -196,12 +200,8 @@ class _Walk:
             elif divisible:
                 look = middle
                 break
-        between = None if look is None else self.between(here.fx, look, there.fx)
-        if between is None:
-            self.advance(step, crossings)
-            return
-        self.go(here, between)
-        self.go(between, there)
+        divide = [] if look is None else between(lambda fx: DampedModes.of(self.pencil(fx)), here.fx, look, there.fx)
+        return (None if divide else (step, crossings)), divide
 
     def unclear(self, step: Step) -> float | None:
         """A load at which all modes have to be looked at, as a pair grows there or cannot be followed; else None."""
@@ -234,15 +234,6 @@ class _Walk:
             return fx
         return self.inspected(here, modes) or self.inspected(modes, there)
 
-    def between(self, below: float, middle: float, above: float) -> DampedModes | None:
-        """The modes at a load in between, or at one beside it where that has no equilibrium."""
-        for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
-            try:
-                return DampedModes.of(self.pencil(fx))
-            except NoEquilibriumError:
-                continue
-        return None
-
     def crossing(self, here: DampedMode, there: DampedMode) -> Crossing | None:
         """Where a mode crosses the axis between two loads; None if it cannot be followed or jumps."""
         known = {here.fx: here, there.fx: there}
@@ -263,8 +254,9 @@ class _Walk:
         except (_LostError, NoEquilibriumError):
             return None
 
-    def advance(self, step: Step, crossings: dict[tuple[int, int], Crossing]) -> None:
+    def record(self, sure: tuple[Step, Crossings]) -> None:
         """Carry the windows over a step; what could not be solved for begins and ends halfway."""
+        step, crossings = sure
         half = 0.5 * (step.there.fx - step.here.fx)
         growing_here, growing_there = set(step.here.growing.tolist()), set(step.there.growing.tolist())
         now: dict[int, Crossing] = {}
@@ -298,10 +290,7 @@ def _root(mode: Callable[[float], DampedMode], below: float, above: float) -> Cr
         steady = middle.rate.imag <= STEADY * float(np.sqrt(np.abs(middle.pencil.stiffness).max()))
         kind: Kind = "steady" if steady else "hopf"
         return Crossing(root.fx, root.error + middle.pencil.balance, middle.rate.imag, kind)
-    left, right = below, above
-    while right - left > max(LIMITS.jump * (above - below), 4 * float(np.spacing(abs(right)))):
-        middle_fx = 0.5 * (left + right)
-        left, right = (middle_fx, right) if rate(middle_fx) * rate(below) > 0 else (left, middle_fx)
+    left, right = bracketed_jump(rate, below, above, jump_width(below, above))
     across = mode(left).at(mode(right).pencil)
     if across is None or (across.rate.real > 0) != (mode(right).rate.real > 0):
         raise _LostError  # the equilibrium does not jump there: it is the mode that has become another one

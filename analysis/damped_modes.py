@@ -30,7 +30,6 @@ from .onset import force_bearing
 from .packing import Floats, Indices, Packing
 from .spectrum import SAFETY, Complexes, unit_rounding
 from .state_space import StateSpace
-from .stiffness import Form
 
 STEADY = 1e-3
 """Digits of an eigenvalue smaller than this share of |Z|_F are not asked for."""
@@ -65,10 +64,10 @@ class Pencil:
     rounding: float
 
     @classmethod
-    def of(cls, packing: Packing, form: Form = "consistent") -> "Pencil":
+    def of(cls, packing: Packing) -> "Pencil":
         """That of a packing with dashpots or drag."""
         balance = packing.residual / float(np.sqrt(max(1, packing.top.sum())))
-        return cls.of_system(packing.fx, StateSpace.of(force_bearing(packing), form), 3 * len(packing), balance)
+        return cls.of_system(packing.fx, StateSpace.of(force_bearing(packing)), 3 * len(packing), balance)
 
     @classmethod
     def of_system(cls, fx: float, system: StateSpace, size: int, balance: float = 0.0) -> "Pencil":

@@ -13,7 +13,6 @@ from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from .packing import Floats, Indices, Packing
 from .spectrum import Complexes, dynamical_matrix, participation_ratio, rotation_share
-from .stiffness import Form
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,22 +51,20 @@ class Eigenpairs:
         return np.abs(np.sum(self.left.conj() * self.right, axis=0))
 
 
-def normal_modes(packing: Packing, form: Form = "consistent") -> Eigenpairs:
+def normal_modes(packing: Packing) -> Eigenpairs:
     """Every mode with its left and right vectors, by LAPACK's dense solver.
 
     Parameters
     ----------
     packing : Packing
         The configuration.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
 
     Returns
     -------
     Eigenpairs
         Sorted by real part, then imaginary part, as of :func:`spectrum`.
     """
-    matrix, active = dynamical_matrix(packing, form)
+    matrix, active = dynamical_matrix(packing)
     values, left, right = eig(matrix.toarray(), left=True, right=True)
     order = np.lexsort((values.imag, values.real))
     spread = np.zeros((2, 3 * len(packing), len(values)), dtype=np.complex128)
@@ -107,9 +104,7 @@ def closest_to_meeting(modes: Eigenpairs) -> tuple[int, int, float]:
     return int(real[first]), int(real[second]), float(cosine[first, second])
 
 
-def eigenpairs(
-    packing: Packing, near: complex, count: int, form: Form = "consistent", tolerance: float = 0.0
-) -> Eigenpairs:
+def eigenpairs(packing: Packing, near: complex, count: int, tolerance: float = 0.0) -> Eigenpairs:
     """The eigenvalues nearest to a shift, with left and right vectors: shift-invert Arnoldi (ARPACK).
 
     One sparse LU factorisation of :math:`A - \\sigma` serves the right vectors and, transposed, the left
@@ -123,8 +118,6 @@ def eigenpairs(
         The shift sigma, 1 / time^2. It should not be an eigenvalue to the last digit.
     count : int
         How many eigenvalues, at least 1 and at most E - 2 of the E coordinates that feel a force.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
     tolerance : float
         Relative error of the eigenvalues of the inverted operator at which the iteration may end; 0 for that of
         doubles.
@@ -142,7 +135,7 @@ def eigenpairs(
     scipy.sparse.linalg.ArpackError
         If Arnoldi's iteration does not converge.
     """
-    matrix, active = dynamical_matrix(packing, form)
+    matrix, active = dynamical_matrix(packing)
     size = matrix.shape[0]
     if not 1 <= count <= size - 2:
         raise ValueError(f"{count} eigenvalues were asked of an operator with {size}; at most {size - 2} are possible.")

@@ -46,6 +46,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arrays import settle
+
 Floats = NDArray[np.float64]
 
 EXPONENTS = (1.5, 1.0)
@@ -105,7 +107,7 @@ class MindlinLaw:
     def __post_init__(self) -> None:
         for name in ("kn", "kt", "mu", "exponent", "cn", "ct"):
             value = float(getattr(self, name))
-            object.__setattr__(self, name, value)
+            settle(self, **{name: value})
             if not isfinite(value) or value < 0 or (name == "kn" and value == 0):
                 sign = "positive" if name == "kn" else "not negative"
                 raise ValueError(f"{name} = {value} must be finite and {sign}.")

@@ -45,11 +45,9 @@ from scipy.optimize import brentq, minimize_scalar
 from .packing import Floats
 from .spectrum import Complexes
 
-STAR = np.array([1.0, 1.0]) / np.sqrt(2)
-"""v*, the direction that both eigenvectors take at the coalescence."""
-
 ORTHOGONAL = np.array([1.0, -1.0]) / np.sqrt(2)
-"""The direction across it, in which the response starts."""
+"""The direction across v* = (1, 1)/2^(1/2), which both eigenvectors take at the coalescence: the response starts in
+it."""
 
 PERIODS = 3
 """Periods of the fast oscillation on either side of the envelope's maximum among which the largest is looked for: the
@@ -107,11 +105,6 @@ class NormalForm:
     def gain(self) -> float:
         """g, the least upper bound of the undamped response over all times; infinite where the pair is complex."""
         return float(np.sqrt((2 - self.epsilon) / self.epsilon)) if self.epsilon > 0 else np.inf
-
-    @property
-    def asymptotic_amplitude(self) -> float:
-        """(2 / epsilon)^(1/2), the paper's Eq. 19 with its factor; infinite where the pair is complex."""
-        return float(np.sqrt(2 / self.epsilon)) if self.epsilon > 0 else np.inf
 
     @property
     def tau_d(self) -> float:

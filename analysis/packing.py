@@ -24,14 +24,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import display
-from .arrays import Floats, Indices, floats, frozen, same_bits
+from .arrays import Floats, Indices, booleans, floats, frozen, number, positive_each, same_bits, settle
 from .compensated import Pair
 from .contacts import Contacts
 from .geometry import ContactGeometry, check_box, measured
 from .law import MindlinLaw
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, init=False, eq=False)
 class Packing:
     """A configuration of disks with its contacts, law and load. Arrays are copied and made read-only.
 
@@ -73,46 +73,54 @@ class Packing:
     radius: Floats
     contacts: Contacts
     law: MindlinLaw
-    # None stands for the defaults that __post_init__ puts in its place: the attributes are arrays
-    angle: Floats = None  # type: ignore[assignment]
-    mass: Floats = None  # type: ignore[assignment]
-    inertia_factor: float = 1.0
-    box_length: float | None = None
-    top: NDArray[np.bool_] = None  # type: ignore[assignment]
-    fx: float = 0.0
-    fy: float = 0.0
-    position_low: Floats | None = None
-    drag_time: float | None = None
+    angle: Floats
+    mass: Floats
+    inertia_factor: float
+    box_length: float | None
+    top: NDArray[np.bool_]
+    fx: float
+    fy: float
+    position_low: Floats | None
+    drag_time: float | None
 
-    def __post_init__(self) -> None:
-        n = len(np.atleast_1d(self.radius))
+    def __init__(
+        self,
+        *,
+        position: ArrayLike,
+        radius: ArrayLike,
+        contacts: Contacts,
+        law: MindlinLaw,
+        angle: ArrayLike | None = None,
+        mass: ArrayLike | None = None,
+        inertia_factor: float = 1.0,
+        box_length: float | None = None,
+        top: ArrayLike | None = None,
+        fx: float = 0.0,
+        fy: float = 0.0,
+        position_low: ArrayLike | None = None,
+        drag_time: float | None = None,
+    ) -> None:
+        n = len(np.atleast_1d(np.asarray(radius)))
         if n == 0:
             raise ValueError("A packing needs at least one disk.")
-        arrays: dict[str, NDArray] = {
-            "position": floats("position", self.position, (n, 2)),
-            "radius": floats("radius", self.radius, (n,)),
-            "angle": floats("angle", np.zeros(n) if self.angle is None else self.angle, (n,)),
-            "mass": floats("mass", np.ones(n) if self.mass is None else self.mass, (n,)),
-            "top": np.array(np.zeros(n, bool) if self.top is None else self.top),
-        }
-        if self.position_low is not None:
-            arrays["position_low"] = floats("position_low", self.position_low, (n, 2))
-        for name in ("radius", "mass"):
-            if np.any(arrays[name] <= 0):
-                raise ValueError(f"Every {name} must be positive; disk {np.argmin(arrays[name])} has another.")
-        if arrays["top"].shape != (n,) or arrays["top"].dtype != np.bool_:
-            raise ValueError(f"top must be {n} booleans, one for each disk.")
-        for name, value in arrays.items():
-            object.__setattr__(self, name, frozen(value))
-        for name in ("inertia_factor", "fx", "fy", "box_length", "drag_time"):
-            if getattr(self, name) is None:
-                continue
-            number = float(getattr(self, name))
-            object.__setattr__(self, name, number)
-            if not np.isfinite(number) or (name in ("inertia_factor", "box_length", "drag_time") and number <= 0):
-                raise ValueError(f"{name} = {number} is not a number that it can have.")
+        settle(
+            self,
+            position=floats("position", position, (n, 2)),
+            radius=positive_each("radius", floats("radius", radius, (n,))),
+            contacts=contacts,
+            law=law,
+            angle=floats("angle", np.zeros(n) if angle is None else angle, (n,)),
+            mass=positive_each("mass", floats("mass", np.ones(n) if mass is None else mass, (n,))),
+            inertia_factor=number("inertia_factor", inertia_factor, positive=True),
+            box_length=None if box_length is None else number("box_length", box_length, positive=True),
+            top=booleans("top", np.zeros(n, bool) if top is None else top, n),
+            fx=number("fx", fx),
+            fy=number("fy", fy),
+            position_low=None if position_low is None else floats("position_low", position_low, (n, 2)),
+            drag_time=None if drag_time is None else number("drag_time", drag_time, positive=True),
+        )
         check_box(self.radius, self.box_length)
-        if len(self.contacts) and max(self.contacts.i.max(), self.contacts.j.max()) >= n:
+        if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= n:
             raise ValueError(f"A contact names a disk beyond the last one, {n - 1}.")
 
     def __len__(self) -> int:
@@ -212,38 +220,6 @@ class Packing:
         distance[self.contacts.floor] = between[self.contacts.floor, 1]
         normal = between / distance[:, None]
         return self.law.normal_force(delta), self.law.tangential_force(delta, slip), normal
-
-    def moved(
-        self,
-        position: ArrayLike,
-        angle: ArrayLike,
-        contacts: Contacts,
-        position_low: ArrayLike | None = None,
-        fx: float | None = None,
-    ) -> "Packing":
-        """The same disks elsewhere; only what is new is checked.
-
-        Parameters
-        ----------
-        position, angle, contacts, position_low
-            As of the class.
-        fx : float, optional
-            Force along x on each disk of the upper layer; as it was by default.
-        """
-        n = len(self)
-        if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= n:
-            raise ValueError(f"A contact names a disk beyond the last one, {n - 1}.")
-        other = object.__new__(Packing)
-        other.__dict__.update({name: getattr(self, name) for name in self.__dataclass_fields__})
-        other.__dict__.update(
-            position=frozen(floats("position", position, (n, 2))),
-            angle=frozen(floats("angle", angle, (n,))),
-            contacts=contacts,
-            position_low=None if position_low is None else frozen(floats("position_low", position_low, (n, 2))),
-        )
-        if fx is not None:
-            other.__dict__["fx"] = fx
-        return other
 
     def loaded(self, least: float) -> "Packing":
         """The packing without the contacts that carry no more than a given force.

@@ -32,7 +32,7 @@ from .oscillator import Oscillator
 from .packing import Floats, Packing
 from .spectrum import Complexes
 from .state_space import StateSpace, driven, released
-from .stiffness import Form, stiffness_matrix
+from .stiffness import stiffness_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +89,11 @@ class LinearMotion:
     modes: Modes
 
     @classmethod
-    def of(cls, packing: Packing, form: Form = "consistent", damping_time: float | None = None) -> "LinearMotion":
+    def of(cls, packing: Packing, damping_time: float | None = None) -> "LinearMotion":
         """Decompose a packing; parameters and errors as of `linear_response`."""
         if damping_time is not None:
             packing = replace(packing, drag_time=damping_time)
-        system = StateSpace.of(packing, form)
+        system = StateSpace.of(packing)
         modes = Modes.of(system.matrix if packing.law.damped else system.stiffness)
         return cls(packing, system, packing.drag_time, modes)
 
@@ -172,7 +172,6 @@ def linear_response(
     initial: ArrayLike | None = None,
     damping_time: float | None = None,
     dt: float | None = None,
-    form: Form = "consistent",
 ) -> Response:
     """Motion of the linearised packing from rest, with its dashpots and drag.
 
@@ -194,8 +193,6 @@ def linear_response(
         tau of the drag -M q'/tau, time; that of the packing by default.
     dt : float, optional
         Time step of the undamped velocity Verlet run to be met; exact dynamics by default.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
 
     Returns
     -------
@@ -209,11 +206,11 @@ def linear_response(
     numpy.linalg.LinAlgError
         If more than two eigenvalues coalesce.
     """
-    motion = LinearMotion.of(packing, form, damping_time)
+    motion = LinearMotion.of(packing, damping_time)
     return motion.response(times, force=force, omega=omega, initial=initial, dt=dt)
 
 
-def layer_response(packing: Packing, omega: ArrayLike, form: Form = "consistent") -> Complexes:
+def layer_response(packing: Packing, omega: ArrayLike) -> Complexes:
     """Stationary velocity of the upper layer per unit of force at any frequency.
 
     The force Re(a exp(i omega t)) along x on each disk of the upper layer goes with the mean velocity
@@ -226,15 +223,13 @@ def layer_response(packing: Packing, omega: ArrayLike, form: Form = "consistent"
         The equilibrium, with its dashpots and drag. Without them V is imaginary, and infinite in resonance.
     omega : array_like, shape (W,)
         Angular frequencies, radian / time.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
 
     Returns
     -------
     ndarray of complex, shape (W,)
         V, length / time / force.
     """
-    k, c = stiffness_matrix(packing, form), damping_matrix(packing)
+    k, c = stiffness_matrix(packing), damping_matrix(packing)
     active = np.flatnonzero(np.diff(k.indptr))
     k, c = (csc_array(matrix[active][:, active]) for matrix in (k, c))
     mass = diags_array(_mass(packing)[active])

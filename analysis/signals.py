@@ -17,11 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import Floats, settle
 from .errors import BadInputError
-
-Floats = NDArray[np.float64]
 
 ONSET_OF_PULSE = 10.0
 """omega t_0 of a pulse: x = 5 at t = 0, where the pulse is 1e-9 of its peak."""
@@ -55,8 +54,7 @@ class Signal:
     value: Floats
 
     def __post_init__(self) -> None:
-        for name in ("time", "value"):
-            object.__setattr__(self, name, np.array(getattr(self, name), dtype=np.float64))
+        settle(self, time=np.array(self.time, dtype=np.float64), value=np.array(self.value, dtype=np.float64))
         if self.time.ndim != 1 or self.time.shape != self.value.shape or len(self.time) < 2:
             raise SignalError(
                 f"a signal has two columns of one length with two rows or more, and not the shapes {self.time.shape} "

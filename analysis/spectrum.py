@@ -297,10 +297,8 @@ def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
     return np.asarray(2.0 / dt * np.arcsin(0.5 * dt * root), dtype=np.complex128)
 
 
-def largest_frequency(packing: Packing, form: Form = "consistent") -> float:
+def largest_frequency(packing: Packing) -> float:
     """omega_max = max sqrt|lambda|; to `LIMIT`, by Arnoldi's iteration (ARPACK), beyond `DENSE` coordinates.
-
-    Its arguments are those of :func:`~faultgouge.analysis.dynamical_matrix`.
 
     Returns
     -------
@@ -312,10 +310,10 @@ def largest_frequency(packing: Packing, form: Form = "consistent") -> float:
     scipy.sparse.linalg.ArpackError
         If the iteration does not converge.
     """
-    matrix, _ = dynamical_matrix(packing, form)
+    matrix, _ = dynamical_matrix(packing)
     size = matrix.shape[0]
     if size <= DENSE:
-        return spectrum(packing, form).omega_max
+        return spectrum(packing).omega_max
     # always the same one, for a result that is reproducible; without the symmetry that a crystal's fastest mode lacks
     start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
     largest = eigs(matrix, 1, which="LM", v0=start, tol=LIMIT, return_eigenvectors=False)

@@ -10,12 +10,12 @@ Coordinates and forces are those of :mod:`~faultgouge.analysis.packing`, in the 
     (P \cdot \mathrm dq)/r, \quad \mathrm d\boldsymbol\tau = -\mathbf n\, (P \cdot \mathrm dq)/r \\
     T &= (\boldsymbol\tau, -1, -\boldsymbol\tau, -1), & \mathrm ds &= T \cdot \mathrm dq
 
-The force on all six is :math:`f_n N + f_t T`, and its derivative, with a and b of
-:mod:`~faultgouge.analysis.law`,
+The force on all six is :math:`f_n N + f_t T`, and its derivative, with :math:`f_n' = \mathrm df_n/\mathrm d\delta`
+and with a and b of :mod:`~faultgouge.analysis.law`,
 
 .. math::
 
-    -K_c = -\tfrac32 k_n \delta^{1/2}\, N N^T + \frac{f_n}{r}\, P P^T + a\, T T^T
+    -K_c = -f_n'\, N N^T + \frac{f_n}{r}\, P P^T + a\, T T^T
     - b\, T N^T - \frac{f_t}{r}\, N P^T
 
 For the floor only the first three coordinates exist and P = 0. The last two terms are not symmetric: the
@@ -34,9 +34,8 @@ T, and rotations the same sign:
     \mathbf h^T & -a & -\mathbf h^T & -a \\ -S & -a\boldsymbol\tau & S & -a\boldsymbol\tau \\
     \mathbf h^T & -a & -\mathbf h^T & -a \end{pmatrix}, \qquad \mathbf h = a\boldsymbol\tau - b\,\mathbf n
 
-with :math:`S = \tfrac32 k_n \delta^{1/2} \mathbf n \mathbf n^T - (f_n/r + a) \boldsymbol\tau \boldsymbol\tau^T +
-b\, \boldsymbol\tau \mathbf n^T + (f_t/r)\, \mathbf n \boldsymbol\tau^T`. K is assembled from these (`contact_terms`);
-`contact_stiffness` writes out the products above.
+with :math:`S = f_n' \mathbf n \mathbf n^T - (f_n/r + a) \boldsymbol\tau \boldsymbol\tau^T +
+b\, \boldsymbol\tau \mathbf n^T + (f_t/r)\, \mathbf n \boldsymbol\tau^T`. K is assembled from these (`contact_terms`).
 
 Without friction only N and P are left, and K is an operator on the 2N coordinates (x, y): rows and columns of rotations
 are empty.
@@ -168,53 +167,6 @@ def contact_terms(law: Derivatives, normal: Floats, distance: Floats, pairs: int
     np.subtract(terms[:2, 2], b * normal, out=terms[2, :2])
     np.negative(a, out=terms[2, 2])
     return terms
-
-
-def contact_stiffness(packing: Packing, form: Form = "consistent") -> Floats:
-    """The 6 x 6 blocks K_c of the contacts in (x_i, y_i, u_i, x_j, y_j, u_j).
-
-    Parameters
-    ----------
-    packing : Packing
-        The configuration.
-    form : {"consistent", "paper"}
-        As in :func:`stiffness_matrix`.
-
-    Returns
-    -------
-    ndarray, shape (C, 6, 6)
-        Force / length; the rows and columns of j are zero for the floor, those of u without friction.
-    """
-    _check(form)
-    law, slip, floor = packing.law, packing.contacts.slip, packing.contacts.floor
-    normal, tangent, distance, overlap = packing.geometry
-    zero = np.zeros((len(slip), 1))
-    big_n = np.hstack([normal, zero, -normal, zero])
-    big_p = np.hstack([tangent, zero, -tangent, zero])
-    big_n[floor, 3:] = big_p[floor] = 0.0
-    # Only contacts of finite length turn; the floor's distance is a height and may even be zero.
-    turning = np.where(floor, 0.0, 1.0) / np.where(floor, 1.0, distance)
-    fn_over_r = law.normal_force(overlap) * turning
-    c = law.normal_stiffness(overlap)
-    if not law.frictional:
-        left = np.stack([big_n, big_p], axis=2)
-        return left @ np.stack([c[:, None] * big_n, -fn_over_r[:, None] * big_p], axis=1)
-    one = np.ones_like(zero)
-    big_t = np.hstack([tangent, -one, -tangent, -one])
-    big_t[floor, 3:] = 0.0
-    ft_over_r = law.tangential_force(overlap, slip) * turning * (form == "consistent")
-    a = law.tangential_slip_derivative(overlap, slip)
-    b = law.tangential_overlap_derivative(overlap, slip)
-    left = np.stack([big_n, big_p, big_t], axis=2)
-    right = np.stack(
-        [
-            c[:, None] * big_n + ft_over_r[:, None] * big_p,
-            -fn_over_r[:, None] * big_p,
-            -a[:, None] * big_t + b[:, None] * big_n,
-        ],
-        axis=1,
-    )
-    return left @ right
 
 
 def _check(form: str) -> None:

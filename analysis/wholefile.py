@@ -70,15 +70,6 @@ def check_folder(path: Path) -> None:
         raise OutputError(f"{path} cannot be written: the folder {folder} may not be written to.")
 
 
-def append_line(path: Path, line: str) -> None:
-    """Add a line to a text file; it is in the file when this returns. Errors as those of `write_whole`."""
-    try:
-        with path.open("a") as stream:
-            stream.write(line + "\n")
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror}; its lines so far are kept.") from error
-
-
 def make_folder(path: Path) -> None:
     """Make a folder, and those above it, if need be."""
     try:

@@ -30,7 +30,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
-from faultgouge.analysis import scan_windows
+from faultgouge.analysis import spectrum
 from faultgouge.pywrap import Equilibrium, Scene, ramp
 from faultgouge.studies.onsets import onset_run
 
@@ -113,14 +113,13 @@ def scanned(progress: Callable[[Equilibrium], None]) -> Result:
     for equilibrium in ramp(scene("overdamped", increment)):
         equilibria.append(equilibrium)
         progress(equilibrium)
-    windows = scan_windows([each.packing for each in equilibria])
+    loads = [each.fx for each in equilibria if spectrum(each.packing).pairs]
     seconds = elapsed(begin)
-    if not windows:
+    if not loads:
         sys.exit(f"The scan shows no complex pair up to F_x = {UNTIL}.")
     evaluations = sum(each.evaluations for each in equilibria)
-    first = windows[0]
-    difference = abs(first.fx_onset - EXACT)
-    return Result("scanned", increment, *seconds, evaluations, first.fx_onset, first.error, difference)
+    onset, error = loads[0] - 0.5 * increment, 0.5 * increment
+    return Result("scanned", increment, *seconds, evaluations, onset, error, abs(onset - EXACT))
 
 
 def announce(equilibrium: Equilibrium) -> None:

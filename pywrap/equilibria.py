@@ -68,18 +68,18 @@ def ramp(
                 yield start
 
 
-def reach(scene: Scene, fx: float, communicator: MPI.Comm | None = None) -> Iterator[Equilibrium]:
+def reach(scene: Scene, fx: float) -> Iterator[Equilibrium]:
     """The equilibria of a ramp up to and with fx, by the steps of the scene's ramp or, without one, of 1e-3."""
     step = scene.ramp.step if scene.ramp else 1e-3
     settings = (scene.ramp or Ramp(until=max(fx, step))).model_copy(update={"step": step, "until": max(fx, step)})
     bounded = scene.model_copy(update={"ramp": settings})
     last = None
-    for last in ramp(bounded, communicator=communicator):
+    for last in ramp(bounded):
         if last.fx > fx:
             return
         yield last
     if last is not None and last.fx < fx:
-        with Engine(last.packing, communicator) as engine:
+        with Engine(last.packing) as engine:
             yield next_equilibrium(engine, last, fx, bounded)
 
 

@@ -5,7 +5,7 @@ nothing more; a `Packing`, with all that is checked for it, is made of the one t
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -65,6 +65,8 @@ class Trial:
         (Fx.., Fy.., T/R..), load included.
     arrays : dict of ndarray
         All of this as LAMMPS has it, by the names of its arrays.
+    known : Packing or None
+        The configuration, if the trial was made of one.
     """
 
     still: Packing
@@ -77,31 +79,30 @@ class Trial:
     slip_low: Floats | None
     force: Floats
     arrays: dict[str, Floats]
+    known: Packing | None = None
 
     @classmethod
     def of(cls, packing: Packing) -> "Trial":
         """A packing as a trial, forces unknown."""
         contacts = packing.contacts
-        trial = cls(
-            packing,
-            packing.fx,
-            packing.position,
-            packing.position_low,
-            packing.angle,
-            ContactGraph(contacts, packing.radius),
-            contacts.slip,
-            contacts.slip_low,
-            np.full(3 * len(packing), np.nan),
-            {},
-        )
-        trial.__dict__["packing"] = packing
-        return trial
+        graph = ContactGraph(contacts, packing.radius)
+        place = packing.position, packing.position_low, packing.angle
+        force = np.full(3 * len(packing), np.nan)
+        return cls(packing, packing.fx, *place, graph, contacts.slip, contacts.slip_low, force, {}, packing)
 
     @cached_property
     def packing(self) -> Packing:
         """The configuration with its load."""
-        contacts = self.graph.contacts.slipped(self.slip, self.slip_low)
-        return self.still.moved(self.position, self.angle, contacts, self.position_low, self.fx)
+        if self.known is not None:
+            return self.known
+        return replace(
+            self.still,
+            position=self.position,
+            position_low=self.position_low,
+            angle=self.angle,
+            contacts=self.graph.contacts.slipped(self.slip, self.slip_low),
+            fx=self.fx,
+        )
 
     @cached_property
     def branches(self) -> Branches:

@@ -173,11 +173,6 @@ def unforced(scene: Scene) -> Scene:
     return scene.model_copy(update={"perturb": settings.model_copy(update={"amplitude": 0.0, "signal": None})})
 
 
-def calibrated(scene: Scene, start: Equilibrium, communicator: MPI.Comm | None = None) -> float:
-    """The threshold v_0: the largest |mean v_x| of the upper layer in an unforced undamped run of the scene's time."""
-    return max(abs(sample.layer_velocity) for sample in perturb(unforced(scene), start, communicator=communicator))
-
-
 def weakening_of(friction: Friction, v0: float) -> Weakening:
     """The scene's mu(v) for a threshold v_0, length / time."""
     return Weakening(B=friction.B, w=friction.w, mu_ss=friction.mu_ss, v0=v0, v_ss=friction.velocity_scale(v0))

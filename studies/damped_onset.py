@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..analysis import NoEquilibriumError, Onset, OnsetError, Window, find_onset
@@ -100,7 +99,6 @@ class Ramped:
 def ramped(
     scene: Scene,
     mu: float | None = None,
-    communicator: MPI.Comm | None = None,
     watch: Callable[[str], None] = lambda says: None,
 ) -> Iterator[Ramped]:
     """Ramp a scene to its end, or to where the packing flows; its equilibria have no dissipation.
@@ -117,13 +115,13 @@ def ramped(
     wanted = loads(scene.ramp)
     # dashpots would settle the same seed to another packing: the onsets with and without them are to be of one
     scene = scene.model_copy(update={"damping": None})
-    start = settle(scene, mu, communicator, watch=lambda what: watch(f"settling: {what}"))
+    start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"))
     if len(start.packing) > MOST_DISKS:
         raise SceneError(
             f"the onset with dissipation takes all modes at every load, which is too much for {len(start.packing)} "
             f"disks: take {MOST_DISKS} at the most, or leave [damping] out"
         )
-    with Engine(start.packing, communicator) as engine:
+    with Engine(start.packing) as engine:
         path = EquilibriumPath(engine, start, scene)
         watch(f"ramp up to F_x = {wanted[-1]:g}")
         for _ in path.climb(wanted[1:]):
@@ -135,7 +133,6 @@ def ramped(
 def damped_onset_run(
     scene: Scene,
     mu: float,
-    communicator: MPI.Comm | None = None,
     watch: Callable[[str], None] = lambda says: None,
 ) -> DampedOnset:
     """The windows of growing motion of a scene for one friction coefficient, and its undamped onset.
@@ -146,8 +143,6 @@ def damped_onset_run(
         With sections [ramp] and [damping].
     mu : float
         Friction coefficient.
-    communicator : mpi4py.MPI.Comm, optional
-        The ranks that share the packing; all by default.
     watch : callable, optional
         Told in words what is under way.
 
@@ -161,7 +156,7 @@ def damped_onset_run(
     if scene.damping is None:
         raise SceneError("the scene has no section [damping]: add it, with cn, ct or tau")
     damping = scene.damping
-    with ramped(scene, mu, communicator, watch) as ramp:
+    with ramped(scene, mu, watch) as ramp:
         try:
             undamped = find_onset(dissipating(ramp.path), ramp.forces)
         except OnsetError:

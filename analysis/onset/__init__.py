@@ -19,7 +19,7 @@ from .edge import Edge, Family, LostPairError, Root, locate, smooth_root
 from .limits import LIMITS, Limits
 from .modes import Modes, assign, force_bearing, full_operator
 from .pair import Pair, Place, continued
-from .search import Onset, OnsetError, complex_windows, find_onset, follow, scan_windows, seeks_all
+from .search import Onset, OnsetError, complex_windows, find_onset, seeks_all
 from .sliced import FirstWindow, first_window
 from .windows import Window
 
@@ -42,11 +42,9 @@ __all__ = [
     "continued",
     "find_onset",
     "first_window",
-    "follow",
     "force_bearing",
     "full_operator",
     "locate",
-    "scan_windows",
     "seeks_all",
     "smooth_root",
 ]

@@ -18,9 +18,10 @@ from scipy.sparse import csr_array
 from ..errors import NoEquilibriumError
 from ..spectrum import Complexes
 from .dip import deepest_dip
-from .edge import Edge, Family, Kind, LostPairError, locate
+from .edge import Edge, Family, LostPairError, locate
 from .modes import Members, Modes, Operator, assign
 from .pair import Pair
+from .walk import between
 from .windows import Course, Ledger
 
 Decompose = Callable[[float, Operator], Modes]
@@ -75,9 +76,8 @@ class Step:
         """Whether every complex pair at one end is recognised at the other."""
         return not self.lost and not self.found
 
-    def courses(self, edge: Callable[["Step", Members, Members], Edge], unknown: Kind) -> Iterator[Course]:
-        """The courses of all complex pairs, with edges by a function, and half-way for pairs that are not
-        recognised."""
+    def courses(self, edge: Callable[["Step", Members, Members], Edge]) -> Iterator[Course]:
+        """The courses of all complex pairs: edges by a function, and half-way for pairs that are not recognised."""
         here, there = self.here, self.there
         for members, image in self.staying:
             yield (here.pair(members), there.pair(image), None)
@@ -87,14 +87,14 @@ class Step:
             yield (None, there.pair(image), edge(self, members, image))
         for members in self.lost:
             pair = here.pair(members)
-            yield (pair, None, self.halfway(pair, unknown))
+            yield (pair, None, self.halfway(pair))
         for image in self.found:
             pair = there.pair(image)
-            yield (None, pair, self.halfway(pair, unknown))
+            yield (None, pair, self.halfway(pair))
 
-    def halfway(self, pair: Pair, kind: Kind) -> Edge:
+    def halfway(self, pair: Pair) -> Edge:
         """An edge somewhere in this step."""
-        return Edge.somewhere(self.here.fx, self.there.fx, pair, kind)
+        return Edge.somewhere(self.here.fx, self.there.fx, pair)
 
     def hidden_window(self, family: Family) -> float | None:
         """Load where a window wider than the narrowest, or a gap in one, most likely hides; None if nowhere."""
@@ -162,9 +162,9 @@ class AllModes:
         """The courses of all complex pairs, once nothing can hide any more."""
         edge = self._solved.get((here.fx, there.fx))
         if edge is not None:
-            return list(step.courses(lambda *_: edge, "contact change")), []
-        between = self._between(step) if there.fx - here.fx > self.family.narrowest else []
-        return (None if between else list(step.courses(self._edge, "contact change"))), between
+            return list(step.courses(lambda *_: edge)), []
+        divide = self._between(step) if there.fx - here.fx > self.family.narrowest else []
+        return (None if divide else list(step.courses(self._edge))), divide
 
     def record(self, sure: list[Course]) -> None:
         """Carry the open windows over an increment."""
@@ -185,21 +185,14 @@ class AllModes:
                 edge, below, above = solution
                 self._solved[below.fx, above.fx] = edge
                 return [self.decompose(side.fx, side.matrix) for side in (below, above)]
-        return [] if middle is None else self._modes_at(here.fx, middle, there.fx)
-
-    def _modes_at(self, below: float, middle: float, above: float) -> list[Modes]:
-        """The modes at a load in between, or at one beside it where that has no equilibrium; none if there is none."""
-        for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
-            try:
-                return [self.decompose(*self.family.at(fx))]
-            except NoEquilibriumError:
-                continue
-        return []
+        if middle is None:
+            return []
+        return between(lambda fx: self.decompose(*self.family.at(fx)), here.fx, middle, there.fx)
 
     def _edge(self, step: Step, members: Members, image: Members) -> Edge:
         """The edge of a pair, half the step wide if it cannot be solved for."""
         solution = self._solution(step, members, image)
-        return step.halfway(step.there.pair(image), "contact change") if solution is None else solution[0]
+        return step.halfway(step.there.pair(image)) if solution is None else solution[0]
 
     def _solution(self, step: Step, members: Members, image: Members) -> tuple[Edge, Pair, Pair] | None:
         """The edge of a pair that is complex at one end, and the pair close by on either side; None if it is not

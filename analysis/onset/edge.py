@@ -30,7 +30,7 @@ from .limits import LIMITS, Limits
 from .modes import Modes, Operator, span
 from .pair import Pair, Place, continued
 
-Kind = Literal["coalescence", "contact change", "start", "scan"]
+Kind = Literal["coalescence", "contact change", "start"]
 
 
 class LostPairError(FaultgougeError):
@@ -61,10 +61,10 @@ class Edge:
         return cls(pair.fx, 0.0, pair.mean, pair.overlap, "start")
 
     @classmethod
-    def somewhere(cls, below: float, above: float, pair: Pair, kind: Kind) -> "Edge":
+    def somewhere(cls, below: float, above: float, pair: Pair) -> "Edge":
         """Of a pair between two loads, uncertain by half of their distance."""
         half = 0.5 * (above - below)
-        return cls(below + half, half, pair.mean, pair.overlap, kind)
+        return cls(below + half, half, pair.mean, pair.overlap, "contact change")
 
     @classmethod
     def jump(cls, outside: Pair, inside: Pair) -> "Edge":
@@ -125,11 +125,6 @@ class Family:
                 raise LostPairError.of(pair, f"between F_x = {pair.fx:.10g} and {place.fx:.10g}")
         return moving
 
-    def jump_width(self, here: float, there: float) -> float:
-        """Width to which a jump between two loads is bracketed, force."""
-        rounding = float(np.spacing(max(abs(here), abs(there))))
-        return max(self.limits.jump * abs(there - here), 4 * rounding)
-
 
 class Root(NamedTuple):
     """The root of a smooth function of the load, its error, and the loads about it that were looked at."""
@@ -159,6 +154,20 @@ def smooth_root(value: Callable[[float], float], below: float, above: float, lim
             return Root(*found, loads)
         distance *= 30
     return None
+
+
+def jump_width(here: float, there: float, limits: Limits = LIMITS) -> float:
+    """Width to which a jump between two loads is bracketed, force."""
+    rounding = float(np.spacing(max(abs(here), abs(there))))
+    return max(limits.jump * abs(there - here), 4 * rounding)
+
+
+def bracketed_jump(value: Callable[[float], float], below: float, above: float, width: float) -> tuple[float, float]:
+    """The loads on either side of a jump of a function from one sign to the other, by bisection."""
+    while above - below > width:
+        middle = 0.5 * (below + above)
+        below, above = (middle, above) if value(middle) * value(below) > 0 else (below, middle)
+    return below, above
 
 
 def _root_of_five(loads: Floats, values: Floats) -> tuple[float, float] | None:
@@ -200,14 +209,9 @@ def locate(family: Family, here: Pair, there: Pair) -> tuple[Edge, Pair, Pair]:
 def _located_jump(family: Family, pair: Callable[[float], Pair], known: dict[float, Pair]) -> tuple[Edge, Pair, Pair]:
     """The edge of a pair whose discriminant jumps between loads that are known, by bisection."""
     order = sorted(known)
-    width = family.jump_width(order[0], order[-1])
+    width = jump_width(order[0], order[-1], family.limits)
     below, above = next((a, b) for a, b in pairwise(order) if known[a].discriminant * known[b].discriminant <= 0)
-    while above - below > width:
-        middle = 0.5 * (below + above)
-        if pair(middle).discriminant * known[below].discriminant > 0:
-            below = middle
-        else:
-            above = middle
+    below, above = bracketed_jump(lambda fx: pair(fx).discriminant, below, above, width)
     # Where the equilibrium does not jump, it is the pair that has become another one on the way.
     across = family.followed(known[below], Place(above, known[above].matrix))
     if across.discriminant * known[above].discriminant < 0 or not across.same_planes(known[above]):
@@ -221,7 +225,7 @@ def edge_from_inside(family: Family, outside: Pair, inside: Pair) -> Edge:
     The pair is followed from inside, with the increment halved until the pair outside leads back to the one inside.
     Then the root of D lies in between. If no half is short enough, the equilibrium jumps.
     """
-    width = family.jump_width(outside.fx, inside.fx)
+    width = jump_width(outside.fx, inside.fx, family.limits)
     while abs(inside.fx - outside.fx) > width:
         if leads_back(family, outside, inside):
             try:

@@ -1,8 +1,7 @@
-"""What a user asks for: the onset along a ramp, the windows of a family of matrices, a scan, modes in columns."""
+"""What a user asks for: the onset along a ramp, and the windows of a family of matrices."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,14 +10,12 @@ from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError
 from ..packing import Packing
-from ..spectrum import Complexes
-from .all_modes import Step
 from .edge import Family
 from .limits import LIMITS, Limits
-from .modes import Modes, Operator, assign, full_operator
+from .modes import Operator, full_operator
 from .screened import all_windows
 from .sliced import FirstWindow, Watch, first_window
-from .windows import Ledger, Window, increasing
+from .windows import Window, increasing
 
 
 class OnsetError(FaultgougeError):
@@ -202,59 +199,3 @@ def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:
         error=window.error + at(window.fx_onset),
         end_error=None if end is None else (window.end_error or 0.0) + at(end),
     )
-
-
-def scan_windows(packings: Sequence[Packing]) -> tuple[Window, ...]:
-    """Windows that stored equilibria show by themselves, each edge uncertain by half its increment.
-
-    Parameters
-    ----------
-    packings : sequence of Packing
-        Equilibria of increasing fx, at least two.
-
-    Returns
-    -------
-    tuple of Window
-        Edges are midpoints between the last equilibrium on one side and the first on the other; kind is
-        "scan". Windows between two equilibria are missed, which is what :func:`find_onset` is for.
-
-    Raises
-    ------
-    ValueError
-        If the loads do not increase.
-    """
-    increasing([packing.fx for packing in packings])
-    states = [Modes.of(packing.fx, full_operator(packing)) for packing in packings]
-    ledger = Ledger()
-    ledger.begin(states[0].pair(members) for members in states[0].complex_pairs)
-    for here, there in pairwise(states):
-        step = Step(here, there)
-        ledger.carry(step.courses(lambda step, _, image: step.halfway(step.there.pair(image), "scan"), "scan"))
-    return ledger.all()
-
-
-def follow(packings: Iterable[Packing]) -> Complexes:
-    """Eigenvalues along a ramp, each mode in a column of its own.
-
-    Parameters
-    ----------
-    packings : iterable of Packing
-        Equilibria along a ramp, close enough for modes to be recognised.
-
-    Returns
-    -------
-    ndarray of complex, shape (S, E)
-        Column k follows the k-th lowest eigenvalue of the first packing; nan from where a mode is gone.
-    """
-    rows: list[Complexes] = []
-    before: Modes | None = None
-    for packing in packings:
-        modes = Modes.of(packing.fx, full_operator(packing))
-        if before is None:
-            columns = np.arange(len(modes.values))
-        else:
-            partner = assign(before, modes)
-            columns = np.where(columns >= 0, partner[columns], -1)
-        rows.append(np.where(columns >= 0, modes.values[columns], np.nan))
-        before = modes
-    return np.array(rows)

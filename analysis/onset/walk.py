@@ -7,15 +7,15 @@ The walker knows loads and nothing of matrices. For each increment it asks an *o
 3. where to look in between, should the oracle not be sure of it. The walker then goes through the parts of the
    increment in the same way, and only what is sure is recorded.
 
-Three oracles are asked. In the search for all windows `Screened` (:mod:`~faultgouge.analysis.onset.screened`) confirms
-the few pairs that perturbation theory names by following each of them, and hands an increment that needs more to
-`AllModes` (:mod:`~faultgouge.analysis.onset.all_modes`), which has all modes at both loads. `Sliced`
-(:mod:`~faultgouge.analysis.onset.sliced`) finds the first window of a large packing in slices of its spectrum.
+The oracles are :mod:`~faultgouge.analysis.onset.screened`, :mod:`~faultgouge.analysis.onset.all_modes` and
+:mod:`~faultgouge.analysis.onset.sliced`, and that of growing motion, :mod:`~faultgouge.analysis.damped`.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import Protocol, TypeVar
+
+from ..errors import NoEquilibriumError
 
 At = TypeVar("At")
 """What an oracle has of a load: the operator, or all of its modes."""
@@ -66,3 +66,13 @@ def walk(oracle: Oracle[At, Announced, Sure], places: Sequence[At], depth: int =
             oracle.record(sure)
         if oracle.finished:
             return
+
+
+def between(look: Callable[[float], At], below: float, middle: float, above: float) -> list[At]:
+    """What is at a load in between, or at one beside it where that has no equilibrium; nothing if there is none."""
+    for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
+        try:
+            return [look(fx)]
+        except NoEquilibriumError:
+            continue
+    return []

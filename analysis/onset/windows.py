@@ -36,9 +36,9 @@ class Window:
     overlap : float
         Smallest |y^H x| met at the onset; it vanishes at an exceptional point, to the root of the rounding
         error.
-    kind : {"coalescence", "contact change", "start", "scan"}
-        What begins the window: two real eigenvalues that meet; a jump of the equilibrium; nothing, as the
-        pair is complex at the smallest load; or unknown, in a scan.
+    kind : {"coalescence", "contact change", "start"}
+        What begins the window: two real eigenvalues that meet; a jump of the equilibrium; or nothing, as the pair is
+        complex at the smallest load.
     """
 
     fx_onset: float

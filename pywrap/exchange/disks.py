@@ -206,8 +206,8 @@ def packing_of(
             radius=disks.radius,
             contacts=_contacts(disks, law),
             law=law,
-            angle=disks.angle,  # type: ignore[arg-type]  # None is the default
-            mass=disks.mass,  # type: ignore[arg-type]
+            angle=disks.angle,
+            mass=disks.mass,
             inertia_factor=inertia_factor,
             box_length=disks.box_length,
             top=top,

@@ -22,11 +22,6 @@ DRAWS = 300
 """Fits to resampled packings: the ends of an interval are then known to a tenth of its width."""
 
 
-def weibull(reach: Floats, found: Bools) -> Floats:
-    """ln F_0 and ln k of the largest likelihood, shape (2,)."""
-    return _fit(np.zeros(len(reach)), reach, found)[[0, 2]]
-
-
 def size_law(disks: Floats, reach: Floats, found: Bools) -> dict[str, Any]:
     """The exponent p of F_0 = c N^-p and the shape k, each with its interval.
 
