@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgbtrf, dgbtrs
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
-from scipy.sparse.linalg import LinearOperator, SuperLU, gmres
+from scipy.sparse.linalg import LinearOperator, gmres
 
-from ..analysis.sparse_lu import SingularMatrixError, symmetric_lu
+from ..analysis.sparse_lu import Factors, SingularMatrixError, minimum_degree, symmetric_lu
 from ..analysis.stiffness import SIGNS
 
 Floats = NDArray[np.float64]
@@ -153,12 +153,12 @@ class SparseFactors:
     ----------
     coordinates : ndarray of int, shape (E,)
         Which of the 3N coordinates the matrix has, in the order of elimination.
-    factors : SuperLU
+    factors : Factors
         Of the matrix in this order.
     """
 
     coordinates: Indices
-    factors: SuperLU
+    factors: Factors
 
     def solve(self, force: Floats) -> Floats:
         """The solution on these coordinates, zero on the others, shape (3N,)."""
@@ -256,6 +256,6 @@ def elimination_order(i: Indices, j: Indices, disks: int, coordinates: Indices) 
         (np.concatenate([-ones, -ones, degree + 1.0]), (np.concatenate([i, j, every]), np.concatenate([j, i, every]))),
         shape=(disks, disks),
     )
-    factors = symmetric_lu(csc_array(graph))
+    place = minimum_degree(csc_array(graph))
     axis, disk = np.divmod(coordinates, disks)
-    return np.lexsort((axis, factors.perm_c[disk]))
+    return np.lexsort((axis, place[disk]))

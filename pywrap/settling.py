@@ -32,10 +32,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import SuperLU
 
 from ..analysis import NoEquilibriumError, Packing, stiffness_matrix, touching
-from ..analysis.sparse_lu import SingularMatrixError, symmetric_lu
+from ..analysis.sparse_lu import Factors, SingularMatrixError, symmetric_lu
 from .engine import Engine
 from .quasistatic import Equilibrium, equilibrate, rounding_floor
 
@@ -186,16 +185,17 @@ def _moved(packing: Packing, move: Floats) -> Packing:
     return replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
 
 
-def _positive(packing: Packing, sigma: float) -> SuperLU | None:
+def _positive(packing: Packing, sigma: float) -> Factors | None:
     """Factors of K + sigma for x and y; None if that is not positive definite."""
     size = 2 * len(packing)
     matrix = csc_array(stiffness_matrix(packing)[:size, :size] + diags_array(np.full(size, sigma)))
     try:
-        # symmetric, and without pivoting: the pivots are positive if and only if the matrix is positive definite
-        factors = symmetric_lu(matrix)
+        # symmetric, and without pivoting: the pivots are positive if and only if the matrix is positive definite; by
+        # SuperLU, so that a seed gives the same packing whatever is installed
+        factors = symmetric_lu(matrix, mumps=False)
     except SingularMatrixError:
         return None
-    return factors if np.all(factors.U.diagonal() > 0) else None
+    return None if factors.negative else factors
 
 
 def _largest(packing: Packing) -> float:

@@ -18,6 +18,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 
 import numpy as np
@@ -29,7 +30,7 @@ from threadpoolctl import threadpool_limits
 
 from ..errors import FaultgougeError
 from ..packing import Floats, Indices
-from ..sparse_lu import symmetric_lu
+from ..sparse_lu import minimum_degree, symmetric_lu
 from .limits import LIMITS, Limits
 
 
@@ -67,14 +68,16 @@ Solve = Callable[[Floats], Floats]
 Factored = tuple[Solve, int]
 
 
-def factored(matrix: csc_array, shift: float) -> Factored:
+def factored(matrix: csc_array, shift: float, mumps: bool = False) -> Factored:
     """The inverse of S - shift, and how many eigenvalues of S are below the shift: Sylvester's law of inertia.
 
     The factors are made without pivoting, so that the signs of the pivots tell the inertia. What stability that costs
-    is looked at afterwards, by Rayleigh quotients. The coordinates of S are in the order of elimination.
+    is looked at afterwards, by Rayleigh quotients. The coordinates of S are in the order of elimination. `mumps` says
+    whether MUMPS may be used.
     """
-    factors = symmetric_lu(csc_array(matrix - shift * eye_array(matrix.shape[0])), ordered=True)
-    return factors.solve, int(np.count_nonzero(factors.U.diagonal() < 0))
+    shifted = csc_array(matrix - shift * eye_array(matrix.shape[0]))
+    factors = symmetric_lu(shifted, ordered=True, symmetric=True, mumps=mumps)
+    return factors.solve, factors.negative
 
 
 def slices(
@@ -83,7 +86,7 @@ def slices(
     workers: int = 1,
     modes: tuple[int, int] | None = None,
     limits: Limits = LIMITS,
-    factorise: Callable[[csc_array, float], Factored] = factored,
+    factorise: Callable[[csc_array, float], Factored] | None = None,
 ) -> Iterator[Slice]:
     """Eigenvalues and eigenvectors of a symmetric matrix, slice by slice in the order of the spectrum.
 
@@ -98,14 +101,14 @@ def slices(
     modes : tuple of (int, int), optional
         Numbers of the first eigenvalue that is wanted and of the first that is not, the lowest being 0; all by default.
     limits, factorise
-        Sizes, and how to factorise S - shift.
+        Sizes, and how to factorise S - shift if not by :func:`factored`.
 
     Raises
     ------
     SliceError
         If eigenvalues do not converge, or neighbouring slices disagree.
     """
-    spectrum = _Spectrum(matrix, limits, factorise)
+    spectrum = _Spectrum(matrix, limits, factorise or partial(factored, mumps=workers == 1))
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(workers) as pool:
         waiting: deque[Future[Slice]] = deque()
         before: Slice | None = None
@@ -139,7 +142,7 @@ class _Spectrum:
         self.limits, self.factorise = limits, factorise
         size = matrix.shape[0]
         self.bound = float(abs(matrix).sum(axis=0).max())  # no eigenvalue is beyond
-        order = symmetric_lu(csc_array(matrix + 2 * self.bound * eye_array(size))).perm_c
+        order = minimum_degree(csc_array(matrix + 2 * self.bound * eye_array(size)))
         self.place: Indices = order
         self.matrix = csc_array(matrix[np.argsort(order)][:, np.argsort(order)])
 
