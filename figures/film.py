@@ -135,10 +135,12 @@ class Film(ABC):
         width, height = (2 * round(size * dots / 2) for size in figure.get_size_inches())
         figure.set_size_inches(width / dots, height / dots)
         self._canvas = FigureCanvasAgg(figure)
+        self.show(0)  # the words of a frame take their room
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
         for artist in self._moving:
             artist.set_animated(True)
         self._canvas.draw()
-        figure.set_layout_engine("none")
         self._still = self._canvas.copy_from_bbox(figure.bbox)
 
     @property
@@ -193,7 +195,7 @@ class RunFilm(Film):
             beside.set_ylim(0.3 * self._msd[late].min(), 3 * self._msd.max())
         beside.margins(x=0.02)
         few_decades(beside)
-        moving = [self._artist.disks, self._artist.chains, self._says, self._line, self._dot]
+        moving = [*self._artist.moving, self._says, self._line, self._dot]
         super().__init__(figure, moving, frames, dots)
 
     def show(self, number: int) -> None:
@@ -238,7 +240,7 @@ class ModeFilm(Film):
             one.set_title(mode.words, fontsize=7)
         finish(figure, axes, packing, words if len(modes) > 1 else "growth left out")
         self._phase = 2 * np.pi * periods / frames
-        moving = [part for each in self._artists for part in (each.artist.disks, each.artist.chains)]
+        moving = [part for each in self._artists for part in each.artist.moving]
         super().__init__(figure, moving, frames, dots)
 
     def show(self, number: int) -> None:
@@ -284,14 +286,16 @@ class RampFilm(Film):
         self._words = f"displacements {factor}"
         self._says = axes.text(0.5, 1.01, "", transform=axes.transAxes, ha="center", va="bottom", fontsize=8)
         upper = first.top if first.top.any() else np.ones(len(first), dtype=bool)
-        self._moved = shifts[:, upper, 0].mean(axis=1)
+        moved = shifts[:, upper, 0].mean(axis=1)
+        power = int(np.floor(np.log10(np.abs(moved).max() or 1.0)))
+        unit = rf" $/\,10^{{{power}}}$" if power else ""
+        self._moved = moved / 10.0**power
         self._fx = np.array([each.fx for each in packings])
         beside.plot(self._moved, self._fx, color=BULK, linewidth=1.2)
         (self._line,) = beside.plot([], [], color="C1", linewidth=1.0)
         (self._dot,) = beside.plot([], [], "o", color="C0", markersize=4)
-        beside.set(xlabel="mean displacement of the upper layer along x", ylabel="$F_x$")
-        beside.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3))
-        moving = [self._artist.disks, self._artist.chains, self._says, self._line, self._dot]
+        beside.set(xlabel=f"displacement of the upper layer{unit}", ylabel="$F_x$")
+        moving = [*self._artist.moving, self._says, self._line, self._dot]
         super().__init__(figure, moving, frames, dots)
 
     def show(self, number: int) -> None:
@@ -319,7 +323,8 @@ def _two_panels(packing: Packing, scale: bool = False) -> tuple[Figure, Axes, Ax
     ratio = (view.ceiling - view.bottom) / (view.right - view.left)
     across = min(2.4, 3.2 / ratio)
     size: dict[str, Any] = {"figsize": (across + 2.5 + (0.7 if scale else 0.0), max(2.0, across * ratio + 0.3))}
-    figure = Figure(layout="constrained", **size)
+    figure = Figure(**size)
+    figure.set_layout_engine("constrained", h_pad=0.07)
     left, right = figure.subplots(1, 2, width_ratios=(across + (0.7 if scale else 0.0), 2.3))
     for spine in right.spines.values():
         spine.set_color(INK)

@@ -48,7 +48,7 @@ def _mobilised(packing: Packing) -> Floats:
 
 
 def _share_scale(_: Floats) -> Normalize:
-    return LogNorm(LEAST_SHARE, 1)
+    return LogNorm(LEAST_SHARE, 1, clip=True)  # a contact without slip has the lowest colour
 
 
 def _force_scale(values: Floats) -> Normalize:
@@ -150,6 +150,8 @@ class PackingArtist:
         Every image of every disk.
     chains : LineCollection
         Every image of every contact.
+    moving : tuple of Artist
+        What a film draws in each frame, in its order: disks and contacts, and the floor that hides what goes below.
     """
 
     def __init__(
@@ -163,9 +165,11 @@ class PackingArtist:
         self.widest = 0.5 * packing.radius.min() * self.points
         self.chains = self._chains(axes, color)
         sides = [self.view.left, self.view.right]
-        axes.fill_between(sides, self.view.bottom, 0, color=FLOOR, linewidth=0, zorder=4, label="floor")
+        floor = axes.fill_between(sides, self.view.bottom, 0, color=FLOOR, linewidth=0, zorder=4, label="floor")
         if packing.box_length is not None:
-            axes.vlines(sides, 0, self.view.ceiling, colors=INK, linewidths=0.8, linestyles=(0, (3, 3)))
+            dashes: dict[str, Any] = {"linewidths": 0.8, "linestyles": (0, (3, 3)), "clip_on": False}
+            axes.vlines(sides, 0, self.view.ceiling, colors=INK, **dashes)
+        self.moving = (self.disks, self.chains, floor)
 
     def move(self, displacement: Floats) -> None:
         """Draw disks and contacts displaced from where the packing has them; length, shape (N, 2)."""

@@ -11,8 +11,8 @@ from faultgouge.analysis import BadInputError
 
 from .film import Film
 
-COLOURS = 64
-"""Colours of a GIF: a packing has a dozen, and shades of lines take the rest."""
+COLOURS = 128
+"""Colours of a GIF: a packing or a mode has some dozens, and shades of lines take the rest."""
 
 NEVER_SEEN = [1, 255, 1]
 """The colour whose place in the palette stands for a dot that stays as it was: no figure has this green."""
@@ -68,9 +68,11 @@ def _gif(film: Film, path: Path, rate: float, progress: Progress) -> None:
 
     # One palette for all frames, from the first, the middle and the last: colours do not flicker.
     samples = np.concatenate([film.frame(k) for k in (0, film.count // 2, film.count - 1)])
-    palette = Image.fromarray(samples).quantize(COLOURS - 1, dither=Image.Dither.NONE)
-    colours = (palette.getpalette() or [])[: 3 * (COLOURS - 1)]
-    palette.putpalette(colours + NEVER_SEEN * (COLOURS - len(colours) // 3))
+    # It spans the colours evenly; the median cut, Pillow's own choice, has greys for the few dots of a bright colour.
+    palette = Image.fromarray(samples).quantize(COLOURS - 1, method=Image.Quantize.MAXCOVERAGE)
+    colours = np.reshape((palette.getpalette() or [])[: 3 * (COLOURS - 1)], (-1, 3))
+    colours[colours.min(axis=1) > 247] = 255  # the ground is white, as that of the page
+    palette.putpalette([*colours.ravel().tolist(), *(NEVER_SEEN * (COLOURS - len(colours)))])
 
     def picture(number: int) -> Image.Image:
         return Image.fromarray(film.frame(number)).quantize(palette=palette, dither=Image.Dither.NONE)

