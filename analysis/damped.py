@@ -301,23 +301,23 @@ def _window(onset: Crossing, end: Crossing | None) -> DampedWindow:
     return DampedWindow(onset.fx, None if end is None else end.fx, onset.frequency, onset.error, onset.kind)
 
 
-def dissipating(
-    equilibrium: Callable[[float], Packing], cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None
-) -> Callable[[float], Packing]:
-    """The same equilibria with dashpots and drag: dissipation has no part in where a packing rests.
+def dissipative(packing: Packing, cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None) -> Packing:
+    """The same equilibrium with dashpots and drag: dissipation has no part in where a packing rests.
 
     Parameters
     ----------
-    equilibrium : callable
-        fx -> Packing.
+    packing : Packing
+        The equilibrium.
     cn, ct : float
         Dashpots of every contact, as of :class:`~faultgouge.analysis.MindlinLaw`.
     drag_time : float, optional
         tau of the drag, time; none by default.
     """
+    return replace(packing, law=replace(packing.law, cn=cn, ct=ct), drag_time=drag_time)
 
-    def packing(fx: float) -> Packing:
-        found = equilibrium(fx)
-        return replace(found, law=replace(found.law, cn=cn, ct=ct), drag_time=drag_time)
 
-    return packing
+def dissipating(
+    equilibrium: Callable[[float], Packing], cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None
+) -> Callable[[float], Packing]:
+    """`dissipative` of every equilibrium of a ramp."""
+    return lambda fx: dissipative(equilibrium(fx), cn, ct, drag_time)

@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis import NoEquilibriumError, Onset, OnsetError, Window, find_onset
-from ..analysis.damped import DampedOnsetError, DampedWindow, damped_windows, dissipating
+from ..analysis.damped import DampedOnsetError, DampedWindow, damped_windows, dissipating, dissipative
 from ..pywrap import Engine, Scene, SceneError
 from ..pywrap.bed import settle
 from ..pywrap.equilibria import EquilibriumPath, loads
+from .path_error import with_damped_path_error, with_path_error
 
 MOST_DISKS = 300
 """Disks up to which all damped modes are computed at a load: 15 s there, and it grows with the cube."""
@@ -73,6 +75,10 @@ class Ramped:
 
     Attributes
     ----------
+    engine : Engine
+        LAMMPS with the packing.
+    scene : Scene
+        Of the ramp, without dissipation.
     path : EquilibriumPath
         fx -> Packing.
     forces : ndarray
@@ -81,6 +87,8 @@ class Ramped:
         Whether the packing flows before the ramp's end.
     """
 
+    engine: Engine
+    scene: Scene
     path: EquilibriumPath
     forces: NDArray[np.float64]
     flows: bool
@@ -127,7 +135,7 @@ def ramped(
         for _ in path.climb(wanted[1:]):
             pass
         forces = np.array([each.fx for each in path.kept])
-        yield Ramped(path, forces, len(forces) < len(wanted))
+        yield Ramped(engine, scene, path, forces, len(forces) < len(wanted))
 
 
 def damped_onset_run(
@@ -161,8 +169,9 @@ def damped_onset_run(
             undamped = find_onset(dissipating(ramp.path), ramp.forces)
         except OnsetError:
             undamped = None
+        dissipation = partial(dissipative, cn=damping.cn, ct=damping.ct, drag_time=damping.tau)
         found = damped_windows(
-            dissipating(ramp.path, damping.cn, damping.ct, damping.tau),
+            lambda fx: dissipation(ramp.path(fx)),
             ramp.forces,
             look=() if undamped is None else _inside(undamped.windows),
             watch=watch,
@@ -175,7 +184,13 @@ def damped_onset_run(
             )
         if not found:
             raise DampedOnsetError(f"No motion grows up to fx = {last:.10g}: raise ramp.until.")
-        return DampedOnset(mu, found, undamped, last if ramp.flows else None)
+        watch("the path once more, with other increments")
+        again = ramp.engine, ramp.path, ramp.scene
+        if undamped is not None:
+            undamped = with_path_error(undamped, *again)
+        return DampedOnset(
+            mu, with_damped_path_error(found, dissipation, *again), undamped, last if ramp.flows else None
+        )
 
 
 def _inside(windows: Iterable[Window]) -> list[float]:

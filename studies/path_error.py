@@ -23,21 +23,25 @@ increments, too; its S is then the smaller one, and the same formula holds.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigvals
 from scipy.sparse.linalg import ArpackError
 
-from ..analysis import NoEquilibriumError, Onset, Packing, dynamical_matrix, eigenpairs
+from ..analysis import NoEquilibriumError, Onset, Packing, Window, dynamical_matrix, eigenpairs
+from ..analysis.damped import DampedWindow
+from ..analysis.damped_modes import DampedModes, Pencil
 from ..analysis.onset import force_bearing
 from ..pywrap import Engine, Equilibrium, Scene
 from ..pywrap.equilibria import EquilibriumPath
 
 Floats = NDArray[np.float64]
+Vanishes = Callable[[Packing], float]
 
 FEWEST = 4
 """Increments up to the onset from which on every second load may be left out."""
@@ -128,27 +132,58 @@ def with_path_error(onset: Onset, engine: Engine, path: EquilibriumPath, scene: 
     Onset
         Windows with the onset of the exact path and the whole error.
     """
-    windows = []
-    for window in onset.windows:
-        if window.fx_onset > path.kept[0].fx:
-            part = path_error(window.fx_onset, window.eigenvalue, window.error, engine, path, scene)
-            here = window.fx_onset + part.correction
-            window = replace(window, fx_onset=here, error=window.error + part.error)
-        windows.append(window)
-    return replace(onset, windows=tuple(windows))
+    windows = tuple(
+        _whole(window, meeting(window.eigenvalue), engine, path, scene) if window.fx_onset > path.kept[0].fx else window
+        for window in onset.windows
+    )
+    return replace(onset, windows=windows)
+
+
+def with_damped_path_error(
+    windows: Sequence[DampedWindow],
+    dissipation: Callable[[Packing], Packing],
+    engine: Engine,
+    path: EquilibriumPath,
+    scene: Scene,
+) -> tuple[DampedWindow, ...]:
+    """Windows of growing motion with the error of the path on which they were found.
+
+    Parameters
+    ----------
+    windows : sequence of DampedWindow
+        As found on the path; their errors are those of rounding.
+    dissipation : callable
+        A packing of the path -> the same with its dashpots and drag.
+    engine, path, scene
+        As in `with_path_error`.
+    """
+    return tuple(
+        _whole(window, crossing(window.frequency, dissipation), engine, path, scene)
+        if window.fx_onset > path.kept[0].fx
+        else window
+        for window in windows
+    )
+
+
+W = TypeVar("W", Window, DampedWindow)
+
+
+def _whole(window: W, vanishes: Vanishes, engine: Engine, path: EquilibriumPath, scene: Scene) -> W:
+    part = path_error(window.fx_onset, vanishes, window.error, engine, path, scene)
+    return replace(window, fx_onset=window.fx_onset + part.correction, error=window.error + part.error)
 
 
 def path_error(
-    fx: float, eigenvalue: float, rounding: float, engine: Engine, path: EquilibriumPath, scene: Scene
+    fx: float, vanishes: Vanishes, rounding: float, engine: Engine, path: EquilibriumPath, scene: Scene
 ) -> PathError:
-    """What the increments do to the onset at fx, whose double eigenvalue and rounding error are known.
+    """What the increments do to the onset at fx, whose rounding error is known.
 
     Parameters
     ----------
     fx : float
         The onset as found on the path, force.
-    eigenvalue : float
-        The double eigenvalue, 1 / time^2.
+    vanishes : callable
+        Packing -> what goes through zero at the onset: `meeting` or `crossing`.
     rounding : float
         Uncertainty of fx from rounding, force.
     engine, path, scene
@@ -165,7 +200,7 @@ def path_error(
     try:
         for load in other[1:-1]:
             elsewhere(float(load))
-        shift = _root(lambda there: _discriminant(elsewhere(there), eigenvalue), fx, rounding, 0.5 * increment) - fx
+        shift = _root(lambda there: vanishes(elsewhere(there)), fx, rounding, 0.5 * increment) - fx
     except (NoEquilibriumError, ArpackError):
         shift = np.nan
     return PathError(shift, float(weight), bool(changed.any()), rounding, increment)
@@ -204,13 +239,27 @@ def _cubes(loads: Floats) -> float:
     return float(np.sum(np.diff(loads) ** 3))
 
 
-def _discriminant(packing: Packing, eigenvalue: float) -> float:
-    """(lambda_1 - lambda_2)^2 of the two eigenvalues nearest to one, 1 / time^4."""
-    near = eigenvalue * (1 + 1e-7)  # no eigenvalue to the last digit
-    bare = force_bearing(packing)
-    values = eigvals(dynamical_matrix(bare)[0].toarray()) if len(bare) < SMALL else eigenpairs(bare, near, 4).values
-    one, other = values[np.argsort(np.abs(values - eigenvalue))[:2]]
-    return float(((one - other) ** 2).real)
+def meeting(eigenvalue: float) -> Vanishes:
+    """(lambda_1 - lambda_2)^2 of the two eigenvalues nearest to one, 1 / time^4, as a function of the packing."""
+
+    def discriminant(packing: Packing) -> float:
+        near = eigenvalue * (1 + 1e-7)  # no eigenvalue to the last digit
+        bare = force_bearing(packing)
+        values = eigvals(dynamical_matrix(bare)[0].toarray()) if len(bare) < SMALL else eigenpairs(bare, near, 4).values
+        one, other = values[np.argsort(np.abs(values - eigenvalue))[:2]]
+        return float(((one - other) ** 2).real)
+
+    return discriminant
+
+
+def crossing(frequency: float, dissipation: Callable[[Packing], Packing]) -> Vanishes:
+    """Re s of the motion nearest to a frequency, 1 / time, as a function of the packing without its dissipation."""
+
+    def growth(packing: Packing) -> float:
+        rates = DampedModes.of(Pencil.of(dissipation(packing))).rates
+        return float(rates[np.argmin(np.abs(rates - 1j * frequency))].real)
+
+    return growth
 
 
 def _root(discriminant: Callable[[float], float], fx: float, rounding: float, reach: float) -> float:

@@ -10,7 +10,8 @@ import faultgouge
 from faultgouge.analysis import find_onset, spectrum
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.equilibria import EquilibriumPath
-from faultgouge.studies.path_error import path_error, with_path_error
+from faultgouge.studies.damped_onset import damped_onset_run
+from faultgouge.studies.path_error import meeting, path_error, with_path_error
 
 SHIPPED = Path(faultgouge.__file__).parent / "scenes" / "paper.toml"
 
@@ -68,7 +69,7 @@ def test_a_contact_that_slides_before_the_onset_is_covered():
         with Engine(start.packing) as engine:
             path = EquilibriumPath(engine, start, scene)
             window, *_ = find_onset(path, increment * np.arange(round(3e-3 / increment) + 1)).windows
-            part = path_error(window.fx_onset, window.eigenvalue, window.error, engine, path, scene)
+            part = path_error(window.fx_onset, meeting(window.eigenvalue), window.error, engine, path, scene)
         assert part.changes
         assert part.correction == 0
         found[precision, increment] = window.fx_onset, window.error + part.error
@@ -77,6 +78,22 @@ def test_a_contact_that_slides_before_the_onset_is_covered():
     for fx, error in found.values():
         assert abs(fx - truth) <= error + least
         assert error < 1e-10
+
+
+def test_onsets_with_dissipation_state_the_whole_error():
+    """Beside them stands the undamped onset, with its whole error."""
+    found = {}
+    for precision, increment in (("compensated", 5e-4), ("double", 2e-3), ("double", 1e-3)):
+        mapping = {"packing": {"disks": 30, "seed": 4}, "law": {"kn": 2e5}, "damping": {"cn": 0.5, "ct": 0.2}}
+        changes = {"precision": precision, "load": {"fy": 3.0}, "ramp": {"step": increment, "until": 0.012}}
+        run = damped_onset_run(Scene.from_mapping(mapping | changes), 1.0)
+        found[precision, increment] = (run.fx_c, run.error), (run.undamped.fx_c, run.undamped.error)
+    truth = found.pop(("compensated", 5e-4))
+    for onsets in found.values():
+        for (fx, error), (exact, least) in zip(onsets, truth, strict=True):
+            assert least < 1e-12
+            assert abs(fx - exact) <= error + least
+            assert error < 1e-10
 
 
 def test_one_packing_per_seed_whatever_the_arithmetic():
@@ -97,7 +114,7 @@ def test_an_onset_that_is_not_found_again_is_uncertain_by_the_increment():
     with Engine(start.packing) as engine:
         path = EquilibriumPath(engine, start, scene)
         path(1e-3)
-        part = path_error(0.0005, 30.0, 1e-11, engine, path, scene)  # no pair coalesces there
+        part = path_error(0.0005, meeting(30.0), 1e-11, engine, path, scene)  # no pair coalesces there
     assert np.isnan(part.shift)
     assert part.correction == 0
     assert part.error == pytest.approx(5e-4)

@@ -155,15 +155,17 @@ def onset(
 def _damped_onset(scene: Scene, mu: float) -> dict[str, Any]:
     """The onset of a scene with dissipation, as its JSON; and what a user reads of it."""
     from faultgouge.studies.damped_onset import damped_onset_run
+    from faultgouge.studies.digits import with_uncertainty
 
     with status(f"mu = {mu:g}") as show:
         run = damped_onset_run(scene, mu, watch=partial(_under_way, show, f"mu = {mu:g}"))
     first = run.windows[0]
     say(
-        f"mu = {mu:g}: with dissipation F_x^c = {run.fx_c:.12g} +- {run.error:.1g} ({first.kind}, "
+        f"mu = {mu:g}: with dissipation F_x^c = {with_uncertainty(run.fx_c, run.error)} ({first.kind}, "
         f"omega = {first.frequency:.6g})"
     )
-    without = "none on this ramp" if run.undamped is None else f"F_x^c = {run.undamped.fx_c:.12g}"
+    undamped = run.undamped
+    without = "none on this ramp" if undamped is None else f"F_x^c = {with_uncertainty(undamped.fx_c, undamped.error)}"
     say(f"mu = {mu:g}: without dissipation {without}")
     real = _in_si(scene, [(each.fx_onset, each.frequency) for each in run.windows])
     for each in real.get("si", [])[:1]:
