@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Floats, Indices, floats, integers, same_bits, settle
+from .arrays import Floats, Indices, derived, floats, integers, same_bits, settle
 
 FLOOR = -1
 """The index that stands for the floor as the second partner of a contact."""
@@ -76,7 +76,8 @@ class Contacts:
 
     def slipped(self, slip: ArrayLike, slip_low: ArrayLike | None = None) -> "Contacts":
         """The same contacts with other slips, whose order is the one here; length, shape (C,)."""
-        return Contacts(self.i, self.j, slip, slip_low)
+        low = None if slip_low is None else floats("slip_low", slip_low, self.i.shape)
+        return derived(self, slip=floats("slip", slip, self.i.shape), slip_low=low)
 
 
 def _canonical(i: Indices, j: Indices) -> bool:

@@ -30,7 +30,7 @@ from .contacts import FLOOR, Contacts
 from .files import PackingFileError
 from .geometry import nearest_image
 from .law import MindlinLaw
-from .packing import Floats, Packing
+from .packing import Floats, Indices, Packing
 
 DISK = {
     "id": ("id",),
@@ -125,51 +125,24 @@ def read_dump(
     contacts = disks.with_suffix(".contacts") if contacts is None else Path(contacts)
     shown = _snapshot(disks, frame)
     given = _sidecar(disks.with_suffix(".params"))
-    try:
-        law = law or MindlinLaw(
-            *(given[name] for name in ("kn", "kt", "mu")),
-            **{name: given[name] for name in ("exponent", "cn", "ct") if name in given},
-        )
-    except KeyError as error:
-        sidecar = disks.with_suffix(".params")
-        raise PackingFileError(f"The law of {disks} is not given: {sidecar} does not name {error}.") from None
+    law = law or _law(given, disks)
     absent = () if law.frictional else ("angle", "floor_slip", "slip")
     disk = _columns(disks, shown, DISK, absent)
+    disk = {name: column[np.argsort(disk["id"])] for name, column in disk.items()}
     pair = _columns(contacts, _snapshot_of_step(contacts, shown.step), CONTACT, absent)
-
-    order = np.argsort(disk["id"])
-    disk = {name: column[order] for name, column in disk.items()}
-    position, low = np.column_stack([disk["x"], disk["y"]]), None
-    if "x_low" in disk:
-        position, low = normalized(position, np.column_stack([disk["x_low"], disk["y_low"]]))
+    position, low = _places(disk)
     box_length = float(shown.bounds[0, 1] - shown.bounds[0, 0]) if shown.boundary[0].startswith("p") else None
-    index = {}
-    for partner in ("first", "second"):
-        where = np.searchsorted(disk["id"], pair[partner])
-        if np.any(disk["id"][np.minimum(where, len(position) - 1)] != pair[partner]):
-            raise PackingFileError(f"{contacts} has a contact of a disk that {disks} does not have.")
-        index[partner] = where
-    i, j, radius = index["first"], index["second"], disk["radius"]
-    touch = np.hypot(*nearest_image(position[i] - position[j], box_length).T) < radius[i] + radius[j]
-    floor = np.flatnonzero(radius - position[:, 1] > 0)
-    slip_low = None
-    if "slip_low" in pair and "floor_slip_low" in disk:
-        slip_low = np.concatenate([pair["slip_low"][touch], disk["floor_slip_low"][floor]])
+    i, j = (_numbers(disk["id"], pair[partner], disks, contacts) for partner in ("first", "second"))
     try:
         return Packing(
             position=position,
-            radius=radius,
+            radius=disk["radius"],
             angle=disk["angle"],
             mass=disk["mass"],
             inertia_factor=given.get("inertia_factor", 1.0) if inertia_factor is None else inertia_factor,
             box_length=box_length,
             top=disk["type"] == TOP_TYPE,
-            contacts=Contacts(
-                np.concatenate([i[touch], floor]),
-                np.concatenate([j[touch], np.full(len(floor), FLOOR)]),
-                np.concatenate([pair["slip"][touch], disk["floor_slip"][floor]]),
-                slip_low,
-            ),
+            contacts=_touching(position, i, j, disk, pair, box_length),
             law=law,
             fx=given.get("fx", 0.0) if fx is None else fx,
             fy=given.get("fy", 0.0) if fy is None else fy,
@@ -178,6 +151,57 @@ def read_dump(
         )
     except ValueError as error:
         raise PackingFileError(f"{disks} and {contacts} describe no possible packing: {error}") from error
+
+
+def _law(given: Mapping[str, float], disks: Path) -> MindlinLaw:
+    """The law of a sidecar file."""
+    try:
+        return MindlinLaw(
+            *(given[name] for name in ("kn", "kt", "mu")),
+            **{name: given[name] for name in ("exponent", "cn", "ct") if name in given},
+        )
+    except KeyError as error:
+        sidecar = disks.with_suffix(".params")
+        raise PackingFileError(f"The law of {disks} is not given: {sidecar} does not name {error}.") from None
+
+
+def _places(disk: Mapping[str, Floats]) -> tuple[Floats, Floats | None]:
+    """Centres, and their low parts if the dump has them."""
+    position = np.column_stack([disk["x"], disk["y"]])
+    if "x_low" not in disk:
+        return position, None
+    return normalized(position, np.column_stack([disk["x_low"], disk["y_low"]]))
+
+
+def _numbers(ids: Floats, partners: Floats, disks: Path, contacts: Path) -> Indices:
+    """Numbers of the disks with these IDs."""
+    where = np.searchsorted(ids, partners)
+    if np.any(ids[np.minimum(where, len(ids) - 1)] != partners):
+        raise PackingFileError(f"{contacts} has a contact of a disk that {disks} does not have.")
+    return where
+
+
+def _touching(
+    position: Floats,
+    i: Indices,
+    j: Indices,
+    disk: Mapping[str, Floats],
+    pair: Mapping[str, Floats],
+    box_length: float | None,
+) -> Contacts:
+    """The contacts among the listed neighbours, and those with the floor."""
+    radius = disk["radius"]
+    touch = np.hypot(*nearest_image(position[i] - position[j], box_length).T) < radius[i] + radius[j]
+    floor = np.flatnonzero(radius - position[:, 1] > 0)
+    slip_low = None
+    if "slip_low" in pair and "floor_slip_low" in disk:
+        slip_low = np.concatenate([pair["slip_low"][touch], disk["floor_slip_low"][floor]])
+    return Contacts(
+        np.concatenate([i[touch], floor]),
+        np.concatenate([j[touch], np.full(len(floor), FLOOR)]),
+        np.concatenate([pair["slip"][touch], disk["floor_slip"][floor]]),
+        slip_low,
+    )
 
 
 def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import display
-from .arrays import Floats, Indices, booleans, floats, frozen, number, positive_each, same_bits, settle
+from .arrays import Floats, Indices, booleans, derived, floats, frozen, number, positive_each, same_bits, settle
 from .compensated import Pair
 from .contacts import Contacts
 from .geometry import ContactGeometry, check_box, measured
@@ -120,8 +120,7 @@ class Packing:
             drag_time=None if drag_time is None else number("drag_time", drag_time, positive=True),
         )
         check_box(self.radius, self.box_length)
-        if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= n:
-            raise ValueError(f"A contact names a disk beyond the last one, {n - 1}.")
+        _check_partners(contacts, n)
 
     def __len__(self) -> int:
         return len(self.radius)
@@ -221,6 +220,34 @@ class Packing:
         normal = between / distance[:, None]
         return self.law.normal_force(delta), self.law.tangential_force(delta, slip), normal
 
+    def moved(
+        self,
+        position: ArrayLike,
+        angle: ArrayLike,
+        contacts: Contacts,
+        position_low: ArrayLike | None = None,
+        fx: float | None = None,
+    ) -> "Packing":
+        """The same disks elsewhere; only what is new is checked.
+
+        Parameters
+        ----------
+        position, angle, contacts, position_low
+            As of the class.
+        fx : float, optional
+            Force along x on each disk of the upper layer; as it was by default.
+        """
+        n = len(self)
+        _check_partners(contacts, n)
+        return derived(
+            self,
+            position=floats("position", position, (n, 2)),
+            angle=floats("angle", angle, (n,)),
+            contacts=contacts,
+            position_low=None if position_low is None else floats("position_low", position_low, (n, 2)),
+            fx=self.fx if fx is None else number("fx", fx),
+        )
+
     def loaded(self, least: float) -> "Packing":
         """The packing without the contacts that carry no more than a given force.
 
@@ -249,3 +276,8 @@ class Packing:
         """
         per_disk = np.linalg.norm(self.net_force.reshape(3, -1), axis=0)
         return float(np.delete(per_disk, self.rattlers).max(initial=0.0))
+
+
+def _check_partners(contacts: Contacts, disks: int) -> None:
+    if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= disks:
+        raise ValueError(f"A contact names a disk beyond the last one, {disks - 1}.")

@@ -1,4 +1,4 @@
-"""run.h5: the equilibria of a run, to the bit, written as they come. The only place that knows the format.
+"""run.h5: the equilibria of a run, to the bit, written as they come.
 
 The file is H5MD 1.1, which MDAnalysis opens with
 ``Universe.empty(N, trajectory=True).load_new("run.h5", format="H5MD", convert_units=False)``::
@@ -33,10 +33,9 @@ is an attribute of the root. One file holds one set of disks and one law.
 """
 
 from collections.abc import Mapping
-from dataclasses import MISSING, fields
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import h5py
 import numpy as np
@@ -47,19 +46,8 @@ from .errors import PackingFileError
 from .law import MindlinLaw
 from .packing import Floats, Packing
 from .runfile_check import equilibria
+from .runfile_header import CHECKED, COMPACT, LAW_DEFAULTS, parameters_of, write_header
 from .sealedfile import SealedFile, new_file, write
-
-CREATOR = "faultgouge"
-
-CHECKED = {"fletcher32": True}
-"""A checksum for every chunk, for readers other than this one."""
-
-LAW_DEFAULTS = {field.name: field.default for field in fields(MindlinLaw) if field.default is not MISSING}
-"""Parameters of the law that are in a file only if they are others than these."""
-
-COMPACT = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHECKED}
-"""Filters of what is stored for every disk or contact: half the size, mostly from indices and equal leading bytes, at a
-few milliseconds for a thousand disks. Slower ones gain 3 % more."""
 
 
 class RunFile(SealedFile):
@@ -112,7 +100,7 @@ class RunFile(SealedFile):
             If the file cannot be written.
         """
         with new_file() as file:
-            _write_header(file, packing)
+            write_header(file, packing)
             file.attrs["complete"] = False
             for name, value in (attributes or {}).items():
                 file.attrs[name] = value
@@ -368,51 +356,10 @@ class RunFile(SealedFile):
         data[frame] = row
 
     def _check_same(self, packing: Packing) -> None:
-        parameters, values = self._file["parameters"], _parameters(packing)
+        parameters, values = self._file["parameters"], parameters_of(packing)
         for name in parameters.keys() | values.keys():
             if not (name in parameters and name in values and np.array_equal(parameters[name][()], values[name])):
                 raise ValueError(f"{self.path} was begun for a packing with another {name}.")
-
-
-def _parameters(packing: Packing) -> dict[str, Any]:
-    law = packing.law
-    values = {
-        "radius": packing.radius,
-        "mass": packing.mass,
-        "top": packing.top,
-        "kn": law.kn,
-        "kt": law.kt,
-        "mu": law.mu,
-        "inertia_factor": packing.inertia_factor,
-    }
-    values |= {name: getattr(law, name) for name, default in LAW_DEFAULTS.items() if getattr(law, name) != default}
-    if packing.drag_time is not None:
-        values["drag_time"] = packing.drag_time
-    if packing.box_length is not None:
-        values["box_length"] = packing.box_length
-    return values
-
-
-def _write_header(file: h5py.File, packing: Packing) -> None:
-    h5md = file.create_group("h5md")
-    h5md.attrs["version"] = np.array([1, 1])
-    h5md.create_group("author").attrs["name"] = CREATOR
-    creator = h5md.create_group("creator")
-    creator.attrs["name"], creator.attrs["version"] = CREATOR, "1"
-    disks = file.create_group("particles/disks")
-    box = disks.create_group("box")
-    box.attrs["dimension"] = 3
-    periodic = packing.box_length is not None
-    box.attrs["boundary"] = np.array(["periodic" if periodic else "none", "none", "none"], dtype="S8")
-    position = disks.create_group("position")
-    position.create_dataset("step", (0,), np.int64, maxshape=(None,), **CHECKED)
-    position.create_dataset("time", (0,), np.float64, maxshape=(None,), **CHECKED)
-    shape = (len(packing), 3)
-    position.create_dataset("value", (0, *shape), np.float64, maxshape=(None, *shape), chunks=(1, *shape), **COMPACT)
-    file.create_group("observables")
-    parameters = file.create_group("parameters")
-    for name, value in _parameters(packing).items():
-        parameters[name] = value
 
 
 def _rows(group: h5py.Group) -> int:

@@ -127,6 +127,18 @@ def announce(equilibrium: Equilibrium) -> None:
     print(f"\rF_x = {equilibrium.fx:.4f} of {UNTIL}", end="", file=sys.stderr, flush=True)
 
 
+def compared(fast: Result, slow: Result) -> dict[str, float]:
+    """How many times more the slow way takes and errs."""
+    # a difference below the spacing of doubles says nothing
+    return {
+        "seconds": slow.seconds / fast.seconds,
+        "processor_seconds": slow.processor_seconds / fast.processor_seconds,
+        "evaluations": slow.evaluations / fast.evaluations,
+        "stated_error": slow.stated_error / fast.stated_error,
+        "difference": slow.difference / max(fast.difference, sys.float_info.epsilon * EXACT),
+    }
+
+
 def main() -> None:
     """Print the table, and write it as JSON if asked to."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -146,14 +158,7 @@ def main() -> None:
             f"{row.method:10s}{row.increment:10.0e}{row.seconds:9.2f}{row.processor_seconds:9.2f}{row.evaluations:13d}"
             f"{row.fx_c:20.15f}{row.stated_error:10.1e}{row.difference:10.1e}"
         )
-    # a difference below the spacing of doubles says nothing
-    ratios = {
-        "seconds": slow.seconds / fast.seconds,
-        "processor_seconds": slow.processor_seconds / fast.processor_seconds,
-        "evaluations": slow.evaluations / fast.evaluations,
-        "stated_error": slow.stated_error / fast.stated_error,
-        "difference": slow.difference / max(fast.difference, sys.float_info.epsilon * EXACT),
-    }
+    ratios = compared(fast, slow)
     print(
         f"{'ratio':20s}{ratios['seconds']:9.1f}{ratios['processor_seconds']:9.1f}{ratios['evaluations']:13.0f}{'':20s}"
         f"{ratios['stated_error']:10.1e}{ratios['difference']:10.1e}"

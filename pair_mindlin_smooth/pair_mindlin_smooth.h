@@ -67,8 +67,12 @@ private:
   void read_keywords(int, char **);
   void make_fixes();
   void make_dashpots();
+  void check_disks() const;
+  void check_run() const;
+  void check_box(double diameter) const;
   void check_integrators() const;
   void check_damping() const;
+  double measure_radii();
   void set_force_grids();
   void rebuild_pairs();
   void load_slips();      // from the fix

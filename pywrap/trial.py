@@ -5,7 +5,7 @@ nothing more; a `Packing`, with all that is checked for it, is made of the one t
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -95,14 +95,8 @@ class Trial:
         """The configuration with its load."""
         if self.known is not None:
             return self.known
-        return replace(
-            self.still,
-            position=self.position,
-            position_low=self.position_low,
-            angle=self.angle,
-            contacts=self.graph.contacts.slipped(self.slip, self.slip_low),
-            fx=self.fx,
-        )
+        contacts = self.graph.contacts.slipped(self.slip, self.slip_low)
+        return self.still.moved(self.position, self.angle, contacts, self.position_low, self.fx)
 
     @cached_property
     def branches(self) -> Branches:

@@ -103,10 +103,7 @@ def onset_run(
     """
     wanted = loads(needed(scene.ramp, "ramp"))
     start = settle(scene, mu, communicator, watch=lambda what: watch(f"settling: {what}"))
-    if modes is not None:
-        count = np.count_nonzero(np.diff(full_operator(start.packing).indptr))
-        if modes[0] >= count:
-            raise SceneError(f"modes {modes[0]}:{modes[1]} are no part of the {count} modes of the packing, 0:{count}")
+    _check_modes(start.packing, modes)
     whole = reached is not None or seeks_all(start.packing, modes)
     reached = reached or (lambda _: None)
     reached(start)
@@ -134,3 +131,12 @@ def onset_run(
         watch("the path once more, with other increments")
         onset = with_path_error(onset, engine, path, scene)
     return OnsetRun(mu, tuple(path.kept), onset, last if flows else None, between)
+
+
+def _check_modes(packing: Packing, modes: tuple[int, int] | None) -> None:
+    """Refuse modes that a packing does not have."""
+    if modes is None:
+        return
+    count = np.count_nonzero(np.diff(full_operator(packing).indptr))
+    if modes[0] >= count:
+        raise SceneError(f"modes {modes[0]}:{modes[1]} are no part of the {count} modes of the packing, 0:{count}")

@@ -193,74 +193,68 @@ def features(run: Run) -> Iterator[Feature]:
     ------
     Feature
     """
-    packing, law = run.packing, run.packing.law
-    bare = replace(run, push=None, sent=None, weakening=None)
-    on_floor = where(packing, packing.contacts.i[packing.contacts.floor])
-    yield Feature(
-        "floor",
-        f"{on_floor.sum()} of {len(packing)} disks rest on it, and nothing else bears the load",
-        replace(bare, floor=False),
-        bare,
-        on_floor,
-        moves=True,
-    )
-
-    contacts = touching(packing.position, packing.radius, packing.box_length)  # with zero slips
+    law = run.packing.law
     rough_law = law if law.frictional else replace(law, kt=2 / 7 * law.kn, mu=1.0)
-    yield Feature(
+    bare = replace(run, push=None, sent=None, weakening=None)
+    yield _floor(bare)
+    yield _history(bare, rough_law)
+    yield _periodicity(bare)
+    yield _weakening(run, replace(bare, packing=replace(run.packing, law=rough_law)))
+    yield from _damping(bare, law)
+    yield _perturbation(run, bare)
+    yield _signal(run, bare)
+
+
+def _floor(bare: Run) -> Feature:
+    packing = bare.packing
+    on_floor = where(packing, packing.contacts.i[packing.contacts.floor])
+    reason = f"{on_floor.sum()} of {len(packing)} disks rest on it, and nothing else bears the load"
+    return Feature("floor", reason, replace(bare, floor=False), bare, on_floor, moves=True)
+
+
+def _history(bare: Run, rough_law: MindlinLaw) -> Feature:
+    """Zero slips in both, so that friction alone differs."""
+    packing, law = bare.packing, bare.packing.law
+    packing = replace(packing, contacts=touching(packing.position, packing.radius, packing.box_length))
+    return Feature(
         "tangential history",
         f"mu = {law.mu:g}, kt = {law.kt:g}" + ("" if law.frictional else ": no tangential force"),
-        replace(bare, packing=replace(packing, contacts=contacts, law=replace(law, mu=0.0))),
-        replace(bare, packing=replace(packing, contacts=contacts, law=rough_law)),
+        replace(bare, packing=replace(packing, law=replace(law, mu=0.0))),
+        replace(bare, packing=replace(packing, law=rough_law)),
         where(packing, []),
         moves=True,
     )
 
-    opened, closed, across = _opened_and_closed(packing)
-    yield Feature(
-        "periodicity",
-        "the sides are open" if packing.box_length is None else f"x has the period {packing.box_length:g}",
-        replace(bare, packing=opened),
-        replace(bare, packing=closed),
-        across,
-        moves=True,
-    )
 
-    rough = replace(bare, packing=replace(packing, law=rough_law))
-    yield Feature(
-        "dynamic friction",
-        "section [friction]; measured below its threshold" if run.weakening else "no section [friction]",
-        rough,
-        replace(rough, weakening=run.weakening or Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=UNREACHED, v_ss=1.0)),
-        where(packing, []),
-        moves=False,
-    )
+def _periodicity(bare: Run) -> Feature:
+    opened, closed, across = _opened_and_closed(bare.packing)
+    box = bare.packing.box_length
+    reason = "the sides are open" if box is None else f"x has the period {box:g}"
+    open_run, closed_run = (replace(bare, packing=packing) for packing in (opened, closed))
+    return Feature("periodicity", reason, open_run, closed_run, across, moves=True)
 
-    yield from _damping(bare, law)
 
+def _weakening(run: Run, rough: Run) -> Feature:
+    weakening = run.weakening or Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=UNREACHED, v_ss=1.0)
+    reason = "section [friction]; measured below its threshold" if run.weakening else "no section [friction]"
+    nobody = where(run.packing, [])
+    return Feature("dynamic friction", reason, rough, replace(rough, weakening=weakening), nobody, moves=False)
+
+
+def _perturbation(run: Run, bare: Run) -> Feature:
     push = run.push or Push(1e-9, 0.01, None)
-    yield Feature(
-        "perturbation",
-        f"amplitude {push.amplitude:g}" if run.push else "no amplitude in [perturb]",
-        bare,
-        replace(bare, push=push),
-        packing.top if push.target is None else where(packing, push.target),
-        moves=True,
-    )
+    reason = f"amplitude {push.amplitude:g}" if run.push else "no amplitude in [perturb]"
+    pushed = run.packing.top if push.target is None else where(run.packing, push.target)
+    return Feature("perturbation", reason, bare, replace(bare, push=push), pushed, moves=True)
 
+
+def _signal(run: Run, bare: Run) -> Feature:
     sent = run.sent or Sent(Signal([0.0, 1e6], [1e-9, 1e-9]), "layer", None)
-    yield Feature(
-        "signal",
-        f"{len(sent.signal)} rows, on the {sent.on}" if run.sent else "no signal in [perturb]",
-        bare,
-        replace(bare, sent=sent),
-        np.ones(len(packing), dtype=bool)
-        if sent.on == "floor"
-        else packing.top
-        if sent.target is None
-        else where(packing, sent.target),
-        moves=True,
-    )
+    reason = f"{len(sent.signal)} rows, on the {sent.on}" if run.sent else "no signal in [perturb]"
+    moved = run.packing.top if sent.target is None else where(run.packing, sent.target)
+    if sent.on == "floor":
+        moved = np.ones(len(run.packing), dtype=bool)
+    return Feature("signal", reason, bare, replace(bare, sent=sent), moved, moves=True)
 
 
 def _damping(bare: Run, law: MindlinLaw) -> Iterator[Feature]:

@@ -83,12 +83,9 @@ def _columns(properties: str) -> list[tuple[str, str]]:
     return names
 
 
-def write_xyz(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
-    """An extended XYZ file; what is in it, in words."""
+def _written(packing: Packing, modes: list[ModeVectors]) -> list[tuple[str, str, np.ndarray]]:
+    """Names, kinds and numbers of what stands in a row for each disk."""
     n, force = len(packing), disk_force(packing)
-    box = packing.box_length
-    width = box if box is not None else 2 * np.ptp(packing.position[:, 0]) + 2 * packing.radius.max()
-    height = (packing.position[:, 1] + packing.radius).max()
     columns: list[tuple[str, str, np.ndarray]] = [
         # first, for readers of plain XYZ
         ("pos", "R", np.column_stack([packing.position, np.zeros(n)])),
@@ -110,6 +107,15 @@ def write_xyz(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
             if not part or np.any(values):
                 columns.append((f"{mode.name}{part}", "R", np.column_stack([values[0], values[1], np.zeros(n)])))
                 columns.append((f"{mode.name}{part}_rotation", "R", values[2]))
+    return columns
+
+
+def write_xyz(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
+    """An extended XYZ file; what is in it, in words."""
+    box = packing.box_length
+    width = box if box is not None else 2 * np.ptp(packing.position[:, 0]) + 2 * packing.radius.max()
+    height = (packing.position[:, 1] + packing.radius).max()
+    columns = _written(packing, modes)
     properties = ":".join(f"{name}:{kind}:{1 if array.ndim == 1 else array.shape[1]}" for name, kind, array in columns)
     numbers = " ".join(repr(value) for value in contact_rows(packing).ravel().tolist())
     says = [
@@ -122,7 +128,7 @@ def write_xyz(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
     rows = np.column_stack([array if array.ndim == 2 else array[:, None] for *_, array in columns])
     whole = np.concatenate([[kind == "I"] * (1 if a.ndim == 1 else a.shape[1]) for _, kind, a in columns])
     species = np.where(packing.top, "T", "B").tolist()
-    lines = [str(n), " ".join(says)]
+    lines = [str(len(packing)), " ".join(says)]
     for name, row in zip(species, rows.tolist(), strict=True):
         words = (str(int(value)) if is_whole else repr(value) for value, is_whole in zip(row, whole, strict=True))
         lines.append(f"{name} " + " ".join(words))

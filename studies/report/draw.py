@@ -51,22 +51,8 @@ def figure_of(study: Study) -> Figure:
             style["linestyle"] = "none"
         left.plot([point.seconds for point in points], error, label=method, **style, **clip)
         _second(right, points, error, study.abscissa, style | clip)
-    for number, line in enumerate(study.theory):
-        grey: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": DASHES[number], "zorder": 4}
-        if line.parameter:
-            right.plot(line.parameter, line.error, label=line.label, **grey)
-        else:
-            left.axhline(line.error[0], **grey)
-            right.axhline(line.error[0], label=line.label, **grey)
-    if study.reference_error > bottom:
-        for axes in (left, right):
-            axes.axhspan(bottom, study.reference_error, color=SHADE, linewidth=0, zorder=0)
-    if any(point.error == 0 for point in study.points):
-        for axes in (left, right):
-            axes.axhline(zero, color=INK, linewidth=0.5, linestyle=":")
-        left.annotate(
-            "0", (0.015, zero), xycoords=left.get_yaxis_transform(), xytext=(0, 2), textcoords="offset points"
-        )
+    _draw_theory(left, right, study)
+    _draw_floor(left, right, study, bottom, zero)
     left.set(xscale="log", yscale="log", ylim=(bottom, top), xlabel="wall time, s", ylabel=_label(study.error))
     right.set(xscale="log", xlabel=_label(getattr(study, study.abscissa)))
     handles, labels = left.get_legend_handles_labels()
@@ -76,6 +62,30 @@ def figure_of(study: Study) -> Figure:
         _whole_decades(axes)
         axes.grid(color=INK, alpha=0.12, linewidth=0.4)
     return figure
+
+
+def _draw_theory(left: Axes, right: Axes, study: Study) -> None:
+    """Grey lines: over the parameter on the right, or horizontal in both panels."""
+    for number, line in enumerate(study.theory):
+        grey: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": DASHES[number], "zorder": 4}
+        if line.parameter:
+            right.plot(line.parameter, line.error, label=line.label, **grey)
+        else:
+            left.axhline(line.error[0], **grey)
+            right.axhline(line.error[0], label=line.label, **grey)
+
+
+def _draw_floor(left: Axes, right: Axes, study: Study, bottom: float, zero: float) -> None:
+    """The shade below the reference's own error, and the line of errors of zero."""
+    if study.reference_error > bottom:
+        for axes in (left, right):
+            axes.axhspan(bottom, study.reference_error, color=SHADE, linewidth=0, zorder=0)
+    if any(point.error == 0 for point in study.points):
+        for axes in (left, right):
+            axes.axhline(zero, color=INK, linewidth=0.5, linestyle=":")
+        left.annotate(
+            "0", (0.015, zero), xycoords=left.get_yaxis_transform(), xytext=(0, 2), textcoords="offset points"
+        )
 
 
 def _steady(points: list[Point]) -> bool:

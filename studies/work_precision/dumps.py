@@ -9,7 +9,7 @@ most of the stiffness of the weakest contacts, and contacts open that were close
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -87,20 +87,18 @@ def dumps(settings: Settings) -> Study:
         return _study(settings, packing, Path(name))
 
 
+Run = tuple[str, float | None, Callable[[], tuple[Packing, int]]]
+
+
 def _study(settings: Settings, packing: Packing, folder: Path) -> Study:
     exact = eigenvalues(packing)
     digits = (G, 9, 12, 15, 16, 17) if settings.quick else (G, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17)
-    runs: list[tuple[str, float | None, Callable[[], tuple[Packing, int]]]] = []
-    runs += [(TEXT, n, partial(through_text, packing, folder / "packing", n, folder)) for n in digits]
-    runs.append((HDF5, None, partial(through_hdf5, packing, folder)))
-    runs.append((SINGLE, None, partial(through_trajectory, packing)))
-    runs.append((NO_SLIPS, None, partial(without_slips, packing)))
+    runs = _runs(packing, folder, digits)
     results = timed([run for *_, run in runs], settings.repeats, settings.progress)
     points = tuple(
         Point(method, parameter, loss(found, exact), seconds, size)
         for (method, parameter, _), ((found, size), seconds) in zip(runs, results, strict=True)
     )
-    by = {(point.method, point.parameter): point.error for point in points}
     overlap, furthest = packing.geometry.overlap, np.abs(packing.position).max()
     stiffest = float(packing.law.normal_stiffness(overlap).max())
     weakest = float(packing.law.normal_curvature(overlap.min())) / stiffest
@@ -118,18 +116,32 @@ def _study(settings: Settings, packing: Packing, folder: Path) -> Study:
         reference="the packing in memory; eigenvalues have the rounding of their solver",
         reference_error=float(np.finfo(float).eps),
         points=points,
-        advice=(
-            "Take run.h5 or the decks' %.17g: both give the packing back to the bit.",
-            f"Never take eigenvalues from text at %g, which changes them by {by[TEXT, G]:.0e} of the largest, from "
-            f"the float32 of a trajectory ({by[SINGLE, None]:.0e}), or from positions without slips "
-            f"({by[NO_SLIPS, None]:.0e}).",
-        ),
+        advice=_advice(points),
         theory=(Theory("rounding of the coordinates", tuple(expected), tuple(sizes)),),
         remarks=(
             f"The smallest overlap is {overlap.min():.1e}, coordinates go up to {furthest:.3g}. Where text has too "
             "few digits for an overlap, contacts open or close.",
             "An error of zero, the same eigenvalues to the bit, stands at the lower edge of the figure.",
         ),
+    )
+
+
+def _runs(packing: Packing, folder: Path, digits: Sequence[int]) -> list[Run]:
+    """The ways through a file: method, digits, and what takes the packing through it."""
+    runs: list[Run] = [(TEXT, n, partial(through_text, packing, folder / "packing", n, folder)) for n in digits]
+    runs.append((HDF5, None, partial(through_hdf5, packing, folder)))
+    runs.append((SINGLE, None, partial(through_trajectory, packing)))
+    runs.append((NO_SLIPS, None, partial(without_slips, packing)))
+    return runs
+
+
+def _advice(points: Sequence[Point]) -> tuple[str, str]:
+    by = {(point.method, point.parameter): point.error for point in points}
+    return (
+        "Take run.h5 or the decks' %.17g: both give the packing back to the bit.",
+        f"Never take eigenvalues from text at %g, which changes them by {by[TEXT, G]:.0e} of the largest, from "
+        f"the float32 of a trajectory ({by[SINGLE, None]:.0e}), or from positions without slips "
+        f"({by[NO_SLIPS, None]:.0e}).",
     )
 
 

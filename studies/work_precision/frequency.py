@@ -7,7 +7,7 @@ of a frequency is known exactly, :math:`\sin\tfrac12\Omega\,\Delta t = \tfrac12\
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -87,6 +87,10 @@ def growth(settings: Settings) -> Study:
     )
 
 
+Measured = tuple[Mode, Sequence[tuple[complex, float]]]
+"""A mode, and the frequency and the seconds of each run."""
+
+
 def _study(
     settings: Settings,
     equilibrium: Equilibrium,
@@ -101,36 +105,18 @@ def _study(
     shares = SHARES[: len(SHARES) - settings.quick]
     steps = [share * mode.limit for share in shares]
     fine_mode = Mode.of(compensated(equilibrium).packing, mode.growing)
-    with Engine(mode.packing) as engine, Engine(fine_mode.packing) as fine_engine:
-        jobs: list[Callable[[], complex]] = [partial(mode.measured, engine, dt, time) for dt in steps]
-        jobs += [partial(fine_mode.measured, fine_engine, dt, time) for dt in steps]
-        *runs, (alone, seconds_alone) = timed([*jobs, mode.from_spectrum], settings.repeats, settings.progress)
+    *runs, (alone, seconds_alone) = _measured(settings, mode, fine_mode, steps, time)
     plain, careful = runs[: len(steps)], runs[len(steps) :]
-    points = []
-    for method, one, found_at, change in (
-        (RUN, mode, plain, lambda found, _: found),
-        (CAREFUL_RUN, fine_mode, careful, lambda found, _: found),
-        (CORRECTED, mode, plain, corrected),
-        (COMPENSATED, fine_mode, careful, corrected),
-    ):
-        for dt, (found, seconds) in zip(steps, found_at, strict=True):
-            off = max(abs(one.quantity(change(found, dt)) / one.exact - 1), float(np.finfo(float).eps))
-            points.append(Point(method, dt, off, seconds, int(time / dt)))
+    points = _points((mode, plain), (fine_mode, careful), steps, time)
     own = max(abs(alone / exact - 1), float(np.finfo(float).eps))
     points.append(Point(SPECTRUM, None, own, seconds_alone, None))
-    noise, careful_noise = (
-        float(np.median([point.error for point in points if point.method == method]))
-        for method in (CORRECTED, COMPENSATED)
-    )
-    raw = {share: point.error for share, point in zip(shares, points, strict=False)}
-    fine = np.geomspace(steps[-1], steps[0], 60)
-    predicted = [abs(mode.quantity(complex(discrete_frequency(mode.eigenvalue, dt))) / exact - 1) for dt in fine]
+    noise, careful_noise = (_typical(points, method) for method in (CORRECTED, COMPENSATED))
     order = fit_order(points, CAREFUL_RUN, 2, least=10 * careful_noise, most=0.01)
     figures = {
         "coarse": shares[1],
         "noise": noise,
-        "default": raw[0.05],
-        "raw": raw[shares[1]],
+        "default": points[shares.index(0.05)].error,
+        "raw": points[1].error,
         "spectrum": max(own, mode.resolution),
         "slower": 2 / mode.limit / abs(np.sqrt(mode.eigenvalue)),
     }
@@ -144,13 +130,50 @@ def _study(
         points=tuple(points),
         advice=(many_steps.format(**figures), otherwise.format(**figures)),
         orders=(order,),
-        theory=(
-            Theory("velocity Verlet on a frozen K", tuple(map(float, predicted)), tuple(map(float, fine))),
-            Theory("rounding of K", (mode.resolution,)),
-        ),
-        remarks=(
-            f"With the dispersion taken out, runs in doubles differ from K's eigenvalue by {noise:.0e}: the "
-            "rounding of the coordinates, and that the packing is not quite linear at displacements of "
-            f"{mode.amplitude:g}. In compensated arithmetic, at {fine_mode.amplitude:g}, it is {careful_noise:.0e}.",
-        ),
+        theory=(_dispersion(mode, steps), Theory("rounding of K", (mode.resolution,))),
+        remarks=(_remark(mode, fine_mode, noise, careful_noise),),
+    )
+
+
+def _measured(
+    settings: Settings, mode: Mode, fine_mode: Mode, steps: Sequence[float], time: float
+) -> list[tuple[complex, float]]:
+    """Frequency and seconds of the runs in doubles, of those in compensated arithmetic, and of K's eigenvalue."""
+    with Engine(mode.packing) as engine, Engine(fine_mode.packing) as fine_engine:
+        jobs: list[Callable[[], complex]] = [partial(mode.measured, engine, dt, time) for dt in steps]
+        jobs += [partial(fine_mode.measured, fine_engine, dt, time) for dt in steps]
+        return timed([*jobs, mode.from_spectrum], settings.repeats, settings.progress)
+
+
+def _typical(points: Sequence[Point], method: str) -> float:
+    return float(np.median([point.error for point in points if point.method == method]))
+
+
+def _points(plain: Measured, careful: Measured, steps: Sequence[float], time: float) -> list[Point]:
+    """The runs in both arithmetics, as they are and with the dispersion taken out."""
+    points = []
+    for method, one, found_at, change in (
+        (RUN, *plain, lambda found, _: found),
+        (CAREFUL_RUN, *careful, lambda found, _: found),
+        (CORRECTED, *plain, corrected),
+        (COMPENSATED, *careful, corrected),
+    ):
+        for dt, (found, seconds) in zip(steps, found_at, strict=True):
+            off = max(abs(one.quantity(change(found, dt)) / one.exact - 1), float(np.finfo(float).eps))
+            points.append(Point(method, dt, off, seconds, int(time / dt)))
+    return points
+
+
+def _dispersion(mode: Mode, steps: Sequence[float]) -> Theory:
+    """What velocity Verlet makes of a mode of a frozen K."""
+    fine = np.geomspace(steps[-1], steps[0], 60)
+    predicted = [abs(mode.quantity(complex(discrete_frequency(mode.eigenvalue, dt))) / mode.exact - 1) for dt in fine]
+    return Theory("velocity Verlet on a frozen K", tuple(map(float, predicted)), tuple(map(float, fine)))
+
+
+def _remark(mode: Mode, fine_mode: Mode, noise: float, careful_noise: float) -> str:
+    return (
+        f"With the dispersion taken out, runs in doubles differ from K's eigenvalue by {noise:.0e}: the "
+        "rounding of the coordinates, and that the packing is not quite linear at displacements of "
+        f"{mode.amplitude:g}. In compensated arithmetic, at {fine_mode.amplitude:g}, it is {careful_noise:.0e}."
     )

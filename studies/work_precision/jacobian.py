@@ -8,7 +8,7 @@ force has a kink in its second derivative, which adds a term of first order for 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -49,19 +49,15 @@ def jacobian(settings: Settings) -> Study:
         return _study(settings, engine, packing)
 
 
+Run = tuple[str, float | None, int, Callable[[], Floats]]
+
+
 def _study(settings: Settings, engine: Engine, packing: Packing) -> Study:
     exact = complex_step(packing, np.clongdouble)
     scale = np.abs(exact).max()
     steps = np.logspace(-11, -5, 5 if settings.quick else 13)
-    fewer = steps[::2]
+    runs = _runs(engine, packing, steps)
     size = 3 * len(packing)
-    runs: list[tuple[str, float | None, int, Callable[[], Floats]]] = [
-        (ANALYTIC, None, 1, lambda: stiffness_matrix(packing).toarray()),
-        (PAPER, None, 1, lambda: stiffness_matrix(packing, "paper").toarray()),
-        (COMPLEX, None, size, partial(complex_step, packing)),
-    ]
-    runs += [(DIFFERENCES, step, 2 * size, partial(central_differences, packing, step)) for step in steps]
-    runs += [(LAMMPS, step, 2 * size, partial(in_lammps, engine, packing, step)) for step in fewer]
     results = timed([run for *_, run in runs], settings.repeats, settings.progress)
     points = tuple(
         Point(method, parameter, float(np.abs(matrix - exact).max() / scale), seconds, evaluations)
@@ -71,7 +67,6 @@ def _study(settings: Settings, engine: Engine, packing: Packing) -> Study:
     own, analytic = (_rounding(packing, number) / float(scale) for number in (np.longdouble, np.float64))
     fine = np.geomspace(steps[0], steps[-1], 60)
     truncation, rounding = _difference_errors(packing, float(scale), fine)
-    best = {method: min((p for p in points if p.method == method), key=lambda p: p.error) for method in METHODS}
     return Study(
         name="Jacobian",
         question=f"The stability operator K = -dF/dq of {len(packing)} disks at F_x = {packing.fx:g}, {size} x {size}.",
@@ -83,13 +78,7 @@ def _study(settings: Settings, engine: Engine, packing: Packing) -> Study:
         "precision",
         reference_error=own,
         points=points,
-        advice=(
-            f"Take the analytic K: {best[ANALYTIC].seconds * 1e3:.2g} ms and {best[ANALYTIC].error:.0e}; the "
-            f"paper's form, which costs the same, is another operator, off by {best[PAPER].error:.0e}.",
-            f"Take complex steps to check a law that changes, {best[COMPLEX].error:.0e} without a step to choose; "
-            f"central differences, with a step of {best[LAMMPS].parameter:.0e} and at the best "
-            f"{best[LAMMPS].error:.0e}, only for forces that are a black box, such as LAMMPS's.",
-        ),
+        advice=_advice(points),
         theory=(
             Theory("truncation + rounding", tuple((truncation + rounding).tolist()), tuple(fine.tolist())),
             Theory("overlaps as plain differences", (analytic,)),
@@ -99,6 +88,30 @@ def _study(settings: Settings, engine: Engine, packing: Packing) -> Study:
             "A sparse K needs fewer differences than columns, if columns that share no row are displaced together; the "
             "errors are the same.",
         ),
+    )
+
+
+def _runs(engine: Engine, packing: Packing, steps: Floats) -> list[Run]:
+    """Method, step, evaluations, and what computes K."""
+    size = 3 * len(packing)
+    runs: list[Run] = [
+        (ANALYTIC, None, 1, lambda: stiffness_matrix(packing).toarray()),
+        (PAPER, None, 1, lambda: stiffness_matrix(packing, "paper").toarray()),
+        (COMPLEX, None, size, partial(complex_step, packing)),
+    ]
+    runs += [(DIFFERENCES, step, 2 * size, partial(central_differences, packing, step)) for step in steps]
+    runs += [(LAMMPS, step, 2 * size, partial(in_lammps, engine, packing, step)) for step in steps[::2]]
+    return runs
+
+
+def _advice(points: Sequence[Point]) -> tuple[str, str]:
+    best = {method: min((p for p in points if p.method == method), key=lambda p: p.error) for method in METHODS}
+    return (
+        f"Take the analytic K: {best[ANALYTIC].seconds * 1e3:.2g} ms and {best[ANALYTIC].error:.0e}; the "
+        f"paper's form, which costs the same, is another operator, off by {best[PAPER].error:.0e}.",
+        f"Take complex steps to check a law that changes, {best[COMPLEX].error:.0e} without a step to choose; "
+        f"central differences, with a step of {best[LAMMPS].parameter:.0e} and at the best "
+        f"{best[LAMMPS].error:.0e}, only for forces that are a black box, such as LAMMPS's.",
     )
 
 

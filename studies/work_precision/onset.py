@@ -12,7 +12,7 @@ product linearly, and the pair is believed from :math:`50\, u |A|_F` on.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
@@ -120,6 +120,9 @@ def onset(settings: Settings) -> Study:
         return _study(settings, Ways(engine, start, settings.scene), exact)
 
 
+Run = tuple[str, float, Callable[[], tuple[float, int]]]
+
+
 def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     quick = settings.quick
     check, finest = (2e-3, 1e-3) if quick else (5e-4, 2.5e-4)
@@ -127,18 +130,8 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     found, _ = reference.solved(finest, guess)
     exact = found.fx_c
     reference_error = found.error + abs(reference.root(check, guess)[0] - exact)
-    whole = {
-        name: partial(way.whole, beyond=guess) for name, way in {"doubles": ways, "compensated": reference}.items()
-    }
-    runs: list[tuple[str, float, Callable[[], tuple[float, int]]]] = []
-    for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
-        runs.append((OVERDAMPED, increment, partial(ways.scan, increment, "overdamped")))
-    for increment in (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4):
-        runs.append((SCAN, increment, partial(ways.scan, increment)))
-    for halvings in (5, 25) if quick else (2, 5, 10, 20, 30):
-        runs.append((BISECTION, 1e-3 * 2.0**-halvings, partial(ways.bisect, 1e-3, halvings)))
-    for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
-        runs.append((ROOT, increment, partial(ways.root, increment, exact)))
+    whole = {"doubles": partial(ways.whole, beyond=guess), "compensated": partial(reference.whole, beyond=guess)}
+    runs = _runs(ways, quick, exact)
     results = timed([run for _, _, run in runs], settings.repeats, settings.progress)
     resolution = float(np.spacing(exact))
     points = tuple(
@@ -146,7 +139,6 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
         for (method, parameter, _), ((found, equilibria), seconds) in zip(runs, results, strict=True)
     )
     lost, overlap = ways.beyond(exact)
-    counts = np.array([3.0, 300.0])
     residual = max(each.residual for each in settings.ramp)
     best = {method: min((p for p in points if p.method == method), key=lambda p: p.error) for method in METHODS}
     return Study(
@@ -162,22 +154,43 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
         reference_error=reference_error,
         points=points,
         covered=coverage(whole, INCREMENTS[:2] if quick else INCREMENTS),
-        advice=(
-            f"Take the root of the discriminant: {best[ROOT].error:.0e} in {best[ROOT].seconds:.2g} s, with an "
-            "error that it states, and windows of complex eigenvalues that are narrower than an increment are "
-            "found.",
-            f"Take a bisection where one window is known to be there, {best[BISECTION].error:.0e} in "
-            f"{best[BISECTION].seconds:.2g} s and nothing else computed; a scan, which errs by up to half its "
-            "increment, only for a picture of the eigenvalues, and never with overdamped dynamics.",
-        ),
-        theory=(
-            Theory("half an increment", tuple((0.5 * exact / counts).tolist()), tuple(counts.tolist())),
-            Theory("pair lost in rounding", (lost,)),
-        ),
+        advice=_advice(best),
+        theory=(_half_an_increment(exact), Theory("pair lost in rounding", (lost,))),
         remarks=(
             f"At {BEYOND:g} beyond the onset |y^H x| is {overlap:.1e}; an error of the equilibria, of the order of "
             f"their residual {residual:.0e}, is in all ways alike.",
             f"The best scan by overdamped dynamics took {best[OVERDAMPED].seconds:.3g} s for an error of "
             f"{best[OVERDAMPED].error:.0e}. An error below the spacing of doubles, {resolution:.0e}, is shown as that.",
         ),
+    )
+
+
+def _runs(ways: Ways, quick: bool, exact: float) -> list[Run]:
+    """Method, increment, and what finds the onset."""
+    runs: list[Run] = []
+    for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
+        runs.append((OVERDAMPED, increment, partial(ways.scan, increment, "overdamped")))
+    for increment in (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4):
+        runs.append((SCAN, increment, partial(ways.scan, increment)))
+    for halvings in (5, 25) if quick else (2, 5, 10, 20, 30):
+        runs.append((BISECTION, 1e-3 * 2.0**-halvings, partial(ways.bisect, 1e-3, halvings)))
+    for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
+        runs.append((ROOT, increment, partial(ways.root, increment, exact)))
+    return runs
+
+
+def _half_an_increment(exact: float) -> Theory:
+    """The error of a scan over the number of its equilibria."""
+    counts = np.array([3.0, 300.0])
+    return Theory("half an increment", tuple((0.5 * exact / counts).tolist()), tuple(counts.tolist()))
+
+
+def _advice(best: Mapping[str, Point]) -> tuple[str, str]:
+    return (
+        f"Take the root of the discriminant: {best[ROOT].error:.0e} in {best[ROOT].seconds:.2g} s, with an "
+        "error that it states, and windows of complex eigenvalues that are narrower than an increment are "
+        "found.",
+        f"Take a bisection where one window is known to be there, {best[BISECTION].error:.0e} in "
+        f"{best[BISECTION].seconds:.2g} s and nothing else computed; a scan, which errs by up to half its "
+        "increment, only for a picture of the eigenvalues, and never with overdamped dynamics.",
     )

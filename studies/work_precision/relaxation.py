@@ -13,7 +13,7 @@ power :math:`F \cdot v`. LAMMPS's own minimizers advance no slips and are refuse
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -119,6 +119,9 @@ def relaxation(settings: Settings) -> Study:
         )
 
 
+Run = tuple[str, float, Increment, Callable[[], tuple[Packing, int]]]
+
+
 def _study(settings: Settings, plain: Increment, careful: Increment, end: Equilibrium) -> Study:
     matrix, _ = dynamical_matrix(end.packing)
     values = np.linalg.eigvals(matrix.toarray()).real
@@ -127,22 +130,7 @@ def _study(settings: Settings, plain: Increment, careful: Increment, end: Equili
     softness = float(np.sqrt(np.mean(values**-2.0)))
     rounding = rounding_floor(plain.start.packing) * softness
     relax_step, verlet_step, drag = STABLE * 2 / fastest, STABLE * 2 / np.sqrt(fastest), 2 * np.sqrt(slowest)
-    runs: list[tuple[str, float, Increment, Callable[[], tuple[Packing, int]]]] = []
-    for force in np.logspace(-3, -9, 4 if settings.quick else 7).tolist():
-        runs.append((DECKS, force, plain, partial(plain.overdamped, None, force)))
-        runs.append((OVERDAMPED, force, plain, partial(plain.overdamped, relax_step, force)))
-        if force > 1e-6:  # its evaluations are slow, and its convergence steady
-            runs.append((FIRE, force, plain, partial(plain.fire, verlet_step, force)))
-    for force in (1e-5, 1e-9, 1e-13):
-        runs.append((OVERDAMPED + COMPENSATED, force, careful, partial(careful.overdamped, relax_step, force)))
-    for steps in (50, 100, 200, 400, 800):
-        runs.append((VERLET, steps, plain, partial(plain.verlet, verlet_step, drag, steps)))
-        runs.append((VERLET + COMPENSATED, steps, careful, partial(careful.verlet, verlet_step, drag, steps)))
-    for force in (1e-1, 1e-4, 1e-7, 0.0):
-        runs.append((NEWTON, force, plain, partial(plain.newton, force or None)))
-    for force in (1e-1, 1e-4, 1e-7, 1e-12, 0.0):
-        runs.append((NEWTON + COMPENSATED, force, careful, partial(careful.newton, force or None)))
-    runs.sort(key=lambda run: run[0])
+    runs = _runs(plain, careful, (relax_step, verlet_step, drag), settings.quick)
     results = timed([run for *_, run in runs], settings.repeats, settings.progress)
     reference_error = end.floor * softness
     points = tuple(
@@ -154,7 +142,6 @@ def _study(settings: Settings, plain: Increment, careful: Increment, end: Equili
     decay = {OVERDAMPED: slowest * relax_step, VERLET: 0.5 * drag * verlet_step}
     theory = [_decay(f"slowest mode, {name}", first, rate, many) for name, rate in decay.items()]
     best = {name: min((p for p in points if p.method == name), key=lambda p: p.error) for name, *_ in runs}
-    newton, careful_newton, verlet = best[NEWTON], best[NEWTON + COMPENSATED], best[VERLET]
     return Study(
         name="relaxation",
         question=f"The equilibrium of {len(end.packing)} disks at F_x = {TO:g}, from that at {FROM:g}: how far from "
@@ -168,27 +155,57 @@ def _study(settings: Settings, plain: Increment, careful: Increment, end: Equili
         "because of their path is in their errors",
         reference_error=reference_error,
         points=points,
-        advice=(
-            f"Take Newton's method: {newton.error:.0e} after {newton.evaluations} evaluations ({newton.seconds:.2g} "
-            f"s) in doubles, {careful_newton.error:.0e} after {careful_newton.evaluations} in compensated "
-            f"arithmetic ({careful_newton.seconds:.2g} s), and no parameter to choose.",
-            "Take Verlet with drag where the path has to be a motion: with a drag of 2 omega_min, spins included, "
-            f"it errs by {verlet.error:.0e} after {verlet.evaluations} steps ({verlet.seconds:.2g} s), where the "
-            f"paper's overdamped dynamics errs by {best[DECKS].error:.0e} after {best[DECKS].evaluations} "
-            f"({best[DECKS].seconds:.2g} s).",
-        ),
+        advice=_advice(best),
         theory=(*theory, Theory("rounding of doubles", (rounding,))),
-        remarks=(
-            f"The eigenvalues of K/m go from {slowest:.3g} to {fastest:.3g}: overdamped dynamics needs a number of "
-            "steps proportional to their ratio, Verlet with critical drag to its root. Overdamped means with the "
-            "longest stable step, from K, where the step of the decks is not named.",
-            "FIRE is on the displacement from the last equilibrium, with slips advanced along the straight path "
-            "from there in every evaluation, as in Newton's method; run as a motion, its stops and restarts would "
-            "be in the slips. An evaluation of FIRE or Newton goes through Python, one of the dynamics does not.",
-            "The dynamics in compensated arithmetic ends beside Newton's equilibrium, not on it: it has taken another "
-            "path, and slips depend on it.",
-            "Nothing slides in this increment. Where contacts slide, ways that differ may end further apart.",
-        ),
+        remarks=_remarks(slowest, fastest),
+    )
+
+
+def _runs(plain: Increment, careful: Increment, dynamics: tuple[float, float, float], quick: bool) -> list[Run]:
+    """Method, parameter, increment, and what finds the equilibrium; steps of dynamics, of Verlet, and its drag."""
+    relax_step, verlet_step, drag = dynamics
+    runs: list[Run] = []
+    for force in np.logspace(-3, -9, 4 if quick else 7).tolist():
+        runs.append((DECKS, force, plain, partial(plain.overdamped, None, force)))
+        runs.append((OVERDAMPED, force, plain, partial(plain.overdamped, relax_step, force)))
+        if force > 1e-6:  # its evaluations are slow, and its convergence steady
+            runs.append((FIRE, force, plain, partial(plain.fire, verlet_step, force)))
+    for force in (1e-5, 1e-9, 1e-13):
+        runs.append((OVERDAMPED + COMPENSATED, force, careful, partial(careful.overdamped, relax_step, force)))
+    for steps in (50, 100, 200, 400, 800):
+        runs.append((VERLET, steps, plain, partial(plain.verlet, verlet_step, drag, steps)))
+        runs.append((VERLET + COMPENSATED, steps, careful, partial(careful.verlet, verlet_step, drag, steps)))
+    for force in (1e-1, 1e-4, 1e-7, 0.0):
+        runs.append((NEWTON, force, plain, partial(plain.newton, force or None)))
+    for force in (1e-1, 1e-4, 1e-7, 1e-12, 0.0):
+        runs.append((NEWTON + COMPENSATED, force, careful, partial(careful.newton, force or None)))
+    return sorted(runs, key=lambda run: run[0])
+
+
+def _advice(best: Mapping[str, Point]) -> tuple[str, str]:
+    newton, careful_newton, verlet = best[NEWTON], best[NEWTON + COMPENSATED], best[VERLET]
+    return (
+        f"Take Newton's method: {newton.error:.0e} after {newton.evaluations} evaluations ({newton.seconds:.2g} "
+        f"s) in doubles, {careful_newton.error:.0e} after {careful_newton.evaluations} in compensated "
+        f"arithmetic ({careful_newton.seconds:.2g} s), and no parameter to choose.",
+        "Take Verlet with drag where the path has to be a motion: with a drag of 2 omega_min, spins included, "
+        f"it errs by {verlet.error:.0e} after {verlet.evaluations} steps ({verlet.seconds:.2g} s), where the "
+        f"paper's overdamped dynamics errs by {best[DECKS].error:.0e} after {best[DECKS].evaluations} "
+        f"({best[DECKS].seconds:.2g} s).",
+    )
+
+
+def _remarks(slowest: float, fastest: float) -> tuple[str, ...]:
+    return (
+        f"The eigenvalues of K/m go from {slowest:.3g} to {fastest:.3g}: overdamped dynamics needs a number of "
+        "steps proportional to their ratio, Verlet with critical drag to its root. Overdamped means with the "
+        "longest stable step, from K, where the step of the decks is not named.",
+        "FIRE is on the displacement from the last equilibrium, with slips advanced along the straight path "
+        "from there in every evaluation, as in Newton's method; run as a motion, its stops and restarts would "
+        "be in the slips. An evaluation of FIRE or Newton goes through Python, one of the dynamics does not.",
+        "The dynamics in compensated arithmetic ends beside Newton's equilibrium, not on it: it has taken another "
+        "path, and slips depend on it.",
+        "Nothing slides in this increment. Where contacts slide, ways that differ may end further apart.",
     )
 
 

@@ -34,15 +34,21 @@ def test_contacts_with_other_slips():
             contacts.slipped(slips)
 
 
-def test_a_packing_elsewhere_has_a_geometry_of_its_own(cluster):
+def test_moved_packing_is_one_made_anew(cluster):
     position, angle = cluster.position + 1e-3, cluster.angle - 0.1
     contacts = cluster.contacts.slipped(np.zeros(12))
     _ = cluster.geometry, cluster.rattlers  # of the old place
-    there = replace(cluster, position=position, angle=angle, contacts=contacts, position_low=1e-18 * position, fx=0.3)
-    assert np.any(there.geometry.overlap != cluster.geometry.overlap)
-    assert there.position is not position
-    assert not there.position.flags.writeable
-    assert there.mass.tobytes() == cluster.mass.tobytes()
+    moved = cluster.moved(position, angle, contacts, 1e-18 * position, 0.3)
+    anew = replace(cluster, position=position, angle=angle, contacts=contacts, position_low=1e-18 * position, fx=0.3)
+    assert moved == anew
+    np.testing.assert_array_equal(moved.geometry.overlap, anew.geometry.overlap)
+    np.testing.assert_array_equal(moved.net_force, anew.net_force)
+    assert moved.position is not position
+    assert not moved.position.flags.writeable
+    assert cluster.moved(position, angle, contacts).fx == cluster.fx
+    for wrong in ({"position": position[1:]}, {"angle": np.full(6, np.nan)}, {"contacts": Contacts([6], [-1], [0])}):
+        with pytest.raises(ValueError, match=r"position|angle|beyond"):
+            cluster.moved(**({"position": position, "angle": angle, "contacts": contacts} | wrong))
 
 
 def test_a_packing_is_frozen(cluster):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +14,7 @@ from ..ranks import is_root
 from .terminal import AsJson, ScenePath, print_json, read_scene, say, status, stored_packing
 
 if TYPE_CHECKING:
-    from ..analysis import Packing, Window
+    from ..analysis import Packing, Spectrum, Window
     from ..pywrap import Scene
 
 app = typer.Typer()
@@ -57,6 +57,12 @@ def spectrum(
             }
         )
         return
+    _print_spectrum(packing, result, pairs, gain)
+
+
+def _print_spectrum(
+    packing: Packing, result: Spectrum, pairs: list[dict[str, Any]], gain: dict[str, Any] | None
+) -> None:
     real = result.eigenvalues.real
     print(
         f"F_x = {packing.fx:g}: {len(real)} eigenvalues from {real.min():.6g} to {real.max():.6g}, "
@@ -140,11 +146,7 @@ def onset(
         among = "" if part is None else f" among the modes {part[0]}:{part[1]}"
         say(f"mu = {mu:g}: F_x^c = {with_uncertainty(run.onset.fx_c, run.onset.error)}{among}")
         _show_windows(run.onset.windows, real.get("si", []))
-        for below, above in run.onset.doubtful:
-            say(
-                f"a pair was expected to become complex between F_x = {below:.6g} and {above:.6g}, and was not found: "
-                "an earlier onset may hide there; take smaller increments to be sure"
-            )
+        _say_doubtful(run.onset.doubtful)
     result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
     if output and is_root():
         write_text(output, json.dumps(result, indent=1) + "\n")
@@ -185,6 +187,14 @@ def _in_si(scene: Scene, windows: Sequence[tuple[float, float]]) -> dict[str, li
 def _columns(si: dict[str, float]) -> list[str]:
     """Stress, its share of the overburden, and frequency."""
     return [f"{number:.4g}" for number in si.values()]
+
+
+def _say_doubtful(increments: Iterable[tuple[float, float]]) -> None:
+    for below, above in increments:
+        say(
+            f"a pair was expected to become complex between F_x = {below:.6g} and {above:.6g}, and was not found: "
+            "an earlier onset may hide there; take smaller increments to be sure"
+        )
 
 
 def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]]) -> None:

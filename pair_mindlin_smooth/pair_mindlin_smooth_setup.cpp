@@ -1,0 +1,301 @@
+// What comes before a run and between runs: keywords, checks, fixes, restarts.
+
+#include "pair_mindlin_smooth.h"
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "fix_disc_integrators.h"
+#include "force.h"
+#include "memory.h"
+#include "modify.h"
+#include "neighbor.h"
+#include "update.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+using namespace LAMMPS_NS;
+using faultgouge::MindlinLaw;
+
+PairMindlinSmooth::PairMindlinSmooth(LAMMPS *lmp) : Pair(lmp)
+{
+  single_enable = 1;
+  single_extra = 8;
+  svector = new double[single_extra];
+  restartinfo = 1;
+  one_coeff = 1;
+  finitecutflag = 1;
+  no_virial_fdotr_compute = 1;    // forces act on owned disks only, so that a sum over ghosts would miss some
+  centroidstressflag = CENTROID_SAME;
+}
+
+PairMindlinSmooth::~PairMindlinSmooth()
+{
+  if (history && modify->get_fix_by_id(FixSlipHistory::ID)) modify->delete_fix(FixSlipHistory::ID);
+  if (low_parts && modify->get_fix_by_id(FixLowParts::ID)) modify->delete_fix(FixLowParts::ID);
+  if (dashpots && modify->get_fix_by_id(FixDashpotVelocities::ID)) modify->delete_fix(FixDashpotVelocities::ID);
+  delete[] svector;
+  if (allocated) {
+    memory->destroy(setflag);
+    memory->destroy(cutsq);
+    memory->destroy(largest_radius);
+  }
+}
+
+void PairMindlinSmooth::allocate()
+{
+  allocated = 1;
+  const int n = atom->ntypes + 1;
+  memory->create(setflag, n, n, "pair:setflag");
+  memory->create(cutsq, n, n, "pair:cutsq");
+  memory->create(largest_radius, n, "pair:largest_radius");
+  for (int i = 1; i < n; i++)
+    for (int j = i; j < n; j++) setflag[i][j] = 0;
+}
+
+void PairMindlinSmooth::settings(int narg, char **arg)
+{
+  if (narg < 3)
+    error->all(FLERR, "pair_style mindlin/smooth takes three numbers, KN KT MU, and keywords, but got {} arguments",
+               narg);
+  law = MindlinLaw();
+  law.kn = utils::numeric(FLERR, arg[0], false, lmp);
+  law.kt = utils::numeric(FLERR, arg[1], false, lmp);
+  law.mu = utils::numeric(FLERR, arg[2], false, lmp);
+  if (!law.valid())
+    error->all(FLERR,
+               "pair_style mindlin/smooth: KN must be positive, KT and MU not negative, all finite (got {} {} {})",
+               arg[0], arg[1], arg[2]);
+  read_keywords(narg, arg);
+}
+
+void PairMindlinSmooth::read_keywords(int narg, char **arg)
+{
+  compensated = damping = false;
+  for (int k = 3; k < narg; k++) {
+    if (strcmp(arg[k], "compensated") == 0) {
+      compensated = true;
+    } else if (strcmp(arg[k], "exponent") == 0) {
+      if (++k >= narg || !law.set_exponent(utils::numeric(FLERR, arg[k], false, lmp)))
+        error->all(FLERR, "pair_style mindlin/smooth: exponent must be 1.5 or 1, not {}",
+                   k < narg ? arg[k] : "left out");
+    } else if (strcmp(arg[k], "damping") == 0) {
+      if (k + 2 >= narg) error->all(FLERR, "pair_style mindlin/smooth: damping takes two numbers, CN CT");
+      law.cn = utils::numeric(FLERR, arg[++k], false, lmp);
+      law.ct = utils::numeric(FLERR, arg[++k], false, lmp);
+      if (!law.valid_dashpots())
+        error->all(FLERR, "pair_style mindlin/smooth: damping CN CT must be finite and not negative (got {} {})",
+                   arg[k - 1], arg[k]);
+      damping = true;
+    } else {
+      error->all(FLERR, "pair_style mindlin/smooth knows the keywords exponent, damping and compensated, but not {}",
+                 arg[k]);
+    }
+  }
+}
+
+void PairMindlinSmooth::coeff(int narg, char **arg)
+{
+  if (narg != 2 || strcmp(arg[0], "*") != 0 || strcmp(arg[1], "*") != 0)
+    error->all(FLERR, "pair mindlin/smooth has one law for all disks: use pair_coeff * *");
+  if (!allocated) allocate();
+  for (int i = 1; i <= atom->ntypes; i++)
+    for (int j = i; j <= atom->ntypes; j++) setflag[i][j] = 1;
+}
+
+void PairMindlinSmooth::init_style()
+{
+  check_disks();
+  has_friction = law.frictional();
+  damped = damping && !displaces_disks(*modify);
+  if (damped) check_damping();
+  check_run();
+
+  // newton off: pairs of owned disks once, pairs with ghosts at both their owners
+  neighbor->add_request(this, NeighConst::REQ_NEWTON_OFF);
+
+  make_fixes();
+  if (compensated) check_integrators();
+  comm_forward = (compensated ? 4 : 2) + (damped ? FixDashpotVelocities::FELT : 0);
+
+  const double diameter = 2.0 * measure_radii();
+  check_box(diameter);
+  if (compensated) low_parts->set_reach(diameter);
+  set_force_grids();
+}
+
+void PairMindlinSmooth::check_disks() const
+{
+  if (domain->dimension != 2) error->all(FLERR, "pair mindlin/smooth is for disks in the plane: use dimension 2");
+  if (domain->triclinic) error->all(FLERR, "pair mindlin/smooth needs an orthogonal box, not a triclinic one");
+  if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->torque_flag)
+    error->all(FLERR, "pair mindlin/smooth needs disks with radius and spin: use atom_style sphere");
+  if (atom->molecular != Atom::ATOMIC)
+    error->all(FLERR, "pair mindlin/smooth is for single disks: use atom_style sphere without molecules");
+}
+
+void PairMindlinSmooth::check_run() const
+{
+  if (has_friction && !comm->ghost_velocity)
+    error->all(FLERR, "pair mindlin/smooth needs the velocities of ghost disks: use comm_modify vel yes");
+  if (compensated && update->whichflag == 2)
+    error->all(FLERR, "pair mindlin/smooth: a minimizer does not carry the low parts of coordinates: minimize without "
+                      "the keyword compensated");
+  if (has_friction && update->whichflag == 2)
+    error->all(FLERR,
+               "pair mindlin/smooth with friction cannot be minimized, since its forces depend on the path: relax "
+               "with fix overdamped/disc, or minimize with mu = 0");
+}
+
+// Returns the largest of all.
+double PairMindlinSmooth::measure_radii()
+{
+  std::vector<double> mine(atom->ntypes + 1, 0.0);
+  for (int i = 0; i < atom->nlocal; i++) mine[atom->type[i]] = std::max(mine[atom->type[i]], atom->radius[i]);
+  MPI_Allreduce(mine.data(), largest_radius, atom->ntypes + 1, MPI_DOUBLE, MPI_MAX, world);
+  return *std::max_element(largest_radius + 1, largest_radius + atom->ntypes + 1);
+}
+
+void PairMindlinSmooth::check_box(double diameter) const
+{
+  for (int d = 0; d < 2; d++)
+    if (domain->periodicity[d] && domain->prd[d] < 2.0 * diameter)
+      error->all(FLERR,
+                 "pair mindlin/smooth: the periodic box is {} long in {}, less than two diameters of the largest disk "
+                 "({}), and a disk could touch two images of one neighbour: use a larger box",
+                 domain->prd[d], "xy"[d], diameter);
+}
+
+// An overlap of more than the smaller radius is refused.
+void PairMindlinSmooth::set_force_grids()
+{
+  const double radius = *std::max_element(largest_radius + 1, largest_radius + atom->ntypes + 1);
+  double normal = law.normal_force(radius);
+  // no disk moves by more than its radius in a step, and the velocity that dashpots feel is up to three times that
+  if (damped) normal += law.cn * law.growth(radius) * 6.0 * radius / update->dt;
+  force_grid = faultgouge::SummationGrid::for_largest(normal * std::sqrt(1.0 + law.mu * law.mu));
+  tangential_grid = faultgouge::SummationGrid::for_largest(normal * law.mu);
+}
+
+// made at init and not with the pair style, because data of a restart file reach a fix when it is made
+void PairMindlinSmooth::make_fixes()
+{
+  history = dynamic_cast<FixSlipHistory *>(modify->get_fix_by_id(FixSlipHistory::ID));
+  if (history && (!has_friction || history->compensated() != compensated)) {
+    modify->delete_fix(FixSlipHistory::ID);
+    history = nullptr;
+  }
+  if (has_friction && !history)
+    history = dynamic_cast<FixSlipHistory *>(
+        modify->add_fix(fmt::format("{} all slip/history{}", FixSlipHistory::ID, compensated ? " compensated" : "")));
+  if (history) history->set_source(this);
+  slips_in_fix = true;
+
+  low_parts = dynamic_cast<FixLowParts *>(modify->get_fix_by_id(FixLowParts::ID));
+  if (compensated && !low_parts)
+    low_parts = dynamic_cast<FixLowParts *>(modify->add_fix(fmt::format("{} all low/parts", FixLowParts::ID)));
+  if (!compensated && low_parts) {
+    modify->delete_fix(FixLowParts::ID);
+    low_parts = nullptr;
+  }
+  make_dashpots();
+}
+
+void PairMindlinSmooth::make_dashpots()
+{
+  dashpots = dynamic_cast<FixDashpotVelocities *>(modify->get_fix_by_id(FixDashpotVelocities::ID));
+  if (damping && !dashpots)
+    dashpots = dynamic_cast<FixDashpotVelocities *>(
+        modify->add_fix(fmt::format("{} all dashpot/velocities", FixDashpotVelocities::ID)));
+  if (!damping && dashpots) {
+    modify->delete_fix(FixDashpotVelocities::ID);
+    dashpots = nullptr;
+  }
+}
+
+void PairMindlinSmooth::check_damping() const
+{
+  if (update->whichflag == 2)
+    error->all(FLERR, "pair mindlin/smooth: a minimizer has no velocities: minimize without the keyword damping");
+  for (const auto &fix : modify->get_fix_list())
+    if (dynamic_cast<const FixOverdampedDisc *>(fix))
+      error->all(FLERR,
+                 "pair mindlin/smooth: fix {} of style {} has no dynamics that dashpots could damp, and equilibria do "
+                 "not depend on them: leave the keyword damping out",
+                 fix->id, fix->style);
+}
+
+void PairMindlinSmooth::check_integrators() const
+{
+  for (const auto &fix : modify->get_fix_list()) {
+    if (!fix->time_integrate) continue;
+    const auto *integrator = dynamic_cast<const FixDiscIntegrator *>(fix);
+    if (!integrator || !integrator->compensated())
+      error->all(FLERR,
+                 "pair mindlin/smooth: fix {} of style {} moves disks without the low parts of their coordinates: use "
+                 "nve/disc, overdamped/disc or displace/disc with the keyword compensated",
+                 fix->id, fix->style);
+  }
+}
+
+double PairMindlinSmooth::init_one(int i, int j)
+{
+  if (!setflag[i][j]) error->all(FLERR, "pair mindlin/smooth has no coefficients: use pair_coeff * *");
+  return largest_radius[i] + largest_radius[j];
+}
+
+// called by fix adapt after it has changed a parameter
+void PairMindlinSmooth::reinit()
+{
+  if (!law.valid()) error->all(FLERR, "pair mindlin/smooth: KN KT MU became {} {} {}", law.kn, law.kt, law.mu);
+  if (law.frictional() && !has_friction)
+    error->all(FLERR, "pair mindlin/smooth: friction cannot be switched on within a run that began without");
+  if (!law.valid_dashpots()) error->all(FLERR, "pair mindlin/smooth: CN CT became {} {}", law.cn, law.ct);
+  set_force_grids();
+}
+
+void *PairMindlinSmooth::extract(const char *name, int &dim)
+{
+  dim = 0;
+  if (strcmp(name, "kn") == 0) return &law.kn;
+  if (strcmp(name, "kt") == 0) return &law.kt;
+  if (strcmp(name, "mu") == 0) return &law.mu;
+  if (damping && strcmp(name, "cn") == 0) return &law.cn;
+  if (damping && strcmp(name, "ct") == 0) return &law.ct;
+  return nullptr;
+}
+
+void PairMindlinSmooth::write_restart(FILE *fp)
+{
+  write_restart_settings(fp);
+}
+
+void PairMindlinSmooth::read_restart(FILE *fp)
+{
+  read_restart_settings(fp);
+  allocate();
+  for (int i = 1; i <= atom->ntypes; i++)
+    for (int j = i; j <= atom->ntypes; j++) setflag[i][j] = 1;
+}
+
+void PairMindlinSmooth::write_restart_settings(FILE *fp)
+{
+  fwrite(&law, sizeof(MindlinLaw), 1, fp);
+  fwrite(&compensated, sizeof(bool), 1, fp);
+  fwrite(&damping, sizeof(bool), 1, fp);
+}
+
+void PairMindlinSmooth::read_restart_settings(FILE *fp)
+{
+  if (comm->me == 0) {
+    utils::sfread(FLERR, &law, sizeof(MindlinLaw), 1, fp, nullptr, error);
+    utils::sfread(FLERR, &compensated, sizeof(bool), 1, fp, nullptr, error);
+    utils::sfread(FLERR, &damping, sizeof(bool), 1, fp, nullptr, error);
+  }
+  MPI_Bcast(&law, sizeof(MindlinLaw), MPI_BYTE, 0, world);
+  MPI_Bcast(&compensated, sizeof(bool), MPI_BYTE, 0, world);
+  MPI_Bcast(&damping, sizeof(bool), MPI_BYTE, 0, world);
+}
