@@ -18,6 +18,7 @@ from ..pywrap.equilibria import EquilibriumPath, loads
 from ..pywrap.refusals import needed
 from ..pywrap.settling import Watch
 from .path_error import with_path_error
+from .sharing import searching
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +118,7 @@ def onset_run(
             forces = np.array([each.fx for each in path.kept])
         flows = len(forces) < len(wanted)
         try:
-            onset = find_onset(path, forces, modes=modes, watch=watch)
+            onset = find_onset(path, forces, modes=modes, watch=watch, ranks=searching(communicator))
         except (OnsetError, NoEquilibriumError) as error:
             if not flows and isinstance(error, OnsetError):
                 raise

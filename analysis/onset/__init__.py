@@ -19,6 +19,7 @@ from .edge import Edge, Family, LostPairError, Root, locate, smooth_root
 from .limits import LIMITS, Limits
 from .modes import Modes, assign, force_bearing, full_operator
 from .pair import Pair, Place, continued
+from .ranks import Ranks
 from .search import Onset, OnsetError, complex_windows, find_onset, seeks_all
 from .sliced import FirstWindow, first_window
 from .windows import Window
@@ -35,6 +36,7 @@ __all__ = [
     "OnsetError",
     "Pair",
     "Place",
+    "Ranks",
     "Root",
     "Window",
     "assign",

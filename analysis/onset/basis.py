@@ -20,6 +20,7 @@ from scipy.sparse import csc_array, csr_array
 
 from ..packing import Floats, Indices
 from .limits import LIMITS, Limits
+from .ranks import Ranks
 from .screening import Cluster, Levels
 
 
@@ -60,27 +61,31 @@ class Basis:
         return cls(matrix.shape[0], active, values, vectors, slice(0, len(values)), limits)
 
     @classmethod
-    def slices(cls, matrix: csr_array, workers: int, modes: tuple[int, int], limits: Limits) -> "Iterator[Basis]":
-        """Bases whose own modes are, together, those of these numbers; all in one for a small operator.
+    def slices(cls, matrix: csr_array, modes: tuple[int, int], limits: Limits, ranks: Ranks) -> "Iterator[Basis]":
+        """This rank's bases; the own modes of those of all ranks are those of these numbers.
+
+        A small operator has one, which the first rank makes.
 
         Parameters
         ----------
         matrix : scipy.sparse.csr_array, shape (n, n)
             The operator, 1 / time^2.
-        workers : int
-            Threads.
         modes : tuple of (int, int)
             Numbers of the first mode that is wanted and of the first that is not, the lowest being 0.
         limits : Limits
+        ranks : Ranks
+            Who shares the slices. All of them must come to the end of their bases.
         """
         active = np.flatnonzero(np.diff(matrix.indptr))
         if len(active) <= limits.one_basis:
-            yield replace(cls.of(matrix, limits), own=slice(*modes))
+            if ranks.rank == 0:
+                yield replace(cls.of(matrix, limits), own=slice(*modes))
             return
         from .slicing import slices  # with libraries that nothing else needs
 
         inner = matrix[active][:, active]
-        for part in slices(csc_array(0.5 * (inner + inner.T)), limits.margin + limits.beyond, workers, modes, limits):
+        symmetric, margin = csc_array(0.5 * (inner + inner.T)), limits.margin + limits.beyond
+        for part in slices(symmetric, margin, modes, limits, ranks=ranks):
             yield cls(matrix.shape[0], active, part.values, part.vectors, part.own, limits)
 
     @property

@@ -13,6 +13,7 @@ from ..packing import Packing
 from .edge import Family
 from .limits import LIMITS, Limits
 from .modes import Operator, full_operator
+from .ranks import ALONE, Ranks
 from .screened import all_windows
 from .sliced import FirstWindow, Watch, first_window
 from .windows import Window, increasing
@@ -123,6 +124,7 @@ def find_onset(
     narrowest: float | None = None,
     modes: tuple[int, int] | None = None,
     watch: Watch = lambda says: None,
+    ranks: Ranks = ALONE,
     limits: Limits = LIMITS,
 ) -> Onset:
     """The windows of complex eigenvalues between the smallest and the largest load.
@@ -151,6 +153,9 @@ def find_onset(
         window as all of it.
     watch : callable, optional
         Told in words what is being looked at in a large packing.
+    ranks : Ranks, optional
+        The processes that search a large packing together. Each makes the same call, and is told the same by
+        `equilibrium`.
     limits : Limits, optional
         Sizes and tolerances of the search.
 
@@ -180,7 +185,7 @@ def find_onset(
     if complete:
         windows, first = complex_windows(operator, loads, narrowest=narrowest, limits=limits), FirstWindow(None)
     else:
-        first = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch)
+        first = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks)
         windows = () if first.window is None else (first.window,)
     if not windows:
         raise OnsetError.among(modes, float(loads[-1]), first.doubtful)

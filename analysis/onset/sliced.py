@@ -24,7 +24,6 @@ parts is handed out with the result.
 its kind, so a pair is followed from inside of its window to the edge.
 """
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -41,6 +40,7 @@ from .dip import dip_between
 from .edge import Edge, Family, LostPairError, complex_pair_near, edge_from_inside, leads_back
 from .modes import Members, Modes
 from .pair import Pair, Place, continued
+from .ranks import ALONE, Ranks
 from .screened import all_windows
 from .screening import Cluster, Levels, may_meet
 from .walk import walk
@@ -87,8 +87,14 @@ class DoubtError(FaultgougeError):
 class Sliced:
     """The oracle; its places are operators, and what it is sure of is a window."""
 
-    def __init__(self, family: Family, modes: tuple[int, int] | None = None, watch: Watch = lambda says: None) -> None:
-        self.family, self.limits, self.modes, self.watch = family, family.limits, modes, watch
+    def __init__(
+        self,
+        family: Family,
+        modes: tuple[int, int] | None = None,
+        watch: Watch = lambda says: None,
+        ranks: Ranks = ALONE,
+    ) -> None:
+        self.family, self.limits, self.modes, self.watch, self.ranks = family, family.limits, modes, watch, ranks
         self.first: Window | None = None
         self.doubtful: list[tuple[float, float]] = []
         self._passed: list[Place] = []
@@ -105,18 +111,36 @@ class Sliced:
             self.first = sure
 
     def candidates(self, places: Sequence[Place]) -> list[list[Candidate]]:
-        """The pairs that turn complex in their clusters on each increment, by increasing onset."""
+        """The pairs that turn complex in their clusters on each increment, by increasing onset: those of all ranks."""
+        everyone = self.ranks.together(lambda: self._found(places))
+        merged = ([candidate for each in one for candidate in each] for one in zip(*everyone, strict=True))
+        return [sorted(each, key=lambda candidate: candidate.onset) for each in merged]
+
+    def _found(self, places: Sequence[Place]) -> list[list[Candidate]]:
+        """The same from this rank's bases, in the order of the spectrum."""
         found: list[list[Candidate]] = [[] for _ in places[1:]]
         first, stop = self.range(places[0].matrix)
-        done = 0
+        done, wanted = 0, -(-(stop - first) // self.ranks.size)
+        failure: FaultgougeError | None = None
         for basis, before in self.bases(places[0].matrix):
+            if failure is not None:
+                continue  # the ranks meet at the end of their bases
             done += basis.own.stop - basis.own.start
-            self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {done} of {stop - first} modes")
-            for announced, (here, there) in zip(found, pairwise(places), strict=True):
-                after = basis.change(before, there.matrix - here.matrix)
-                announced.extend(self._announced(basis, (here.fx, before), (there.fx, after)))
-                before = after
-        return [sorted(each, key=lambda candidate: candidate.onset) for each in found]
+            self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {done} of {wanted} modes")
+            try:
+                self._announce(found, basis, before, places)
+            except FaultgougeError as error:
+                failure = error
+        if failure is not None:
+            raise failure
+        return found
+
+    def _announce(self, found: list[list[Candidate]], basis: Basis, before: Levels, places: Sequence[Place]) -> None:
+        """Add the pairs of one basis."""
+        for announced, (here, there) in zip(found, pairwise(places), strict=True):
+            after = basis.change(before, there.matrix - here.matrix)
+            announced.extend(self._announced(basis, (here.fx, before), (there.fx, after)))
+            before = after
 
     def confirm(
         self, candidates: list[Candidate], here: Place, there: Place, depth: int
@@ -187,23 +211,23 @@ class Sliced:
         return (stop - first + margins) * matrix.shape[0] <= limits.kept
 
     def bases(self, matrix: csr_array) -> Iterable[tuple[Basis, Levels]]:
-        """Bases of all modes that are looked at, those of an earlier load as long as they serve, and the operator."""
+        """This rank's bases, those of an earlier load as long as all ranks' serve, and the operator in them."""
         known = self._serving(matrix)
-        if known:
+        if known is not None:
             return known
-        bases: Iterable[Basis] = Basis.slices(matrix, _cores(), self.range(matrix), self.limits)
+        bases: Iterable[Basis] = Basis.slices(matrix, self.range(matrix), self.limits, self.ranks)
         if self.keeps(matrix):
             self._kept = []  # its memory is free before that for the next ones is taken
             bases = self._kept = list(bases)
         return ((basis, basis.levels(matrix)) for basis in bases)
 
-    def _serving(self, matrix: csr_array) -> list[tuple[Basis, Levels]]:
-        """The bases that are kept and the operator in them; none if they do not serve."""
-        if not all(basis.covers(matrix) for basis in self._kept):
-            return []
-        known = [(basis, basis.levels(matrix)) for basis in self._kept]
-        mixing = [each for basis, levels in known for each in basis.mixing(levels)]
-        return known if known and np.median(mixing) < self.limits.mixing else []
+    def _serving(self, matrix: csr_array) -> list[tuple[Basis, Levels]] | None:
+        """The bases that are kept and the operator in them; None if those of all ranks do not serve."""
+        covering = all(basis.covers(matrix) for basis in self._kept)
+        known = [(basis, basis.levels(matrix)) for basis in self._kept if covering]
+        mine = [each for basis, levels in known for each in basis.mixing(levels)] if covering else [np.inf]
+        mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
+        return known if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing else None
 
     # What clusters announce
 
@@ -300,11 +324,12 @@ def first_window(
     loads: Floats,
     modes: tuple[int, int] | None = None,
     watch: Watch = lambda says: None,
+    ranks: Ranks = ALONE,
 ) -> FirstWindow:
     """The first window of complex eigenvalues of a family of large matrices, without all their eigenvalues.
 
     `loads` increase. Those beyond the one above the onset are not asked for, except those of `Limits.ahead` increments;
-    `modes` and `watch` are those of :func:`~faultgouge.analysis.find_onset`.
+    `modes`, `watch` and `ranks` are those of :func:`~faultgouge.analysis.find_onset`.
 
     Raises
     ------
@@ -318,7 +343,7 @@ def first_window(
     ValueError
         If the packing has none of these modes.
     """
-    oracle = Sliced(family, modes, watch)
+    oracle = Sliced(family, modes, watch, ranks)
     here = family.at(loads[0])
     ahead = 1 if oracle.keeps(here.matrix) else family.limits.ahead
     done = 1
@@ -357,8 +382,3 @@ def _exceeding(block: Floats, excess: float) -> Floats:
     width = max(float(np.ptp(levels)), np.finfo(np.float64).tiny)
     mixing = float(np.linalg.norm(block - np.diag(levels))) / width
     return block + excess * mixing**2 * width / len(levels) * np.sign(block - block.T)
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

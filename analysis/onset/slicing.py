@@ -12,14 +12,16 @@ for one vector at a time; blocks halve the time of solutions and of products.
 are as many as there are eigenvalues below :math:`\sigma`. So every eigenvalue of a slice has its number in the whole
 spectrum. Where two slices meet both must give the same eigenvalue the same number; a missing eigenvalue would shift the
 numbers of all beyond it.
+
+Several ranks count together, and each finds a run of neighbouring slices (:mod:`~faultgouge.analysis.onset.ranks`).
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from itertools import count
+from itertools import count, pairwise
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -32,6 +34,7 @@ from ..errors import FaultgougeError
 from ..packing import Floats, Indices
 from ..sparse_lu import minimum_degree, symmetric_lu
 from .limits import LIMITS, Limits
+from .ranks import ALONE, Ranks
 
 
 class SliceError(FaultgougeError):
@@ -83,10 +86,10 @@ def factored(matrix: csc_array, shift: float, mumps: bool = False) -> Factored:
 def slices(
     matrix: csc_array,
     margin: int,
-    workers: int = 1,
     modes: tuple[int, int] | None = None,
     limits: Limits = LIMITS,
     factorise: Callable[[csc_array, float], Factored] | None = None,
+    ranks: Ranks = ALONE,
 ) -> Iterator[Slice]:
     """Eigenvalues and eigenvectors of a symmetric matrix, slice by slice in the order of the spectrum.
 
@@ -96,50 +99,79 @@ def slices(
         Symmetric.
     margin : int
         Further modes wanted on either side of a slice.
-    workers : int
-        Threads, and slices at the most that are under way beyond the one that is asked for.
     modes : tuple of (int, int), optional
         Numbers of the first eigenvalue that is wanted and of the first that is not, the lowest being 0; all by default.
     limits, factorise
         Sizes, and how to factorise S - shift if not by :func:`factored`.
+    ranks : Ranks
+        Who shares the slices; those of this rank are found. Its threads are also the slices at the most that are under
+        way beyond the one that is asked for. All ranks must come to the end of their slices.
 
     Raises
     ------
     SliceError
         If eigenvalues do not converge, or neighbouring slices disagree.
     """
-    spectrum = _Spectrum(matrix, limits, factorise or partial(factored, mumps=workers == 1))
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(workers) as pool:
-        waiting: deque[Future[Slice]] = deque()
-        before: Slice | None = None
-        for shift, own in spectrum.shifts(pool, *(modes or (0, matrix.shape[0]))):
-            waiting.append(pool.submit(spectrum.slice_about, shift, own, margin))
-            if len(waiting) > workers:
-                before = _checked(before, waiting.popleft().result())
-                yield before
-        for future in waiting:
-            before = _checked(before, future.result())
-            yield before
+    spectrum = _Spectrum(matrix, limits, factorise or partial(factored, mumps=ranks.workers == 1), ranks)
+    ends: list[Slice] = []
+    failure: FaultgougeError | None = None
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(ranks.workers) as pool:
+        shifts = spectrum.shifts(pool, *(modes or (0, matrix.shape[0])))
+        try:
+            for part in _in_turn(pool, ranks.workers, spectrum, shifts[ranks.part(len(shifts))], margin):
+                ends = [*ends[:1], replace(part, vectors=np.empty((0, 0)))]
+                yield part
+        except FaultgougeError as error:
+            failure = error
+
+    def borders() -> list[Slice]:
+        if failure is not None:
+            raise failure
+        return ends
+
+    for before, after in pairwise([each for each in ranks.together(borders) if each]):
+        _compare(before[-1], after[0])
 
 
-def _checked(before: Slice | None, after: Slice) -> Slice:
-    """The second slice, if it gives its first eigenvalue the same number as the slice before it."""
-    if before is not None:
-        number = after.first + after.own.start
-        here, there = after.values[after.own.start], before.values[number - before.first]
-        if abs(here - there) > 0.01 * after.spacing:
-            raise SliceError(
-                f"the eigenvalue of number {number} is {there:.10g} from one shift and {here:.10g} from the next: "
-                "one is missing in between"
-            )
-    return after
+Shift = tuple[float, tuple[int, int]]
+"""A shift, and the numbers of the first eigenvalue that belongs to it and of the first that does not."""
+
+
+def _in_turn(
+    pool: ThreadPoolExecutor, workers: int, spectrum: "_Spectrum", shifts: Sequence[Shift], margin: int
+) -> Iterator[Slice]:
+    """Neighbouring slices in their order, each compared with the one before it."""
+    waiting: deque[Future[Slice]] = deque()
+    before: Slice | None = None
+    for place in range(len(shifts) + workers):
+        if place < len(shifts):
+            waiting.append(pool.submit(spectrum.slice_about, *shifts[place], margin))
+        if place >= workers and waiting:
+            after = waiting.popleft().result()
+            if before is not None:
+                _compare(before, after)
+            yield after
+            before = after
+
+
+def _compare(before: Slice, after: Slice) -> None:
+    """Raise an error if the second slice gives its first eigenvalue another number than the slice before it."""
+    number = after.first + after.own.start
+    here, there = after.values[after.own.start], before.values[number - before.first]
+    if abs(here - there) > 0.01 * after.spacing:
+        raise SliceError(
+            f"the eigenvalue of number {number} is {there:.10g} from one shift and {here:.10g} from the next: "
+            "one is missing in between"
+        )
 
 
 class _Spectrum:
     """A symmetric matrix in an order that keeps its factors sparse."""
 
-    def __init__(self, matrix: csc_array, limits: Limits, factorise: Callable[[csc_array, float], Factored]) -> None:
-        self.limits, self.factorise = limits, factorise
+    def __init__(
+        self, matrix: csc_array, limits: Limits, factorise: Callable[[csc_array, float], Factored], ranks: Ranks
+    ) -> None:
+        self.limits, self.factorise, self.ranks = limits, factorise, ranks
         size = matrix.shape[0]
         self.bound = float(abs(matrix).sum(axis=0).max())  # no eigenvalue is beyond
         order = minimum_degree(csc_array(matrix + 2 * self.bound * eye_array(size)))
@@ -150,15 +182,18 @@ class _Spectrum:
         """How many eigenvalues are below the shift."""
         return self.factorise(self.matrix, shift)[1]
 
-    def shifts(self, pool: ThreadPoolExecutor, first: int, stop: int) -> Iterator[tuple[float, tuple[int, int]]]:
-        """Shifts, and the numbers of the first eigenvalue that belongs to each and of the first that does not.
+    def counted(self, pool: ThreadPoolExecutor, shifts: Floats) -> list[int]:
+        """How many eigenvalues are below each of some shifts; all ranks know what each has counted."""
+        mine = shifts[self.ranks.part(len(shifts))]
+        return [each for one in self.ranks.together(lambda: list(pool.map(self.below, mine))) for each in one]
 
-        Those from the eigenvalue of number `first` on, and before that of number `stop`.
-        """
+    def shifts(self, pool: ThreadPoolExecutor, first: int, stop: int) -> list[Shift]:
+        """The shifts of all slices from the eigenvalue of number `first` on, and before that of number `stop`."""
         size = self.matrix.shape[0]
-        top = float(eigsh(self.matrix, k=1, which="LA", tol=1e-3, return_eigenvectors=False)[0])
+        start = np.random.default_rng(0).standard_normal(size)
+        top = float(eigsh(self.matrix, k=1, which="LA", tol=1e-3, v0=start, return_eigenvectors=False)[0])
         places = np.array([-self.bound, -1e-9 * self.bound, 1.01 * top])
-        numbers = np.array([0, self.below(places[1]), size])
+        numbers = np.array([0, *self.counted(pool, places[1:2]), size])
         for turn in count():
             wanted = (numbers[1:] > first) & (numbers[:-1] < stop)
             wide = np.flatnonzero(wanted & (np.diff(numbers) > self.limits.coarse) & (np.diff(places) > 1e-6 * top))
@@ -166,15 +201,14 @@ class _Spectrum:
                 break
             share = self._share(numbers[wide], numbers[wide + 1], first, stop) if turn % 2 == 0 else 0.5
             between = places[wide] + share * (places[wide + 1] - places[wide])
-            numbers = np.insert(numbers, wide + 1, list(pool.map(self.below, between)))
+            numbers = np.insert(numbers, wide + 1, self.counted(pool, between))
             places = np.insert(places, wide + 1, between)
         numbers, last = np.unique(numbers[::-1], return_index=True)
         pieces = max(1, round((stop - first) / self.limits.own))
         ends = first + np.arange(pieces + 1) * (stop - first) // pieces
         borders = PchipInterpolator(numbers, places[::-1][last])(ends)
         middles = 0.5 * (borders[:-1] + borders[1:])
-        for middle, start, stop in zip(middles, ends[:-1], ends[1:], strict=True):
-            yield float(middle), (int(start), int(stop))
+        return [(float(middle), (int(a), int(b))) for middle, (a, b) in zip(middles, pairwise(ends), strict=True)]
 
     def _share(self, low: Indices, high: Indices, first: int, stop: int) -> Floats:
         """Where to divide intervals that hold the eigenvalues of these numbers, as if these lay there evenly.

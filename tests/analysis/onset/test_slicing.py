@@ -1,10 +1,13 @@
 """All eigenvectors of a sparse symmetric matrix, slice by slice, against LAPACK."""
 
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
 import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
-from faultgouge.analysis.onset import LIMITS, Limits
+from faultgouge.analysis.onset import LIMITS, Family, Limits, Ranks, first_window
 from faultgouge.analysis.onset.slicing import SliceError, factored, slices
 
 
@@ -30,7 +33,7 @@ def test_slices_are_the_whole_spectrum(workers):
     matrix = network(34, 1)
     expected, basis = np.linalg.eigh(matrix.toarray())
     values, count = [], 0
-    for part in slices(matrix, 20, workers):
+    for part in slices(matrix, 20, ranks=Ranks(workers=workers)):
         own = part.values[part.own]
         assert part.first + part.own.start == count
         count += len(own)
@@ -100,3 +103,82 @@ def test_inaccurate_factors_are_noticed():
 
     with pytest.raises(SliceError, match="the factors are inaccurate"):
         list(slices(network(34, 3), 20, factorise=inaccurate))
+
+
+def on_ranks(size, work):
+    """What work gives on each of several ranks, which are threads here."""
+    barrier, given = Barrier(size, timeout=60), [None] * size
+
+    def rank(number):
+        def gather(mine):
+            given[number] = mine
+            barrier.wait()
+            everyone = list(given)
+            barrier.wait()
+            return everyone
+
+        return work(Ranks(number, size, gather, workers=1))
+
+    with ThreadPoolExecutor(size) as pool:
+        return [pool.submit(rank, number) for number in range(size)]
+
+
+FEW = Limits(own=24, coarse=60, first_look=14, one_basis=50)
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_ranks_have_together_the_slices_of_one_to_the_bit(size):
+    matrix = network(20, 5)
+    alone = list(slices(matrix, 10, limits=FEW))
+    shared = [each.result() for each in on_ranks(size, lambda ranks: list(slices(matrix, 10, limits=FEW, ranks=ranks)))]
+    assert min(len(each) for each in shared) >= len(alone) // size > 1
+    for one, other in zip(alone, (part for each in shared for part in each), strict=True):
+        assert (one.first, one.own) == (other.first, other.own)
+        assert np.array_equal(one.values, other.values)
+        assert np.array_equal(one.vectors, other.vectors)
+
+
+def test_an_error_of_one_rank_is_that_of_all():
+    matrix = network(20, 5)
+
+    def of(ranks):
+        def failing(matrix, shift):
+            if shift > 6 and ranks.rank == 1:
+                raise SliceError("of one rank")
+            return factored(matrix, shift)
+
+        return list(slices(matrix, 10, limits=FEW, factorise=failing, ranks=ranks))
+
+    for each in on_ranks(2, of):
+        with pytest.raises(SliceError, match="of one rank"):
+            each.result()
+
+
+def test_ranks_that_leave_out_an_eigenvalue_at_their_border_notice():
+    matrix = network(20, 5)
+
+    def of(ranks):
+        def wrong(matrix, shift):
+            solve, below = factored(matrix, shift)
+            return solve, below + ranks.rank
+
+        return list(slices(matrix, 10, limits=FEW, factorise=wrong, ranks=ranks))
+
+    for each in on_ranks(2, of):
+        with pytest.raises(SliceError, match="is missing in between"):
+            each.result()
+
+
+def test_ranks_find_the_same_first_window_to_the_bit():
+    here, there = network(20, 6), network(20, 7)
+    turn = np.random.default_rng(0).standard_normal((400, 400))
+    turn -= turn.T
+
+    def operator(fx):
+        return here.toarray() + 0.02 * fx * there.toarray() + 1e-3 * fx * turn
+
+    loads = np.linspace(0, 1, 5)
+    alone = first_window(Family(operator, 0.0, FEW), loads)
+    assert alone.window is not None
+    for each in on_ranks(2, lambda ranks: first_window(Family(operator, 0.0, FEW), loads, ranks=ranks)):
+        assert each.result() == alone
