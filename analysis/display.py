@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from .onset import Window
     from .packing import Packing
 
 
@@ -35,6 +36,16 @@ def packing_picture(packing: Packing) -> bytes | None:
     stream = BytesIO()
     draw_packing(packing).savefig(stream, format="png", dpi=150)
     return stream.getvalue()
+
+
+def windows_table(title: str, windows: Sequence[Window]) -> str:
+    """An HTML table of windows of complex eigenvalues."""
+    rows = {
+        f"from {each.fx_onset:.10g}": f"to {'the end' if each.fx_end is None else format(each.fx_end, '.10g')}, "
+        f"lambda = {each.eigenvalue:.6g}, {each.kind}"
+        for each in windows
+    }
+    return table(title, rows)
 
 
 def table(title: str, rows: Mapping[str, str]) -> str:

@@ -1,7 +1,11 @@
-"""Sphinx configuration. The package must be installed, or be on the path; LAMMPS and MPI need not be there."""
+"""Sphinx configuration. The package must be installed, or be on the path, with its plugin: the gallery runs LAMMPS."""
 
 import re
+import sys
 from importlib import metadata
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))  # gallery_figures
 
 project = "faultgouge"
 author = "The faultgouge developers"
@@ -18,11 +22,21 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx-mathjax-offline",
+    "sphinx_gallery.gen_gallery",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["_build", "README.md"]
+exclude_patterns = ["_build", "README.md", "gallery", "sg_execution_times.rst"]
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
+
+sphinx_gallery_conf = {
+    "examples_dirs": "gallery",
+    "gallery_dirs": "auto_gallery",
+    "image_scrapers": ("gallery_figures.scraper",),
+    "within_subsection_order": "FileNameSortKey",
+    "show_signature": False,
+    "abort_on_example_error": True,
+}
 
 smartquotes = False  # --json is no dash
 html_theme = "furo"

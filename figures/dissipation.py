@@ -93,7 +93,7 @@ def draw_dashpot_onset(curve: OnsetCurve, axes: Axes | None = None) -> Figure:
                 arrowprops={"arrowstyle": "->", "color": "C0"},
             )
     axes.set(xscale="log", xlabel="$C_N$", ylabel="$F_x$ of the onset", ylim=(curve.undamped - 2 * gap, top))
-    axes.legend(loc="upper left")
+    axes.legend(loc="upper left", bbox_to_anchor=(0, 0.85))  # below what lies beyond the axes
     return figure_of(axes)
 
 
@@ -158,7 +158,7 @@ def dissipation_figure(dashpots: OnsetCurve, drag: OnsetCurve, gains: Sequence[G
     gains : sequence of GainCurve
         As of `draw_gain`.
     """
-    figure = Figure(figsize=(9.6, 3.1), layout="constrained")
+    figure = Figure(figsize=(7.4, 3.0), layout="constrained")
     one, two, three = figure.subplots(1, 3)
     draw_dashpot_onset(dashpots, one)
     draw_drag_shift(drag, two)

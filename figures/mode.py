@@ -252,7 +252,7 @@ def side_by_side(packing: Packing, count: int) -> tuple[Figure, list[Axes], floa
     view = View.of(packing)
     across = WIDTH - 0.1
     height = across * (view.ceiling - view.bottom) / (view.right - view.left)
-    figure = Figure(figsize=(WIDTH * count, height + 0.85), layout="constrained")
+    figure = Figure(figsize=(WIDTH * count, height + 0.95), layout="constrained")
     axes = figure.subplots(1, count, squeeze=False)[0]
     return figure, list(axes), 72 * across / (view.right - view.left)
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -70,7 +71,7 @@ def draw_pair(curves: Sequence[PairCurve], axes: tuple[Axes, Axes] | None = None
         real, imaginary = axes
         figure = real.get_figure(root=True)  # type: ignore[assignment]  # axes in a figure have one
     for number, curve in enumerate(curves):
-        colour = f"C{number}"
+        colour = to_hex(f"C{number}")
         real.plot(curve.fx, curve.real, color=colour)
         imaginary.plot(curve.fx, curve.imaginary, color=colour)
         where = "" if curve.fx_c is None else f", $F_x^c = {curve.fx_c:.5g}$"
@@ -116,7 +117,7 @@ def _magnify_onset(axes: Axes, curve: PairCurve, fx_c: float) -> None:
     power = int(np.floor(np.log10(reach)))
     from_onset = (curve.fx[near] - fx_c) / 10.0**power
     inset = axes.inset_axes((0.13, 0.66, 0.36, 0.31))
-    inset.plot(from_onset, curve.imaginary[near], color="C0", marker="o", markersize=2, linewidth=0.7)
+    inset.plot(from_onset, curve.imaginary[near], color=to_hex("C0"), marker="o", markersize=2, linewidth=0.7)
     inset.axvline(0, color=INK, linewidth=0.6, linestyle=":")
     inset.set_xlim(-1.05 * reach / 10.0**power, 1.05 * reach / 10.0**power)
     inset.locator_params(nbins=4)

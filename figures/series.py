@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike, NDArray
@@ -46,7 +47,7 @@ def draw_series(
     axes = panel(axes)
     time, values = positive(time, values, times=False)
     axes.set_yscale("log")
-    axes.plot(time, values, color=color, linewidth=linewidth, label=label)
+    axes.plot(time, values, color=to_hex(color), linewidth=linewidth, label=label)
     axes.set(xlabel="$t$", ylabel=ylabel)
     axes.margins(x=0)
     return figure_of(axes)

@@ -18,7 +18,8 @@ BULK, UPPER, EDGE, FLOOR, INK = "#dfe5ea", "#f2c14e", "#8a949c", "#c0392b", "#33
 MOBILIZATION = LinearSegmentedColormap.from_list("mobilization", ["#14213d", "#3d6a9e", "#b56576", "#f07d1a"])
 
 styled = matplotlib.rc_context(fname=STYLE)
-"""Decorator: what the function draws is drawn in the style, and no setting leaks out."""
+"""Decorator: what the function draws is drawn in the style, and no setting leaks out. A line keeps its colour wherever
+the figure is saved if the colour is `to_hex("C0")`: matplotlib looks up "C0" itself only when the line is drawn."""
 
 
 def panel(axes: Axes | None, **size: tuple[float, float]) -> Axes:

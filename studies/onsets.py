@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..analysis import Onset, OnsetError, Packing, find_onset
-from ..analysis.display import table
+from ..analysis.display import windows_table
 from ..analysis.onset import full_operator, seeks_all
 from ..pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, SceneError
 from ..pywrap.bed import settle
@@ -53,12 +53,7 @@ class OnsetRun:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the windows."""
-        rows = {
-            f"from {each.fx_onset:.10g}": f"to {'the end' if each.fx_end is None else format(each.fx_end, '.10g')}, "
-            f"lambda = {each.eigenvalue:.6g}, {each.kind}"
-            for each in self.onset.windows
-        }
-        return table(repr(self).strip("<>"), rows)
+        return windows_table(repr(self).strip("<>"), self.onset.windows)
 
 
 def onset_run(

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 # before NumPy is imported: the matrices are small, and workers share the cores
@@ -17,6 +18,9 @@ import pytest
 from faultgouge.analysis import MindlinLaw, Packing, touching
 
 BIN = Path(sys.executable).parent
+LIMIT = 1800
+"""Seconds for one command on a busy machine."""
+
 REFERENCE = Path(__file__).parent / "reference" / "packing7.json"
 
 
@@ -44,6 +48,24 @@ def reference_packing(reference: dict) -> Callable[[float], Packing]:
         )
 
     return make
+
+
+@pytest.fixture(scope="session")
+def faultgouge_in() -> Callable[..., subprocess.CompletedProcess]:
+    """Runs the command in a folder, on one rank or on several."""
+
+    def run(folder: Path, *words: object, ranks: int | None = None) -> subprocess.CompletedProcess:
+        before = [] if ranks is None else [BIN / "mpiexec", "-n", str(ranks)]
+        command = [*before, BIN / "faultgouge", *map(str, words)]
+        return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=LIMIT)
+
+    return run
+
+
+@pytest.fixture
+def faultgouge(faultgouge_in, tmp_path: Path) -> Callable[..., subprocess.CompletedProcess]:
+    """Runs the command in tmp_path, on one rank or on several."""
+    return partial(faultgouge_in, tmp_path)
 
 
 @pytest.fixture

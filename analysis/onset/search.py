@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
+from ..display import windows_table
 from ..errors import FaultgougeError
 from ..packing import Packing
 from .edge import Family
@@ -58,6 +59,13 @@ class Onset:
     complete: bool = True
     doubtful: tuple[tuple[float, float], ...] = ()
     modes: tuple[int, int] | None = None
+
+    def __repr__(self) -> str:
+        return f"<Onset: F_x^c = {self.fx_c:.10g} +- {self.error:.1g}, {len(self.windows)} windows>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the windows."""
+        return windows_table(repr(self).strip("<>"), self.windows)
 
     @property
     def fx_c(self) -> float:

@@ -93,7 +93,8 @@ def size_figure(numbers: dict[str, Any]) -> Figure:
         disks = np.array([row["disks"] for row in levels])
         left.plot(disks, [row["median"]["value"] for row in levels], ":", color=INK, label="two levels")
     left.set(xscale="log", yscale="log", xlabel="disks", ylabel="median of $F_x^c / F_y$")
-    left.legend()
+    if levels or left.containers:
+        left.legend()
     for number, each in enumerate(numbers["growth"]):
         points = [point for point in each["points"] if point["median"] > 0]
         loads = [point["load"] for point in points]
@@ -124,7 +125,8 @@ def mechanism_figure(found: dict[str, Any]) -> Figure:
         part = found[name]
         _survival(axes, np.array(part["reach"]), np.array(part["is_onset"], dtype=bool), label, f"C{number}")
     axes.set(xlabel="$F_x$", ylabel="without an onset", xlim=(0, 0.03), ylim=(0, 1))
-    axes.legend(fontsize=7)
+    if axes.lines:
+        axes.legend(fontsize=7)
     return figure
 
 

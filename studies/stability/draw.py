@@ -55,6 +55,7 @@ def stability_figure(done: Sequence[tuple[Case, Outcome]]) -> Figure:
     axes.set(xscale="log", xlim=(0.4 * LOWEST, 30), ylim=(rows - 0.5, -1), xlabel="figure / bound")
     axes.set_yticks(list(names), [_typeset(name) for name in names.values()], fontsize=7)
     axes.set_xticks([LOWEST, 1e-4, 1e-2, 1], ["0", "$10^{-4}$", "$10^{-2}$", "1"])
+    axes.tick_params(axis="x", labeltop=True)  # the picture is longer than a screen
     axes.tick_params(axis="y", length=0, which="both")
     axes.minorticks_off()
     marks = [

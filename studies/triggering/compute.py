@@ -39,6 +39,10 @@ EARLY = 2000
 """Samples of each run at times that grow geometrically: the layer passes the velocities over which the friction falls
 early in a run, within a small share of its length."""
 
+FALL = 20_000
+"""The same of the run whose friction falls: within some twenty time steps after a thousand, and this many samples take
+each step up to there."""
+
 SENSITIVE = 1e-2
 """Largest distance 1 - F_x/F_x^c at which the response is compared with its power law: further off, the pair is no
 longer the whole of it."""
@@ -190,7 +194,7 @@ def trigger(
     v0 = np.abs(column(unperturbed, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
     weakening = weakening_of(friction, float(v0))
     perturbed = run("perturbed", settings.amplitude)
-    erupting = run("erupting", settings.amplitude, weakening)
+    erupting = run("erupting", settings.amplitude, weakening, early=FALL)
     control = None if below is None else run("control", settings.amplitude, weakening, start=below)
     amplitude = ABOVE_NOISE * settings.amplitude
     strong = run("strong", amplitude, time=min(settings.time, COMPARED_TIME))

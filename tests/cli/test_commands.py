@@ -1,8 +1,6 @@
 """The command line as a user types it: results, errors in one sentence, exit codes."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import h5py
@@ -12,7 +10,6 @@ import pytest
 from faultgouge.analysis import RunFile, read_dump, spectrum
 from faultgouge.pywrap.decks import DECKS
 
-BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
 SCENE = f"""
@@ -31,16 +28,9 @@ time = 0.5
 """
 
 
-@pytest.fixture
-def faultgouge(tmp_path):
-    def run(*arguments, ranks=None):
-        command = [BIN / "faultgouge", *arguments]
-        if ranks:
-            command = [BIN / "mpiexec", "-n", str(ranks), *command]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
-
+@pytest.fixture(autouse=True)
+def _scene(tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
-    return run
 
 
 def datasets(path):

@@ -1,8 +1,6 @@
 """Commands on scenes with [damping], and what spectrum says of transient growth."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -10,7 +8,6 @@ import pytest
 from faultgouge.analysis import RunFile
 from faultgouge.analysis.transient import transient_gain
 
-BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
 SCENE = f"""
@@ -26,14 +23,9 @@ until = 4e-3
 """
 
 
-@pytest.fixture
-def faultgouge(tmp_path):
-    def run(*arguments):
-        command = [BIN / "faultgouge", *arguments]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600)
-
+@pytest.fixture(autouse=True)
+def _scene(tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
-    return run
 
 
 def test_spectrum_says_how_far_a_stable_packing_moves(faultgouge, tmp_path):

@@ -1,7 +1,5 @@
 """Section [output]: what is written only when it is asked for."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +7,6 @@ import pytest
 
 from faultgouge.analysis import RunFile, mean_square_displacement, read_dump
 
-BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
 SCENE = f"""
@@ -30,24 +27,28 @@ omega = 1.0
 """
 
 
-def faultgouge(folder, command, output):
-    (folder / "scene.toml").write_text(SCENE + output)
-    done = subprocess.run(
-        [BIN / "faultgouge", command, "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=300
-    )
-    assert done.returncode == 0, done.stderr
-    return sorted(path.name for path in folder.iterdir())
+@pytest.fixture
+def written_by(faultgouge, tmp_path):
+    """What a command leaves in the folder, with a section [output]."""
+
+    def run(command, output):
+        (tmp_path / "scene.toml").write_text(SCENE + output)
+        done = faultgouge(command, "scene.toml")
+        assert done.returncode == 0, done.stderr
+        return sorted(path.name for path in tmp_path.iterdir())
+
+    return run
 
 
-def test_nothing_but_the_result_without_output(tmp_path):
-    assert faultgouge(tmp_path, "ramp", "") == ["run.h5", "scene.toml"]
-    assert faultgouge(tmp_path, "perturb", "") == ["perturb.h5", "run.h5", "scene.toml"]
+def test_nothing_but_the_result_without_output(written_by, tmp_path):
+    assert written_by("ramp", "") == ["run.h5", "scene.toml"]
+    assert written_by("perturb", "") == ["perturb.h5", "run.h5", "scene.toml"]
     with RunFile(tmp_path / "perturb.h5") as file, pytest.raises(ValueError, match="no series trajectory"):
         file.series("trajectory")
 
 
-def test_dumps_hold_the_equilibria(tmp_path):
-    written = faultgouge(tmp_path, "ramp", "[output]\ndumps = true\n")
+def test_dumps_hold_the_equilibria(written_by, tmp_path):
+    written = written_by("ramp", "[output]\ndumps = true\n")
     assert {f"run.{k}.{kind}" for k in (1, 2) for kind in ("disks", "contacts", "params")} <= set(written)
     with RunFile(tmp_path / "run.h5") as file:
         for k in (1, 2):
@@ -57,8 +58,8 @@ def test_dumps_hold_the_equilibria(tmp_path):
             assert dumped.fx == stored.fx
 
 
-def test_trajectory_is_that_of_the_displacements(tmp_path):
-    faultgouge(tmp_path, "perturb", "[output]\ntrajectory = true\n")
+def test_trajectory_is_that_of_the_displacements(written_by, tmp_path):
+    written_by("perturb", "[output]\ntrajectory = true\n")
     with RunFile(tmp_path / "perturb.h5") as file:
         path, series, start = file.series("trajectory"), file.series("undamped"), file.packing()
     assert np.array_equal(path["time"], series["time"])

@@ -48,10 +48,9 @@ FIGURES = ("figure1", "figure2", "figure3", "figure4", "figure5a", "figure5b", "
 
 
 @pytest.mark.slow
-def test_reproduce(tmp_path):
+def test_reproduce(faultgouge, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
-    command = [BIN / "faultgouge", "reproduce", "scene.toml", "-o", "results"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600)
+    done = faultgouge("reproduce", "scene.toml", "-o", "results")
     assert done.returncode == 0, done.stderr
     results = tmp_path / "results"
     for name in (*FIGURES, "response"):

@@ -1,4 +1,4 @@
-"""Links between pages lead somewhere, and the map names files that are there."""
+"""Links between pages lead somewhere, lines fit a screen, and the map names files that are there."""
 
 import re
 from pathlib import Path
@@ -7,12 +7,21 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
+PROSE = [*PAGES, *sorted((ROOT / "docs" / "styles").glob("*.md"))]
+NO_PROSE = re.compile(r"^(```|\$\$).*?^(```|\$\$)$|^(\||    ).*?$", re.MULTILINE | re.DOTALL)
+"""Blocks of code and formulas, and rows of tables."""
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_lead_somewhere(page):
     links = re.findall(r"\]\((?!https?:)([^)#\s]+)(?:#[^)]*)?\)", page.read_text())
     assert [link for link in links if not (page.parent / link).exists()] == []
+
+
+@pytest.mark.parametrize("page", PROSE, ids=lambda page: page.name)
+def test_no_line_of_prose_is_longer_than_a_screen(page):
+    prose = NO_PROSE.sub("", page.read_text())
+    assert [line for line in prose.splitlines() if len(line) > 120] == []
 
 
 def test_files_of_the_map_are_there():

@@ -1,8 +1,6 @@
 """A packing under shear with slips, and the command."""
 
-import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,8 +11,6 @@ from faultgouge.analysis import Packing, RunFile
 from faultgouge.pywrap import Engine, Equilibrium, equilibrate
 
 sys.path.insert(0, str(Path(__file__).parent))
-
-BIN = Path(sys.executable).parent
 
 
 @pytest.fixture(scope="session")
@@ -35,14 +31,3 @@ def stored(tmp_path, sheared) -> Path:
         file.append(sheared)
         file.complete = True
     return tmp_path / "run.h5"
-
-
-@pytest.fixture
-def faultgouge(tmp_path) -> Callable[..., subprocess.CompletedProcess]:
-    """Runs the command in tmp_path."""
-
-    def run(*words: object) -> subprocess.CompletedProcess:
-        command = [str(BIN / "faultgouge"), *map(str, words)]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
-
-    return run

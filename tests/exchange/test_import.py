@@ -1,6 +1,7 @@
 """Packings of other codes: what is read, what is brought to rest, and what is refused in one sentence."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -139,6 +140,31 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packi
     moved[:, 0] -= packing.box_length * np.round(moved[:, 0] / packing.box_length)
     held = np.setdiff1d(np.arange(len(packing)), np.union1d(rest.rattlers, packing.rattlers))
     assert np.abs(moved[held]).max() < 0.01
+
+
+@pytest.mark.xdist_group("ranks")
+@pytest.mark.slow
+def test_disks_with_slips_come_to_rest_with_friction_on_any_number_of_ranks(tmp_path, faultgouge, sheared):
+    rounded = replace(sheared, position=np.round(sheared.position, 6))  # forces of 1e-2 out of balance
+    (tmp_path / "packing.csv").write_text(csv(rounded, "x,y,radius,top"))
+    c = sheared.contacts
+    rows = zip((c.i + 1).tolist(), (c.j + 1).tolist(), c.slip.tolist(), strict=True)
+    (tmp_path / "slips.csv").write_text("id1,id2,slip\n" + "\n".join(f"{a},{b},{s!r}" for a, b, s in rows) + "\n")
+    width, shear = ("--width", sheared.box_length), ("--fx", sheared.fx)
+    words = ("import", "packing.csv", *width, "--contacts", "slips.csv", *LAW, *shear)
+    found = []
+    for name, ranks in (("one.h5", None), ("two.h5", 2)):
+        done = faultgouge(*words, "--relax", "-o", name, ranks=ranks)
+        assert done.returncode == 0, done.stderr
+        assert "brought to rest" in done.stderr
+        with RunFile(tmp_path / name) as file:
+            found.append(file.packing())
+    one, two = found
+    assert same(one, two)
+    assert one.fx == sheared.fx
+    assert one.residual < 1e-9
+    # friction keeps the slips to within what the disks have moved
+    np.testing.assert_allclose(one.contacts.slip, c.slip, atol=1e-6)
 
 
 def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):

@@ -1,9 +1,6 @@
 """Ensembles: what is counted, what is kept, and that nothing is dropped."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +14,6 @@ from faultgouge.studies.onsets import onset_run
 from faultgouge.studies.statistics import distribution, median_interval, quartiles, share
 from faultgouge.studies.sweep import triggering
 from faultgouge.studies.sweep.triggering import Eruption, RampEnd
-
-BIN = Path(sys.executable).parent
 
 SCENE = {
     "packing": {"disks": 30, "top": 5, "width": 6.0, "seed": 2},
@@ -199,7 +194,7 @@ def test_stored_packings_make_no_ensemble(tmp_path):
 
 
 @pytest.mark.xdist_group("ranks")
-def test_ranks_share_the_packings(tmp_path):
+def test_ranks_share_the_packings(faultgouge, tmp_path):
     toml = """
     [packing]
     disks = 30
@@ -216,11 +211,8 @@ def test_ranks_share_the_packings(tmp_path):
     until = 1e-2
     """
     (tmp_path / "scene.toml").write_text(toml)
-    command = [BIN / "faultgouge", "reproduce", "scene.toml", "--ensemble", "2", "-o"]
-    for name, before in (("one", []), ("shared", [BIN / "mpiexec", "-n", "2"])):
-        done = subprocess.run(
-            [*before, *command, name], cwd=tmp_path, capture_output=True, text=True, timeout=120, env=os.environ
-        )
+    for name, ranks in (("one", None), ("shared", 2)):
+        done = faultgouge("reproduce", "scene.toml", "--ensemble", "2", "-o", name, ranks=ranks)
         assert done.returncode == 0, done.stderr
     one, shared = (json.loads((tmp_path / name / "ensemble.json").read_text()) for name in ("one", "shared"))
     assert one == shared

@@ -1,11 +1,8 @@
 """explain: what it says is what LAMMPS holds, what it measures is measured, and a wrong claim is found out."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from importlib.resources import files
-from pathlib import Path
 from time import sleep
 
 import numpy as np
@@ -17,7 +14,6 @@ from faultgouge.studies.costs import in_turns
 from faultgouge.studies.explain import _affordable, _switched, explain
 from faultgouge.studies.switches import Feature, Loaded, Push, Run, features
 
-BIN = Path(sys.executable).parent
 SCENES = files("faultgouge") / "scenes"
 
 BROUGHT = {
@@ -184,16 +180,14 @@ def test_turns_begin_with_either():
     assert order == ["with", "without", "without", "with"] * 2
 
 
-def test_command_prints_a_table(tmp_path):
-    done = subprocess.run(
-        [BIN / "faultgouge", "explain", str(SCENES / "minimal.toml")], capture_output=True, text=True, timeout=120
-    )
+def test_command_prints_a_table(faultgouge):
+    done = faultgouge("explain", SCENES / "minimal.toml")
     assert done.returncode == 0, done.stderr
     for name in BROUGHT:
         assert name in done.stdout
     assert "deck parts: system.in, friction.in, undamped.in\n" in done.stdout
     assert "not imported: matplotlib, MDAnalysis" in done.stdout
     assert "law.mu = 1.0" in done.stdout
-    refused = subprocess.run([BIN / "faultgouge", "explain", "no.toml"], capture_output=True, text=True, timeout=120)
+    refused = faultgouge("explain", "no.toml")
     assert refused.returncode == 2
     assert len(refused.stderr.strip().splitlines()) == 1

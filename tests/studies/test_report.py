@@ -2,10 +2,7 @@
 
 import json
 import math
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -25,7 +22,6 @@ from faultgouge.studies.work_precision.study import Point, Settings, fit_order
 from faultgouge.studies.work_precision.timing import timed
 from faultgouge.studies.work_precision.verlet import Verlet
 
-BIN = Path(sys.executable).parent
 POINT = {"method", "parameter", "error", "seconds", "evaluations"}
 
 
@@ -231,9 +227,8 @@ def test_a_study_that_fails_does_not_take_the_others_along(tmp_path):
 
 
 @pytest.mark.slow
-def test_quick_report(tmp_path):
-    command = [BIN / "faultgouge", "report", "--quick", "-o", "report"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600)
+def test_quick_report(faultgouge, tmp_path):
+    done = faultgouge("report", "--quick", "-o", "report")
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "report" / "report.json").read_text())
     assert [study["name"] for study in result["studies"]] == list(page.STUDIES)

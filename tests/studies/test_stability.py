@@ -1,10 +1,7 @@
 """The stability study: its small part, its files, and a case that fails among others."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -16,7 +13,6 @@ from faultgouge.studies.stability_cases import checks
 from faultgouge.studies.stability_cases.case import Case, Outcome, measured, refusal, refused
 from faultgouge.studies.stability_cases.packings import crystal, sheared
 
-BIN = Path(sys.executable).parent
 QUICK = [case for case in CASES if case.quick]
 
 
@@ -112,16 +108,11 @@ def test_outcome_of_a_refusal():
     assert refusal(" kn is wrong: correct it\n", "wrong") == Outcome("refused", None, None, "kn is wrong: correct it")
 
 
-def faultgouge(folder, *arguments, ranks=1):
-    command = [BIN / "mpiexec", "-n", str(ranks), BIN / "faultgouge", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=3600)
-
-
 @pytest.mark.xdist_group("ranks")
 @pytest.mark.slow
-def test_same_table_on_two_ranks(tmp_path):
-    one = faultgouge(tmp_path, "stability", "--quick", "-o", "one", "--json")
-    two = faultgouge(tmp_path, "stability", "--quick", "-o", "two", ranks=2)
+def test_same_table_on_two_ranks(faultgouge, tmp_path):
+    one = faultgouge("stability", "--quick", "-o", "one", "--json")
+    two = faultgouge("stability", "--quick", "-o", "two", ranks=2)
     assert one.returncode == 0, one.stderr
     assert two.returncode == 0, two.stderr
     assert (tmp_path / "one" / "stability.json").read_text() == (tmp_path / "two" / "stability.json").read_text()
@@ -130,12 +121,12 @@ def test_same_table_on_two_ranks(tmp_path):
 
 
 @pytest.mark.xdist_group("ranks")
-def test_error_of_one_rank_ends_the_others(tmp_path):
+def test_error_of_one_rank_ends_the_others(faultgouge, tmp_path):
     """A contact that the law does not cover is found by the rank that owns it; the other one waits for its forces."""
     (tmp_path / "scene.toml").write_text(
         "packing = { disks = 24, top = 5, width = 5.95, seed = 2 }\nlaw = { kn = 2e5 }\nload = { fy = 2e4 }\n"
     )
-    done = faultgouge(tmp_path, "settle", "scene.toml", ranks=2)
+    done = faultgouge("settle", "scene.toml", ranks=2)
     assert done.returncode != 0
     assert "where the contact law does not hold: lower the load" in done.stderr
     assert ".cpp" not in done.stderr

@@ -213,10 +213,9 @@ def test_parts_of_the_modes_are_merged(tmp_path):
     assert any("1200:1500" in line for line in said)
 
 
-def test_the_dry_run_counts_and_computes_nothing(tmp_path):
+def test_the_dry_run_counts_and_computes_nothing(faultgouge, tmp_path):
     (tmp_path / "sweep.toml").write_text(TOML)
-    command = [BIN / "faultgouge", "sweep", "sweep.toml", "-o", "out", "--dry-run"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    done = faultgouge("sweep", "sweep.toml", "-o", "out", "--dry-run")
     assert done.returncode == 0, done.stderr
     assert "8 scenes to compute, 4 packings to settle" in done.stderr
     assert "4 points make no scene" in done.stderr

@@ -1,8 +1,6 @@
 """The commands trigger and eruptions on a small scale: what they find, and that they go on where they were cut off."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,7 +9,6 @@ from faultgouge.pywrap import Scene, SceneError
 from faultgouge.studies.eruptions import eruptions
 from faultgouge.studies.trigger import trigger_map
 
-BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 BASE = {
     "packing": {"file": str(REFERENCE)},
@@ -52,7 +49,7 @@ def test_trigger_needs_a_threshold(tmp_path, friction, says):
 
 @pytest.mark.xdist_group("ranks")
 @pytest.mark.slow
-def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(tmp_path):
+def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(faultgouge, tmp_path):
     """Below the onset, 0.0218, nothing grows; at 0.024 D grows, but not to its end in the time that is given."""
     text = f"""
 [packing]
@@ -75,7 +72,6 @@ time = 60.0
     assert all(run["balance"] < 1e-2 for run in one["runs"])
     # rounding alone: 1e-25 after a hundred time units
     assert all(run["noise"] < 1e-25 for run in one["runs"])
-    command = [BIN / "mpiexec", "-n", "2", BIN / "faultgouge", "eruptions", "scene.toml", "-o", "two", "--json"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    done = faultgouge("eruptions", "scene.toml", "-o", "two", "--json", ranks=2)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == one == json.loads((tmp_path / "two/eruptions.json").read_text())

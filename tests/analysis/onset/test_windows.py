@@ -219,6 +219,8 @@ def test_json(ramp):
     assert as_dict["error"] == onset.error
     assert as_dict["windows"][0].keys() >= {"fx_onset", "fx_end", "lambda", "error"}
     assert as_dict["windows"][0]["lambda"] == onset.windows[0].eigenvalue
+    assert repr(onset).startswith(f"<Onset: F_x^c = {onset.fx_c:.10g} +- ")
+    assert f"from {onset.fx_c:.10g}</th>" in onset._repr_html_()
 
 
 def test_modes_that_cross_keep_their_names():

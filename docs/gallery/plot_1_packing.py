@@ -1,0 +1,34 @@
+"""
+A packing and its unstable mode
+===============================
+
+Forty disks are settled, and sheared to a load at which one pair of eigenvalues is complex.
+"""
+
+from faultgouge.analysis import normal_modes, spectrum
+from faultgouge.figures import draw_packing
+from faultgouge.figures.mode import draw_modes, unstable_pair
+from faultgouge.pywrap import Scene, reach
+
+scene = Scene.from_mapping({"packing": {"seed": 4, "disks": 40, "width": 7.5}, "law": {"kn": 2e5}, "load": {"fy": 3.0}})
+*_, last = reach(scene, 0.05)
+packing = last.packing
+print(packing)
+
+# %%
+# Bars are contacts, as wide as their normal force. Their colour says how much of the Coulomb limit they use.
+
+chains = draw_packing(packing)
+
+# %%
+# The spectrum has one complex pair. Its motion grows exponentially.
+
+found = spectrum(packing)
+print(found)
+print(f"D grows as exp({found.growth_rate():.4f} t)")
+
+# %%
+# Arrows are displacements and colours rotations, at two moments that are a quarter of a period apart.
+
+modes, words = unstable_pair(packing, normal_modes(packing), [pair.eigenvalue for pair in found.pairs])
+motion = draw_modes(packing, modes, words)
