@@ -201,9 +201,11 @@ class Modes:
             inverse[pair, pair] = np.linalg.inv(blocks[column])
         turned, back = self.basis @ rate, inverse @ self.inverse
         size = len(root)
+        outward: Complexes = np.block([[self.basis, self.basis], [turned, -turned]])
+        inward: Complexes = np.block([[self.inverse, back], [self.inverse, -back]])
         return Modes(
-            np.block([[self.basis, self.basis], [turned, -turned]]),
-            0.5 * np.block([[self.inverse, back], [self.inverse, -back]]),
+            outward,
+            0.5 * inward,
             np.concatenate([root, -root]),
             blocks | {column + size: -block for column, block in blocks.items()},
         )

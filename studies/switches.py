@@ -139,13 +139,13 @@ class Run:
         # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
         stiffness = self.packing.law.stiffness_scale(10 * self.packing.fy)
         step = QUIET_SHARE * 0.2 / np.sqrt(12 * stiffness)
-        push = self.push or Push(0.0, 0.0, None)
-        target, signal = push.target, {}
-        if self.sent:
-            target, signal = self.sent.target, {"signal": self.sent.signal, "on": self.sent.on}
+        push, sent = self.push or Push(0.0, 0.0, None), self.sent
+        target = sent.target if sent else push.target
+        on: Literal["layer", "floor"] = sent.on if sent else "layer"
+        signal = sent.signal if sent else None
         with (
             Engine(self.packing, communicator, log) as engine,
-            engine.undamped(step, push.amplitude, push.omega, target, self.weakening, **signal) as dynamics,
+            engine.undamped(step, push.amplitude, push.omega, target, self.weakening, signal=signal, on=on) as dynamics,
         ):
             if not self.floor:
                 engine.lammps.command("unfix floor")
@@ -249,7 +249,7 @@ def _perturbation(run: Run, bare: Run) -> Feature:
 
 
 def _signal(run: Run, bare: Run) -> Feature:
-    sent = run.sent or Sent(Signal([0.0, 1e6], [1e-9, 1e-9]), "layer", None)
+    sent = run.sent or Sent(Signal(np.array([0.0, 1e6]), np.array([1e-9, 1e-9])), "layer", None)
     reason = f"{len(sent.signal)} rows, on the {sent.on}" if run.sent else "no signal in [perturb]"
     moved = run.packing.top if sent.target is None else where(run.packing, sent.target)
     if sent.on == "floor":

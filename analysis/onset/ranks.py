@@ -56,9 +56,9 @@ class Ranks:
         except FaultgougeError as error:
             mine = None, error
         everyone: Sequence[Any] = self.gather(mine)
-        for _, error in everyone:
-            if error is not None:
-                raise error
+        for _, met in everyone:
+            if met is not None:
+                raise met
         return [each for each, _ in everyone]
 
 

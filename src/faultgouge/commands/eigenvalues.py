@@ -209,8 +209,8 @@ def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]]) -> 
     table = Table("from F_x", "to F_x", *more, "begins with", box=box.SIMPLE_HEAD)
     for k, each in enumerate(windows):
         until = "the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}"
-        more = _columns(si[k]) if si else (f"{each.eigenvalue:.6g}",)
-        table.add_row(f"{each.fx_onset:.10g}", until, *more, each.kind)
+        numbers = _columns(si[k]) if si else [f"{each.eigenvalue:.6g}"]
+        table.add_row(f"{each.fx_onset:.10g}", until, *numbers, each.kind)
     Console(stderr=True, highlight=False).print(table)
 
 
