@@ -6,6 +6,8 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from .digits import with_uncertainty
+
 if TYPE_CHECKING:
     from .onset import Window
     from .packing import Packing
@@ -40,11 +42,11 @@ def packing_picture(packing: Packing) -> bytes | None:
 
 def windows_table(title: str, windows: Sequence[Window]) -> str:
     """An HTML table of windows of complex eigenvalues."""
-    rows = {
-        f"from {each.fx_onset:.10g}": f"to {'the end' if each.fx_end is None else format(each.fx_end, '.10g')}, "
-        f"lambda = {each.eigenvalue:.6g}, {each.kind}"
-        for each in windows
-    }
+    rows = {}
+    for each in windows:
+        end = "the end" if each.fx_end is None else f"{each.fx_end:.8g}"
+        begin = f"from {with_uncertainty(each.fx_onset, each.error)}"
+        rows[begin] = f"to {end}, lambda = {each.eigenvalue:.6g}, {each.kind}"
     return table(title, rows)
 
 

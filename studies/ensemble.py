@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.digits import with_uncertainty
 from ..analysis.wholefile import write_text
 from ..figures.style import save
 from ..pywrap import Scene, SceneError
 from ..pywrap.packing_section import GeneratedPacking
 from ..pywrap.refusals import needed
-from .digits import with_uncertainty
 from .ensemble_figure import ensemble_figure
 from .statistics import quartiles, share
 from .sweep.compute import Progress, Say, run_sweep

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..analysis import Onset, OnsetError, Packing, find_onset
+from ..analysis.digits import with_uncertainty
 from ..analysis.display import windows_table
 from ..analysis.onset import full_operator, seeks_all
 from ..pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, SceneError
@@ -46,8 +47,9 @@ class OnsetRun:
     between: dict[float, Packing]
 
     def __repr__(self) -> str:
+        found = with_uncertainty(self.onset.fx_c, self.onset.error)
         return (
-            f"<OnsetRun: mu = {self.mu:g}, F_x^c = {self.onset.fx_c:.10g}, {len(self.onset.windows)} windows, "
+            f"<OnsetRun: mu = {self.mu:g}, F_x^c = {found}, {len(self.onset.windows)} windows, "
             f"{len(self.equilibria)} equilibria up to F_x = {self.equilibria[-1].fx:g}>"
         )
 

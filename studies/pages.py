@@ -7,7 +7,7 @@ from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-from .digits import with_uncertainty
+from ..analysis.digits import with_uncertainty
 
 
 def render(package: str, name: str, **numbers: Any) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
+from ..digits import with_uncertainty
 from ..display import windows_table
 from ..errors import FaultgougeError
 from ..packing import Packing
@@ -61,7 +62,7 @@ class Onset:
     modes: tuple[int, int] | None = None
 
     def __repr__(self) -> str:
-        return f"<Onset: F_x^c = {self.fx_c:.10g} +- {self.error:.1g}, {len(self.windows)} windows>"
+        return f"<Onset: F_x^c = {with_uncertainty(self.fx_c, self.error)}, {len(self.windows)} windows>"
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the windows."""

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from ...analysis.digits import with_uncertainty
 from ...analysis.wholefile import make_folder, write_text
 from ...pywrap import Scene
-from ..digits import with_uncertainty
 from .compute import growth_run, pair_curve, recorded_ramp, summary_of, triggering_run
 from .draw import figures, triggering_figures
 from .page import report

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ...analysis.digits import with_uncertainty
 from ...analysis.wholefile import make_folder, write_text
 from ...pywrap import SceneError
 from .compute import ASKED, LINES, Say, stored
@@ -85,8 +86,8 @@ def _merge_modes(parts: Sequence[Path], output: Path, say: Say) -> None:
     write_text(output / "onset.json", json.dumps(result, indent=1) + "\n")
     for each in found:
         say(
-            f"mu = {each['mu']:g}: F_x^c = {each['fx_c']:.12g} +- {each['error']:.1g} among the modes of {len(parts)} "
-            "parts"
+            f"mu = {each['mu']:g}: F_x^c = {with_uncertainty(each['fx_c'], each['error'])} among the modes of "
+            f"{len(parts)} parts"
         )
     for first, stop in found[0]["missing"]:
         say(f"modes {first}:{stop} are in no part: either they were not searched, or they have no window")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from ...analysis.digits import with_uncertainty
 from ...pywrap import Scene, SceneError
 from ...pywrap.units import real_units
 from ..rows import Rows
@@ -117,7 +118,7 @@ def _onset(scene: Scene, rows: Rows, say: Say) -> tuple[float, float]:
         say("onset")
         onset = onset_run(scene, scene.law.mus[0]).onset
         known = rows.append(kind="onset", fx_c=onset.fx_c, error=onset.error)
-        say(f"F_x^c = {onset.fx_c:.10g} +- {onset.error:.1g}")
+        say(f"F_x^c = {with_uncertainty(onset.fx_c, onset.error)}")
     return known["fx_c"], known["error"]
 
 

@@ -126,8 +126,8 @@ def onset(
     With a section [damping]: the windows in which some motion grows in spite of
     the dissipation, or because of it, and beside them the undamped onset.
     """
+    from faultgouge.analysis.digits import with_uncertainty
     from faultgouge.analysis.wholefile import check_folder, write_text
-    from faultgouge.studies.digits import with_uncertainty
     from faultgouge.studies.onsets import onset_run
 
     wanted, part = read_scene(scene, "onset"), None if modes is None else _modes(modes)
@@ -156,8 +156,8 @@ def onset(
 
 def _damped_onset(scene: Scene, mu: float) -> dict[str, Any]:
     """The onset of a scene with dissipation, as its JSON; and what a user reads of it."""
+    from faultgouge.analysis.digits import with_uncertainty
     from faultgouge.studies.damped_onset import damped_onset_run
-    from faultgouge.studies.digits import with_uncertainty
 
     with status(f"mu = {mu:g}") as show:
         run = damped_onset_run(scene, mu, watch=partial(_under_way, show, f"mu = {mu:g}"))
@@ -205,12 +205,14 @@ def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]]) -> 
     from rich.console import Console
     from rich.table import Table
 
+    from faultgouge.analysis.digits import with_uncertainty
+
     more = ("in Pa", "F_x/F_y", "in Hz") if si else ("eigenvalue",)
     table = Table("from F_x", "to F_x", *more, "begins with", box=box.SIMPLE_HEAD)
     for k, each in enumerate(windows):
         until = "the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}"
         numbers = _columns(si[k]) if si else [f"{each.eigenvalue:.6g}"]
-        table.add_row(f"{each.fx_onset:.10g}", until, *numbers, each.kind)
+        table.add_row(with_uncertainty(each.fx_onset, each.error), until, *numbers, each.kind)
     Console(stderr=True, highlight=False).print(table)
 
 

@@ -14,6 +14,7 @@ from faultgouge.analysis import (
     find_onset,
     spectrum,
 )
+from faultgouge.analysis.digits import with_uncertainty
 from faultgouge.analysis.onset import Family, Modes, assign, force_bearing, full_operator
 from faultgouge.analysis.onset.dip import deepest_dip
 from faultgouge.analysis.onset.screened import Screen, all_windows
@@ -219,8 +220,9 @@ def test_json(ramp):
     assert as_dict["error"] == onset.error
     assert as_dict["windows"][0].keys() >= {"fx_onset", "fx_end", "lambda", "error"}
     assert as_dict["windows"][0]["lambda"] == onset.windows[0].eigenvalue
-    assert repr(onset).startswith(f"<Onset: F_x^c = {onset.fx_c:.10g} +- ")
-    assert f"from {onset.fx_c:.10g}</th>" in onset._repr_html_()
+    written = with_uncertainty(onset.fx_c, onset.error)
+    assert repr(onset).startswith(f"<Onset: F_x^c = {written}, ")
+    assert f"from {written}</th>" in onset._repr_html_()
 
 
 def test_modes_that_cross_keep_their_names():
