@@ -36,6 +36,20 @@ def test_prediction_is_what_lammps_bisects(tmp_path):
     assert {"map.png", "thresholds.png", "trigger.md"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
+def test_distances_count_from_the_onset_with_dissipation(tmp_path):
+    """Normal dashpots alone lower it, from 0.0218331 to 0.0218328; the wave is damped, in K's answer as in LAMMPS."""
+    trigger = {"distance": [0.1], "omega": [14.0], "time": 1.0, "runs": 1}
+    more = {"damping": {"cn": 1.0}, "friction": {"v0": 1e-7, "v_ss": "10 v0"}, "trigger": trigger}
+    scene = Scene.from_mapping({**BASE, "ramp": {"step": 5.5e-3, "until": 0.022}, **more})
+    result = trigger_map(scene, tmp_path / "out", say=lambda _: None)
+    assert result["fx_c"] == pytest.approx(0.0218328368, abs=1e-10)
+    assert result["undamped_fx_c"] == pytest.approx(0.021833056408, rel=1e-9)
+    (row,) = result["map"]
+    assert row["fx"] == pytest.approx(0.9 * result["fx_c"], rel=1e-12)
+    assert row["predicted"] == pytest.approx(row["measured"], rel=0.05)
+    assert "without them it is F_x^c = 0.02183305" in (tmp_path / "out/trigger.md").read_text()
+
+
 @pytest.mark.parametrize(
     ("friction", "says"),
     [(None, r"no section \[friction\]"), ({"v_ss": 1e-6}, "rounding noise: give a velocity above 0")],
