@@ -121,7 +121,6 @@ def ramped(
     if scene.ramp is None:
         raise SceneError("the scene has no section [ramp]: add it, with step and until")
     wanted = loads(scene.ramp)
-    # dashpots would settle the same seed to another packing: the onsets with and without them are to be of one
     scene = scene.model_copy(update={"damping": None})
     start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"))
     if len(start.packing) > MOST_DISKS:

@@ -1,7 +1,8 @@
 r"""How large: undamped runs from rest at many loads, until they are over.
 
 Above its onset a packing at rest is unstable. The rounding of the coordinates is perturbation enough: D grows from it
-at the rate :math:`2 |\mathrm{Im}\,\omega|` of the spectrum, by ten and more decades, and then levels off. The largest D
+at the rate :math:`2 |\mathrm{Im}\,\omega|` of the spectrum (:math:`2\,\mathrm{Re}\,s` with dissipation), by ten and
+more decades, and then levels off. The largest D
 is the size of the eruption at that load.
 
 **Over** is a run at time t when the largest D of its second half, (t/2, t], is at most 1.5 times that of the quarter
@@ -16,8 +17,8 @@ curvature of the contact law alone. A contact that opens and closes between two 
 
 **Energy.** No potential belongs to the tangential force, so nothing is conserved but the balance of work: the kinetic
 energy changes by the work of all forces, load included. Each run ends with `WORK_STEPS` steps in which this work is
-added up; the balance is off by the order of the time step squared. The noise floor is the largest D of the first time
-unit, before anything could grow.
+added up; without drag, which is no force to LAMMPS, the balance is off by the order of the time step squared. The noise
+floor is the largest D of the first time unit, before anything could grow.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ from threadpoolctl import threadpool_limits
 
 from ...analysis import Packing, mean_square_displacement, nearest_image, spectrum
 from ...analysis.packing import Floats
+from ...analysis.propagator import SLOW
+from ...analysis.state_space import StateSpace
 from ...pywrap import Engine
 from ...pywrap.dynamics import Dynamics, Motion
 from ...pywrap.undamped import time_step
@@ -112,7 +115,7 @@ class Eruption:
     damped : bool
         Whether with dashpots or drag.
     rate : float
-        Growth rate of D from the spectrum of the undamped packing, 1 / time.
+        Growth rate of D from the spectrum, 1 / time; 0 of a stable packing.
     time : float
         When the run was over.
     msd, kinetic_energy : float
@@ -157,7 +160,7 @@ class Eruption:
 def erupt(start: Start) -> Eruption:
     """A run from rest until it is over, on this process alone."""
     with threadpool_limits(1):
-        rate = spectrum(start.packing).growth_rate()
+        rate = growth_rate(start.packing)
         dt = time_step(start.packing)
         looks: list[Look] = []
         with Engine(start.packing, MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
@@ -168,6 +171,15 @@ def erupt(start: Start) -> Eruption:
                     break
             balance = _balance(dynamics, start.packing)
     return _eruption(start, looks, rate, balance)
+
+
+def growth_rate(packing: Packing) -> float:
+    """Of D, from K or, with dissipation, from K, C and M, 1 / time; 0 of a stable packing."""
+    if not packing.law.damped and packing.drag_time is None:
+        return spectrum(packing).growth_rate()
+    rates = np.linalg.eigvals(StateSpace.of(packing).matrix)
+    fastest = float(rates.real.max(initial=0.0))
+    return 2 * fastest if fastest > SLOW * np.abs(rates).max() else 0.0
 
 
 def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[float, Motion]]:

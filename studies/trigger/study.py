@@ -71,10 +71,11 @@ def trigger_map(
             return {}
         output.mkdir(parents=True, exist_ok=True)
         rows = Rows(output / "trigger.jsonl", scene, beside="output")
-        fx_c, error = _onset(scene, rows, say)
+        onset = _onset(scene, rows, say)
+        fx_c = onset["fx_c"]
         predicted = _predicted(scene, rows, fx_c, say)
         measured = _measured(scene, rows, predicted, share, say, progress)
-    result = summary(scene, fx_c, error, predicted, measured)
+    result = summary(scene, onset, predicted, measured)
     (output / "trigger.json").write_text(json.dumps(result, indent=1) + "\n")
     draw.figures(result, output)
     (output / "trigger.md").write_text(page.page(scene, result))
@@ -82,7 +83,7 @@ def trigger_map(
 
 
 def summary(
-    scene: Scene, fx_c: float, error: float, predicted: list[Prediction], measured: list[Measured]
+    scene: Scene, onset: dict[str, Any], predicted: list[Prediction], measured: list[Measured]
 ) -> dict[str, Any]:
     """What trigger.json holds."""
     runs = {(each.fx, each.omega): each for each in measured}
@@ -100,8 +101,7 @@ def summary(
     return {
         "scene": scene.resolved(),
         "units": None if real is None else real.as_dict(),
-        "fx_c": fx_c,
-        "error": error,
+        **{key: onset[key] for key in ("fx_c", "error", "undamped_fx_c")},
         "v0": threshold(scene),
         "time": settings(scene).time,
         "on": settings(scene).on,
@@ -110,16 +110,25 @@ def summary(
     }
 
 
-def _onset(scene: Scene, rows: Rows, say: Say) -> tuple[float, float]:
+def _onset(scene: Scene, rows: Rows, say: Say) -> dict[str, Any]:
+    """The onset from which distances count, with the scene's dissipation if it has any, and the undamped one."""
     known = rows.find(kind="onset")
-    if known is None:
+    if known is not None:
+        return known
+    say("onset")
+    mu, undamped = scene.law.mus[0], None
+    if scene.damping is None:
         from ..onsets import onset_run
 
-        say("onset")
-        onset = onset_run(scene, scene.law.mus[0]).onset
-        known = rows.append(kind="onset", fx_c=onset.fx_c, error=onset.error)
-        say(f"F_x^c = {with_uncertainty(onset.fx_c, onset.error)}")
-    return known["fx_c"], known["error"]
+        onset = onset_run(scene, mu).onset
+        fx_c, error = onset.fx_c, onset.error
+    else:
+        from ..damped_onset import damped_onset_run
+
+        run = damped_onset_run(scene, mu)
+        fx_c, error, undamped = run.fx_c, run.error, None if run.undamped is None else run.undamped.fx_c
+    say(f"F_x^c = {with_uncertainty(fx_c, error)}")
+    return rows.append(kind="onset", fx_c=fx_c, error=error, undamped_fx_c=undamped)
 
 
 def _predicted(scene: Scene, rows: Rows, fx_c: float, say: Say) -> list[Prediction]:

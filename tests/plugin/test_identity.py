@@ -121,6 +121,21 @@ def test_restart_in_a_new_process(trajectory, defaults, lmp, tmp_path, ranks):
     assert (tmp_path / "end").read_text() == straight[1] == trajectory()[1]
 
 
+@pytest.mark.parametrize("defaults", ["double", "compensated"], indirect=True)
+@pytest.mark.parametrize("on", ["layer", "floor"])
+def test_signal_through_a_restart(trajectory, defaults, lmp, tmp_path, on):
+    """A signal goes by the time of the run, which a restart file keeps."""
+    rows = (f"{0.1 * k} {(-1) ** k * 0.3}" for k in range(81))
+    (tmp_path / "wave.txt").write_text("\n".join(rows))
+    extra = f"variable signal index wave.txt\nvariable on index {on}\ninclude {DECKS}/signal.in"
+    straight = trajectory(extra=extra, middle="write_restart middle.restart")
+    (tmp_path / "end").unlink()
+    second = (START + RUN[RUN.index("{middle}") :]).format(**{**defaults, "extra": extra})
+    done = lmp(second, "-var", "restart", "middle.restart", ranks=2)
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert (tmp_path / "end").read_text() == straight[1] != trajectory()[1]
+
+
 @pytest.mark.parametrize("defaults", ["compensated", "harmonic, damped, compensated"], indirect=True)
 def test_compensated_run_in_one_piece_or_two(lmp, tmp_path, trajectory, defaults):
     """Disks are wrapped into the box at every set-up: on the grid that is exact."""

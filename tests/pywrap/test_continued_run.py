@@ -13,23 +13,33 @@ from faultgouge.pywrap.undamped import sampling, weakening_of
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
 
-def scene(precision):
+FORCED = {
+    "cosine": {"amplitude": 1e-6, "omega": 3.0},
+    "sweep": {"signal": "sweep", "amplitude": 1e-6, "omega": 3.0, "omega_end": 9.0},
+    "moving floor": {"signal": "pulse", "on": "floor", "amplitude": 1e-6, "omega": 1.0},
+}
+
+
+def scene(precision, forced):
     return Scene.from_mapping(
         {
             "precision": precision,
             "packing": {"file": str(REFERENCE)},
             "law": {"kn": 2e5},
             "load": {"fy": 3.0},
-            "perturb": {"fx": 1e-3, "time": 8.0, "amplitude": 1e-6, "omega": 3.0},
+            "perturb": {"fx": 1e-3, "time": 8.0, **FORCED[forced]},
             "friction": {"v0": 1e-9, "v_ss": 1e-6},
             "output": {"trajectory": True},
         }
     )
 
 
-@pytest.mark.parametrize("precision", ["double", "compensated"])
-def test_it_goes_on_to_the_bit(precision, tmp_path):
-    wanted = scene(precision)
+@pytest.mark.parametrize(
+    ("precision", "forced"),
+    [("double", "cosine"), ("compensated", "cosine"), ("double", "moving floor"), ("compensated", "sweep")],
+)
+def test_it_goes_on_to_the_bit(precision, forced, tmp_path):
+    wanted = scene(precision, forced)
     *_, start = reach(wanted, wanted.perturb.fx)
     weakening = weakening_of(wanted.friction, wanted.friction.v0)
     kept = []
@@ -62,7 +72,7 @@ def test_it_goes_on_to_the_bit(precision, tmp_path):
 
 
 def test_a_file_of_another_task_is_not_continued(tmp_path):
-    wanted = scene("double")
+    wanted = scene("double", "cosine")
     *_, start = reach(wanted, wanted.perturb.fx)
     with Record(tmp_path / "run.h5", wanted) as record:
         record.append(replace(start))
