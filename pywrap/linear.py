@@ -142,7 +142,7 @@ class BandSolver:
         solution, _ = dgbtrs(self._factors, self._width, self._width, force.take(self._coordinates), self._pivots)
         step = np.zeros(len(force))
         step[self._coordinates] = solution
-        return step if np.isfinite(solution).all() else None
+        return step if np.isfinite(solution.sum()) else None
 
 
 @dataclass(frozen=True, eq=False)
