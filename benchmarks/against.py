@@ -9,7 +9,8 @@ packing of 100 disks:
     onset       `find_onset` along the ramp to F_x = 0.0225 in increments of 1e-3, ramp included, in seconds
     large       the same of a packing of 320 disks, whose spectrum comes in slices
 
-Medians over the rounds, and the ratio of the two. The other tree needs its plugin in `src/faultgouge/lib`.
+Medians over the rounds, and the ratio of the two. The other tree needs its plugin in `src/faultgouge/lib`, and in
+`src/faultgouge` the links to its folders.
 
     python benchmarks/against.py OTHER_TREE [--rounds 7] [--only assembly increment onset large]
 """
@@ -61,7 +62,11 @@ def onset(packing: dict, ramp: dict) -> float:
     """Seconds of the second solution: the first one loads libraries."""
     from faultgouge.analysis import find_onset
     from faultgouge.pywrap import Engine, Scene, settle
-    from faultgouge.pywrap.equilibria import EquilibriumPath, loads
+
+    try:
+        from faultgouge.pywrap.equilibria import EquilibriumPath, loads
+    except ModuleNotFoundError:  # version 0.1.0
+        from faultgouge.pywrap.stages import EquilibriumPath, loads
 
     scene = Scene.from_mapping({"packing": packing, "ramp": ramp} | LAW)
     start, seconds = settle(scene, 1.0), 0.0

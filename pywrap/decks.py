@@ -32,11 +32,11 @@ class Decks:
 
     def command(self, command: str) -> None:
         """One line of an input script; what LAMMPS says against it is raised as an `EngineError`."""
-        from lammps.core import MPIAbortException
-
         try:
             self.lammps.command(command)
         except Exception as error:  # the LAMMPS module raises plain Exception, or MPIAbortException on one rank alone
+            from lammps.core import MPIAbortException
+
             failure = EngineError(f"LAMMPS stopped: {DECORATION.sub('', str(error).splitlines()[0])}.")
             failure.one_rank = isinstance(error, MPIAbortException)
             raise failure from error

@@ -142,7 +142,7 @@ class BandSolver:
         solution, _ = dgbtrs(self._factors, self._width, self._width, force.take(self._coordinates), self._pivots)
         step = np.zeros(len(force))
         step[self._coordinates] = solution
-        return step if np.isfinite(solution).all() else None
+        return step if np.isfinite(solution.sum()) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +181,11 @@ class SparseSolver:
         The pairs of disks that it couples.
     nearby : SparseSolver, optional
         That of a matrix nearby.
+
+    Attributes
+    ----------
+    own : bool
+        Whether it has had to make factors of its own.
     """
 
     def __init__(self, matrix: csr_array, i: Indices, j: Indices, nearby: "SparseSolver | None" = None) -> None:
@@ -189,14 +194,14 @@ class SparseSolver:
         self._matrix = matrix[self._active][:, self._active]
         self._pairs = i, j
         self._factors: SparseFactors | None = None if nearby is None else nearby._factors
-        self._own = False
+        self.own = False
 
     def solve(self, force: Floats) -> Floats | None:
         """The solution of K dq = F, shape (3N,); None if K is singular."""
         step = self._solved(force)
-        if step is None and not self._own:
+        if step is None and not self.own:
             self._factors = None  # before the memory for others is taken
-            self._factors, self._own = self._factored(), True
+            self._factors, self.own = self._factored(), True
             step = self._solved(force)
         return step if step is not None and np.all(np.isfinite(step)) else None
 
@@ -204,7 +209,7 @@ class SparseSolver:
         """The solution with the factors at hand; None without any, and if they are of no use."""
         if self._factors is None:
             return None
-        if self._own and self._factors.exact:
+        if self.own and self._factors.exact:
             return self._factors.solve(force)
         return self._iterated(self._factors, force)
 

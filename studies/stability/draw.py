@@ -35,7 +35,7 @@ def stability_figure(done: Sequence[tuple[Case, Outcome]]) -> Figure:
     Returns
     -------
     Figure
-        A row for each case; a disc at its figure over its bound, a square beyond the bound's line for a refusal.
+        A row for each case; a dot at its figure over its bound, a square beyond the bound's line for a refusal.
     """
     groups = [list(members) for _, members in groupby(done, lambda each: each[0].group)]
     rows = sum(len(group) + 1.5 for group in groups)

@@ -149,7 +149,7 @@ def _examination(scene: Scene, start: Start) -> Iterator[dict[str, Any]]:
     yield {"lowered": lowered}
     if lowered and strong.fx_c is not None and scene.perturb is not None and scene.friction is not None:
         window = weak.reach, strong.fx_c
-        yield {"eruption": asdict(_eruption(scene, paths[0], window, scene.perturb, scene.friction))}
+        yield {"eruption": asdict(eruption(scene, paths[0], window, scene.perturb, scene.friction))}
 
 
 def frictions(scene: Scene) -> tuple[float, ...]:
@@ -193,7 +193,7 @@ def lowers(strong: RampEnd, weak: RampEnd) -> bool | None:
     return False if strong.fx_c is not None and strong.reach <= weak.reach else None
 
 
-def _eruption(
+def eruption(
     scene: Scene,
     path: tuple[Equilibrium, ...],
     window: tuple[float, float],

@@ -102,8 +102,7 @@ def _study(
 ) -> Study:
     """Runs of a length over the time step; the advice is filled in."""
     exact = mode.exact
-    shares = SHARES[: len(SHARES) - settings.quick]
-    steps = [share * mode.limit for share in shares]
+    steps = [share * mode.limit for share in SHARES[: len(SHARES) - settings.quick]]
     fine_mode = Mode.of(compensated(equilibrium).packing, mode.growing)
     *runs, (alone, seconds_alone) = _measured(settings, mode, fine_mode, steps, time)
     plain, careful = runs[: len(steps)], runs[len(steps) :]
@@ -113,9 +112,9 @@ def _study(
     noise, careful_noise = (_typical(points, method) for method in (CORRECTED, COMPENSATED))
     order = fit_order(points, CAREFUL_RUN, 2, least=10 * careful_noise, most=0.01)
     figures = {
-        "coarse": shares[1],
+        "coarse": SHARES[1],
         "noise": noise,
-        "default": points[shares.index(0.05)].error,
+        "default": points[SHARES.index(0.05)].error,
         "raw": points[1].error,
         "spectrum": max(own, mode.resolution),
         "slower": 2 / mode.limit / abs(np.sqrt(mode.eigenvalue)),

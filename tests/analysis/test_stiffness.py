@@ -95,9 +95,10 @@ def test_derivative_of_forces_in_a_loaded_packing(ramp):
     assert np.abs(matrix[:, columns] - expected).max() < 1e-7 * np.abs(matrix).max()
 
 
-def test_single_valued_at_the_bound():
+@pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
+def test_single_valued_at_the_bound(exponent):
     """From the bound, one way slides and the other sticks: either one-sided derivative is the operator."""
-    law = MindlinLaw(2e5, 6e4, 0.7)
+    law = MindlinLaw(2e5, 6e4, 0.7, exponent)
     overlap, step = 1e-2, 1e-7
     limit = float(law.slip_limit(overlap))
     packing = Packing(

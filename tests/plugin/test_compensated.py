@@ -37,7 +37,7 @@ def true_net_force(packing):
             continue
         slip, limit = exact(s, s_low), mu * kn / kt * overlap
         ratio = min(abs(slip) / limit, mpf(1)) if limit else mpf(1)
-        normal = kn * overlap * mpmath.sqrt(overlap)
+        normal = kn * overlap ** mpf(law.exponent)
         tangential = -mpmath.sign(slip) * mu * normal * (ratio + ratio**2 - ratio**3)
         force = [(normal * x - tangential * y) / r, (normal * y + tangential * x) / r, -tangential]
         for k, sign in ((i, 1), (j, -1)):
@@ -64,8 +64,9 @@ def equilibrium(reference_packing):
 
 @pytest.mark.parametrize("overlap", [1e-12, 1e-9, 1e-6, 1e-3, 0.3])
 @pytest.mark.parametrize("radii", [(0.5, 0.7), (0.02, 1.0), (0.1, 0.3)])
+@pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
 @pytest.mark.parametrize("mu", [0.0, 0.5])
-def test_force_of_two_disks(overlap, radii, mu):
+def test_force_of_two_disks(overlap, radii, mu, exponent):
     """A force is right to its last place, at any overlap, inside of the box and across its end."""
     rng = np.random.default_rng(3)
     overlap *= min(radii)
@@ -77,7 +78,7 @@ def test_force_of_two_disks(overlap, radii, mu):
             position=np.array([centre + away, centre]),
             position_low=1e-17 * rng.standard_normal((2, 2)),
             radius=np.array(radii),
-            law=MindlinLaw(2e5, 2e5 / 3.5, mu),
+            law=MindlinLaw(2e5, 2e5 / 3.5, mu, exponent),
             contacts=Contacts([0], [1], [slip], [1e-17 * slip]) if mu else Contacts([0], [1], [0.0], [0.0]),
             box_length=11.9,
         )
@@ -90,8 +91,8 @@ def test_force_of_two_disks(overlap, radii, mu):
             packing = replace(packing, contacts=clamped)
         true = true_net_force(packing).astype(np.float64)
         # The last place of the double that is handed out. An overlap is known to 2^-77 of 2^e, e.g. to 1e-11 at 1e-12,
-        # and the force to 3/2 of that.
-        known = 1.5 * packing.coordinate_rounding / overlap
+        # and the force to p of that.
+        known = exponent * packing.coordinate_rounding / overlap
         assert np.abs(force - true).max() <= (3e-16 + 3 * known) * np.abs(true).max()
 
 

@@ -79,10 +79,11 @@ def test_disk_on_floor(overlap, radius, mu, exponent):
         assert abs(force[0]) <= mu * f_n
 
 
+@pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
 @pytest.mark.parametrize("mu", [0.1, 1.0])
-def test_coulomb_bound_is_reached_exactly(mu):
+def test_coulomb_bound_is_reached_exactly(mu, exponent):
     position = np.array([[1.0, 3.0], [1.0, 3.999]])
-    packing = single_contact(position, np.array([0.5, 0.5]), Contacts([0], [1], [1.0]), mu)
+    packing = single_contact(position, np.array([0.5, 0.5]), Contacts([0], [1], [1.0]), mu, exponent=exponent)
     with Engine(packing) as engine:
         engine.displace(packing, np.zeros(6))
         force = engine.net_force.reshape(3, 2)

@@ -148,7 +148,7 @@ def test_what_was_found_before_a_failure_is_kept(scene, monkeypatch):
 
     found = {1.0: RampEnd(1.0, "onset", 0.01), 0.8: RampEnd(0.8, "onset", 0.008)}
     monkeypatch.setattr(triggering, "first_onset", lambda scene, mu, start: (found[mu], ()))
-    monkeypatch.setattr(triggering, "_eruption", fail)
+    monkeypatch.setattr(triggering, "eruption", fail)
     row = triggering.triggering(scene, start_of(scene))
     assert [each["reach"] for each in row["ramps"]] == [0.01, 0.008]
     assert row["lowered"] is True
