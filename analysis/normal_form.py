@@ -49,6 +49,9 @@ ORTHOGONAL = np.array([1.0, -1.0]) / np.sqrt(2)
 """The direction across v* = (1, 1)/2^(1/2), which both eigenvectors take at the coalescence: the response starts in
 it."""
 
+LEAST_CROSSOVER = 4.0
+"""Undamped amplitude from which on damping may take half of it: of a smaller one the start itself would be half."""
+
 PERIODS = 3
 """Periods of the fast oscillation on either side of the envelope's maximum among which the largest is looked for: the
 neighbouring ones may win by their phase, those further out lie lower on the envelope."""
@@ -213,10 +216,10 @@ class NormalForm:
         Raises
         ------
         ValueError
-            If the undamped amplitude is not at least 4: the start itself would be half of it.
+            If the undamped amplitude is less than `LEAST_CROSSOVER`.
         """
         full = self.amplitude()
-        if not 4 <= full < np.inf:
+        if not LEAST_CROSSOVER <= full < np.inf:
             raise ValueError(f"An amplitude of {full:.3g} shows no crossover: take an epsilon between 0 and 0.1.")
         bounds = 0.3 * self.tau_d, 10 * self.tau_d
         return float(brentq(lambda tau: self.amplitude(tau) - 0.5 * full, *bounds, rtol=1e-9))

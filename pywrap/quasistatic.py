@@ -59,7 +59,7 @@ def rounding_floor(packing: Packing) -> float:
     The forces of a disk's contacts are summed as independent errors, and the largest over disks is taken.
     """
     graph = ContactGraph(packing.contacts, packing.radius)
-    return rounding(packing.law, graph, packing.geometry.overlap, packing.coordinate_rounding)
+    return rounding(packing.law.normal_stiffness(packing.geometry.overlap), graph, packing.coordinate_rounding)
 
 
 def equilibrate(

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis import MindlinLaw, Packing
+from ..analysis import Packing
 from ..analysis.law import Derivatives
 from .contact_graph import ContactGraph
 
@@ -143,21 +143,19 @@ class Trial:
 
     def rounded(self, unit: float) -> float:
         """As `rounding`, of an error of so much in every overlap."""
-        return rounding(self.still.law, self.graph, self.branches.overlap, unit)
+        return rounding(self.derivatives.normal_stiffness, self.graph, unit)
 
 
-def rounding(law: MindlinLaw, graph: ContactGraph, overlap: Floats, unit: float) -> float:
+def rounding(stiffness: Floats, graph: ContactGraph, unit: float) -> float:
     """What an error of one unit in every overlap does to the force on a disk, as independent errors; the largest.
 
     Parameters
     ----------
-    law : MindlinLaw
-        Whose normal stiffness turns the unit into a force.
+    stiffness : ndarray, shape (C,)
+        Normal stiffness of each contact, force / length.
     graph : ContactGraph
         Who touches whom.
-    overlap : ndarray, shape (C,)
-        Length.
     unit : float
         Length.
     """
-    return unit * math.sqrt(graph.per_disk(law.normal_stiffness(overlap) ** 2).max(initial=0.0))
+    return unit * math.sqrt(graph.per_disk(stiffness**2).max(initial=0.0))

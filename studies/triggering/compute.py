@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import RunFile
+from ...analysis.normal_form import LEAST_CROSSOVER
 from ...analysis.pair_form import PairForm, pair_forms
 from ...analysis.power_law import PowerLaw, fit_power_law
 from ...analysis.response import Response, layer_force, linear_response
@@ -138,6 +139,11 @@ class Sensitivity:
         """Undamped amplitudes in units of the start, shape (n,)."""
         return np.array([pair.amplitude() for pair in self.pairs])
 
+    @property
+    def near(self) -> tuple[PairForm, ...]:
+        """The pairs of which damping may take half of the response."""
+        return tuple(pair for pair in self.pairs if pair.amplitude() >= LEAST_CROSSOVER)
+
 
 def column(samples: tuple[Sample, ...], name: str) -> Floats:
     """One quantity of a time series, shape (T,)."""
@@ -242,5 +248,5 @@ def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
         "amplitude_exponent": sensitive.fit.exponent,
         "amplitude_exponent_error": sensitive.fit.error,
         "distances": [float(sensitive.distance.min()), float(sensitive.distance.max())],
-        "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in sensitive.pairs],
+        "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in sensitive.near],
     }

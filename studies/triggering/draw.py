@@ -95,8 +95,9 @@ def figures(triggering: Triggering, sensitive: Sensitivity, mu: float, output: P
     reach = (float(sensitive.distance.min()), float(sensitive.distance.max()))
     curve = draw_response.AmplitudeCurve("", sensitive.distance, sensitive.amplitude, sensitive.fit, reach)
     save(draw_response.amplitude_figure([curve]), output / "amplitude")
-    chosen = [sensitive.pairs[k] for k in np.linspace(0, len(sensitive.pairs) - 1, 4).astype(int)]
-    save(draw_response.damping_figure([_damping_curve(pair) for pair in chosen]), output / "damping")
+    if near := sensitive.near:
+        chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, 4).astype(int))]
+        save(draw_response.damping_figure([_damping_curve(pair) for pair in chosen]), output / "damping")
 
 
 def _displacements(triggering: Triggering, name: str) -> Displacements:

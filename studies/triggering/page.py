@@ -38,5 +38,5 @@ def section(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, m
         control=None if triggering.control is None else float(column(triggering.control, "msd").max()),
         grown=largest / first,
         above_noise=ABOVE_NOISE,
-        half_gain=float(np.mean([pair.half_gain_time() / pair.tau_d for pair in sensitive.pairs])),
+        half_gain=[pair.half_gain_time() / pair.tau_d for pair in sensitive.near],
     )
