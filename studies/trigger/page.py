@@ -32,4 +32,5 @@ def page(scene: Scene, result: dict[str, Any]) -> str:
         if result["on"] == "layer"
         else "an acceleration a cos(omega t) of the floor along x",
         units=result["units"],
+        damped=scene.damping is not None,
     )
