@@ -103,10 +103,14 @@ class Modes:
         return Pair(self.fx, self.matrix, span(self.right[:, two]), span(self.left[:, two]))
 
     def nearest(self, pair: Pair) -> Members:
-        """The two modes that lie closest to the planes of a pair at a neighbouring load."""
+        """The two modes, conjugates or both real, that lie closest to the planes of a pair at a neighbouring load."""
         weight = np.linalg.norm(pair.right.T @ self.right, axis=0) * np.linalg.norm(pair.left.T @ self.left, axis=0)
-        first, second = np.argsort(weight)[-2:]
-        return int(first), int(second)
+        real = np.flatnonzero(self.partner < 0)
+        candidates = self.complex_pairs
+        if len(real) > 1:
+            first, second = real[np.argsort(weight[real])[-2:]]
+            candidates = [*candidates, (int(first), int(second))]
+        return max(candidates, key=lambda members: float(weight[list(members)].sum()))
 
     def about(self, eigenvalue: float) -> Members:
         """The two modes whose eigenvalues are closest to a real number."""

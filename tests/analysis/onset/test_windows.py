@@ -225,6 +225,19 @@ def test_json(ramp):
     assert f"from {written}</th>" in onset._repr_html_()
 
 
+def test_a_complex_pair_is_not_torn_by_a_level_beside_it():
+    """A level mixes with one direction of the pair's plane; the nearest two are still conjugates."""
+    operator = np.diag([2.0, 2.0, 2.1, 5.0])
+    operator[0, 1], operator[1, 0] = 1.0, -1.0
+    modes = Modes.of(0.0, operator)
+    pair = modes.pair(modes.complex_pairs[0])
+    turn, angle = np.eye(4), np.radians(65)
+    turn[1:3, 1:3] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    turned = Modes.of(1.0, turn @ operator @ turn.T)
+    first, second = turned.nearest(pair)
+    assert turned.partner[first] == second
+
+
 def test_modes_that_cross_keep_their_names():
     """Coupled so weakly that the levels pass each other within the increment, and strongly enough not to."""
     for product, exchanged in ((1e-6, True), (-1e-6, True), (4.0, False)):
