@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis.normal_form import NormalForm
-from faultgouge.analysis.power_law import PowerLaw
+from faultgouge.analysis.pair_form import PairForm
+from faultgouge.analysis.power_law import PowerLaw, fit_power_law
 from faultgouge.figures import save
 from faultgouge.studies.reproduce.draw import growth_figure
+from faultgouge.studies.triggering.compute import Sensitivity
 from faultgouge.studies.triggering.draw import eruption_figure
 from faultgouge.studies.triggering.draw_friction import (
     FrictionLaw,
@@ -182,3 +184,12 @@ def test_no_settings_leak_out_and_files_repeat(tmp_path, runs):
     first, second = (save(eruption_figure(*runs), tmp_path / name) for name in ("a", "b"))
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
     assert dict(matplotlib.rcParams) == before
+
+
+def test_pairs_far_from_coalescence_have_no_crossover_with_damping():
+    """The report leaves out what half of a response of less than four times the start would be."""
+    plane = np.eye(3, 2)
+    pairs = tuple(PairForm(0.1, NormalForm(0.2, epsilon), 1.0, plane, plane) for epsilon in (0.01, 0.5))
+    found = Sensitivity(np.array([0.01, 0.5]), pairs, fit_power_law([0.01, 0.1, 0.5], [10.0, 3.0, 1.5]))
+    assert found.near == pairs[:1]
+    assert found.near[0].half_gain_time() > 0
