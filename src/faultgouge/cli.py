@@ -4,7 +4,6 @@ import os
 from typing import NoReturn
 
 from .guard import guarded, raise_interrupt_in
-from .ranks import size
 
 
 def main() -> NoReturn:
@@ -12,9 +11,6 @@ def main() -> NoReturn:
     # one thread for BLAS: its threads cost more than they bring at these sizes, and change the last digits of a solve
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    if os.getloadavg()[0] + size() > len(os.sched_getaffinity(0)):
-        # ranks of MPICH that wait for others then give their core away, where they would spin
-        os.environ.setdefault("MPIR_CVAR_ENABLE_HEAVY_YIELD", "1")
     guarded(_command)
 
 
