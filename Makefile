@@ -24,10 +24,9 @@ export OPENBLAS_NUM_THREADS ?= 1
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
 
-# MPI ranks spin while they wait: tests of several ranks are one group, which runs in one process beside the others.
 # Tests and checks take Python from src, where links lead to the folders: an edit of Python needs no installation
 test: $(VENV)/.test
-	PYTHONPATH=src $(BIN)/python -m pytest -q -n 2 --dist loadgroup
+	PYTHONPATH=src $(BIN)/python -m pytest -q -n 2
 
 # the exports, read by the programs that they are for: half a gigabyte of OVITO and VTK
 readers: $(VENV)/.test

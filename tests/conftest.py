@@ -1,11 +1,12 @@
 """What tests share: LAMMPS as a user runs it, and the reference packing."""
 
+import fcntl
 import json
 import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -23,6 +24,17 @@ LIMIT = 1800
 """Seconds for one command on a busy machine."""
 
 REFERENCE = Path(__file__).parent / "reference" / "packing7.json"
+
+
+@pytest.fixture(autouse=True)
+def _in_turns(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Tests of several ranks take turns: ranks spin while they wait, and those of two tests would starve each other."""
+    if request.node.get_closest_marker("ranks") is None:
+        yield
+        return
+    with (tmp_path_factory.getbasetemp().parent / "ranks.lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 @pytest.fixture(scope="session")

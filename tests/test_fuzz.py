@@ -14,7 +14,7 @@ def test_odd_scenes(tmp_path):
     assert [pair for pair in scenes.run(100, tmp_path, seed=1) if pair[1]] == []
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 @pytest.mark.slow
 @pytest.mark.parametrize("work", [work.name for work in kills.WORKS])
 def test_killed_commands(tmp_path, work):

@@ -60,7 +60,7 @@ def test_ramp_as_json(faultgouge, tmp_path):
         assert json.loads(file.attributes["scene"])["ramp"]["until"] == 4e-3
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 def test_two_ranks_write_the_same_run(faultgouge, tmp_path):
     assert faultgouge("ramp", "scene.toml", "-o", "one.h5").returncode == 0
     assert faultgouge("ramp", "scene.toml", "-o", "two.h5", ranks=2).returncode == 0
@@ -105,7 +105,7 @@ def test_spectrum_from_run_file_and_from_memory(faultgouge, tmp_path):
     assert printed["rattlers"] == here.rattlers.tolist()
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 def test_spectrum_of_a_decks_dumps(faultgouge, lmp, tmp_path):
     done = lmp(DECKS / "ramp.in", "-var", "decks", str(DECKS), "-var", "until", "2e-3", ranks=2)
     assert done.returncode == 0, done.stdout[-2000:]

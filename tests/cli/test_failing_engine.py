@@ -76,7 +76,7 @@ def scene(tmp_path):
     return tmp_path
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 @pytest.mark.parametrize(("ranks", "rank"), [(1, -1), (2, -1), (2, 0), (2, 1)])
 @pytest.mark.parametrize("call", [1, 30])
 def test_its_sentence_reaches_the_command(scene, ranks, rank, call):

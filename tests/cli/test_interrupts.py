@@ -70,7 +70,7 @@ def equilibria(path):
         return 0
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize(
     ("number", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]

@@ -9,7 +9,7 @@ from docs.run_page import commands, run
 PAGE = Path(__file__).parents[2] / "README.md"
 
 
-@pytest.mark.xdist_group("ranks")  # two ranks that share their cores with others take ten times as long
+@pytest.mark.ranks  # two ranks that share their cores with others take ten times as long
 @pytest.mark.slow
 def test_readme_shows_what_its_commands_print(tmp_path):
     assert len(list(commands(PAGE))) == 9

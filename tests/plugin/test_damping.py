@@ -281,7 +281,7 @@ def test_adapted_dashpots_are_dashpots_from_the_start(lmp, tmp_path):
     assert dumps[0] == dumps[1]
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 def test_deck_with_damping_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path):
     written = []
     settings = ["-var", "fx", "0.01", "-var", "time", "2.0", "-var", "amplitude", "1e-6"]

@@ -7,7 +7,7 @@ from faultgouge.pywrap.decks import DECKS
 SHORT = {"settle.in": (), "ramp.in": ("-var", "until", "2e-3"), "perturb.in": ("-var", "time", "0.5")}
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 @pytest.mark.parametrize("precision", ["double", "compensated"])
 @pytest.mark.parametrize("deck", SHORT)
 def test_deck_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path, deck, precision):

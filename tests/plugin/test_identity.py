@@ -62,7 +62,7 @@ def trajectory(lmp, tmp_path, defaults):
     return run
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 @pytest.mark.parametrize(
     "changes",
     [
@@ -93,7 +93,7 @@ def test_same_trajectory(trajectory, changes):
     assert trajectory(**changes) == straight
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_restart_in_the_same_process(trajectory, defaults, ranks):
     again = (
@@ -110,7 +110,7 @@ fix             move all nve/disc 1.0 {drag} ${{compensated}}
     assert trajectory(ranks=ranks, middle=again) == trajectory()
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_restart_in_a_new_process(trajectory, defaults, lmp, tmp_path, ranks):
     straight = trajectory(ranks=ranks, middle="write_restart middle.restart")

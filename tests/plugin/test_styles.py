@@ -106,7 +106,7 @@ def test_unknown_parameter_is_refused_by_adapt(lmp):
     assert "nonsense" in done.stdout
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 def test_weakening_friction_is_the_same_on_two_ranks(lmp, tmp_path):
     written = []
     settings = ["-var", "fx", "0.01", "-var", "time", "2.0", "-var", "amplitude", "1e-6", "-var", "v_ss", "2e-9"]

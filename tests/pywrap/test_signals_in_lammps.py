@@ -47,7 +47,7 @@ def test_record_moves_the_packing_as_linear_response_says(packing, on, scale):
     assert np.abs(np.array(rows) - predicted).max() < 1e-2 * np.abs(rows).max()
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 def test_deck_takes_a_table_and_is_the_same_on_two_ranks(lmp, tmp_path):
     time = np.linspace(0.0, 0.3, 31)
     table = tmp_path / "record.txt"

@@ -193,7 +193,7 @@ def test_stored_packings_make_no_ensemble(tmp_path):
         study.ensemble(stored, 2, tmp_path, silent)
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 def test_ranks_share_the_packings(faultgouge, tmp_path):
     toml = """
     [packing]

@@ -108,7 +108,7 @@ def test_outcome_of_a_refusal():
     assert refusal(" kn is wrong: correct it\n", "wrong") == Outcome("refused", None, None, "kn is wrong: correct it")
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 @pytest.mark.slow
 def test_same_table_on_two_ranks(faultgouge, tmp_path):
     one = faultgouge("stability", "--quick", "-o", "one", "--json")
@@ -120,7 +120,7 @@ def test_same_table_on_two_ranks(faultgouge, tmp_path):
     assert len(json.loads(one.stdout)["cases"]) == len(QUICK)
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 def test_error_of_one_rank_ends_the_others(faultgouge, tmp_path):
     """A contact that the law does not cover is found by the rank that owns it; the other one waits for its forces."""
     (tmp_path / "scene.toml").write_text(

@@ -226,7 +226,7 @@ def test_the_dry_run_counts_and_computes_nothing(faultgouge, tmp_path):
     assert hundred.seconds / ten.seconds == pytest.approx(10**1.6)
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 @pytest.mark.slow
 def test_one_table_after_kills_on_workers_and_in_shards(tmp_path):
     """Five kills at random moments with one process and with two workers, and three shards: one table to the byte."""

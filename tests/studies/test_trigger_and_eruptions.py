@@ -61,7 +61,7 @@ def test_trigger_needs_a_threshold(tmp_path, friction, says):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.xdist_group("ranks")
+@pytest.mark.ranks
 @pytest.mark.slow
 def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(faultgouge, tmp_path):
     """Above the onset, 0.0218, D grows, but not to its end in the time that is given; with strong drag nothing does."""
