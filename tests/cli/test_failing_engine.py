@@ -7,18 +7,18 @@ from pathlib import Path
 import pytest
 
 BIN = Path(sys.executable).parent
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
-
-SCENE = f"""
+SCENE = """
 [packing]
-file = "{REFERENCE}"
+disks = 16
+radii = [0.5, 0.7]
+seed = 10
 [law]
 kn = 2e5
 [load]
 fy = 3.0
 [ramp]
-step = 7.5e-3
-until = 0.0225
+step = 0.11
+until = 0.11
 """
 
 FAILING = """
@@ -44,6 +44,7 @@ main()
 
 EVERY_CALL = """
 import sys
+from mpi4py import MPI
 from faultgouge.commands import program
 from faultgouge.pywrap import Engine, EngineError
 
@@ -56,17 +57,22 @@ def failing(self, *arguments):
         raise EngineError("as it was told to")
     return displaced(self, *arguments)
 
-Engine.displaced = failing
-program()(["onset", "scene.toml"], standalone_mode=False)
-total = calls
-for wanted in range(1, total + 1, int(sys.argv[1])):
+def search():
+    global calls
     calls = 0
+    program()(["onset", "scene.toml", *sys.argv[1:]], standalone_mode=False)
+
+Engine.displaced = failing
+search()
+total = calls
+for wanted in range(1, total + 1):
     try:
-        program()(["onset", "scene.toml"], standalone_mode=False)
+        search()
     except EngineError:
         continue
     sys.exit(f"no error at call {wanted} of {total}")
-print(total)
+if MPI.COMM_WORLD.rank == 0:
+    print(total)
 """
 
 
@@ -89,9 +95,11 @@ def test_its_sentence_reaches_the_command(scene, ranks, rank, call):
     assert says == [f"Error: LAMMPS stopped: it was told to at call {call}."]
 
 
-@pytest.mark.slow
-def test_no_call_is_taken_for_a_missing_onset(scene):
-    command = [sys.executable, "-c", EVERY_CALL, "1"]
-    done = subprocess.run(command, cwd=scene, capture_output=True, text=True, timeout=1200)
+@pytest.mark.ranks
+@pytest.mark.parametrize("search", [[], ["--modes", "0:39"]], ids=["all_windows", "slices"])
+@pytest.mark.parametrize("ranks", ["1", "2"])
+def test_no_call_is_taken_for_a_missing_onset(scene, ranks, search):
+    command = [BIN / "mpiexec", "-n", ranks, sys.executable, "-c", EVERY_CALL, *search]
+    done = subprocess.run(command, cwd=scene, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr[-500:]
     assert int(done.stdout.splitlines()[-1]) > 20
