@@ -39,15 +39,15 @@ SHARES = (0.1, 0.3, 0.6, 1.0)
 
 PACKINGS = {"onsets": 200, "settled with friction": 10, "harmonic": 100, "surrogates": 100, "halved increments": 30}
 
-SIZES = {50: 100, 200: 40, 400: 16, 1000: 6, 3000: 2}
+SIZES = {50: 100, 200: 40, 400: 16, 1000: 8, 3000: 4, 10000: 4}
 """Packings by number of disks, for either way to load them; those of 100 disks are the ones of `onsets` for mu = 1."""
 
-REACH = {50: 0.02, 100: 0.01, 200: 0.0067, 400: 0.006, 1000: 0.003, 3000: 0.0015}
+REACH = {50: 0.02, 100: 0.01, 200: 0.0067, 400: 0.006, 1000: 0.003, 3000: 0.0015, 10000: 0.00045}
 """F_x/F_y up to which these are sought for, by number of disks."""
 
-INCREMENTS = {50: 15, 100: 15, 200: 15, 400: 20, 1000: 15, 3000: 12}
+INCREMENTS = {50: 15, 100: 15, 200: 15, 400: 20, 1000: 15, 3000: 12, 10000: 12}
 
-LEVELS = {50: 40, 100: 100, 200: 20, 400: 8, 1000: 2}
+LEVELS = {50: 40, 100: 100, 200: 20, 400: 8, 1000: 4}
 """Packings whose levels are looked at, by number of disks; a dense decomposition grows with the cube."""
 
 GROWTH = {50: 20, 100: 20, 200: 6}

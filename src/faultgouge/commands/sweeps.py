@@ -92,7 +92,7 @@ def genericity(
     """How generic the onset is, how it depends on the number of disks, and why: tables, pictures and a page.
 
     Onsets of 200 packings for five friction coefficients, of packings of 50 to
-    3,000 disks, of random matrices and of shuffled contacts. It takes an hour or
+    10,000 disks, of random matrices and of shuffled contacts. It takes an hour or
     two on one core, and goes on where it was cut off; --share 0.1 is done in
     minutes.
     """
