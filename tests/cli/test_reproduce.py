@@ -76,6 +76,8 @@ def test_reproduce(faultgouge, tmp_path):
     assert triggering["jump"] > 1e6 * triggering["largest_D"]["perturbed"]
     assert triggering["largest_D_of_the_control"] > 0
     assert triggering["smallest_mu"] == pytest.approx(0.8, abs=1e-6)
+    perturbed = faultgouge("perturb", "scene.toml")
+    assert f"v0 = {triggering['v0']:.3g} (" in perturbed.stdout + perturbed.stderr
 
     rows = {cells[1].strip(): cells[3].strip() for line in report.splitlines() if len(cells := line.split("|")) == 5}
     real = real_units(Scene.from_toml(tmp_path / "scene.toml"))
