@@ -188,12 +188,12 @@ def tiled(cell: Packing, copies: int) -> Packing:
 
 
 @pytest.mark.slow
-def test_first_window_of_a_thousand_disks(ramp):
+def test_first_window_of_hundreds_of_disks(ramp):
     """Against all eigenvalues by LAPACK, at the loads before it, just below and just above it."""
     path = ramp(1.0, 1e-3, 22)
 
     def operator(fx):
-        return full_operator(tiled(path(fx), 10))
+        return full_operator(tiled(path(fx), 5))
 
     window = searched(operator, path.grid).window
     assert window.kind == "coalescence"
