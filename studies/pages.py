@@ -50,17 +50,27 @@ def render(package: str, name: str, **numbers: Any) -> str:
 
 
 def filled(text: str) -> str:
-    """A page whose lines of prose are no longer than a screen is wide; blocks of code and formulas stay as they are."""
+    """A page whose paragraphs are as wide as a screen at the most; blocks of code and formulas stay as they are."""
     parts = re.split(r"^((?:```|\$\$).*?^(?:```|\$\$)$)", text, flags=re.MULTILINE | re.DOTALL)
-    for number in range(0, len(parts), 2):
-        parts[number] = "\n".join(map(_folded, parts[number].split("\n")))
+    parts[::2] = map(_folded, parts[::2])
     return "".join(parts)
 
 
-def _folded(line: str) -> str:
-    """A line of prose as several; those of an item of a list are indented."""
-    if len(line) <= WIDTH or LAID_OUT.match(line):
-        return line
+def _folded(text: str) -> str:
+    """Paragraphs and items of lists folded anew; an item's lines are indented."""
+    done: list[str] = []
+    open_paragraph = False
+    for line in text.split("\n"):
+        prose = bool(line.strip()) and not LAID_OUT.match(line)
+        if open_paragraph and prose and not line.startswith("- "):
+            done[-1] += " " + line.strip()
+        else:
+            done.append(line)
+        open_paragraph = prose
+    return "\n".join(line if LAID_OUT.match(line) else _wrapped(line) for line in done)
+
+
+def _wrapped(line: str) -> str:
     bound = NO_BEGINNING.sub("\0", line)
     indent = "  " if line.startswith("- ") else ""
     lines = textwrap.wrap(bound, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
