@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from .digits import with_uncertainty
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from .onset import Window
     from .packing import Packing
 
@@ -40,20 +42,33 @@ def packing_picture(packing: Packing) -> bytes | None:
     return stream.getvalue()
 
 
-def windows_table(title: str, windows: Sequence[Window]) -> str:
-    """An HTML table of windows of complex eigenvalues."""
+class Tabled:
+    """A result that shows itself as a table of two columns: in a notebook, and when rich prints it."""
+
+    def _rows(self) -> Mapping[str, str]:
+        raise NotImplementedError
+
+    def _repr_html_(self) -> str:
+        body = "".join(
+            f"<tr><th style='text-align:left'>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>"
+            for name, value in self._rows().items()
+        )
+        return f"<table><caption>{html.escape(repr(self).strip('<>'))}</caption>{body}</table>"
+
+    def __rich__(self) -> Table:
+        from rich.table import Table
+
+        table = Table("", "", title=repr(self).strip("<>"), show_header=False, title_justify="left")
+        for name, value in self._rows().items():
+            table.add_row(name, value)
+        return table
+
+
+def windows_rows(windows: Sequence[Window]) -> dict[str, str]:
+    """Windows of complex eigenvalues in words: where each begins, and what it is."""
     rows = {}
     for each in windows:
         end = "the end" if each.fx_end is None else f"{each.fx_end:.8g}"
         begin = f"from {with_uncertainty(each.fx_onset, each.error)}"
         rows[begin] = f"to {end}, lambda = {each.eigenvalue:.6g}, {each.kind}"
-    return table(title, rows)
-
-
-def table(title: str, rows: Mapping[str, str]) -> str:
-    """An HTML table of two columns."""
-    body = "".join(
-        f"<tr><th style='text-align:left'>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>"
-        for name, value in rows.items()
-    )
-    return f"<table><caption>{html.escape(title)}</caption>{body}</table>"
+    return rows

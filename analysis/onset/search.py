@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from ..digits import with_uncertainty
-from ..display import windows_table
+from ..display import Tabled, windows_rows
 from ..errors import FaultgougeError
 from ..packing import Packing
 from .edge import Family
@@ -40,7 +40,7 @@ class OnsetError(FaultgougeError):
 
 
 @dataclass(frozen=True)
-class Onset:
+class Onset(Tabled):
     """The windows of complex eigenvalues along a ramp.
 
     Attributes
@@ -64,9 +64,8 @@ class Onset:
     def __repr__(self) -> str:
         return f"<Onset: F_x^c = {with_uncertainty(self.fx_c, self.error)}, {len(self.windows)} windows>"
 
-    def _repr_html_(self) -> str:
-        """What a notebook shows: the windows."""
-        return windows_table(repr(self).strip("<>"), self.windows)
+    def _rows(self) -> dict[str, str]:
+        return windows_rows(self.windows)
 
     @property
     def fx_c(self) -> float:

@@ -1,4 +1,4 @@
-"""The picture of docs/search.md: the discriminant of four pairs over one increment of the load.
+"""The picture of docs/complex_pairs.md: the discriminant of four pairs over one increment of the load.
 
 python docs/pictures/search.py
 """

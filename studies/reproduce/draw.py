@@ -11,14 +11,10 @@ from numpy.typing import ArrayLike
 
 from ...figures.packing import draw_packing
 from ...figures.pair import PairCurve, draw_pair
-from ...figures.series import draw_series, few_decades
+from ...figures.series import begin_at_noise, draw_series, few_decades
 from ...figures.style import save, styled
 from ..triggering.draw import figures as draw_triggering
 from .compute import GrowthRun, TriggeringRun
-
-BELOW_NOISE = 1e-2
-"""Lower end of D in the figure of growth, in units of its median in the first quarter of the run: the very first
-steps, which are many decades lower, would flatten the rest."""
 
 
 def figures(curves: Sequence[PairCurve], growth: GrowthRun, output: Path) -> None:
@@ -85,8 +81,7 @@ def growth_figure(
     predicted = rf"$2\,|\mathrm{{Im}}\,\omega| = {predicted_rate:.5g}$, from the spectrum"
     slope = 10**1.5 * np.exp(intercept + predicted_rate * ends)
     axes.plot(ends, slope, color="C0", linestyle="--", label=predicted)
-    noise = msd[(time <= 0.25 * time[-1]) & (msd > 0)]
-    axes.set_ylim(bottom=BELOW_NOISE * float(np.median(noise)) if len(noise) else None)
+    begin_at_noise(axes, time, msd)
     few_decades(axes)
     figure.legend(loc="outside upper left")
     return figure

@@ -63,16 +63,16 @@ def eruption_figure(
 
 
 def _name_line(axes: Axes, place: float, name: str) -> None:
-    """A name at the foot of a vertical line, to its left."""
+    """A name at the head of a vertical line, to its left: before the crossing D is small."""
     axes.annotate(
         name,
-        (place, 0.03),
+        (place, 0.97),
         xycoords=axes.get_xaxis_transform(),
         xytext=(-2, 0),
         textcoords="offset points",
         ha="right",
         rotation=90,
-        va="bottom",
+        va="top",
         fontsize=7,
     )
 

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
+from ...analysis.digits import with_uncertainty
 from ...analysis.power_law import PowerLaw
 from ...figures.series import few_decades, positive, scientific
 from ...figures.style import INK, styled
@@ -107,7 +108,7 @@ def amplitude_figure(curves: Sequence[AmplitudeCurve]) -> Figure:
         inside = np.array(curve.fitted)
         axes.plot(ends, fit.factor * ends**fit.exponent, color=colour, linewidth=0.6, linestyle=":")
         axes.plot(inside, fit.factor * inside**fit.exponent, color=colour, linewidth=0.8)
-        name = f"{curve.name}slope ${_with_error(fit.exponent, fit.error)}$"
+        name = f"{curve.name}slope ${with_uncertainty(fit.exponent, fit.error)}$"
         axes.plot(curve.distance, curve.amplitude, "o", color=colour, label=name)
     few_decades(axes)
     figure.legend(loc="outside upper center", handletextpad=0.2)
@@ -208,9 +209,3 @@ def response_figure(run: Displacements, response: Displacements) -> Figure:
     for axes, name in ((upper, "(a)"), (lower, "(b)")):
         axes.set_title(name, loc="left", fontsize=8.5, pad=3)
     return figure
-
-
-def _with_error(value: float, error: float) -> str:
-    """-0.4999(2): the error in units of the last digit; two digits where the error is larger than that shows."""
-    digits = 2 if error <= 0 else min(8, max(2, -int(np.floor(np.log10(error)))))
-    return f"{value:.{digits}f}({np.ceil(error * 10**digits):.0f})"

@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
-PROSE = [*PAGES, *sorted((ROOT / "docs" / "styles").glob("*.md"))]
+PROSE = [*PAGES, *sorted((ROOT / "docs").glob("*/*.md"))]
 NO_PROSE = re.compile(r"^(```|\$\$).*?^(```|\$\$)$|^(\||    ).*?$", re.MULTILINE | re.DOTALL)
 """Blocks of code and formulas, and rows of tables."""
 
@@ -22,6 +22,10 @@ def test_links_lead_somewhere(page):
 def test_no_line_of_prose_is_longer_than_a_screen(page):
     prose = NO_PROSE.sub("", page.read_text())
     assert [line for line in prose.splitlines() if len(line) > 120] == []
+
+
+def test_no_page_has_the_name_of_a_page_that_sphinx_makes():
+    assert {page.stem for page in PAGES} & {"search", "genindex", "py-modindex"} == set()
 
 
 def test_files_of_the_map_are_there():

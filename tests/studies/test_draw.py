@@ -106,13 +106,6 @@ def test_amplitudes_carry_their_exponent():
     assert "pair: slope $-0.49989(3)$" in texts(figure)
 
 
-@pytest.mark.parametrize(("error", "says"), [(0.0, "-0.50(0)"), (0.02, "-0.50(2)"), (0.013, "-0.50(2)")])
-def test_errors_stand_behind_their_digit(error, says):
-    distance = np.array([1.0, 2.0])
-    curve = AmplitudeCurve("pair: ", distance, distance, PowerLaw(-0.5, error, 1.0), (1.0, 2.0))
-    assert says in texts(amplitude_figure([curve]))
-
-
 def test_damping_marks_its_crossover():
     curves = []
     for epsilon in (1e-3, 1e-5):

@@ -77,9 +77,9 @@ def draw(
     else:
         modes, what = modes_of(packing, mode)
         figure = draw_modes(packing, modes, what)
-        words = "; ".join([f"F_x = {packing.fx:g}: {what}", *(each.plain for each in modes)])
+        words = "\n".join([f"F_x = {packing.fx:g}: {what}", *(each.plain for each in modes)])
     save_as(figure, output)
-    say(f"{words}; written to {output}")
+    say(f"{words}\nwritten to {output}")
 
 
 @app.command(epilog="Example: [bold]faultgouge movie perturb.h5 -o eruption.gif[/bold]")

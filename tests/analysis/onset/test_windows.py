@@ -1,10 +1,12 @@
 """Windows of complex eigenvalues, on families of matrices whose windows are known, and along a ramp."""
 
 from dataclasses import replace
+from io import StringIO
 
 import numpy as np
 import pytest
 from families import DIGITS, OTHERS, crossing, embedded, normal_form
+from rich.console import Console
 
 from faultgouge.analysis import (
     Contacts,
@@ -223,6 +225,9 @@ def test_json(ramp):
     written = with_uncertainty(onset.fx_c, onset.error)
     assert repr(onset).startswith(f"<Onset: F_x^c = {written}, ")
     assert f"from {written}</th>" in onset._repr_html_()
+    console = Console(width=100, record=True, file=StringIO())
+    console.print(onset)
+    assert f"from {written}" in console.export_text()
 
 
 def test_a_complex_pair_is_not_torn_by_a_level_beside_it():
