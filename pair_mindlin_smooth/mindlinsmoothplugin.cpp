@@ -12,6 +12,7 @@
 
 #include <cstdio>
 #include <mpi.h>
+#include <new>
 #include <string>
 
 using namespace LAMMPS_NS;
@@ -84,6 +85,14 @@ std::string mismatch(void *lmp)
 }
 
 }    // namespace
+
+// What vectors call for a size beyond all bounds. The library has it since 2021 alone (GLIBCXX_3.4.29), and the linker
+// leads here instead (CMakeLists.txt), so that the plugin loads on older systems too.
+extern "C" [[noreturn]] void __wrap__ZSt28__throw_bad_array_new_lengthv();
+extern "C" [[noreturn]] void __wrap__ZSt28__throw_bad_array_new_lengthv()
+{
+  throw std::bad_alloc();
+}
 
 extern "C" __attribute__((visibility("default"))) void lammpsplugin_init(void *lmp, void *handle, void *regfunc)
 {
