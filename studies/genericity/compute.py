@@ -37,15 +37,19 @@ def compute(output: Path, say: Say = print, progress: Progress = lambda rows, _:
 
 
 def record(output: Path) -> None:
-    """made.json: with which version the tables were made, and what they cost."""
+    """made.json: with which version and at which commits the tables were made, and what they cost."""
     rows = [row for path in output.glob(f"*/{LINES}") for row in stored(path).values()]
+    path = output / "made.json"
+    before = json.loads(path.read_text()) if path.exists() else {"commits": [], "rows": 0}
+    if len(rows) == before["rows"]:
+        return
     made = {
         "version": version("faultgouge"),
-        "commit": _commit(),
+        "commits": list(dict.fromkeys([*before["commits"], _commit()])),
         "rows": len(rows),
         "cpu_seconds": round(sum(row["cpu_seconds"] for row in rows)),
     }
-    write_text(output / "made.json", json.dumps(made, indent=1) + "\n")
+    write_text(path, json.dumps(made, indent=1) + "\n")
 
 
 def _commit() -> str:
