@@ -17,11 +17,11 @@ from ...analysis.wholefile import make_folder, write_text
 from ...pywrap import SceneError
 from .compute import ASKED, LINES, Say, stored
 from .points import Sweep
-from .table import write_tables
+from .table import Row, write_tables
 from .tasks import TASKS
 
 
-def merge(parts: Sequence[Path], output: Path, say: Say = print) -> None:
+def merge(parts: Sequence[Path], output: Path, say: Say = print) -> list[Row]:
     """Merge folders of sweeps into one, or JSON files of `onset --modes` into onset.json.
 
     Parameters
@@ -33,24 +33,29 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> None:
     say : callable
         Takes a line of words.
 
+    Returns
+    -------
+    list of dict
+        The rows of a sweep; none of parts of an onset.
+
     Raises
     ------
     SceneError
         If the parts do not belong together, or are no parts.
     """
     if all((part / ASKED).is_file() for part in parts):
-        _merge_sweeps(parts, output, say)
-    elif all(part.is_file() for part in parts):
+        return _merge_sweeps(parts, output, say)
+    if all(part.is_file() for part in parts):
         _merge_modes(parts, output, say)
-    else:
-        wrong = next(part for part in parts if not (part / ASKED).is_file())
-        raise SceneError(
-            f"{wrong} is no folder of a sweep (it has no {ASKED}): give folders that `faultgouge sweep` has left, or "
-            "JSON files of `faultgouge onset --modes` alone"
-        )
+        return []
+    wrong = next(part for part in parts if not (part / ASKED).is_file())
+    raise SceneError(
+        f"{wrong} is no folder of a sweep (it has no {ASKED}): give folders that `faultgouge sweep` has left, or "
+        "JSON files of `faultgouge onset --modes` alone"
+    )
 
 
-def _merge_sweeps(parts: Sequence[Path], output: Path, say: Say) -> None:
+def _merge_sweeps(parts: Sequence[Path], output: Path, say: Say) -> list[Row]:
     asked = [_read(part / ASKED) for part in parts]
     for part, each in zip(parts, asked, strict=True):
         each.pop("shard", None)
@@ -68,6 +73,7 @@ def _merge_sweeps(parts: Sequence[Path], output: Path, say: Say) -> None:
     say(f"{len(rows)} of {len(sweep.points)} scenes from {len(parts)} folders; written: {output}/results.csv")
     if len(rows) < len(sweep.points):
         say(f"the other {len(sweep.points) - len(rows)} are in none of them: `faultgouge sweep` goes on from here")
+    return rows
 
 
 def _merge_modes(parts: Sequence[Path], output: Path, say: Say) -> None:

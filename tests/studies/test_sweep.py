@@ -15,6 +15,7 @@ import pytest
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.studies.onsets import onset_run
 from faultgouge.studies.sweep.compute import run_sweep, stored
+from faultgouge.studies.sweep.draw import draw_sweep
 from faultgouge.studies.sweep.estimate import estimate
 from faultgouge.studies.sweep.merge import merge
 from faultgouge.studies.sweep.points import Sweep, shard
@@ -240,6 +241,7 @@ def test_one_table_after_kills_on_workers_and_in_shards(tmp_path):
 
     run("whole")
     expected = (tmp_path / "whole" / "results.csv").read_bytes()
+    assert (tmp_path / "whole" / "results.png").stat().st_size > 10_000
     random = np.random.default_rng(5)
     for name, before in (("one", []), ("two", [BIN / "mpiexec", "-n", "3"])):
         lines = tmp_path / name / "results.jsonl"
@@ -276,6 +278,9 @@ def test_trigger_and_eruptions_as_tasks(tmp_path):
         wanted = Sweep.from_mapping({"task": task, "sweep": {"packing.seed": [2]}, "scene": scene}, TASKS)
         (row,) = run_sweep(wanted, tmp_path / task, say=silent)
         assert row["says"] is None
+        picture = draw_sweep([row], tmp_path / task)
+        assert (tmp_path / task / "results.svg").exists()
+        assert picture.endswith("results.png")
         if task == "eruptions":
             (run,) = row["result"]["runs"]
             assert run["fx"] == 0.02

@@ -24,7 +24,7 @@ def sweep(
     ] = "1/1",
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what there is to do and what it will cost.")] = False,
 ) -> None:
-    """One task for every scene of a product of keys: results.jsonl, and the table results.csv.
+    """One task for every scene of a product of keys: results.jsonl, the table results.csv, and a picture.
 
     A sweep names a task (onset, triggering, ...); below \\[sweep] lists of values
     or ranges for any keys of a scene, as in "packing.seed" = "1:200"; and below
@@ -34,6 +34,7 @@ def sweep(
     mpiexec -n 5 keeps 4 cores busy.
     """
     from faultgouge.studies.sweep.compute import LINES, run_sweep, stored
+    from faultgouge.studies.sweep.draw import draw_sweep
     from faultgouge.studies.sweep.estimate import estimate
     from faultgouge.studies.sweep.points import Sweep
     from faultgouge.studies.sweep.points import shard as part_of
@@ -48,8 +49,9 @@ def sweep(
                 say(line)
         return
     rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count))
-    failed = sum(row["says"] is not None for row in rows)
-    say(f"{len(rows)} scenes, {failed} of them failed; written: {output}/results.csv")
+    if is_root():
+        failed = sum(row["says"] is not None for row in rows)
+        say(f"{len(rows)} scenes, {failed} of them failed; written: {output}/results.csv{draw_sweep(rows, output)}")
 
 
 @app.command(epilog="Example: [bold]faultgouge merge shard1 shard2 shard3 -o whole[/bold]")
@@ -65,10 +67,11 @@ def merge(
     JSON files that `onset --modes FIRST:STOP -o FILE` has left, the first window
     is taken and onset.json written.
     """
+    from faultgouge.studies.sweep.draw import draw_sweep
     from faultgouge.studies.sweep.merge import merge as merge_parts
 
     if is_root():
-        merge_parts(parts, output, say)
+        draw_sweep(merge_parts(parts, output, say), output)
 
 
 def _shard(text: str) -> tuple[int, int]:

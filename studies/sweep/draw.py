@@ -1,0 +1,108 @@
+"""The picture of a sweep: onsets, or the sizes of eruptions, over the keys that were swept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ...figures.style import save, styled
+from ..statistics import distribution
+from .table import Row
+
+SEED = "packing.seed"
+
+Reach = tuple[float, bool]
+"""The largest F_x up to which there is no window, and whether that is the onset."""
+
+
+def draw_sweep(rows: Sequence[Row], folder: Path) -> str:
+    """Save results.png and results.svg, and say so; say nothing where no row has an onset or an eruption."""
+    reaches = [(row, reach) for row in rows if (reach := reach_of(row)) is not None]
+    runs = [(row, run) for row in rows for run in row["result"].get("runs", [])]
+    if not reaches and not runs:
+        return ""
+    save(onsets_figure(reaches) if reaches else eruptions_figure(runs), folder / "results")
+    return f" and {folder}/results.png"
+
+
+def reach_of(row: Row) -> Reach | None:
+    """How far the (first) ramp of a row went without a window; None if the row has no ramp."""
+    result = row["result"]
+    end = next(iter(result.get("ramps", [])), result)
+    reach = end.get("reach", end.get("fx_c"))
+    return None if reach is None else (float(reach), end["ends"] == "onset")
+
+
+@styled
+def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
+    """The share of scenes with an onset up to F_x, and the onsets over each swept key.
+
+    Parameters
+    ----------
+    found : sequence of (row, (F_x, whether it is the onset))
+        Forces per disk of the upper layer. Triangles stand where there is no onset up to there.
+
+    Returns
+    -------
+    Figure
+    """
+    keys = _varied([row for row, _ in found])
+    figure = Figure(figsize=(3.4, 2.2 * (1 + len(keys))), layout="constrained")
+    share, *panels = figure.subplots(1 + len(keys), 1, squeeze=False)[:, 0]
+    reach = np.array([each for _, (each, _) in found])
+    onset = np.array([each for _, (_, each) in found])
+    fx, probability = distribution(reach, onset)
+    levels = [0.0, *probability]
+    share.step([0.0, *fx, reach.max()], [*levels, levels[-1]], where="post")
+    share.set(xlabel="$F_x$", ylabel="scenes with an onset", xlim=(0, None), ylim=(0, 1))
+    for axes, key in zip(panels, keys, strict=True):
+        place = _places(axes, key, [row for row, _ in found])
+        axes.plot(place[onset], reach[onset], "o", color="C0", markersize=3)
+        axes.plot(place[~onset], reach[~onset], "^", color="C0", markerfacecolor="none", markersize=3)
+        axes.set(ylabel="$F_x^c$", ylim=(0, None))
+    return figure
+
+
+@styled
+def eruptions_figure(found: Sequence[tuple[Row, dict[str, float]]]) -> Figure:
+    """The mean square displacement D of every run over its load, one colour a scene.
+
+    Parameters
+    ----------
+    found : sequence of (row, run)
+        Runs with "fx", force per disk of the upper layer, and "msd", length^2.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = Figure(figsize=(3.4, 2.6), layout="constrained")
+    axes = figure.add_subplot(xlabel="$F_x$", ylabel="$D$", yscale="log")
+    numbers: dict[str, int] = {}
+    for row, run in found:
+        number = numbers.setdefault(row["key"], len(numbers))
+        axes.plot(run["fx"], run["msd"], "o", color=f"C{number % 10}", markersize=3)
+    return figure
+
+
+def _varied(rows: Sequence[Row]) -> list[str]:
+    """The swept keys with more than one value, but for the seed, which is a sample and no axis."""
+    keys = [key for key in rows[0]["values"] if key != SEED]
+    return [key for key in keys if len({str(row["values"][key]) for row in rows}) > 1]
+
+
+def _places(axes: Axes, key: str, rows: Sequence[Row]) -> np.ndarray:
+    """Where rows stand on the axis of a key: at its number, or at the number of a value that is none."""
+    axes.set_xlabel(key)
+    values = [row["values"][key] for row in rows]
+    if all(isinstance(value, int | float) for value in values):
+        if min(values) > 0 and max(values) > 20 * min(values):
+            axes.set_xscale("log")
+        return np.array(values, float)
+    names = list(dict.fromkeys(map(str, values)))
+    axes.set_xticks(range(len(names)), names)
+    return np.array([names.index(str(value)) for value in values], float)
