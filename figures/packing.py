@@ -323,8 +323,8 @@ def _draw_load(axes: Axes, artist: PackingArtist) -> None:
     middle = 0.5 * (view.left + view.right)
     if packing.fy:
         axes.quiver(x, crest + length, np.zeros_like(x), np.full_like(x, -length), **style)
-        place = _free_place(artist, x, crest, length)
-        axes.text(*place, "$F_y$", ha="center", va="center", zorder=6)
+        along, up = _free_place(artist, x, crest, length)
+        axes.text(along, up, "$F_y$", ha="center", va="center", zorder=6)
     if packing.fx:
         height = view.ceiling - 0.3 * length
         axes.quiver([middle], [height], [np.sign(packing.fx) * 2 * length], [0.0], **style)

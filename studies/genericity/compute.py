@@ -40,12 +40,12 @@ def record(output: Path) -> None:
     """made.json: with which version and at which commits the tables were made, and what they cost."""
     rows = [row for path in output.glob(f"*/{LINES}") for row in stored(path).values()]
     path = output / "made.json"
-    before = json.loads(path.read_text()) if path.exists() else {"commits": [], "rows": 0}
-    if len(rows) == before["rows"]:
+    before = json.loads(path.read_text()) if path.exists() else {}
+    if len(rows) == before.get("rows"):
         return
     made = {
         "version": version("faultgouge"),
-        "commits": list(dict.fromkeys([*before["commits"], _commit()])),
+        "commits": list(dict.fromkeys([*before.get("commits", []), _commit()])),
         "rows": len(rows),
         "cpu_seconds": round(sum(row["cpu_seconds"] for row in rows)),
     }
