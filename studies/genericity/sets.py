@@ -39,7 +39,7 @@ SHARES = (0.1, 0.3, 0.6, 1.0)
 
 PACKINGS = {"onsets": 200, "settled with friction": 10, "harmonic": 100, "surrogates": 100, "halved increments": 30}
 
-SIZES = {50: 100, 200: 40, 400: 16, 1000: 8, 3000: 4, 10000: 4}
+SIZES = {50: 100, 200: 40, 400: 16, 1000: 16, 3000: 8, 10000: 4}
 """Packings by number of disks, for either way to load them; those of 100 disks are the ones of `onsets` for mu = 1."""
 
 REACH = {50: 0.02, 100: 0.01, 200: 0.0067, 400: 0.006, 1000: 0.003, 3000: 0.0015, 10000: 0.00045}
