@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ..analysis import BadInputError, PackingFileError, RunFile
-from ..analysis.wholefile import BEGINNINGS
-from .exchange import Disks, format_of, read_disks, upper_layer
+from .exchange import Disks, format_of, is_hdf5, read_disks, upper_layer
 from .loose import Start, layer_size, loose_start
 from .refusals import Positive, Section, refusal
 
@@ -115,7 +114,7 @@ class StoredPacking(Section):
         folder: Path = (info.context or {}).get("folder", Path())
         path = Path(os.path.realpath(folder / file))  # Path.resolve fails on a loop of links
         try:
-            if not _is_hdf5(path):
+            if not is_hdf5(path):
                 format_of(path)
         except OSError as error:
             says = f"cannot be read at {path} ({error.strerror}): correct the name"
@@ -126,7 +125,7 @@ class StoredPacking(Section):
 
     @model_validator(mode="after")
     def _readable(self) -> "StoredPacking":
-        if _is_hdf5(self.file):
+        if is_hdf5(self.file):
             for key in ("top", "frame"):
                 if getattr(self, key) is not None:
                     raise refusal(
@@ -141,7 +140,7 @@ class StoredPacking(Section):
 
     def read(self) -> tuple[Disks, NDArray[np.bool_]] | None:
         """What the file has, and the upper layer; None for a run.h5."""
-        if _is_hdf5(self.file):
+        if is_hdf5(self.file):
             return None
         disks = read_disks(self.file, self.frame)
         return disks, upper_layer(disks, self.top)
@@ -154,11 +153,6 @@ class StoredPacking(Section):
             return len(read[0])
         with RunFile(self.file) as run:
             return len(run.packing(0)) if len(run) else 0
-
-
-def _is_hdf5(path: Path) -> bool:
-    with path.open("rb") as stream:
-        return stream.read(64).startswith(BEGINNINGS)
 
 
 def kind_of_packing(section: Any) -> str:

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import CensoredData, binomtest, ecdf
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -21,6 +20,8 @@ def share(count: int, of: int) -> dict[str, Any]:
     """count/of with Wilson's 95 % interval: {"count", "of", "share", "low", "high"}, the last three None for of = 0."""
     if of == 0:
         return {"count": 0, "of": 0, "share": None, "low": None, "high": None}
+    from scipy.stats import binomtest  # half a second to import
+
     interval = binomtest(count, of).proportion_ci(0.95, method="wilson")
     return {"count": count, "of": of, "share": count / of, "low": float(interval.low), "high": float(interval.high)}
 
@@ -43,6 +44,8 @@ def distribution(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:
     reach, found = np.asarray(reach, dtype=float), np.asarray(found, dtype=bool)
     if not found.any():
         return np.empty(0), np.empty(0)
+    from scipy.stats import CensoredData, ecdf
+
     steps = ecdf(CensoredData.right_censored(reach, ~found)).cdf
     rises = np.diff(steps.probabilities, prepend=0.0) > 0
     return steps.quantiles[rises], steps.probabilities[rises]

@@ -8,7 +8,7 @@ says which module writes which file.
 from .disks import Disks, Slips, packing_of
 from .layer import upper_layer
 from .quantities import ModeVectors
-from .readers import format_of, known_formats, read_disks
+from .readers import format_of, is_hdf5, known_formats, read_disks
 from .writers import WRITERS, write_packing
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "ModeVectors",
     "Slips",
     "format_of",
+    "is_hdf5",
     "known_formats",
     "packing_of",
     "read_disks",

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...analysis import PackingFileError
+from ...analysis.wholefile import BEGINNINGS
 from .disks import Disks
 
 
@@ -59,6 +60,12 @@ def known_formats() -> str:
     return ", ".join([*listed, "run.h5", f"and {OTHER.words} (pip install 'faultgouge[export]')"])
 
 
+def is_hdf5(path: Path) -> bool:
+    """Whether a file begins as HDF5 does, or as a run.h5."""
+    with path.open("rb") as stream:
+        return stream.read(64).startswith(BEGINNINGS)
+
+
 def format_of(path: Path) -> Format:
     """The format of a file, by its suffix, or by its beginning as LAMMPS's users name files.
 
@@ -76,6 +83,8 @@ def format_of(path: Path) -> Format:
         return RESTART
     if begin in ("data", "dump"):
         return DATA if begin == "data" else DUMP
+    if is_hdf5(path):
+        raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
     from .universe import known
 
     if path.suffix and known(path):

@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import CensoredData, logrank
-from scipy.stats import t as student
 
 from ...analysis.packing import Floats
 from ..statistics import median_interval, quartiles, share
@@ -287,6 +285,8 @@ def _logrank(one: Table, other: Table) -> float | None:
     """Probability of a difference as large, or larger, between two samples of one distribution."""
     if not (one.found.any() and other.found.any()):
         return None
+    from scipy.stats import CensoredData, logrank  # half a second to import
+
     samples = [CensoredData.right_censored(each.reach, ~each.found) for each in (one, other)]
     return float(logrank(*samples).pvalue)
 
@@ -299,6 +299,8 @@ def _middle(values: list[float]) -> dict[str, float]:
 def _mean(values: Floats) -> dict[str, float | None]:
     """The mean and half of its 95 % interval (Student's); no interval of a single value."""
     count = len(values)
+    from scipy.stats import t as student
+
     error = float(student.ppf(0.975, count - 1) * np.std(values, ddof=1) / np.sqrt(count)) if count > 1 else None
     return {"value": float(np.mean(values)), "error": error}
 

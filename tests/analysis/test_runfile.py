@@ -7,7 +7,6 @@ import sys
 from dataclasses import fields, replace
 
 import h5py
-import MDAnalysis
 import numpy as np
 import pytest
 
@@ -340,6 +339,8 @@ def test_mdanalysis_opens_it(tmp_path, states, periodic):
     with RunFile.create(path, states[0]) as run:
         for state in states:
             run.append(state)
+    import MDAnalysis  # a third of a second to import
+
     universe = MDAnalysis.Universe.empty(6, trajectory=True)
     universe.load_new(path, format="H5MD", convert_units=False)
     assert len(universe.trajectory) == 4

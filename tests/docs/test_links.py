@@ -39,3 +39,9 @@ def test_files_of_the_map_are_there():
             missing += [] if (ROOT / path).exists() else [path]
     assert len(rows) > 12
     assert missing == []
+
+
+def test_films_are_small_enough_to_open_with_the_page():
+    films = sorted((ROOT / "docs").rglob("pictures/**/*.gif"))
+    assert films
+    assert [film.name for film in films if film.stat().st_size > 2_000_000] == []

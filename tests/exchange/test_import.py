@@ -8,6 +8,7 @@ import pytest
 from comparing import same
 
 from faultgouge.analysis import BadInputError, RunFile
+from faultgouge.analysis.wholefile import MAGIC
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.exchange import read_disks, upper_layer, write_packing
 
@@ -206,6 +207,7 @@ BAD = {
     "one ID twice": ("a.csv", lambda p: "id,x,y,radius\n1,1,1,1\n1,9,1,1\n", "has disk 1 twice"),
     "empty": ("a.csv", lambda p: "", "is no table"),
     "no touch": ("a.csv", lambda p: "x,y,radius\n1,3,0.5\n3,3,0.5\n", "no disk touches another"),
+    "a run.h5": ("a.h5", lambda p: MAGIC.decode(), "needs no import"),
     "unknown suffix": ("a.doc", lambda p: "?", "is of no format that is read: give dumps of the decks (.disks)"),
     "no data": ("a.data", lambda p: "LAMMPS\n\n3 atoms\n", "no section Atoms"),
     "data of points": ("a.data", lambda p: "LAMMPS\n\n1 atoms\n\nAtoms # atomic\n\n1 1 1 1 0\n", "atom style atomic"),

@@ -1,12 +1,16 @@
 """A trajectory is H5MD: MDAnalysis steps through it, and its analyses agree with ours."""
 
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 
 from faultgouge.analysis import PackingFileError, RunFile, mean_square_displacement, nearest_image
 from faultgouge.pywrap import Record, Scene, reach
 
-MDAnalysis = pytest.importorskip("MDAnalysis", reason="needs the extra export: pip install 'faultgouge[export]'")
+pytestmark = pytest.mark.skipif(
+    find_spec("MDAnalysis") is None, reason="needs the extra export: pip install 'faultgouge[export]'"
+)
 
 
 @pytest.fixture(scope="module", params=["double", "compensated"])
@@ -35,6 +39,8 @@ def run(tmp_path_factory, request):
 
 
 def opened(path, count):
+    import MDAnalysis
+
     universe = MDAnalysis.Universe.empty(count, trajectory=True)
     universe.load_new(str(path), format="H5MD", convert_units=False)
     universe.add_TopologyAttr("type", ["D"] * count)

@@ -4,7 +4,6 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
@@ -110,6 +109,8 @@ def test_another_colour_is_refused(packing):
 
 
 def test_axes_that_are_given_are_drawn_into(packing):
+    import matplotlib.pyplot as plt
+
     figure, (left, right) = plt.subplots(1, 2)
     assert draw_packing(packing, right) is figure
     assert len(labelled(right, EllipseCollection, "disks").get_offsets()) >= len(packing)
