@@ -21,7 +21,7 @@ def section(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, m
     mu : float
         Static friction coefficient.
     """
-    first, largest = jump(triggering.erupting), float(column(triggering.erupting, "msd").max())
+    first = jump(triggering.erupting)
     return render(
         __package__ or "",
         "triggering.md.j2",
@@ -36,7 +36,6 @@ def section(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, m
         jump=first,
         jumped=float(np.log10(first / column(triggering.perturbed, "msd").max())),
         control=None if triggering.control is None else float(column(triggering.control, "msd").max()),
-        grown=largest / first,
         above_noise=ABOVE_NOISE,
         half_gain=[pair.half_gain_time() / pair.tau_d for pair in sensitive.near],
     )

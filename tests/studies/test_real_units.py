@@ -6,12 +6,15 @@ import sys
 from pathlib import Path
 
 import pytest
+import tomllib
 
+from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.units import real_units
 from faultgouge.studies.reproduce import reproduce
 
 BIN = Path(sys.executable).parent
+REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 SCENE = """
 [packing]
 disks = 30
@@ -55,6 +58,22 @@ def test_onset_in_si(tmp_path, damping):
     assert found["si"][0]["shear_stress_Pa"] == pytest.approx(found["fx_c"] / 3.0 * real.overburden, rel=1e-12)
     for number in found["si"][0].values():
         assert f"{number:.4g}" in done.stderr
+
+
+@pytest.mark.slow
+def test_another_packing_may_be_the_one_that_is_triggered(tmp_path):
+    """Its onsets, runs and scene are in files and in the summary of their own, and the report says so."""
+    triggered = Scene.from_mapping(tomllib.loads(SCENE))
+    ramp = {"step": 3e-3, "until": 0.024}
+    scene = Scene.from_mapping({**tomllib.loads(SCENE), "packing": {"file": str(REFERENCE)}, "ramp": ramp})
+    summary = reproduce(scene, tmp_path, say=lambda _: None, triggered=triggered)
+    assert summary["triggering"]["scene"] == triggered.resolved()
+    assert summary["triggering"]["fx"] == 0.011
+    assert summary["triggering"]["onsets"][0]["onset"]["fx_c"] == pytest.approx(0.01159, abs=1e-5)
+    assert summary["ramps"][0]["onset"]["fx_c"] == pytest.approx(0.021833056408, rel=1e-9)
+    with RunFile(tmp_path / "triggered.h5") as file:
+        assert file.series("erupting")["msd"].max() == summary["triggering"]["largest_D"]["erupting"]
+    assert "The packing that is triggered" in (tmp_path / "report.md").read_text()
 
 
 def test_a_ramp_that_steps_over_the_window_is_refused(tmp_path):
