@@ -51,7 +51,7 @@ def _triggering(triggered: TriggeringRun | None) -> str:
         return ""
     if triggered.triggering is None or triggered.sensitive is None:
         return f"## Triggering\n\n{triggered.says}\n\n"
-    return section(triggered.triggering, triggered.sensitive, triggered.settings, triggered.onsets[0].mu)
+    return section(triggered.triggering, triggered.sensitive, triggered.scene, triggered.onsets[0].mu)
 
 
 def _assumptions(scene: Scene, packing: Packing) -> list[str]:

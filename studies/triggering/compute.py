@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import RunFile
+from ...analysis import Growth, RunFile, fit_growth
 from ...analysis.normal_form import LEAST_CROSSOVER
 from ...analysis.pair_form import PairForm, pair_forms
 from ...analysis.power_law import PowerLaw, fit_power_law
@@ -114,6 +114,15 @@ class Triggering:
     def growth(self) -> float:
         """Decades between the jump and the largest D of the run with mu(v)."""
         return float(np.log10(column(self.erupting, "msd").max() / jump(self.erupting)))
+
+    @property
+    def fitted(self) -> Growth | None:
+        """Growth of D from ten times the jump to a tenth of its largest value; None if there is no decade between."""
+        time, msd = column(self.erupting, "time"), column(self.erupting, "msd")
+        try:
+            return fit_growth(time, msd, 10 * jump(self.erupting), 0.1 * float(msd.max()))
+        except ValueError:
+            return None
 
     @property
     def grows(self) -> bool:
@@ -247,6 +256,7 @@ def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
         "jump": jump(triggering.erupting),
         "grows_after_the_jump": triggering.grows,
         "growth_in_decades": triggering.growth,
+        "growth_after_the_jump": None if triggering.fitted is None else asdict(triggering.fitted),
         "forecast": asdict(triggering.foreseen),
         "largest_D_of_the_control": None
         if triggering.control is None

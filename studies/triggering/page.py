@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...pywrap.sections import Perturb
+from ...pywrap import Scene
+from ...pywrap.refusals import needed
 from ..pages import render
 from .compute import ABOVE_NOISE, Sensitivity, Triggering, column, jump, summary
 
 
-def section(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, mu: float) -> str:
+def section(triggering: Triggering, sensitive: Sensitivity, scene: Scene, mu: float) -> str:
     """The section, in Markdown.
 
     Parameters
     ----------
     triggering, sensitive
         What was found.
-    settings : Perturb
-        The perturbation.
+    scene : Scene
+        With [perturb] and [friction].
     mu : float
         Static friction coefficient.
     """
@@ -27,7 +28,8 @@ def section(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, m
         "triggering.md.j2",
         triggering=triggering,
         sensitive=sensitive,
-        settings=settings,
+        settings=scene.perturb,
+        calibrated=isinstance(needed(scene.friction, "friction").v0, str),
         mu=mu,
         weak=triggering.weakening,
         largest=summary(triggering, sensitive)["largest_D"],
