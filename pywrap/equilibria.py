@@ -71,16 +71,15 @@ def ramp(
 def reach(scene: Scene, fx: float) -> Iterator[Equilibrium]:
     """The equilibria of a ramp up to and with fx, by the steps of the scene's ramp or, without one, of 1e-3."""
     step = scene.ramp.step if scene.ramp else 1e-3
+    step = min(step, fx) or step  # one increment, where the first one of the ramp were too large
     settings = (scene.ramp or Ramp(until=max(fx, step))).model_copy(update={"step": step, "until": max(fx, step)})
     bounded = scene.model_copy(update={"ramp": settings})
-    last = None
     for last in ramp(bounded):
-        if last.fx > fx:
-            return
         yield last
-    if last is not None and last.fx < fx:
-        with Engine(last.packing) as engine:
-            yield next_equilibrium(engine, last, fx, bounded)
+        if last.fx >= fx:
+            return
+    with Engine(last.packing) as engine:
+        yield next_equilibrium(engine, last, fx, bounded)
 
 
 def loads(settings: Ramp) -> NDArray[np.float64]:

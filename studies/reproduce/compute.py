@@ -94,8 +94,12 @@ class TriggeringRun:
 
     Attributes
     ----------
+    scene : Scene
+        Of the packing.
     settings : Perturb
         The perturbation.
+    onsets : list of OnsetRun
+        For each friction coefficient.
     triggering : Triggering or None
         The undamped runs; None where there is nothing to trigger.
     sensitive : Sensitivity or None
@@ -104,7 +108,9 @@ class TriggeringRun:
         Why there is nothing to trigger; empty otherwise.
     """
 
+    scene: Scene
     settings: Perturb
+    onsets: list[OnsetRun]
     triggering: Triggering | None = None
     sensitive: Sensitivity | None = None
     says: str = ""
@@ -128,13 +134,14 @@ def triggering_run(
             f"F_x = {settings.fx:g} is below the onset {weakened[0].onset.fx_c:g} of the weakened friction, too: no "
             "window between the two, and nothing to erupt."
         )
-        return TriggeringRun(settings, says=says)
+        return TriggeringRun(scene, settings, runs, says=says)
     if settings.fx >= run.onset.fx_c:
         says = f"F_x = {settings.fx:g} is above the onset {run.onset.fx_c:g}: nothing is stable there to be triggered."
-        return TriggeringRun(settings, says=says)
+        return TriggeringRun(scene, settings, runs, says=says)
     *_, start = reach(scene, settings.fx)  # to the bit the one of `perturb`, and so is v_0
     control = _equilibrium_at(scene, run, max(0.0, 2 * weakened[0].onset.fx_c - settings.fx)) if weakened else None
-    return TriggeringRun(settings, trigger(scene, start, control, settings, friction, path), sensitivity(run))
+    found = trigger(scene, start, control, settings, friction, path)
+    return TriggeringRun(scene, settings, runs, found, sensitivity(run))
 
 
 def recorded_ramp(scene: Scene, mu: float, path: Path) -> OnsetRun:
@@ -197,6 +204,11 @@ def _dominance(modes: Spectrum) -> float:
     """Growth rate of the fastest pair, less that of the second: how fast it gets ahead."""
     rates = sorted((pair.growth_rate for pair in modes.pairs), reverse=True)
     return rates[0] - (rates[1] if len(rates) > 1 else 0.0) if rates else 0.0
+
+
+def onsets_of(runs: list[OnsetRun]) -> list[dict[str, Any]]:
+    """The onset for each friction coefficient, for summary.json."""
+    return [{"mu": run.mu, "onset": run.onset.as_dict()} for run in runs]
 
 
 def summary_of(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> dict[str, Any]:

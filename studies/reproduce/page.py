@@ -39,18 +39,19 @@ def report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, triggered: Tri
         residual=max(each.residual for run in runs for each in run.equilibria),
         mus_rise=all(a.onset.fx_c < b.onset.fx_c for a, b in pairwise(order)),
         growth=growth,
-        triggering=_triggering(triggered, runs[0].mu),
+        triggering=_triggering(triggered),
+        another=triggered if triggered is not None and triggered.scene is not scene else None,
         assumptions=_assumptions(scene, packing),
         si=si_rows(scene, runs, growth, triggered),
     )
 
 
-def _triggering(triggered: TriggeringRun | None, mu: float) -> str:
+def _triggering(triggered: TriggeringRun | None) -> str:
     if triggered is None:
         return ""
     if triggered.triggering is None or triggered.sensitive is None:
         return f"## Triggering\n\n{triggered.says}\n\n"
-    return section(triggered.triggering, triggered.sensitive, triggered.settings, mu)
+    return section(triggered.triggering, triggered.sensitive, triggered.scene, triggered.onsets[0].mu)
 
 
 def _assumptions(scene: Scene, packing: Packing) -> list[str]:
@@ -67,7 +68,8 @@ def _assumptions(scene: Scene, packing: Packing) -> list[str]:
             else "without friction, which then begins with zero slips, so that K is symmetric at F_x = 0; every disk "
             "is pulled down first, so that the upper layer comes to lie on the bed"
         ),
-        "time step of undamped runs: 0.05 of the stability limit 2/omega_max; damping in relaxation only",
+        "time step of undamped runs: 0.05 of the stability limit 2/omega_max, if the scene has none; damping in "
+        "relaxation only",
         "f_min: the force on a disk, with torque over radius, in the units of k_n and F_y; what was reached is said "
         "above",
         "stability operator: the exact derivative of the forces, with the turning of the tangent that the paper's "

@@ -43,7 +43,7 @@ def si_rows(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, triggered: Tr
             ("frequency of the pair there", f"{omega:.4g}", f"{frequency:.4g} Hz"),
         ]
     rows += _growth(real, growth) + _dashpot(scene, real)
-    if triggered is not None and triggered.triggering is not None:
+    if triggered is not None and triggered.triggering is not None and triggered.scene is scene:
         rows += _wave(real, triggered.triggering, triggered.settings.amplitude, triggered.settings.omega or 0.0)
     return rows
 

@@ -16,14 +16,14 @@ Closer and closer to the onset, the response of the pair that is about to coales
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import RunFile
+from ...analysis import Growth, RunFile, fit_growth
 from ...analysis.normal_form import LEAST_CROSSOVER
 from ...analysis.pair_form import PairForm, pair_forms
 from ...analysis.power_law import PowerLaw, fit_power_law
@@ -33,6 +33,7 @@ from ...pywrap.dynamics import Weakening
 from ...pywrap.sections import Friction, Perturb
 from ...pywrap.undamped import perturb, time_step, weakening_of
 from ..onsets import OnsetRun
+from .forecast import JUMP_SHARE, Forecast, forecast
 
 Floats = NDArray[np.float64]
 
@@ -47,10 +48,6 @@ each step up to there."""
 SENSITIVE = 1e-2
 """Largest distance 1 - F_x/F_x^c at which the response is compared with its power law: further off, the pair is no
 longer the whole of it."""
-
-JUMP_SHARE = 0.05
-"""Share of the run with mu(v) that shows the jump: 10 of 200 time units, where the slowest modes of 100 disks have
-periods of 6, and the fastest pairs have just begun to stand out."""
 
 GROWTH_FACTOR = 2.0
 """Factor from the jump to the largest D from which on D has grown. Without an instability, the phases in which many
@@ -82,6 +79,8 @@ class Triggering:
         compared with the linear response.
     response : Response
         Of the linearised packing to that perturbation, time step included.
+    foreseen : Forecast
+        Of the run with mu(v), by linear theory.
     """
 
     start: Equilibrium
@@ -92,6 +91,7 @@ class Triggering:
     control: tuple[Sample, ...] | None
     strong: tuple[Sample, ...]
     response: Response
+    foreseen: Forecast
 
     @property
     def deviation(self) -> float:
@@ -111,9 +111,23 @@ class Triggering:
         return float(column(self.erupting, "time")[np.argmax(faster)]) if faster.any() else None
 
     @property
+    def growth(self) -> float:
+        """Decades between the jump and the largest D of the run with mu(v)."""
+        return float(np.log10(column(self.erupting, "msd").max() / jump(self.erupting)))
+
+    @property
+    def fitted(self) -> Growth | None:
+        """Growth of D from ten times the jump to a tenth of its largest value; None if there is no decade between."""
+        time, msd = column(self.erupting, "time"), column(self.erupting, "msd")
+        try:
+            return fit_growth(time, msd, 10 * jump(self.erupting), 0.1 * float(msd.max()))
+        except ValueError:
+            return None
+
+    @property
     def grows(self) -> bool:
         """Whether D goes on to grow after its jump."""
-        return bool(column(self.erupting, "msd").max() >= GROWTH_FACTOR * jump(self.erupting))
+        return bool(self.growth >= np.log10(GROWTH_FACTOR))
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +226,8 @@ def trigger(
         omega=settings.omega or 0.0,
         dt=time_step(packing, settings.time_step),
     )
-    return Triggering(start, weakening, unperturbed, perturbed, erupting, control, strong, response)
+    foreseen = forecast(start, packing.law.mu * friction.mu_ss, settings.time)
+    return Triggering(start, weakening, unperturbed, perturbed, erupting, control, strong, response, foreseen)
 
 
 def sensitivity(run: OnsetRun) -> Sensitivity:
@@ -240,6 +255,9 @@ def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
         "rise_in_decades": triggering.rise,
         "jump": jump(triggering.erupting),
         "grows_after_the_jump": triggering.grows,
+        "growth_in_decades": triggering.growth,
+        "growth_after_the_jump": None if triggering.fitted is None else asdict(triggering.fitted),
+        "forecast": asdict(triggering.foreseen),
         "largest_D_of_the_control": None
         if triggering.control is None
         else float(column(triggering.control, "msd").max()),

@@ -15,12 +15,16 @@ from . import draw_friction, draw_response
 from .compute import Sensitivity, Triggering, column
 from .draw_response import DampingCurve, Displacements
 
-UNPERTURBED, PERTURBED, WEAKENING = "C1", "C2", "C0"
+UNPERTURBED, PERTURBED, WEAKENING, CONTROL = "C1", "C2", "C0", "C3"
 
 
 @styled
 def eruption_figure(
-    unperturbed: Displacements, perturbed: Displacements, weakening: Displacements, crossing: float | None = None
+    unperturbed: Displacements,
+    perturbed: Displacements,
+    weakening: Displacements,
+    control: Displacements | None = None,
+    crossing: float | None = None,
 ) -> Figure:
     """D(t) below the onset: left alone, perturbed, and perturbed with weakening friction (the paper's figure 5a).
 
@@ -28,6 +32,8 @@ def eruption_figure(
     ----------
     unperturbed, perturbed, weakening : Displacements
         The three runs, of the same packing. What is not positive is not drawn.
+    control : Displacements, optional
+        The last at a load where the packing is stable with the weakened friction, too.
     crossing : float, optional
         When the layer first exceeds v_0, marked.
 
@@ -39,12 +45,15 @@ def eruption_figure(
     """
     figure = Figure(figsize=(3.4, 2.7), layout="constrained")
     early, late = figure.subplots(1, 2, sharey=True)
+    curves = [
+        (weakening, WEAKENING, r"perturbed, friction $\mu(v)$"),
+        (perturbed, PERTURBED, r"perturbed, $\mu_0$"),
+        (unperturbed, UNPERTURBED, r"left alone, $\mu_0$"),
+    ]
+    if control is not None:
+        curves.insert(1, (control, CONTROL, r"$\mu(v)$ below both onsets"))
     for axes in (early, late):
-        for run, colour, name in (
-            (weakening, WEAKENING, r"perturbed, friction $\mu(v)$"),
-            (perturbed, PERTURBED, r"perturbed, $\mu_0$"),
-            (unperturbed, UNPERTURBED, r"left alone, $\mu_0$"),
-        ):
+        for run, colour, name in curves:
             time, msd = positive(run.time, run.msd)
             draw_series(time, msd, axes, label=name, color=colour)
         if crossing is not None:
@@ -85,7 +94,10 @@ def figures(triggering: Triggering, sensitive: Sensitivity, mu: float, output: P
     runs = {name: _displacements(triggering, name) for name in ("unperturbed", "perturbed", "erupting", "strong")}
     reduced = draw_friction.FrictionLaw(mu_0=mu, B=weak.B, w=weak.w, mu_ss=weak.mu_ss)
     save(draw_friction.friction_law_figure(reduced), output / "figure2")
-    erupts = eruption_figure(runs["unperturbed"], runs["perturbed"], runs["erupting"], triggering.crossing)
+    control = None if triggering.control is None else _displacements(triggering, "control")
+    erupts = eruption_figure(
+        runs["unperturbed"], runs["perturbed"], runs["erupting"], control, crossing=triggering.crossing
+    )
     save(erupts, output / "figure5a")
     speed, friction = (column(triggering.erupting, name) for name in ("layer_velocity", "friction"))
     save(draw_friction.weakening_figure(np.abs(speed), friction, law), output / "figure5b")

@@ -4,30 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...pywrap.sections import Perturb
+from ...pywrap import Scene
+from ...pywrap.refusals import needed
 from ..pages import render
 from .compute import ABOVE_NOISE, Sensitivity, Triggering, column, jump, summary
 
 
-def section(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, mu: float) -> str:
+def section(triggering: Triggering, sensitive: Sensitivity, scene: Scene, mu: float) -> str:
     """The section, in Markdown.
 
     Parameters
     ----------
     triggering, sensitive
         What was found.
-    settings : Perturb
-        The perturbation.
+    scene : Scene
+        With [perturb] and [friction].
     mu : float
         Static friction coefficient.
     """
-    first, largest = jump(triggering.erupting), float(column(triggering.erupting, "msd").max())
+    first = jump(triggering.erupting)
     return render(
         __package__ or "",
         "triggering.md.j2",
         triggering=triggering,
         sensitive=sensitive,
-        settings=settings,
+        settings=scene.perturb,
+        calibrated=isinstance(needed(scene.friction, "friction").v0, str),
         mu=mu,
         weak=triggering.weakening,
         largest=summary(triggering, sensitive)["largest_D"],
@@ -36,7 +38,6 @@ def section(triggering: Triggering, sensitive: Sensitivity, settings: Perturb, m
         jump=first,
         jumped=float(np.log10(first / column(triggering.perturbed, "msd").max())),
         control=None if triggering.control is None else float(column(triggering.control, "msd").max()),
-        grown=largest / first,
         above_noise=ABOVE_NOISE,
         half_gain=[pair.half_gain_time() / pair.tau_d for pair in sensitive.near],
     )

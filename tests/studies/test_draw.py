@@ -82,6 +82,12 @@ def test_eruption_draws_three_runs_on_logarithmic_axes(runs):
     assert len({line.get_color() for line in axes.lines}) == 3
 
 
+def test_eruption_draws_the_control_beside_the_run_with_weakening(runs):
+    for axes in eruption_figure(*runs, control=runs[0]).axes:
+        assert [line.get_label() for line in axes.lines][1] == r"$\mu(v)$ below both onsets"
+        assert len({line.get_color() for line in axes.lines}) == 4
+
+
 def test_weakening_draws_the_run_over_its_law():
     law = FrictionLaw(v_0=1e-11, v_ss=1e-9)
     velocity = np.concatenate([np.geomspace(1e-13, 1e-6, 50), [-1e-9, 0.0]])

@@ -6,7 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
+import tomllib
 
+from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.units import real_units
 from faultgouge.studies.reproduce import reproduce
@@ -55,6 +57,23 @@ def test_onset_in_si(tmp_path, damping):
     assert found["si"][0]["shear_stress_Pa"] == pytest.approx(found["fx_c"] / 3.0 * real.overburden, rel=1e-12)
     for number in found["si"][0].values():
         assert f"{number:.4g}" in done.stderr
+
+
+@pytest.mark.slow
+def test_another_packing_may_be_the_one_that_is_triggered(tmp_path):
+    """Its onsets, runs and scene are in files and in the summary of their own, and the report says so.
+
+    Slow because of ten figures.
+    """
+    triggered = Scene.from_mapping(tomllib.loads(SCENE))
+    scene = triggered.model_copy(update={"perturb": None, "friction": None})
+    summary = reproduce(scene, tmp_path, say=lambda _: None, triggered=triggered)
+    assert summary["triggering"]["scene"] == triggered.resolved()
+    assert summary["triggering"]["fx"] == 0.011
+    assert summary["triggering"]["onsets"][0]["onset"] == summary["ramps"][0]["onset"]
+    with RunFile(tmp_path / "triggered.h5") as file:
+        assert file.series("erupting")["msd"].max() == summary["triggering"]["largest_D"]["erupting"]
+    assert "The packing that is triggered" in (tmp_path / "report.md").read_text()
 
 
 def test_a_ramp_that_steps_over_the_window_is_refused(tmp_path):

@@ -54,7 +54,10 @@ def reproduce(
         int, typer.Option(min=0, metavar="M", help="Instead, onsets and eruptions of M packings of the scene.")
     ] = 0,
 ) -> None:
-    """The paper's protocol on one packing: figures 1, 3, 4, numbers and a report.
+    """The paper's protocol on one packing: its figures, numbers and a report.
+
+    Without a scene, figures 1, 3 and 4 are of paper.toml, and figure 5 is of
+    triggered.toml, a packing in which the instability does the work.
 
     With --ensemble M: how generic that is, from M packings that differ in their
     seeds. An interrupted ensemble goes on, and grows with a larger M. A packing
@@ -64,8 +67,8 @@ def reproduce(
     """
     from importlib.resources import files
 
-    path = scene or Path(str(files("faultgouge") / "scenes" / "paper.toml"))
-    wanted = read_scene(path, "reproduce", max(ensemble, 1))
+    shipped = Path(str(files("faultgouge") / "scenes"))
+    wanted = read_scene(scene or shipped / "paper.toml", "reproduce", max(ensemble, 1))
     if ensemble:
         from faultgouge.studies.ensemble import ensemble as examine_packings
 
@@ -83,7 +86,8 @@ def reproduce(
     from faultgouge.studies.reproduce import reproduce as run_protocol
 
     keeps(f"what is in {output} so far is kept; the same command begins anew and replaces it")
-    run_protocol(wanted, output, say)
+    triggered = read_scene(shipped / "triggered.toml") if scene is None else None
+    run_protocol(wanted, output, say, triggered)
     say(f"written: {output}/report.md")
 
 

@@ -1,0 +1,23 @@
+"""Where a ramp to a given load ends."""
+
+from pathlib import Path
+
+import pytest
+
+from faultgouge.pywrap import Scene, reach
+
+REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
+SCENE = {
+    "packing": {"file": str(REFERENCE)},
+    "law": {"kn": 2e5},
+    "load": {"fy": 3.0},
+    "ramp": {"step": 2e-3, "until": 0.02},
+}
+
+
+@pytest.mark.parametrize(("fx", "count"), [(0.0, 1), (5e-4, 2), (2e-3, 2), (5e-3, 4)])
+def test_the_last_equilibrium_is_at_the_load_also_within_the_first_increment(fx, count):
+    found = list(reach(Scene.from_mapping(SCENE), fx))
+    assert found[-1].fx == fx
+    assert len(found) == count
+    assert found[-1].packing.residual < 1e-9
