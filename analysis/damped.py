@@ -181,7 +181,7 @@ class Growing:
         still = [_window(edge, None) for edge in self.open.values()]
         return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
 
-    def candidates(self, places: Sequence[DampedModes]) -> Iterator[Step]:
+    def candidates(self, places: Sequence[DampedModes], depth: int) -> Iterator[Step]:
         """The assignment of the modes over each increment."""
         return (Step.of(here, there) for here, there in pairwise(places))
 

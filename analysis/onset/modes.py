@@ -97,6 +97,14 @@ class Modes:
         """The members of each complex pair, that with the positive imaginary part first."""
         return [(int(k), int(self.partner[k])) for k in np.flatnonzero(self.values.imag > 0)]
 
+    def conjugate(self, members: Members) -> bool:
+        """Whether two modes are a complex pair."""
+        return bool(self.partner[members[0]] == members[1])
+
+    def together(self, members: Members) -> bool:
+        """Whether two modes are a complex pair, or both are real."""
+        return self.conjugate(members) or bool(self.partner[members[0]] == self.partner[members[1]] == -1)
+
     def pair(self, members: Members) -> Pair:
         """The pair of two modes."""
         two = list(members)

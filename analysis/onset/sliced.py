@@ -35,14 +35,14 @@ from scipy.sparse.linalg import ArpackError
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing import Floats
 from ..sparse_lu import SingularMatrixError
-from .basis import Basis
+from .basis import Basis, Cluster, Levels
+from .dense import all_windows
 from .dip import dip_between
 from .edge import Edge, Family, LostPairError, complex_pair_near, edge_from_inside, leads_back
 from .modes import Members, Modes
 from .pair import Pair, Place, continued
 from .ranks import ALONE, Ranks
-from .screened import all_windows
-from .screening import Cluster, Levels, may_meet
+from .screening import may_meet
 from .walk import walk
 from .windows import Window
 
@@ -110,7 +110,7 @@ class Sliced:
         if self.first is None or sure.fx_onset < self.first.fx_onset:
             self.first = sure
 
-    def candidates(self, places: Sequence[Place]) -> list[list[Candidate]]:
+    def candidates(self, places: Sequence[Place], depth: int) -> list[list[Candidate]]:
         """The pairs that turn complex in their clusters on each increment, by increasing onset: those of all ranks."""
         everyone = self.ranks.together(lambda: self._found(places))
         merged = ([candidate for each in one for candidate in each] for one in zip(*everyone, strict=True))

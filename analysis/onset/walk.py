@@ -34,14 +34,14 @@ class Oracle(Protocol[At, Announced, Sure]):
     def finished(self) -> bool:
         """Whether all that is sought has been found."""
 
-    def candidates(self, places: Sequence[At]) -> Iterable[Announced]:
-        """What may happen on each of the increments between neighbouring places."""
+    def candidates(self, places: Sequence[At], depth: int) -> Iterable[Announced]:
+        """What may happen on each of the increments between neighbouring places.
+
+        `depth` is how often the increment has been divided of which these are the parts.
+        """
 
     def confirm(self, candidates: Announced, here: At, there: At, depth: int) -> tuple[Sure | None, Sequence[At]]:
-        """What does happen on one increment, to be recorded, and where to divide the increment if that is in doubt.
-
-        `depth` is how often the increment has been divided already.
-        """
+        """What does happen on one increment, to be recorded, and where to divide the increment if that is in doubt."""
 
     def record(self, sure: Sure) -> None:
         """Take down what is sure of an increment; increments come in order."""
@@ -58,7 +58,7 @@ def walk(oracle: Oracle[At, Announced, Sure], places: Sequence[At], depth: int =
     depth : int
         How often the increment has been divided of which these are the parts.
     """
-    for (here, there), candidates in zip(pairwise(places), oracle.candidates(places), strict=True):
+    for (here, there), candidates in zip(pairwise(places), oracle.candidates(places, depth), strict=True):
         sure, between = oracle.confirm(candidates, here, there, depth)
         if between:
             walk(oracle, [here, *between, there], depth + 1)

@@ -20,7 +20,7 @@ class Negative:
     def finished(self):
         return self.most is not None and len(self.roots) >= self.most
 
-    def candidates(self, places):
+    def candidates(self, places, depth):
         return [self.function(a) * self.function(b) < 0 for a, b in pairwise(places)]
 
     def confirm(self, changes, here, there, depth):
