@@ -39,7 +39,7 @@ from .basis import Basis, Cluster, Levels
 from .dense import all_windows
 from .dip import dip_between
 from .edge import Edge, Family, LostPairError, complex_pair_near, edge_from_inside, leads_back
-from .modes import Members, Modes
+from .modes import Modes
 from .pair import Pair, Place, continued
 from .ranks import ALONE, Ranks
 from .screening import may_meet
@@ -122,25 +122,18 @@ class Sliced:
         first, stop = self.range(places[0].matrix)
         done, wanted = 0, -(-(stop - first) // self.ranks.size)
         failure: FaultgougeError | None = None
-        for basis, before in self.bases(places[0].matrix):
-            if failure is not None:
-                continue  # the ranks meet at the end of their bases
+        for basis, levels in self.bases(places[0].matrix):
             done += basis.own.stop - basis.own.start
             self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {done} of {wanted} modes")
             try:
-                self._announce(found, basis, before, places)
+                for announced, (here, there) in zip(found, pairwise(places), strict=True):
+                    before, levels = levels, basis.change(levels, there.matrix - here.matrix)
+                    announced.extend(self._announced(basis, (here.fx, before), (there.fx, levels)))
             except FaultgougeError as error:
-                failure = error
+                failure = failure or error  # it waits: the ranks meet at the end of their bases
         if failure is not None:
             raise failure
         return found
-
-    def _announce(self, found: list[list[Candidate]], basis: Basis, before: Levels, places: Sequence[Place]) -> None:
-        """Add the pairs of one basis."""
-        for announced, (here, there) in zip(found, pairwise(places), strict=True):
-            after = basis.change(before, there.matrix - here.matrix)
-            announced.extend(self._announced(basis, (here.fx, before), (there.fx, after)))
-            before = after
 
     def confirm(
         self, candidates: list[Candidate], here: Place, there: Place, depth: int
@@ -255,8 +248,7 @@ class Sliced:
         for window in all_windows(family, np.array([here[0], reach])):
             end = reach if window.fx_end is None else window.fx_end
             inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
-            modes = Modes.of(inside, block(inside))
-            pair = modes.pair(_nearest(modes, window.eigenvalue))
+            pair = _nearest(Modes.of(inside, block(inside)), window.eigenvalue)
             if cluster.owns(pair.right):
                 right, left = (basis.lifted(cluster.modes, plane) for plane in (pair.right, pair.left))
                 yield Candidate(window.fx_onset, min(inside, there[0]), right, left)
@@ -370,10 +362,10 @@ def _reached(family: Family, loads: Floats) -> list[Place]:
     return places
 
 
-def _nearest(modes: Modes, eigenvalue: float) -> Members:
+def _nearest(modes: Modes, eigenvalue: float) -> Pair:
     """The complex pair, or failing that the two modes, closest to a real eigenvalue."""
     pairs = modes.complex_pairs or [modes.about(eigenvalue)]
-    return min(pairs, key=lambda members: abs(modes.values[members[0]].real - eigenvalue))
+    return modes.pair(min(pairs, key=lambda members: abs(modes.values[members[0]].real - eigenvalue)))
 
 
 def _exceeding(block: Floats, excess: float) -> Floats:
