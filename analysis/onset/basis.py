@@ -6,7 +6,8 @@ are small against the spacing of the levels.
 
 Perturbation theory (:mod:`~faultgouge.analysis.onset.screening`) asks for a mode and its neighbours in the spectrum
 alone. So a large operator has a basis for each slice of its spectrum (:mod:`~faultgouge.analysis.onset.slicing`), with
-a margin on either side, and never one of all modes.
+a margin on either side, and never one of all modes. A *cluster* of neighbouring modes, with all others in second order,
+has the eigenvalues of A up to the third order of the typical coupling over the distance of the modes outside.
 """
 
 from collections.abc import Iterator

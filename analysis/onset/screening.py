@@ -28,10 +28,6 @@ So the discriminant is positive, and the two modes do not meet, if
 without the last square where :math:`|s| < R_{ij}`, and without the root where it is of a negative number. Denominators
 are taken no smaller than twice the coupling: where they would be, that pair does not pass the test itself. Between the
 loads, H and B are taken to stay within `Limits.slack` of the straight line.
-
-**Clusters.** Which of thousands of modes meet first? A cluster of neighbouring modes, with all other modes in second
-order as above, has the eigenvalues of A up to the third order of the typical coupling over the distance of the modes
-outside. Clusters say where to look; what is found there has yet to be confirmed with A itself.
 """
 
 from collections.abc import Callable

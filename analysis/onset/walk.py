@@ -7,8 +7,8 @@ The walker knows loads and nothing of matrices. For each increment it asks an *o
 3. where to look in between, should the oracle not be sure of it. The walker then goes through the parts of the
    increment in the same way, and only what is sure is recorded.
 
-The oracles are :mod:`~faultgouge.analysis.onset.screened`, :mod:`~faultgouge.analysis.onset.all_modes` and
-:mod:`~faultgouge.analysis.onset.sliced`, and that of growing motion, :mod:`~faultgouge.analysis.damped`.
+The oracles are :mod:`~faultgouge.analysis.onset.dense` and :mod:`~faultgouge.analysis.onset.sliced`, and that of
+growing motion, :mod:`~faultgouge.analysis.damped`.
 """
 
 from collections.abc import Callable, Iterable, Sequence

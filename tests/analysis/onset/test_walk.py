@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from faultgouge.analysis.onset import smooth_root
+from faultgouge.analysis.onset.edge import smooth_root
 from faultgouge.analysis.onset.walk import walk
 
 

@@ -17,9 +17,10 @@ from faultgouge.analysis import (
     spectrum,
 )
 from faultgouge.analysis.digits import with_uncertainty
-from faultgouge.analysis.onset import Family, Modes, assign, force_bearing, full_operator
+from faultgouge.analysis.onset import Family, Modes, force_bearing, full_operator
 from faultgouge.analysis.onset.dense import all_windows
 from faultgouge.analysis.onset.dip import deepest_dip
+from faultgouge.analysis.onset.modes import assign
 from faultgouge.analysis.onset.screening import Screen
 
 
