@@ -19,6 +19,12 @@ from ..analysis.onset import Ranks
 
 Share = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
+Say = Callable[[str], None]
+"""Takes a line of progress."""
+
+Progress = Callable[[Iterable[Any], int], Iterable[Any]]
+"""Takes results as they end and their number, and hands them on."""
+
 
 @contextmanager
 def shared_out() -> Iterator[Share | None]:
