@@ -18,7 +18,7 @@ from .growth import Growth, fit_growth, mean_square_displacement
 from .law import MindlinLaw
 from .onset import Onset, OnsetError, Window, complex_windows, find_onset
 from .packing import Packing
-from .response import LinearMotion, layer_force, layer_response, linear_response
+from .response import layer_force, linear_response
 from .runfile import RunFile
 from .spectrum import (
     ComplexPair,
@@ -44,7 +44,6 @@ __all__ = [
     "Eigenpairs",
     "FaultgougeError",
     "Growth",
-    "LinearMotion",
     "MindlinLaw",
     "NoEquilibriumError",
     "NoGainError",
@@ -70,7 +69,6 @@ __all__ = [
     "largest_damping_rate",
     "largest_frequency",
     "layer_force",
-    "layer_response",
     "linear_response",
     "mean_square_displacement",
     "nearest_image",

@@ -29,6 +29,7 @@ from .damped_modes import DampedMode, DampedModes, Pencil
 from .damped_step import Step, excursion
 from .errors import FaultgougeError, NoEquilibriumError
 from .onset.edge import bracketed_jump, jump_width, smooth_root
+from .onset.limits import LIMITS
 from .onset.walk import between, walk
 from .onset.windows import increasing
 from .packing import Packing
@@ -89,7 +90,6 @@ def damped_windows(
     equilibrium: Callable[[float], Packing],
     forces: ArrayLike,
     *,
-    narrowest: float | None = None,
     look: Iterable[float] = (),
     first: bool = False,
     watch: Callable[[str], None] = lambda says: None,
@@ -102,8 +102,6 @@ def damped_windows(
         fx -> Packing in equilibrium with its dashpots and drag, as in :func:`~faultgouge.analysis.find_onset`.
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
-    narrowest : float, optional
-        Windows narrower than this are not looked for, force; 1e-7 of the largest |load| by default.
     look : iterable of float, optional
         Further loads to be looked at, as those of undamped windows.
     first : bool
@@ -126,13 +124,12 @@ def damped_windows(
     start = equilibrium(float(loads[0]))
     if not start.law.damped and start.drag_time is None:
         raise ValueError("The packing has no dissipation: find_onset is what it needs.")
-    return growing_windows(lambda fx: Pencil.of(equilibrium(fx)), loads, narrowest, look, first, watch)
+    return growing_windows(lambda fx: Pencil.of(equilibrium(fx)), loads, look, first, watch)
 
 
 def growing_windows(
     pencil: Callable[[float], Pencil],
     forces: ArrayLike,
-    narrowest: float | None = None,
     look: Iterable[float] = (),
     first: bool = False,
     watch: Callable[[str], None] = lambda says: None,
@@ -143,11 +140,11 @@ def growing_windows(
     ----------
     pencil : callable
         fx -> Pencil.
-    forces, narrowest, look, first, watch
+    forces, look, first, watch
         As of `damped_windows`.
     """
     loads = increasing(forces)
-    narrowest = 1e-7 * float(np.abs(loads).max()) if narrowest is None else narrowest
+    narrowest = LIMITS.narrowest * float(np.abs(loads).max())
     here = DampedModes.of(pencil(float(loads[0])))
     oracle = Growing(pencil, narrowest, here)
     between = [float(fx) for fx in look if loads[0] < fx < loads[-1]]
@@ -181,7 +178,7 @@ class Growing:
         still = [_window(edge, None) for edge in self.open.values()]
         return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
 
-    def candidates(self, places: Sequence[DampedModes]) -> Iterator[Step]:
+    def candidates(self, places: Sequence[DampedModes], depth: int) -> Iterator[Step]:
         """The assignment of the modes over each increment."""
         return (Step.of(here, there) for here, there in pairwise(places))
 

@@ -41,7 +41,6 @@ from .response import Response
 from .signals import Signal
 from .spectrum import Complexes
 from .state_space import StateSpace
-from .stiffness import Form
 
 KNOTS = 4
 """Steps, at the least, between two rows of a signal: its corners are then cut by less than 1/32 of their height."""
@@ -131,7 +130,7 @@ class ImpulseResponse:
         return omegas + 2 * np.max(np.where(hit, least, 0.0), axis=-1)
 
 
-def impulse_response(packing: Packing, force: ArrayLike, form: Form = "consistent") -> ImpulseResponse:
+def impulse_response(packing: Packing, force: ArrayLike) -> ImpulseResponse:
     """How the upper layer moves after an impulse.
 
     Parameters
@@ -140,14 +139,12 @@ def impulse_response(packing: Packing, force: ArrayLike, form: Form = "consisten
         The equilibrium, with its dashpots and drag.
     force : array_like, shape (3N,)
         f on (x.., y.., R theta..), as of :func:`~faultgouge.analysis.response.layer_force` or `floor_force`.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
 
     Returns
     -------
     ImpulseResponse
     """
-    system = StateSpace.of(packing, form)
+    system = StateSpace.of(packing)
     drive = _vector(packing, force)[system.active] / system.root_mass
     mean = np.concatenate([packing.top / max(1, packing.top.sum()), np.zeros(2 * len(packing))])
     watch = mean[system.active] / system.root_mass
@@ -168,7 +165,6 @@ def sampled_response(
     times: ArrayLike,
     force: ArrayLike,
     dt: float | None = None,
-    form: Form = "consistent",
 ) -> Response:
     """Motion of the linearised packing from rest under the force f s(t).
 
@@ -184,8 +180,6 @@ def sampled_response(
         f on (x.., y.., R theta..), as of :func:`~faultgouge.analysis.response.layer_force` or `floor_force`.
     dt : float, optional
         Time step of the velocity Verlet run whose frequencies are to be met; exact dynamics by default.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
 
     Returns
     -------
@@ -200,7 +194,7 @@ def sampled_response(
     # a part in a million is far above the rounding of times that were printed or summed
     if time.ndim != 1 or not len(time) or np.any(np.abs(time - time[0] * np.arange(1, len(time) + 1)) > 1e-6 * time[0]):
         raise ValueError("The times of a sampled response are h, 2h, 3h and so on.")
-    system = StateSpace.of(packing, form)
+    system = StateSpace.of(packing)
     if dt is not None:
         system = replace(system, stiffness=_of_time_step(system.stiffness, dt))
     active, root = system.active, system.root_mass

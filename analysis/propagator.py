@@ -13,7 +13,6 @@ from .oscillator import Oscillator
 from .packing import Floats, Indices, Packing
 from .spectrum import Complexes
 from .state_space import StateSpace, released
-from .stiffness import Form
 
 Norm = Literal["displacement", "energy"]
 
@@ -71,9 +70,9 @@ class Motions:
     dissipative: bool
 
     @classmethod
-    def of(cls, packing: Packing, form: Form) -> "Motions":
+    def of(cls, packing: Packing) -> "Motions":
         """NoGainError if the packing is unstable."""
-        system = StateSpace.of(packing, form)
+        system = StateSpace.of(packing)
         dissipative = packing.law.damped or packing.drag_time is not None
         modes = Modes.of(system.matrix if dissipative else system.stiffness)
         growth = modes.values.real if dissipative else np.abs(np.sqrt(modes.values).imag)

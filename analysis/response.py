@@ -9,8 +9,8 @@ Without dashpots it is a function of one matrix, and of one oscillator (:mod:`~f
 **Dashpots** (:mod:`~faultgouge.analysis.damping`) have no modes in common with K. The motion is then that of the
 first-order system of :mod:`~faultgouge.analysis.state_space`, whose eigenvalues s give :math:`e^{st}` and, under the
 force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. What is left of it in the end, if all Re s < 0, is the
-transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}`: `layer_response` gives the velocity of the
-upper layer per unit of force at any frequency, `LinearMotion.layer_velocity` also while it sets in.
+transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}` (`transfer` in
+:mod:`~faultgouge.analysis.forcing`).
 
 Functions of the matrix of a packing close to a coalescence of two eigenvalues keep their digits
 (:mod:`~faultgouge.analysis.matrix_functions`).
@@ -23,16 +23,11 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import splu
 
-from .damping import damping_matrix
 from .matrix_functions import Modes, first_order
 from .oscillator import Oscillator
 from .packing import Floats, Packing
-from .spectrum import Complexes
 from .state_space import StateSpace, driven, released
-from .stiffness import stiffness_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,27 +116,6 @@ class LinearMotion:
             velocity[:, active] += v
         return Response(time, displacement, velocity, self.packing.top)
 
-    def layer_velocity(self, times: ArrayLike, omega: float, dt: float | None = None) -> Floats:
-        """Velocity of the upper layer per unit of a force that sets in at t = 0.
-
-        Parameters
-        ----------
-        times : array_like, shape (T,)
-            Times, not negative.
-        omega : float
-            Of the force cos(omega t) along x on each disk of the upper layer, radian / time.
-        dt : float, optional
-            Time step of the undamped velocity Verlet run to be met; exact dynamics by default.
-
-        Returns
-        -------
-        ndarray, shape (T,)
-            Mean velocity along x, length / time / force. It costs as much as the eigenvalues are many, a time.
-        """
-        push = layer_force(self.packing, 1.0)[self.system.active] / self.system.root_mass
-        observed = push[None] / (int(self.packing.top.sum()) or 1)
-        return self._motion(self._oscillator(omega, dt), True, push, _times(times, dt), observed)[1][:, 0]
-
     def _oscillator(self, omega: float, dt: float | None) -> Oscillator:
         if dt is not None and self.packing.law.damped:
             raise ValueError("The dispersion of velocity Verlet is that of undamped runs: leave dt out with dashpots.")
@@ -210,38 +184,6 @@ def linear_response(
     return motion.response(times, force=force, omega=omega, initial=initial, dt=dt)
 
 
-def layer_response(packing: Packing, omega: ArrayLike) -> Complexes:
-    """Stationary velocity of the upper layer per unit of force at any frequency.
-
-    The force Re(a exp(i omega t)) along x on each disk of the upper layer goes with the mean velocity
-    Re(a V exp(i omega t)) of these disks along x, V = i omega e^T H(omega) f, once the motion that the start has set
-    off has died out.
-
-    Parameters
-    ----------
-    packing : Packing
-        The equilibrium, with its dashpots and drag. Without them V is imaginary, and infinite in resonance.
-    omega : array_like, shape (W,)
-        Angular frequencies, radian / time.
-
-    Returns
-    -------
-    ndarray of complex, shape (W,)
-        V, length / time / force.
-    """
-    k, c = stiffness_matrix(packing), damping_matrix(packing)
-    active = np.flatnonzero(np.diff(k.indptr))
-    k, c = (csc_array(matrix[active][:, active]) for matrix in (k, c))
-    mass = diags_array(_mass(packing)[active])
-    push = layer_force(packing, 1.0)[active]
-    count = int(packing.top.sum()) or 1
-    found = [
-        1j * w * (push @ splu(csc_array(k - w**2 * mass + 1j * w * c)).solve(push.astype(complex))) / count
-        for w in np.atleast_1d(np.asarray(omega, dtype=np.float64))
-    ]
-    return np.reshape(np.array(found, dtype=np.complex128), np.shape(omega))
-
-
 def layer_force(packing: Packing, amplitude: float, disks: ArrayLike | None = None) -> Floats:
     """A force along x on some disks.
 
@@ -262,11 +204,6 @@ def layer_force(packing: Packing, amplitude: float, disks: ArrayLike | None = No
     force = np.zeros(3 * len(packing))
     force[: len(packing)] = amplitude * np.asarray(packing.top if disks is None else disks, dtype=bool)
     return force
-
-
-def _mass(packing: Packing) -> Floats:
-    """The diagonal of M, shape (3N,)."""
-    return np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
 
 
 def _times(times: ArrayLike, dt: float | None) -> Floats:

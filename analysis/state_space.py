@@ -28,7 +28,7 @@ from scipy.sparse import csr_array
 from .damping import damping_matrix
 from .packing import Floats, Indices, Packing
 from .spectrum import Complexes, mass_weighted
-from .stiffness import Form, stiffness_matrix
+from .stiffness import stiffness_matrix
 
 SOFTEST = 1e-6
 """Eigenvalues of the symmetric part below this share of the largest weigh as much: a mode without a restoring force has
@@ -68,17 +68,15 @@ class StateSpace:
     positive: bool
 
     @classmethod
-    def of(cls, packing: Packing, form: Form = "consistent") -> "StateSpace":
+    def of(cls, packing: Packing) -> "StateSpace":
         """Set up the system of a packing.
 
         Parameters
         ----------
         packing : Packing
             The equilibrium, with its dashpots and drag.
-        form : {"consistent", "paper"}
-            As in :func:`~faultgouge.analysis.stiffness_matrix`.
         """
-        a = mass_weighted(stiffness_matrix(packing, form), packing)
+        a = mass_weighted(stiffness_matrix(packing), packing)
         g = mass_weighted(damping_matrix(packing), packing)
         mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
         return cls.of_matrices(a, g, np.sqrt(mass))

@@ -41,7 +41,6 @@ from scipy.optimize import minimize_scalar
 
 from .packing import Floats, Packing
 from .propagator import ACCURACY, Motions, NoGainError, Norm, Propagator
-from .stiffness import Form
 
 SYMMETRIC = 1e-6
 """An excess of the bound below this is no gain: K is symmetric, but for rounding."""
@@ -106,17 +105,8 @@ class TransientGain:
         push = self.start.reshape(3, -1)[:2, self.disk]
         return np.asarray(push / np.linalg.norm(push))
 
-    @property
-    def lone_gain(self) -> float:
-        """At least this is what a displacement of that disk alone grows by; nan if the norm is the energy."""
-        if self.norm == "energy":
-            return np.nan
-        return self.gain * float(np.sum(self.start.reshape(3, -1)[:2, self.disk] ** 2))
 
-
-def transient_gain(
-    packing: Packing, norm: Norm = "displacement", window: float | None = None, form: Form = "consistent"
-) -> TransientGain:
+def transient_gain(packing: Packing, norm: Norm = "displacement") -> TransientGain:
     """The largest transient gain of a stable packing, with its dashpots and drag.
 
     Parameters
@@ -125,10 +115,6 @@ def transient_gain(
         The equilibrium.
     norm : {"displacement", "energy"}
         Displacements from rest in the norm of (x, y, R theta), or all states in the norm of the energy.
-    window : float, optional
-        Search the times from 0 to this; by default `propagator.BEATS` beats of the most oblique pair.
-    form : {"consistent", "paper"}
-        As in :func:`~faultgouge.analysis.stiffness_matrix`.
 
     Returns
     -------
@@ -141,16 +127,16 @@ def transient_gain(
     numpy.linalg.LinAlgError
         If more than two eigenvalues coalesce.
     """
-    return _gain(Motions.of(packing, form), norm, window)
+    return _gain(Motions.of(packing), norm)
 
 
-def transient_gains(packing: Packing, form: Form = "consistent") -> tuple[TransientGain, TransientGain]:
+def transient_gains(packing: Packing) -> tuple[TransientGain, TransientGain]:
     """The gains in displacement and in energy, with the modes computed once; as of :func:`transient_gain`."""
-    motions = Motions.of(packing, form)
-    return _gain(motions, "displacement", None), _gain(motions, "energy", None)
+    motions = Motions.of(packing)
+    return _gain(motions, "displacement"), _gain(motions, "energy")
 
 
-def _gain(motions: Motions, norm: Norm, window: float | None) -> TransientGain:
+def _gain(motions: Motions, norm: Norm) -> TransientGain:
     system, disks = motions.system, motions.disks
     if norm == "energy" and not system.positive:
         raise NoGainError("the symmetric part of K is not positive: displacements have no energy to compare with")
@@ -158,7 +144,7 @@ def _gain(motions: Motions, norm: Norm, window: float | None) -> TransientGain:
     bound, columns = propagator.bound(), propagator.kept()
     if bound < 1 + SYMMETRIC:
         return _nothing(disks, norm, 0.0, bound)
-    length = min(propagator.window(columns), propagator.end(bound)) if window is None else window
+    length = min(propagator.window(columns), propagator.end(bound))
     time, size, start = _refined(propagator, propagator.candidates(columns, length))
     if size <= 1:
         return _nothing(disks, norm, length, bound)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from faultgouge.analysis import BadInputError, Eigenpairs, Packing, closest_to_meeting
 
 from .packing import WIDTH, PackingArtist, View
-from .style import EDGE, INK, figure_of, styled
+from .style import EDGE, INK, styled
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -193,33 +193,7 @@ class ModeArtist:
 
 
 @styled
-def draw_mode(packing: Packing, mode: Mode, axes: Axes | None = None, phase: float = 0.0) -> Figure:
-    """One mode at one phase.
-
-    Parameters
-    ----------
-    packing : Packing
-        The packing.
-    mode : Mode
-        The mode.
-    axes : Axes, optional
-        Where to draw; a figure of its own, with a scale and a caption, by default.
-    phase : float
-        Phase of the oscillation, radian.
-
-    Returns
-    -------
-    Figure
-        Arrows are displacements, red disks turn anticlockwise, blue ones clockwise.
-    """
-    if axes is None:
-        return draw_modes(packing, [mode], mode.words.split("\n")[0], phases=(phase,))
-    ModeArtist(axes, packing, mode).show(phase)
-    return figure_of(axes)
-
-
-@styled
-def draw_modes(packing: Packing, modes: Sequence[Mode], words: str, phases: Sequence[float] | None = None) -> Figure:
+def draw_modes(packing: Packing, modes: Sequence[Mode], words: str) -> Figure:
     """Modes side by side, with their numbers below.
 
     Parameters
@@ -230,15 +204,13 @@ def draw_modes(packing: Packing, modes: Sequence[Mode], words: str, phases: Sequ
         One or two.
     words : str
         What they are, a line above.
-    phases : sequence of float, optional
-        Phases at which each mode is drawn, radian; by default 0 for real modes, 0 and a quarter of a period for a
-        complex one.
 
     Returns
     -------
     Figure
+        A complex mode also a quarter of a period later.
     """
-    panels = [(mode, phase) for mode in modes for phase in phases or ((0.0, np.pi / 2) if mode.is_complex else (0.0,))]
+    panels = [(mode, phase) for mode in modes for phase in ((0.0, np.pi / 2) if mode.is_complex else (0.0,))]
     figure, axes, points = side_by_side(packing, len(panels))
     for one, (mode, phase) in zip(axes, panels, strict=True):
         ModeArtist(one, packing, mode, points).show(phase)

@@ -11,6 +11,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Literal
 
 import h5py
 import numpy as np
@@ -102,9 +103,10 @@ def _outcome(path: Path, expected: list[bytes] | None) -> str:
 
 def _opened(path: Path, expected: list[bytes] | None) -> str:
     before = path.read_bytes()
-    for mode in ("r", "a"):
+    modes: tuple[Literal["r", "a"], ...] = ("r", "a")
+    for mode in modes:
         try:
-            with RunFile(path, mode):  # type: ignore[arg-type]
+            with RunFile(path, mode):
                 found = content(path)
         except PackingFileError as error:
             if path.name not in str(error) or "\n" in str(error):

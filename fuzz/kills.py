@@ -196,7 +196,9 @@ def difference(one: dict[str, object], other: dict[str, object]) -> str:
         if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
             if a.dtype != b.dtype or a.shape != b.shape or a.tobytes() != b.tobytes():
                 return f"{name} differs"
-        elif a != b and not (isinstance(a, np.generic) and a.tobytes() == b.tobytes()):  # type: ignore[attr-defined]
+        elif isinstance(a, np.generic) and isinstance(b, np.generic) and a.tobytes() == b.tobytes():
+            continue  # nan is nan
+        elif a != b:
             return f"{name} differs"
     return ""
 

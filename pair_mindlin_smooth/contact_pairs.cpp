@@ -57,12 +57,26 @@ bool within_reach(const Atom &atom, int i, int j, double skin)
 void ContactPairs::build(const NeighList &list, double skin, Atom &atom, const Domain &domain,
                          const std::vector<Vector> &original, bool with_slips, bool compensated)
 {
+  list_pairs(list, skin, atom, domain, original);
+  list_rows(atom);
+  if (compensated)
+    disk_force.assign(atom.nlocal, CompensatedForce{});
+  else
+    force.assign(size(), PairForce{});
+  if (!with_slips) return;
+  slip.assign(size(), 0.0);
+  if (compensated) slip_low.assign(size(), 0.0);
+  touching.assign(size(), 0);
+}
+
+void ContactPairs::list_pairs(const NeighList &list, double skin, Atom &atom, const Domain &domain,
+                              const std::vector<Vector> &original)
+{
   const int nlocal = atom.nlocal;
   const OwnedDisks owned(atom);
   first.clear();
   second.clear();
   image.clear();
-  start.assign(nlocal + 1, 0);
   for (int ii = 0; ii < list.inum; ii++) {
     const int i = list.ilist[ii];
     for (int jj = 0; jj < list.numneigh[i]; jj++) {
@@ -83,9 +97,17 @@ void ContactPairs::build(const NeighList &list, double skin, Atom &atom, const D
       first.push_back(i);
       second.push_back(j);
       image.push_back(shift);
-      start[i + 1]++;
-      if (j < nlocal) start[j + 1]++;
     }
+  }
+}
+
+void ContactPairs::list_rows(const Atom &atom)
+{
+  const int nlocal = atom.nlocal;
+  start.assign(nlocal + 1, 0);
+  for (int p = 0; p < size(); p++) {
+    start[first[p] + 1]++;
+    if (second[p] < nlocal) start[second[p] + 1]++;
   }
   for (int i = 0; i < nlocal; i++) start[i + 1] += start[i];
 
@@ -104,15 +126,6 @@ void ContactPairs::build(const NeighList &list, double skin, Atom &atom, const D
   for (int i = 0; i < nlocal; i++)
     std::sort(row.begin() + start[i], row.begin() + start[i + 1],
               [&](int a, int b) { return partner(a) < partner(b); });
-
-  if (compensated)
-    disk_force.assign(nlocal, CompensatedForce{});
-  else
-    force.assign(size(), PairForce{});
-  if (!with_slips) return;
-  slip.assign(size(), 0.0);
-  if (compensated) slip_low.assign(size(), 0.0);
-  touching.assign(size(), 0);
 }
 
 }    // namespace faultgouge

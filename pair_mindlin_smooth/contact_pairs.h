@@ -56,6 +56,11 @@ public:
   std::vector<CompensatedForce> disk_force;                // of the owned disks, only if compensated
   std::vector<double> slip, slip_low;                      // only with_slips
   std::vector<int> touching;                               // only with_slips
+
+private:
+  void list_pairs(const LAMMPS_NS::NeighList &list, double skin, LAMMPS_NS::Atom &atom, const LAMMPS_NS::Domain &domain,
+                  const std::vector<Vector> &original);
+  void list_rows(const LAMMPS_NS::Atom &atom);
 };
 
 }    // namespace faultgouge

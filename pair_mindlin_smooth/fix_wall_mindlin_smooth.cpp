@@ -220,8 +220,6 @@ template <> void FixWallMindlinSmooth::add_force(int i, Compensated x, Compensat
 template <class NUMBER, bool FRICTION, bool DAMPED> void FixWallMindlinSmooth::contact_forces()
 {
   constexpr bool COMPENSATED = std::is_same<NUMBER, Compensated>::value;
-  const bool advance = !update->setupflag;    // at setup the disks have not moved
-  const double dt = update->dt;
   const double margin = COMPENSATED ? 2.0 * low_parts->grid().spacing : 0.0;    // the coordinate is a high part
   energy = 0.0;
   for (int i = 0; i < atom->nlocal; i++) {
@@ -241,30 +239,38 @@ template <class NUMBER, bool FRICTION, bool DAMPED> void FixWallMindlinSmooth::c
           "hold: lower the load or the time step, or raise KN",
           atom->tag[i], atom->x[i][1]);
     energy += law.normal_energy(value(overlap));
-
-    const bool known = contact[OVERLAP] > 0.0;    // a new contact begins without slip
-    NUMBER slip = known && FRICTION ? contact[SLIP] : 0.0;
-    if constexpr (COMPENSATED && FRICTION) slip.low = known ? contact[SLIP_LOW] : 0.0;
-    const double increment = known && FRICTION ? -(atom->v[i][0] + radius * atom->omega[i][2]) * dt : 0.0;
-    faultgouge::FloorRates rates{};
-    if constexpr (DAMPED) {
-      const double *const felt = dashpots->array_atom[i];
-      rates = {felt[1], -(felt[0] + radius * felt[2])};
-    }
-    const auto [normal, tangential, kept, limit] =
-        faultgouge::floor_contact(law, overlap, slip, increment, rates, {FRICTION, advance, DAMPED});
-    if constexpr (FRICTION) {
-      contact[TANGENTIAL] = value(tangential);
-      contact[SLIP] = leading(kept);
-      contact[SLIP_RATIO] = value(limit) > 0.0 ? value(kept) / value(limit) : 0.0;
-      if constexpr (COMPENSATED) contact[SLIP_LOW] = kept.low;
-    }
-    add_force<NUMBER>(i, -tangential, normal, -(radius * tangential));
-    contact[NORMAL] = value(normal);
-    contact[NX] = 0.0;
-    contact[NY] = 1.0;
-    contact[OVERLAP] = value(overlap);
+    contact_force<NUMBER, FRICTION, DAMPED>(i, overlap);
   }
+}
+
+template <class NUMBER, bool FRICTION, bool DAMPED> void FixWallMindlinSmooth::contact_force(int i, NUMBER overlap)
+{
+  constexpr bool COMPENSATED = std::is_same<NUMBER, Compensated>::value;
+  const bool advance = !update->setupflag;    // at setup the disks have not moved
+  const double radius = atom->radius[i];
+  double *contact = array_atom[i];
+  const bool known = contact[OVERLAP] > 0.0;    // a new contact begins without slip
+  NUMBER slip = known && FRICTION ? contact[SLIP] : 0.0;
+  if constexpr (COMPENSATED && FRICTION) slip.low = known ? contact[SLIP_LOW] : 0.0;
+  const double increment = known && FRICTION ? -(atom->v[i][0] + radius * atom->omega[i][2]) * update->dt : 0.0;
+  faultgouge::FloorRates rates{};
+  if constexpr (DAMPED) {
+    const double *const felt = dashpots->array_atom[i];
+    rates = {felt[1], -(felt[0] + radius * felt[2])};
+  }
+  const auto [normal, tangential, kept, limit] =
+      faultgouge::floor_contact(law, overlap, slip, increment, rates, {FRICTION, advance, DAMPED});
+  if constexpr (FRICTION) {
+    contact[TANGENTIAL] = value(tangential);
+    contact[SLIP] = leading(kept);
+    contact[SLIP_RATIO] = value(limit) > 0.0 ? value(kept) / value(limit) : 0.0;
+    if constexpr (COMPENSATED) contact[SLIP_LOW] = kept.low;
+  }
+  add_force<NUMBER>(i, -tangential, normal, -(radius * tangential));
+  contact[NORMAL] = value(normal);
+  contact[NX] = 0.0;
+  contact[NY] = 1.0;
+  contact[OVERLAP] = value(overlap);
 }
 
 double FixWallMindlinSmooth::compute_scalar()

@@ -51,6 +51,7 @@ private:
   template <class NUMBER> NUMBER overlap_of(int i) const;
   template <class NUMBER> void choose_friction();
   template <class NUMBER, bool FRICTION, bool DAMPED> void contact_forces();
+  template <class NUMBER, bool FRICTION, bool DAMPED> void contact_force(int i, NUMBER overlap);
   template <class NUMBER> void add_force(int i, NUMBER x, NUMBER y, NUMBER torque);
 };
 

@@ -79,32 +79,14 @@ std::string mismatch(void *lmp)
   int length = 0;
   MPI_Get_library_version(library, &length);
   if (std::string(library).find(MPI_FAMILY) == std::string::npos)
-    return says(std::string("the MPI of ") + MPI_FAMILY, "this LAMMPS, whose MPI is " +
-                std::string(library).substr(0, std::string(library).find_first_of(",\n")) + " (-DMPI_HEADERS)");
+    return says(std::string("the MPI of ") + MPI_FAMILY,
+                "this LAMMPS, whose MPI is " +
+                    std::string(library).substr(0, std::string(library).find_first_of(",\n")) + " (-DMPI_HEADERS)");
   return "";
 }
 
-}    // namespace
-
-// What vectors call for a size beyond all bounds. The library has it since 2021 alone (GLIBCXX_3.4.29), and the linker
-// leads here instead (CMakeLists.txt), so that the plugin loads on older systems too.
-extern "C" [[noreturn]] void __wrap__ZSt28__throw_bad_array_new_lengthv();
-extern "C" [[noreturn]] void __wrap__ZSt28__throw_bad_array_new_lengthv()
+void add_styles(void *lmp, void *handle, lammpsplugin_regfunc add)
 {
-  throw std::bad_alloc();
-}
-
-extern "C" __attribute__((visibility("default"))) void lammpsplugin_init(void *lmp, void *handle, void *regfunc)
-{
-  const std::string reason = mismatch(lmp);
-  if (!reason.empty()) {
-    fprintf(stderr,
-            "ERROR: the faultgouge plugin %s: its styles are not available; build the plugin for this LAMMPS\n",
-            reason.c_str());
-    return;
-  }
-
-  const auto add = reinterpret_cast<lammpsplugin_regfunc>(regfunc);
   lammpsplugin_t plugin{};
   plugin.version = static_cast<LAMMPS *>(lmp)->version;
   plugin.author = "faultgouge";
@@ -142,4 +124,25 @@ extern "C" __attribute__((visibility("default"))) void lammpsplugin_init(void *l
           &create_fix<FixDashpotVelocities>);
   add_fix("displace/disc", "moves disks by their velocities alone", &create_fix<FixDisplaceDisc>);
   add_fix("overdamped/disc", "overdamped relaxation of disks in the plane", &create_fix<FixOverdampedDisc>);
+}
+
+}    // namespace
+
+// What vectors call for a size beyond all bounds. The library has it since 2021 alone (GLIBCXX_3.4.29), and the linker
+// leads here instead (CMakeLists.txt), so that the plugin loads on older systems too.
+extern "C" [[noreturn]] void __wrap__ZSt28__throw_bad_array_new_lengthv();
+extern "C" [[noreturn]] void __wrap__ZSt28__throw_bad_array_new_lengthv()
+{
+  throw std::bad_alloc();
+}
+
+extern "C" __attribute__((visibility("default"))) void lammpsplugin_init(void *lmp, void *handle, void *regfunc)
+{
+  const std::string reason = mismatch(lmp);
+  if (!reason.empty()) {
+    fprintf(stderr, "ERROR: the faultgouge plugin %s: its styles are not available; build the plugin for this LAMMPS\n",
+            reason.c_str());
+    return;
+  }
+  add_styles(lmp, handle, reinterpret_cast<lammpsplugin_regfunc>(regfunc));
 }

@@ -10,7 +10,7 @@ from .private_mpi import prepare
 
 prepare()  # before mpi4py.MPI is imported
 
-# ruff: noqa: E402
+# ruff: noqa: E402 - the imports below need it
 from ..analysis import NoEquilibriumError
 from .bed import settle
 from .engine import Engine

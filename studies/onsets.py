@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..analysis import Onset, OnsetError, Packing, find_onset
@@ -60,7 +59,6 @@ class OnsetRun(Tabled):
 def onset_run(
     scene: Scene,
     mu: float,
-    communicator: MPI.Comm | None = None,
     reached: Callable[[Equilibrium], None] | None = None,
     near_onset: NDArray[np.float64] | None = None,
     modes: tuple[int, int] | None = None,
@@ -78,8 +76,6 @@ def onset_run(
         With a section [ramp].
     mu : float
         Friction coefficient.
-    communicator : mpi4py.MPI.Comm, optional
-        The ranks that share the packing; all by default.
     reached : callable, optional
         Called with each equilibrium of the ramp.
     near_onset : ndarray, optional
@@ -99,12 +95,12 @@ def onset_run(
         If the packing flows from the first increment on, or before an onset.
     """
     wanted = loads(needed(scene.ramp, "ramp"))
-    start = settle(scene, mu, communicator, watch=lambda what: watch(f"settling: {what}"))
+    start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"))
     _check_modes(start.packing, modes)
     whole = reached is not None or seeks_all(start.packing, modes)
     reached = reached or (lambda _: None)
     reached(start)
-    with Engine(start.packing, communicator) as engine:
+    with Engine(start.packing) as engine:
         path = EquilibriumPath(engine, start, scene)
         forces = wanted
         if whole:
@@ -114,7 +110,7 @@ def onset_run(
             forces = np.array([each.fx for each in path.kept])
         flows = len(forces) < len(wanted)
         try:
-            onset = find_onset(path, forces, modes=modes, watch=watch, ranks=searching(communicator))
+            onset = find_onset(path, forces, modes=modes, watch=watch, ranks=searching())
         except (OnsetError, NoEquilibriumError) as error:
             if not flows and isinstance(error, OnsetError):
                 raise

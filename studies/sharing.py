@@ -19,6 +19,12 @@ from ..analysis.onset import Ranks
 
 Share = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
+Say = Callable[[str], None]
+"""Takes a line of progress."""
+
+Progress = Callable[[Iterable[Any], int], Iterable[Any]]
+"""Takes results as they end and their number, and hands them on."""
+
 
 @contextmanager
 def shared_out() -> Iterator[Share | None]:
@@ -31,12 +37,9 @@ def shared_out() -> Iterator[Share | None]:
         yield None if pool is None else partial(pool.map, unordered=True)
 
 
-def searching(communicator: MPI.Comm | None = None) -> Ranks:
-    """The ranks of a communicator, all by default, as those of one search; the cores of a machine are shared evenly.
-
-    Collective.
-    """
-    world = MPI.COMM_WORLD if communicator is None else communicator
+def searching() -> Ranks:
+    """All ranks as those of one search; the cores of a machine are shared evenly. Collective."""
+    world = MPI.COMM_WORLD
     if world.size == 1:
         return Ranks()
     mine = MPI.Get_processor_name(), sorted(sched_getaffinity(0))

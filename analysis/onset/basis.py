@@ -6,7 +6,8 @@ are small against the spacing of the levels.
 
 Perturbation theory (:mod:`~faultgouge.analysis.onset.screening`) asks for a mode and its neighbours in the spectrum
 alone. So a large operator has a basis for each slice of its spectrum (:mod:`~faultgouge.analysis.onset.slicing`), with
-a margin on either side, and never one of all modes.
+a margin on either side, and never one of all modes. A *cluster* of neighbouring modes, with all others in second order,
+has the eigenvalues of A up to the third order of the typical coupling over the distance of the modes outside.
 """
 
 from collections.abc import Iterator
@@ -21,7 +22,75 @@ from scipy.sparse import csc_array, csr_array
 from ..packing import Floats, Indices
 from .limits import LIMITS, Limits
 from .ranks import Ranks
-from .screening import Cluster, Levels
+
+
+@dataclass(frozen=True, eq=False)
+class Cluster:
+    """Neighbouring modes of a basis.
+
+    Attributes
+    ----------
+    modes : slice
+        Which modes, by increasing eigenvalue, margins included.
+    core : tuple of int
+        The first and the last mode, counted within the cluster, that no other cluster owns.
+    """
+
+    modes: slice
+    core: tuple[int, int]
+
+    def owns(self, vectors: Floats) -> bool:
+        """Whether the plane of orthonormal vectors, in cluster coordinates, has its weight in the core."""
+        weight = np.sum(vectors**2, axis=1)
+        centre = float(weight @ np.arange(len(weight)) / weight.sum())
+        # One mode more: planes differ a little from cluster to cluster, and twice is better than not at all.
+        return self.core[0] - 1.0 <= centre <= self.core[1] + 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """An operator in an eigenbasis.
+
+    Attributes
+    ----------
+    diagonal : ndarray, shape (E,)
+        H_ii, 1 / time^2.
+    coupling : ndarray of float32, shape (E, E)
+        H_ij, with a zero diagonal: single precision is plenty for what is compared with distances of levels.
+    """
+
+    diagonal: Floats
+    coupling: NDArray[np.float32]
+
+    def block(self, cluster: Cluster) -> Floats:
+        """The operator in a cluster, with the second order of the modes outside; 1 / time^2."""
+        diagonal = self.diagonal[cluster.modes]
+        # Modes of the margin may lie close to modes outside: what these do is right for the core.
+        core = np.sort(diagonal[cluster.core[0] : cluster.core[1] + 1])
+        distance = np.clip(diagonal, core[0], core[-1])[:, None] - self.diagonal
+        weight = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance != 0)
+        weight[:, cluster.modes] = 0.0
+        rows, columns = self.coupling[cluster.modes], self.coupling[:, cluster.modes]
+        second = 0.5 * ((rows * weight) @ columns + rows @ (columns * weight.T))
+        return np.diag(diagonal) + self.coupling[cluster.modes, cluster.modes] + second
+
+    def beyond(self, there: "Levels", share: float) -> "Levels":
+        """The levels at a share of the way to others and on, beyond 1, along a straight line."""
+        return Levels(
+            (1 - share) * self.diagonal + share * there.diagonal,
+            np.float32(1 - share) * self.coupling + np.float32(share) * there.coupling,
+        )
+
+    @cached_property
+    def largest(self) -> NDArray[np.float32]:
+        """The larger of |H_ij| and |H_ji|, shape (E, E)."""
+        magnitude = np.abs(self.coupling)
+        return np.maximum(magnitude, magnitude.T)
+
+    @cached_property
+    def distance(self) -> NDArray[np.float32]:
+        """H_ii - H_jj, shape (E, E); rounded after it is taken."""
+        return np.subtract.outer(self.diagonal, self.diagonal).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)

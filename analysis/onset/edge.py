@@ -61,17 +61,10 @@ class Edge:
         return cls(pair.fx, 0.0, pair.mean, pair.overlap, "start")
 
     @classmethod
-    def somewhere(cls, below: float, above: float, pair: Pair) -> "Edge":
-        """Of a pair between two loads, uncertain by half of their distance."""
-        half = 0.5 * (above - below)
-        return cls(below + half, half, pair.mean, pair.overlap, "contact change")
-
-    @classmethod
-    def jump(cls, outside: Pair, inside: Pair) -> "Edge":
-        """Of a pair where the equilibrium jumps, between two loads that are next to each other."""
-        overlap = min(outside.overlap, inside.overlap)
-        middle, half = 0.5 * (outside.fx + inside.fx), 0.5 * abs(inside.fx - outside.fx)
-        return cls(middle, half, inside.mean, overlap, "contact change")
+    def between(cls, one: float, other: float, *pairs: Pair) -> "Edge":
+        """Of a pair where the equilibrium jumps, or that is not recognised, between two loads: uncertain by half."""
+        half, overlap = 0.5 * abs(other - one), min(pair.overlap for pair in pairs)
+        return cls(0.5 * (one + other), half, pairs[-1].mean, overlap, "contact change")
 
 
 @dataclass(frozen=True)
@@ -216,7 +209,7 @@ def _located_jump(family: Family, pair: Callable[[float], Pair], known: dict[flo
     across = family.followed(known[below], Place(above, known[above].matrix))
     if across.discriminant * known[above].discriminant < 0 or not across.same_planes(known[above]):
         raise LostPairError.of(known[above], f"at F_x = {above:.10g}")
-    return Edge.jump(known[below], known[above]), known[below], known[above]
+    return Edge.between(below, above, known[below], known[above]), known[below], known[above]
 
 
 def edge_from_inside(family: Family, outside: Pair, inside: Pair) -> Edge:
@@ -234,7 +227,7 @@ def edge_from_inside(family: Family, outside: Pair, inside: Pair) -> Edge:
                 pass
         middle = family.followed(inside, family.at(0.5 * (outside.fx + inside.fx)))
         outside, inside = (middle, inside) if middle.discriminant > 0 else (outside, middle)
-    return Edge.jump(outside, inside)
+    return Edge.between(outside.fx, inside.fx, outside, inside)
 
 
 def leads_back(family: Family, outside: Pair, inside: Pair) -> bool:

@@ -1,8 +1,6 @@
 r"""All modes of a packing at one load, and which of them is which at the next.
 
-The operator is :math:`A = M^{-1/2} K M^{-1/2}`, with right vectors x and left vectors y. Contacts whose force is
-unknown are left out, see `force_bearing`.
-
+The operator is :math:`A = M^{-1/2} K M^{-1/2}`, with right vectors x and left vectors y.
 Modes at neighbouring loads a, b are assigned by :math:`|x_a^H x_b|\,|y_a^H y_b|` over unit vectors, so modes that cross
 do not swap names. (:math:`|y_a^H x_b|`, the obvious weight, vanishes at an exceptional point, where it is needed most.)
 """
@@ -37,7 +35,8 @@ def force_bearing(packing: Packing, limits: Limits = LIMITS) -> Packing:
     """The packing without the contacts whose force is no more than the packing's own imbalance.
 
     A disk that only such contacts hold comes to rest just about touching. Its overlap is rounding noise, and with the
-    overlap its stiffness, of order (residual / k_n)^(1/3): large enough to move eigenvalues.
+    overlap its stiffness, of order (residual / k_n)^(1/3): it differs from one equilibrium to the next, and would open
+    and shut windows at random.
     """
     largest = packing.normal_force.max(initial=0.0)
     return packing.loaded(min(limits.unknown_force * packing.residual, limits.small_force * largest))
@@ -96,6 +95,14 @@ class Modes:
     def complex_pairs(self) -> list[Members]:
         """The members of each complex pair, that with the positive imaginary part first."""
         return [(int(k), int(self.partner[k])) for k in np.flatnonzero(self.values.imag > 0)]
+
+    def conjugate(self, members: Members) -> bool:
+        """Whether two modes are a complex pair."""
+        return bool(self.partner[members[0]] == members[1])
+
+    def together(self, members: Members) -> bool:
+        """Whether two modes are a complex pair, or both are real."""
+        return self.conjugate(members) or bool(self.partner[members[0]] == self.partner[members[1]] == -1)
 
     def pair(self, members: Members) -> Pair:
         """The pair of two modes."""

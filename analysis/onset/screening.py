@@ -28,88 +28,17 @@ So the discriminant is positive, and the two modes do not meet, if
 without the last square where :math:`|s| < R_{ij}`, and without the root where it is of a negative number. Denominators
 are taken no smaller than twice the coupling: where they would be, that pair does not pass the test itself. Between the
 loads, H and B are taken to stay within `Limits.slack` of the straight line.
-
-**Clusters.** Which of thousands of modes meet first? A cluster of neighbouring modes, with all other modes in second
-order as above, has the eigenvalues of A up to the third order of the typical coupling over the distance of the modes
-outside. Clusters say where to look; what is found there has yet to be confirmed with A itself.
 """
 
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from ..packing import Floats, Indices
-
-
-@dataclass(frozen=True, eq=False)
-class Levels:
-    """An operator in an eigenbasis.
-
-    Attributes
-    ----------
-    diagonal : ndarray, shape (E,)
-        H_ii, 1 / time^2.
-    coupling : ndarray of float32, shape (E, E)
-        H_ij, with a zero diagonal: single precision is plenty for what is compared with distances of levels.
-    """
-
-    diagonal: Floats
-    coupling: NDArray[np.float32]
-
-    def block(self, cluster: "Cluster") -> Floats:
-        """The operator in a cluster, with the second order of the modes outside; 1 / time^2."""
-        diagonal = self.diagonal[cluster.modes]
-        # Modes of the margin may lie close to modes outside: what these do is right for the core.
-        core = np.sort(diagonal[cluster.core[0] : cluster.core[1] + 1])
-        distance = np.clip(diagonal, core[0], core[-1])[:, None] - self.diagonal
-        weight = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance != 0)
-        weight[:, cluster.modes] = 0.0
-        rows, columns = self.coupling[cluster.modes], self.coupling[:, cluster.modes]
-        second = 0.5 * ((rows * weight) @ columns + rows @ (columns * weight.T))
-        return np.diag(diagonal) + self.coupling[cluster.modes, cluster.modes] + second
-
-    def beyond(self, there: "Levels", share: float) -> "Levels":
-        """The levels at a share of the way to others and on, beyond 1, along a straight line."""
-        return Levels(
-            (1 - share) * self.diagonal + share * there.diagonal,
-            np.float32(1 - share) * self.coupling + np.float32(share) * there.coupling,
-        )
-
-    @cached_property
-    def largest(self) -> NDArray[np.float32]:
-        """The larger of |H_ij| and |H_ji|, shape (E, E)."""
-        magnitude = np.abs(self.coupling)
-        return np.maximum(magnitude, magnitude.T)
-
-    @cached_property
-    def distance(self) -> NDArray[np.float32]:
-        """H_ii - H_jj, shape (E, E); rounded after it is taken."""
-        return np.subtract.outer(self.diagonal, self.diagonal).astype(np.float32)
-
-
-@dataclass(frozen=True, eq=False)
-class Cluster:
-    """Neighbouring modes of a basis.
-
-    Attributes
-    ----------
-    modes : slice
-        Which modes, by increasing eigenvalue, margins included.
-    core : tuple of int
-        The first and the last mode, counted within the cluster, that no other cluster owns.
-    """
-
-    modes: slice
-    core: tuple[int, int]
-
-    def owns(self, vectors: Floats) -> bool:
-        """Whether the plane of orthonormal vectors, in cluster coordinates, has its weight in the core."""
-        weight = np.sum(vectors**2, axis=1)
-        centre = float(weight @ np.arange(len(weight)) / weight.sum())
-        # One mode more: planes differ a little from cluster to cluster, and twice is better than not at all.
-        return self.core[0] - 1.0 <= centre <= self.core[1] + 1.0
+from .basis import Basis, Levels
+from .limits import LIMITS, Limits
 
 
 def may_meet(here: Levels, there: Levels, slack: float) -> Indices:
@@ -168,3 +97,39 @@ def _others(rows: Floats, pairs: tuple[Indices, Indices]) -> Floats:
     for column in pairs:
         rows[place, column] = 0.0
     return rows
+
+
+Screening = Callable[[csr_array, csr_array], list[Floats] | None]
+"""Who names the pairs that may meet between two operators, by orthonormal bases, shape (n, 2), of their planes; None if
+they are more than a few, or not known."""
+
+
+class Screen:
+    """Pairs that may meet along a ramp, from one basis for as many increments as it serves."""
+
+    def __init__(self, limits: Limits = LIMITS) -> None:
+        self.limits = limits
+        self._base: csr_array | None = None
+        self._basis: Basis | None = None
+        self._seen: tuple[csr_array, Levels] | None = None
+
+    def __call__(self, here: csr_array, there: csr_array) -> list[Floats] | None:
+        """The planes of the pairs; None if they are more than `Limits.few`, or if the coordinates change."""
+        found = None if self._basis is None else self._look(self._basis, here, there)
+        if (found is None or len(found) > 0) and self._base is not here:
+            self._base, self._basis, self._seen = here, Basis.of(here, self.limits), None
+            found = self._look(self._basis, here, there)
+        return found
+
+    def _look(self, basis: Basis, here: csr_array, there: csr_array) -> list[Floats] | None:
+        if not (basis.covers(here) and basis.covers(there)):
+            return None
+        if self._seen is None:
+            before = basis.levels(here)
+        else:
+            matrix, before = self._seen
+            before = before if matrix is here else basis.change(before, here - matrix)
+        after = basis.change(before, there - here)
+        self._seen = there, after
+        pairs = may_meet(before, after, self.limits.slack)
+        return [basis.lifted(pair) for pair in pairs] if len(pairs) <= self.limits.few else None

@@ -12,11 +12,11 @@ from ..digits import with_uncertainty
 from ..display import Tabled, windows_rows
 from ..errors import FaultgougeError
 from ..packing import Packing
+from .dense import all_windows
 from .edge import Family
 from .limits import LIMITS, Limits
 from .modes import Operator, full_operator
 from .ranks import ALONE, Ranks
-from .screened import all_windows
 from .sliced import FirstWindow, Watch, first_window
 from .windows import Window, increasing
 

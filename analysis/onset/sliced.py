@@ -1,24 +1,16 @@
-r"""The search for the first window of a large packing: the oracle that looks at slices of the spectrum.
+"""The search for the first window of a large packing: the oracle that looks at slices of the spectrum.
 
-A dense decomposition takes a second at 300 disks and grows with the cube of their number. But modes mix with their
-neighbours in the spectrum only. In the eigenbasis of one load, slice by slice
-(:mod:`~faultgouge.analysis.onset.basis`),
-
-1. perturbation theory names the pairs that may meet (:mod:`~faultgouge.analysis.onset.screening`), few of thousands;
-2. the cluster of neighbouring modes about each of these, interpolated between two loads, is searched for all of its
-   windows as a small packing is: these say where to look;
-3. what clusters announce is confirmed with the operator itself, whose pair is followed to the edges.
-
-So an edge is as certain, and has the same digits, as in the search among all modes. That the window is the first rests
-on two things. No mode is missing, which the inertia tells (:mod:`~faultgouge.analysis.onset.slicing`). And the clusters
-are right: their onsets were within a tenth of an increment of the confirmed ones (packings of 1,000 disks, increments
-of 1e-3). A pair that is complex by less than their error, or for less than `Limits.finest` of an increment, may be
-missed.
+Modes mix with their neighbours in the spectrum only. In the eigenbasis of one load, slice by slice
+(:mod:`~faultgouge.analysis.onset.basis`), perturbation theory names the pairs that may meet, few of thousands. The
+*cluster* of neighbouring modes about each of these, interpolated between two loads, is searched for all of its windows
+as a small packing is. What clusters announce is confirmed with the operator itself; so an edge has the same digits as
+in the search among all modes.
 
 **Where the clusters are wrong.** Between two loads the projected operator is taken to be a straight line, which it is
 not where contacts open, close or slide. What the operator has instead shows it: the announced pair is not there, cannot
 be followed, or turns complex elsewhere. The walker then divides the increment. What is in doubt even in the finest
-parts is handed out with the result.
+parts is handed out with the result. Elsewhere the onsets of clusters were within a tenth of an increment of the
+confirmed ones (packings of 1,000 disks, increments of 1e-3).
 
 **Edges.** A real pair may exchange partners with a third mode within an increment. A complex pair is the only one of
 its kind, so a pair is followed from inside of its window to the edge.
@@ -35,14 +27,14 @@ from scipy.sparse.linalg import ArpackError
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing import Floats
 from ..sparse_lu import SingularMatrixError
-from .basis import Basis
+from .basis import Basis, Cluster, Levels
+from .dense import all_windows
 from .dip import dip_between
 from .edge import Edge, Family, LostPairError, complex_pair_near, edge_from_inside, leads_back
-from .modes import Members, Modes
+from .modes import Modes
 from .pair import Pair, Place, continued
 from .ranks import ALONE, Ranks
-from .screened import all_windows
-from .screening import Cluster, Levels, may_meet
+from .screening import may_meet
 from .walk import walk
 from .windows import Window
 
@@ -110,7 +102,7 @@ class Sliced:
         if self.first is None or sure.fx_onset < self.first.fx_onset:
             self.first = sure
 
-    def candidates(self, places: Sequence[Place]) -> list[list[Candidate]]:
+    def candidates(self, places: Sequence[Place], depth: int) -> list[list[Candidate]]:
         """The pairs that turn complex in their clusters on each increment, by increasing onset: those of all ranks."""
         everyone = self.ranks.together(lambda: self._found(places))
         merged = ([candidate for each in one for candidate in each] for one in zip(*everyone, strict=True))
@@ -122,25 +114,18 @@ class Sliced:
         first, stop = self.range(places[0].matrix)
         done, wanted = 0, -(-(stop - first) // self.ranks.size)
         failure: FaultgougeError | None = None
-        for basis, before in self.bases(places[0].matrix):
-            if failure is not None:
-                continue  # the ranks meet at the end of their bases
+        for basis, levels in self.bases(places[0].matrix):
             done += basis.own.stop - basis.own.start
             self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {done} of {wanted} modes")
             try:
-                self._announce(found, basis, before, places)
+                for announced, (here, there) in zip(found, pairwise(places), strict=True):
+                    before, levels = levels, basis.change(levels, there.matrix - here.matrix)
+                    announced.extend(self._announced(basis, (here.fx, before), (there.fx, levels)))
             except FaultgougeError as error:
-                failure = error
+                failure = failure or error  # it waits: the ranks meet at the end of their bases
         if failure is not None:
             raise failure
         return found
-
-    def _announce(self, found: list[list[Candidate]], basis: Basis, before: Levels, places: Sequence[Place]) -> None:
-        """Add the pairs of one basis."""
-        for announced, (here, there) in zip(found, pairwise(places), strict=True):
-            after = basis.change(before, there.matrix - here.matrix)
-            announced.extend(self._announced(basis, (here.fx, before), (there.fx, after)))
-            before = after
 
     def confirm(
         self, candidates: list[Candidate], here: Place, there: Place, depth: int
@@ -255,8 +240,7 @@ class Sliced:
         for window in all_windows(family, np.array([here[0], reach])):
             end = reach if window.fx_end is None else window.fx_end
             inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
-            modes = Modes.of(inside, block(inside))
-            pair = modes.pair(_nearest(modes, window.eigenvalue))
+            pair = _nearest(Modes.of(inside, block(inside)), window.eigenvalue)
             if cluster.owns(pair.right):
                 right, left = (basis.lifted(cluster.modes, plane) for plane in (pair.right, pair.left))
                 yield Candidate(window.fx_onset, min(inside, there[0]), right, left)
@@ -370,10 +354,10 @@ def _reached(family: Family, loads: Floats) -> list[Place]:
     return places
 
 
-def _nearest(modes: Modes, eigenvalue: float) -> Members:
+def _nearest(modes: Modes, eigenvalue: float) -> Pair:
     """The complex pair, or failing that the two modes, closest to a real eigenvalue."""
     pairs = modes.complex_pairs or [modes.about(eigenvalue)]
-    return min(pairs, key=lambda members: abs(modes.values[members[0]].real - eigenvalue))
+    return modes.pair(min(pairs, key=lambda members: abs(modes.values[members[0]].real - eigenvalue)))
 
 
 def _exceeding(block: Floats, excess: float) -> Floats:

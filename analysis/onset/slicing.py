@@ -2,16 +2,14 @@ r"""The eigenvectors of a large sparse symmetric matrix, all of them, a slice of
 
 The dense decomposition of E coordinates takes some :math:`10 E^3` operations and :math:`16 E^2` bytes: hours and 15 GB
 for 10,000 disks. Spectrum slicing (Parlett, *The Symmetric Eigenvalue Problem*, 1980, ch. 3; Grimes, Lewis and Simon,
-SIAM J. Matrix Anal. Appl. 15, 228 (1994)) cuts the spectrum of S into slices, each about a shift :math:`\sigma`. A
-slice is found by shift-invert block Lanczos: in the Krylov space of :math:`(S - \sigma)^{-1}` the eigenvalues close to
-the shift come first. One sparse factorisation serves the slice, and the slices know nothing of each other, so that
-threads share them. The cost grows little faster than :math:`E^2`, and memory as E. ARPACK would do the same, but solves
-for one vector at a time; blocks halve the time of solutions and of products.
+SIAM J. Matrix Anal. Appl. 15, 228 (1994)) cuts the spectrum of S into slices, each about a shift :math:`\sigma`. In the
+block Krylov space of :math:`(S - \sigma)^{-1}` the eigenvalues close to the shift come first. One sparse factorisation
+serves the slice, and slices know nothing of each other, so that threads share them. The cost grows little faster than
+:math:`E^2`. ARPACK solves for one vector at a time; blocks halve the time of solutions and of products.
 
 **That none is missing** is known from *Sylvester's law of inertia*: in :math:`S - \sigma = L D L^T` the negative pivots
 are as many as there are eigenvalues below :math:`\sigma`. So every eigenvalue of a slice has its number in the whole
-spectrum. Where two slices meet both must give the same eigenvalue the same number; a missing eigenvalue would shift the
-numbers of all beyond it.
+spectrum. Where two slices meet both must give the same eigenvalue the same number.
 
 Several ranks count together, and each finds a run of neighbouring slices (:mod:`~faultgouge.analysis.onset.ranks`).
 """

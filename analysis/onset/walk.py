@@ -7,8 +7,8 @@ The walker knows loads and nothing of matrices. For each increment it asks an *o
 3. where to look in between, should the oracle not be sure of it. The walker then goes through the parts of the
    increment in the same way, and only what is sure is recorded.
 
-The oracles are :mod:`~faultgouge.analysis.onset.screened`, :mod:`~faultgouge.analysis.onset.all_modes` and
-:mod:`~faultgouge.analysis.onset.sliced`, and that of growing motion, :mod:`~faultgouge.analysis.damped`.
+The oracles are :mod:`~faultgouge.analysis.onset.dense` and :mod:`~faultgouge.analysis.onset.sliced`, and that of
+growing motion, :mod:`~faultgouge.analysis.damped`.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -34,14 +34,14 @@ class Oracle(Protocol[At, Announced, Sure]):
     def finished(self) -> bool:
         """Whether all that is sought has been found."""
 
-    def candidates(self, places: Sequence[At]) -> Iterable[Announced]:
-        """What may happen on each of the increments between neighbouring places."""
+    def candidates(self, places: Sequence[At], depth: int) -> Iterable[Announced]:
+        """What may happen on each of the increments between neighbouring places.
+
+        `depth` is how often the increment has been divided of which these are the parts.
+        """
 
     def confirm(self, candidates: Announced, here: At, there: At, depth: int) -> tuple[Sure | None, Sequence[At]]:
-        """What does happen on one increment, to be recorded, and where to divide the increment if that is in doubt.
-
-        `depth` is how often the increment has been divided already.
-        """
+        """What does happen on one increment, to be recorded, and where to divide the increment if that is in doubt."""
 
     def record(self, sure: Sure) -> None:
         """Take down what is sure of an increment; increments come in order."""
@@ -58,7 +58,7 @@ def walk(oracle: Oracle[At, Announced, Sure], places: Sequence[At], depth: int =
     depth : int
         How often the increment has been divided of which these are the parts.
     """
-    for (here, there), candidates in zip(pairwise(places), oracle.candidates(places), strict=True):
+    for (here, there), candidates in zip(pairwise(places), oracle.candidates(places, depth), strict=True):
         sure, between = oracle.confirm(candidates, here, there, depth)
         if between:
             walk(oracle, [here, *between, there], depth + 1)

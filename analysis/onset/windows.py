@@ -1,6 +1,6 @@
 """Windows, intervals of the load on which a pair is complex, and the ledger of those that are open."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,48 +86,41 @@ class Ledger:
     """The windows that are open at the load reached so far, by their pairs there; and the closed ones."""
 
     def __init__(self) -> None:
-        self.open: list[tuple[Pair, Edge]] = []
+        self.open: dict[Pair, Edge] | None = None
         self.closed: list[Window] = []
-        self.begun = False
 
-    def begin(self, complex_pairs: Iterable[Pair]) -> None:
-        """Open the windows of the pairs that are complex at the smallest load; later calls say nothing new."""
-        if not self.begun:
-            self.open = [(each, Edge.start(each)) for each in complex_pairs]
-            self.begun = True
-
-    def carry(self, courses: Iterable[Course]) -> None:
+    def carry(self, courses: Sequence[Course]) -> None:
         """Go on over an increment, whose courses are those of all pairs that are complex at either end.
+
+        Those that are complex at the smallest load begin there.
 
         Raises
         ------
         LostTrackError
             If they are not the pairs of the open windows.
         """
-        now: list[tuple[Pair, Edge]] = []
+        if self.open is None:
+            self.open = {before: Edge.start(before) for before, _, _ in courses if before}
+        now: dict[Pair, Edge] = {}
         for before, after, edge in courses:
-            onset = edge if before is None else self._taken(before)
+            onset = edge
+            if before is not None:
+                known = before.closest(self.open)
+                if known is None:
+                    raise LostTrackError
+                onset = self.open.pop(known)
             assert onset is not None
             if after is None:
                 self.closed.append(Window.between(onset, edge))
             else:
-                now.append((after, onset))
+                now[after] = onset
         if self.open:
             raise LostTrackError
         self.open = now
 
-    def _taken(self, pair: Pair) -> Edge:
-        """The onset of the open window of a pair, which is taken out."""
-        known = pair.closest(each for each, _ in self.open)
-        if known is None:
-            raise LostTrackError
-        (onset,) = (edge for each, edge in self.open if each is known)
-        self.open = [(each, edge) for each, edge in self.open if each is not known]
-        return onset
-
     def all(self) -> tuple[Window, ...]:
         """All windows by increasing onset."""
-        still = [Window.between(edge, None) for _, edge in self.open]
+        still = [Window.between(onset, None) for onset in (self.open or {}).values()]
         return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,7 +110,7 @@ class Disks:
         return self if floor == 0 else replace(self, position=self.position - (0.0, floor))
 
 
-def of_columns(source: str, columns: Mapping[str, Floats], **more: object) -> Disks:
+def of_columns(source: str, columns: Mapping[str, Floats], **more: Any) -> Disks:
     """Disks from columns of numbers.
 
     Parameters
@@ -162,7 +162,7 @@ def of_columns(source: str, columns: Mapping[str, Floats], **more: object) -> Di
         None if kind is None else _whole(source, "type", kind),
         None if top is None else top != 0,
         low,
-        **more,  # type: ignore[arg-type]
+        **more,
     )
 
 

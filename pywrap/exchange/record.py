@@ -8,6 +8,7 @@ double when it is read.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +31,12 @@ def scalars(packing: Packing) -> dict[str, float]:
     return {**values, "fx": packing.fx, "fy": packing.fy, "inertia_factor": packing.inertia_factor}
 
 
-def given(values: Mapping[str, object]) -> dict[str, float]:
+def given(values: Mapping[str, Any]) -> dict[str, float]:
     """The names of `KEYS` among others, as numbers; what is no number is left out."""
     found = {}
     for key in KEYS:
         try:
-            found[key] = float(values[key])  # type: ignore[arg-type]
+            found[key] = float(values[key])
         except (KeyError, TypeError, ValueError):
             continue
     return found

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 
 from ...analysis import BadInputError, NoEquilibriumError, Packing, nearest_image
 from ..engine import Engine
@@ -57,15 +56,13 @@ def largest_force(packing: Packing) -> float:
     return float(np.linalg.norm(packing.net_force.reshape(3, -1), axis=0).max())
 
 
-def at_rest(packing: Packing, communicator: MPI.Comm | None = None, watch: Watch = lambda says: None) -> Rest:
+def at_rest(packing: Packing, watch: Watch = lambda says: None) -> Rest:
     """Bring a packing to rest under its law and load.
 
     Parameters
     ----------
     packing : Packing
         Disks as another code left them.
-    communicator : mpi4py.MPI.Comm, optional
-        The ranks that share the packing; all by default.
     watch : callable, optional
         Told in words what begins.
 
@@ -82,30 +79,30 @@ def at_rest(packing: Packing, communicator: MPI.Comm | None = None, watch: Watch
             f"without slips the disks rest without friction first, and F_x = {packing.fx:g} would push them along for "
             "ever: leave --fx out, and raise F_x by `faultgouge ramp`."
         )
-    resting = _with_friction(packing, communicator) if slipped else _without(packing, communicator, watch)
+    resting = _with_friction(packing) if slipped else _without(packing, watch)
     idle = len(resting.loaded(rounding_floor(resting)).rattlers)
     if idle > 0.5 * len(resting):
         raise NoEquilibriumError(
             f"the upper layer sank through the bed, and {idle} of {len(resting)} disks carry nothing: choose a layer "
             "that closes the box (--top), or a lower load (--fy)"
         )
-    with Engine(resting, communicator) as engine:
+    with Engine(resting) as engine:
         start = Equilibrium(resting, resting.residual, rounding_floor(resting), 0)
         return Rest(equilibrate(engine, start, resting.fx), packing)
 
 
-def _without(packing: Packing, communicator: MPI.Comm | None, watch: Watch) -> Packing:
+def _without(packing: Packing, watch: Watch) -> Packing:
     # where disks rest does not depend on their masses, and the time step of dynamics is that of masses of one
     law, ones = replace(packing.law, mu=0.0, ct=0.0), np.ones(len(packing))
     smooth = replace(packing, law=law, mass=ones)
-    with Engine(smooth, communicator) as engine:
+    with Engine(smooth) as engine:
         found = settled(engine, smooth, watch, bed=False)
     return replace(
         clear_rattlers(found, rounding_floor(found)), law=packing.law, angle=packing.angle, mass=packing.mass
     )
 
 
-def _with_friction(packing: Packing, communicator: MPI.Comm | None) -> Packing:
-    with Engine(packing, communicator) as engine:
+def _with_friction(packing: Packing) -> Packing:
+    with Engine(packing) as engine:
         engine.relax(max(TOLERANCES[-1] * packing.fy, ABOVE_ROUNDING * contact_rounding(packing)))
         return engine.packing

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,12 +17,9 @@ from ...pywrap.refusals import needed
 from ...pywrap.study_sections import Eruptions
 from ...pywrap.units import real_units
 from ..rows import Rows
-from ..sharing import shared_out
+from ..sharing import Progress, Say, shared_out
 from . import draw, page
 from .compute import Start, erupt
-
-Say = Callable[[str], None]
-Progress = Callable[[Iterable[Any], int], Iterable[Any]]
 
 
 def eruptions(

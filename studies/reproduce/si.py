@@ -13,19 +13,7 @@ Row = tuple[str, str, str]
 
 
 def si_rows(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, triggered: TriggeringRun | None) -> list[Row]:
-    """The column in SI of report.md, a row a quantity; none if the scene has no units.
-
-    Parameters
-    ----------
-    scene : Scene
-        What was run.
-    runs : list of OnsetRun
-        Ramp and onset for each friction coefficient.
-    growth : GrowthRun
-        The undamped run above the onset.
-    triggered : TriggeringRun or None
-        The perturbation below it, if the scene has one.
-    """
+    """The column in SI of report.md, a row a quantity; none if the scene has no units. Arguments as of `report`."""
     real = real_units(scene)
     if real is None:
         return []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from ...analysis.digits import with_uncertainty
 from ...pywrap import Scene, SceneError
 from ...pywrap.units import real_units
 from ..rows import Rows
-from ..sharing import Share, shared_out
+from ..sharing import Progress, Say, Share, shared_out
 from . import draw, page
 from .compute import (
     Measured,
@@ -27,9 +26,6 @@ from .compute import (
     settings,
     threshold,
 )
-
-Say = Callable[[str], None]
-Progress = Callable[[Iterable[Any], int], Iterable[Any]]
 
 
 def trigger_map(

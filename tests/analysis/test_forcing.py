@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from transfer import layer_response
 
 from faultgouge.analysis.forcing import floor_force, impulse_response, sampled_response
-from faultgouge.analysis.response import layer_force, layer_response, linear_response
+from faultgouge.analysis.response import layer_force, linear_response
 from faultgouge.analysis.signals import Signal, SignalError, pulse, sweep
 from faultgouge.analysis.spectrum import discrete_frequency, spectrum
 

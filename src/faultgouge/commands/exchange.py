@@ -19,32 +19,41 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 
+Source = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FILE",
+        help="LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, packing.json, "
+        "or what MDAnalysis reads with radii.",
+        show_default=False,
+    ),
+]
+Layer = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LAYER",
+        help="The upper layer: a count of the highest, type:2, ids:1,4,7-9, ids:@FILE, group:NAME of a restart, or "
+        "a region such as 'y>10 and x<5'. By default what the file says.",
+    ),
+]
+Like = Annotated[Path | None, typer.Option(help="Law, load, damping and inertia of this scene.", show_default=False)]
+Width = Annotated[
+    str | None, typer.Option(metavar="L|open", help="Period along x, or open sides; else what the file says.")
+]
+Slips = Annotated[
+    Path | None, typer.Option(help="Slips: CSV with id1, id2 (0: the floor), slip; or a LAMMPS dump local.")
+]
+
+
 @app.command(
     "import",
     epilog="Example: [bold]faultgouge import pour.data --top 12 --kn 2e5 --fy 3 --relax -o packing.h5[/bold]",
 )
 def import_(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE",
-            help="LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, packing.json, "
-            "or what MDAnalysis reads with radii.",
-            show_default=False,
-        ),
-    ],
+    file: Source,
     output: Annotated[Path, typer.Option("-o", "--output", help="The run.h5 to write.")] = Path("packing.h5"),
-    top: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LAYER",
-            help="The upper layer: a count of the highest, type:2, ids:1,4,7-9, ids:@FILE, group:NAME of a restart, or "
-            "a region such as 'y>10 and x<5'. By default what the file says.",
-        ),
-    ] = None,
-    scene: Annotated[
-        Path | None, typer.Option(help="Law, load, damping and inertia of this scene.", show_default=False)
-    ] = None,
+    top: Layer = None,
+    scene: Like = None,
     kn: Annotated[float | None, typer.Option(help="Normal stiffness, without a scene.", show_default=False)] = None,
     kt: Annotated[str | None, typer.Option(help="Tangential stiffness: a number, or '2/7 kn'.")] = None,
     mu: Annotated[float | None, typer.Option(help="Friction coefficient; 1 by default.", show_default=False)] = None,
@@ -53,12 +62,8 @@ def import_(
     fx: Annotated[float | None, typer.Option(help="Shear force on each of them; 0 by default.")] = None,
     inertia: Annotated[float | None, typer.Option(help="I_0 in I = I_0 m R^2; 1 by default.")] = None,
     floor: Annotated[float, typer.Option(help="y of the floor in the file; it is moved to 0.")] = 0.0,
-    width: Annotated[
-        str | None, typer.Option(metavar="L|open", help="Period along x, or open sides; else what the file says.")
-    ] = None,
-    contacts: Annotated[
-        Path | None, typer.Option(help="Slips: CSV with id1, id2 (0: the floor), slip; or a LAMMPS dump local.")
-    ] = None,
+    width: Width = None,
+    contacts: Slips = None,
     frame: Annotated[int | None, typer.Option(help="Which of several frames; negative ones from the last.")] = None,
     relax: Annotated[bool, typer.Option("--relax", help="Bring to rest what is out of balance.")] = False,
 ) -> None:

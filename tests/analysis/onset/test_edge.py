@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from faultgouge.analysis.onset import Family, Limits, LostPairError, Modes, Pair, continued, locate, smooth_root
-from faultgouge.analysis.onset.edge import edge_from_inside
+from faultgouge.analysis.onset import Family, Limits, LostPairError, Modes, Pair
+from faultgouge.analysis.onset.edge import edge_from_inside, locate, smooth_root
+from faultgouge.analysis.onset.pair import continued
 
 BASIS = np.eye(12) + 0.1 * np.random.default_rng(2).normal(size=(12, 12))
 INVERSE = np.linalg.inv(BASIS)

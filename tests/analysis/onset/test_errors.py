@@ -5,7 +5,8 @@ import pytest
 from families import crossing
 
 from faultgouge.analysis import FaultgougeError, complex_windows, find_onset
-from faultgouge.analysis.onset import Family, Limits, first_window
+from faultgouge.analysis.onset import Family, Limits
+from faultgouge.analysis.onset.sliced import first_window
 
 
 class LostEngineError(FaultgougeError):

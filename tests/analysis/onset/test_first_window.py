@@ -9,18 +9,9 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import Contacts, NoEquilibriumError, OnsetError, Packing, complex_windows, find_onset
-from faultgouge.analysis.onset import (
-    LIMITS,
-    Family,
-    FirstWindow,
-    Limits,
-    LostPairError,
-    Pair,
-    continued,
-    first_window,
-    full_operator,
-)
-from faultgouge.analysis.onset.sliced import Sliced
+from faultgouge.analysis.onset import LIMITS, Family, Limits, LostPairError, Pair, full_operator
+from faultgouge.analysis.onset.pair import continued
+from faultgouge.analysis.onset.sliced import FirstWindow, Sliced, first_window
 
 
 def searched(operator, loads, limits=LIMITS):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from faultgouge.analysis.onset import Limits, Modes, Pair, continued, full_operator
-from faultgouge.analysis.onset.pair import inverse_of
+from faultgouge.analysis.onset import Limits, Modes, Pair, full_operator
+from faultgouge.analysis.onset.pair import continued, inverse_of
 
 
 def dense_pair(matrix, reference):

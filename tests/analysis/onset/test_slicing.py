@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
-from faultgouge.analysis.onset import LIMITS, Family, Limits, Ranks, first_window
+from faultgouge.analysis.onset import LIMITS, Family, Limits, Ranks
+from faultgouge.analysis.onset.sliced import first_window
 from faultgouge.analysis.onset.slicing import SliceError, factored, slices
 
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from faultgouge.analysis.onset import smooth_root
+from faultgouge.analysis.onset.edge import smooth_root
 from faultgouge.analysis.onset.walk import walk
 
 
@@ -20,7 +20,7 @@ class Negative:
     def finished(self):
         return self.most is not None and len(self.roots) >= self.most
 
-    def candidates(self, places):
+    def candidates(self, places, depth):
         return [self.function(a) * self.function(b) < 0 for a, b in pairwise(places)]
 
     def confirm(self, changes, here, there, depth):

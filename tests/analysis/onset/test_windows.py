@@ -17,9 +17,11 @@ from faultgouge.analysis import (
     spectrum,
 )
 from faultgouge.analysis.digits import with_uncertainty
-from faultgouge.analysis.onset import Family, Modes, assign, force_bearing, full_operator
+from faultgouge.analysis.onset import Family, Modes, force_bearing, full_operator
+from faultgouge.analysis.onset.dense import all_windows
 from faultgouge.analysis.onset.dip import deepest_dip
-from faultgouge.analysis.onset.screened import Screen, all_windows
+from faultgouge.analysis.onset.modes import assign
+from faultgouge.analysis.onset.screening import Screen
 
 
 @pytest.mark.parametrize("d", [0.01, 0.3])
@@ -167,19 +169,20 @@ def test_no_onset_is_said_so(ramp):
 
 
 @pytest.mark.parametrize("mu", [1.0, 0.8])
-def test_what_nothing_happens_on_is_not_decomposed(ramp, mu):
+def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
     """The same windows as from all modes at every load, which are computed next to the edges alone."""
-    path, decomposed = ramp(mu, 1e-3, 22), []
+    path, decomposed, decompose = ramp(mu, 1e-3, 22), [], Modes.of
     family = Family(lambda fx: full_operator(path(fx)), 2.2e-9)
 
     def counted(fx, matrix):
         decomposed.append(fx)
-        return Modes.of(fx, matrix)
+        return decompose(fx, matrix)
 
-    quick = all_windows(family, path.grid, decompose=counted)
+    monkeypatch.setattr(Modes, "of", counted)
+    quick = all_windows(family, path.grid)
     few, decomposed[:] = len(decomposed), []
     # nothing is known of any increment
-    every = all_windows(family, path.grid, lambda: lambda here, there: None, decompose=counted)
+    every = all_windows(family, path.grid, lambda here, there: None)
     assert len(decomposed) >= 23
     assert few <= 4 * len(quick)
     assert len(quick) == len(every)
@@ -205,9 +208,10 @@ def test_open_windows_keep_their_names_over_increments_that_are_skipped():
 def test_what_the_screening_misses_is_walked_again():
     """A window that opens on increments said to be quiet is found as soon as anything makes us look."""
 
-    def blind():
-        screen = Screen()
-        return lambda here, there: [] if there[1, 0] > -5.0 else screen(here, there)
+    screen = Screen()
+
+    def blind(here, there):
+        return [] if there[1, 0] > -5.0 else screen(here, there)
 
     family = Family(lambda f: family_with_a_long_window(0.3 * f), 1e-6)
     first = all_windows(family, np.arange(10.0), blind)[0]

@@ -1,0 +1,288 @@
+"""The search for all windows of a small packing: the oracle that has all modes of a load if it needs them.
+
+**Few pairs.** On most increments nothing happens, and to know that takes no decomposition. The pairs that
+perturbation theory names (:mod:`~faultgouge.analysis.onset.screening`) are followed one by one. Where at most one of
+them changes, and D and its slopes at both ends tell that nothing hides (:mod:`~faultgouge.analysis.onset.dip`), the
+increment is done.
+
+**All modes.** Everywhere else the modes of both ends are assigned to each other, so that they keep their names
+(:func:`~faultgouge.analysis.onset.modes.assign`). A pair that is complex at one end and real at the other has an edge
+in between, which is solved for. The increment is divided next to the first edge, where something could hide, and
+half-way where a complex pair at one end is not recognised at the other; until nothing wider than `Family.narrowest` is
+left to doubt.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from ..errors import NoEquilibriumError
+from ..packing import Floats, Indices
+from ..spectrum import Complexes
+from .dip import deepest_dip, dip_between
+from .edge import Edge, Family, LostPairError, locate
+from .modes import Members, Modes, assign
+from .pair import Pair, Place, continued
+from .screening import Screen, Screening
+from .walk import between, walk
+from .windows import Course, Ledger, LostTrackError, Window
+
+
+class Load:
+    """A load, the operator there, and all of its modes as soon as somebody asks for them."""
+
+    def __init__(self, place: Place) -> None:
+        self.place, self.fx = place, place.fx
+
+    @cached_property
+    def modes(self) -> Modes:
+        """All modes, by LAPACK."""
+        return Modes.of(*self.place)
+
+
+class Step:
+    """Two neighbouring loads, which mode of one is which of the other, and what becomes of the complex pairs.
+
+    Attributes
+    ----------
+    pairs : list of (Members or None, Members or None)
+        The pairs that are complex at one end at least, by their modes at the lower and at the upper load; None where
+        they are not recognised.
+    """
+
+    def __init__(self, here: Modes, there: Modes) -> None:
+        self.here, self.there = here, there
+        self.forward = assign(here, there)
+        backward = {int(image): k for k, image in enumerate(self.forward)}
+        self.pairs: list[tuple[Members | None, Members | None]] = []
+        for members in here.complex_pairs:
+            image = int(self.forward[members[0]]), int(self.forward[members[1]])
+            self.pairs.append((members, image if self._recognised(members, image) else None))
+        arrived = [image for _, image in self.pairs]
+        for image in there.complex_pairs:
+            if image not in arrived:
+                members = backward.get(image[0], -1), backward.get(image[1], -1)
+                self.pairs.append((members if self._recognised(members, image) else None, image))
+
+    def _recognised(self, members: Members, image: Members) -> bool:
+        """Whether two modes here, conjugates or both real, are the same pair as two such modes there."""
+        here, there = self.here, self.there
+        known = min(*members, *image) >= 0 and here.together(members) and there.together(image)
+        return known and here.pair(members).same_planes(there.pair(image))
+
+    @property
+    def edges(self) -> list[tuple[Members, Members]]:
+        """The pairs that are complex at one end and real at the other: those that close, and then those that open."""
+        known = [(a, b) for a, b in self.pairs if a is not None and b is not None]
+        return [(a, b) for a, b in known if self.here.conjugate(a) != self.there.conjugate(b)]
+
+    def courses(self, edge: Callable[[Members, Members], Edge]) -> Iterator[Course]:
+        """The courses of all these pairs: edges by a function, and half-way for pairs that are not recognised."""
+        here, there = self.here, self.there
+        for members, image in self.pairs:
+            if members is None or image is None:
+                before, after = here.pair(members) if members else None, there.pair(image) if image else None
+                yield before, after, self.halfway(before or after)
+                continue
+            before = here.pair(members) if here.conjugate(members) else None
+            after = there.pair(image) if there.conjugate(image) else None
+            yield before, after, None if before and after else edge(members, image)
+
+    def halfway(self, pair: Pair | None) -> Edge:
+        """An edge of a pair somewhere in this step."""
+        assert pair is not None
+        return Edge.between(self.here.fx, self.there.fx, pair)
+
+    def hidden_window(self, family: Family) -> float | None:
+        """Load where a window wider than the narrowest, or a gap in one, most likely hides; None if nowhere."""
+        here, there = self.here, self.there
+        known = np.flatnonzero(self.forward >= 0)
+        image = self.forward[known]
+        p, q = self._neighbours(known, image)
+        if len(p) == 0:
+            return None
+        a, b = here.values[known], there.values[image]
+        change = there.matrix - here.matrix
+        drift_a, drift_b = _sensitivity(here, change)[known], _sensitivity(there, change)[image]
+        gap_a, gap_b = a[p] - a[q], b[p] - b[q]
+        # In a window that stays open a gap may hide: turn D over.
+        sign = np.where(here.partner[known[p]] < 0, 1.0, -1.0)
+        width, at = deepest_dip(
+            sign * (gap_a**2).real,
+            sign * (2 * gap_a * (drift_a[p] - drift_a[q])).real,
+            sign * (gap_b**2).real,
+            sign * (2 * gap_b * (drift_b[p] - drift_b[q])).real,
+            family.limits.bend,
+        )
+        span = there.fx - here.fx
+        worst = int(np.argmax(width))
+        if width[worst] * span <= family.narrowest:
+            return None
+        margin = 0.25 * family.narrowest / span  # never return an end
+        return here.fx + span * float(np.clip(at[worst], margin, 1 - margin))
+
+    def _neighbours(self, known: Indices, image: Indices) -> tuple[Indices, Indices]:
+        """Two modes each that can meet: neighbours at one end, those that change order, and pairs that stay complex."""
+        here, there = self.here, self.there
+        p, q = np.triu_indices(len(known), 1)
+        rank = np.empty(len(known), int)
+        rank[np.argsort(there.values[image].real)] = np.arange(len(known))
+        near = (q - p == 1) | (np.abs(rank[q] - rank[p]) == 1) | (rank[q] < rank[p])
+        alone = (here.partner[known] < 0) & (there.partner[image] < 0)
+        staying = (here.partner[known[p]] == known[q]) & (there.partner[image[p]] == image[q])
+        kept = (near & alone[p] & alone[q]) | staying
+        return p[kept], q[kept]
+
+
+def _sensitivity(modes: Modes, change: csr_array) -> Complexes:
+    """First-order change of each eigenvalue, y^H dA x / y^H x."""
+    y = modes.left.conj()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sum(y * (change @ modes.right), axis=0) / np.sum(y * modes.right, axis=0)
+
+
+Followed = list[tuple[Pair, Pair]]
+"""The few pairs that may meet on an increment, at both of its ends."""
+
+
+class Dense:
+    """The oracle; what it is sure of are the courses of all pairs that are complex at either end of an increment."""
+
+    finished = False
+
+    def __init__(self, family: Family, screening: Screening) -> None:
+        self.family, self.screening, self.ledger = family, screening, Ledger()
+        self._known: list[Pair] = []  # the few pairs at the load reached so far
+        self._solved: dict[tuple[float, float], Edge] = {}
+
+    def candidates(self, places: Sequence[Load], depth: int) -> Iterator[Followed | None]:
+        """The pairs that may meet; None where these are not few, or the increment has been divided."""
+        for here, there in pairwise(places):
+            planes = self.screening(here.place.matrix, there.place.matrix) if depth == 0 else None
+            pairs = None if planes is None else self._followed(planes, here.place, there.place)
+            if depth == 0:
+                self._known = [after for _, after in pairs or []]
+            yield pairs
+
+    def confirm(
+        self, candidates: Followed | None, here: Load, there: Load, depth: int
+    ) -> tuple[list[Course] | None, list[Load]]:
+        """The courses of the few pairs if these are plain, else those of all, once nothing can hide any more."""
+        courses = None if candidates is None else self._plain(candidates)
+        if courses is not None:
+            return courses, []
+        step = Step(here.modes, there.modes)
+        edge = self._solved.get((here.fx, there.fx))
+        if edge is not None:
+            return list(step.courses(lambda *_: edge)), []
+        divide = self._between(step) if there.fx - here.fx > self.family.narrowest else []
+        return (None if divide else list(step.courses(lambda *pair: self._edge(step, *pair)))), divide
+
+    def record(self, sure: list[Course]) -> None:
+        """Carry the open windows over an increment."""
+        self.ledger.carry(sure)
+
+    # A few pairs
+
+    def _followed(self, planes: list[Floats], here: Place, there: Place) -> Followed | None:
+        """The pairs of these planes at both loads; None if one of them cannot be followed, or is within rounding."""
+        pairs: Followed = []
+        for plane in planes:
+            guess = Pair(*here, plane, plane)
+            a = guess.closest(self._known) or continued(guess, *here, self.family.limits)
+            b = None if a is None else continued(a, *there, self.family.limits)
+            if a is None or b is None or any(before.same_planes(a) for before, _ in pairs):
+                return None
+            if not a.definite or not b.definite:
+                return None
+            pairs.append((a, b))
+        return pairs
+
+    def _plain(self, pairs: Followed) -> list[Course] | None:
+        """The courses of those that are complex at an end; None if more than one changes, or one not plainly."""
+        changing = [pair for pair in pairs if not self._keeps_sign(*pair)]
+        edge = self._plain_edge(*changing[0]) if len(changing) == 1 else None
+        if changing and edge is None:
+            return None
+        ends = [[pair if pair.discriminant < 0 else None for pair in each] for each in pairs]
+        return [(before, after, edge) for before, after in ends if before or after]
+
+    def _plain_edge(self, here: Pair, there: Pair) -> Edge | None:
+        """The edge of a pair if it has one and no more between two loads, as far as its D tells."""
+        solution = self._solution(here, there) if here.discriminant * there.discriminant <= 0 else None
+        if solution is None:
+            return None
+        edge, below, above = solution
+        plain = here.fx < below.fx < above.fx < there.fx
+        return edge if plain and self._keeps_sign(here, below) and self._keeps_sign(above, there) else None
+
+    def _keeps_sign(self, here: Pair, there: Pair) -> bool:
+        """Whether the discriminant of a pair surely has one sign between two loads."""
+        if here.discriminant * there.discriminant <= 0:
+            return False
+        return dip_between(here, there, self.family.limits)[0] <= self.family.narrowest
+
+    # All modes
+
+    def _between(self, step: Step) -> list[Load]:
+        """Where a step is to be divided."""
+        here, there = step.here, step.there
+        halfway = 0.5 * (here.fx + there.fx)
+        middle = halfway if any(None in pair for pair in step.pairs) else step.hidden_window(self.family)
+        if middle is None and step.edges:
+            members, image = step.edges[0]
+            solution = self._solution(here.pair(members), there.pair(image))
+            if solution is None:
+                middle = halfway
+            elif here.fx < solution[1].fx < solution[2].fx < there.fx:
+                # What lies on either side of this edge has yet to be looked at.
+                edge, below, above = solution
+                self._solved[below.fx, above.fx] = edge
+                return [Load(Place(side.fx, side.matrix)) for side in (below, above)]
+        if middle is None:
+            return []
+        return between(lambda fx: Load(self.family.at(fx)), here.fx, middle, there.fx)
+
+    def _edge(self, step: Step, members: Members, image: Members) -> Edge:
+        """The edge of a pair, half the step wide if it cannot be solved for."""
+        here, there = step.here.pair(members), step.there.pair(image)
+        solution = self._solution(here, there)
+        return step.halfway(there) if solution is None else solution[0]
+
+    def _solution(self, here: Pair, there: Pair) -> tuple[Edge, Pair, Pair] | None:
+        """The edge of a pair between two loads, and the pair close by on either side; None if it is not found."""
+        try:
+            return locate(self.family, here, there)
+        except (NoEquilibriumError, LostPairError):
+            return None
+
+
+def all_windows(family: Family, loads: Floats, screening: Screening | None = None) -> tuple[Window, ...]:
+    """All windows of a family of matrices between the first and the last of increasing loads.
+
+    Perturbation theory is of finite order. Should all modes contradict it, the ramp is walked again without it.
+
+    Parameters
+    ----------
+    family : Family
+    loads : ndarray, shape (S,)
+    screening : callable, optional
+        Names the pairs that may meet; a `Screen` by default.
+    """
+    try:
+        return _walked(Dense(family, screening or Screen(family.limits)), loads)
+    except LostTrackError:
+        return _walked(Dense(family, lambda here, there: None), loads)
+
+
+def _walked(oracle: Dense, loads: Floats) -> tuple[Window, ...]:
+    """The windows that an oracle finds along a ramp."""
+    here = Load(oracle.family.at(loads[0]))
+    for load in loads[1:]:
+        there = Load(oracle.family.at(load))
+        walk(oracle, [here, there])
+        here = there
+    return oracle.ledger.all()

@@ -1,0 +1,51 @@
+"""No file over 400 lines, no function over 40: the docstring is not counted."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("analysis", "pywrap", "figures", "studies", "src/faultgouge", "tests", "benchmarks", "fuzz", "docs")
+PYTHON = sorted({path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py") if "_build" not in path.parts})
+CPP = sorted((ROOT / "pair_mindlin_smooth").glob("*.[ch]*"))
+SCOPE = re.compile(r"\b(namespace|class|struct|enum|union)\b[^()]*$")
+
+
+def python_functions(text):
+    """Name and lines of every function."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            first = node.body[0]
+            words = first.end_lineno - first.lineno + 1 if ast.get_docstring(node) is not None else 0
+            yield node.name, node.end_lineno - node.lineno + 1 - words
+
+
+def cpp_functions(text):
+    """Head and lines of every function: braces that follow parentheses, outside of other functions."""
+    bare = re.sub(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"', lambda found: "\n" * found[0].count("\n"), text, flags=re.S)
+    line, head, open_braces = 1, "", []
+    for character in bare:
+        line += character == "\n"
+        if character == "{":
+            inside = any(function for *_, function in open_braces)
+            open_braces.append((line, head.strip(), "(" in head and not SCOPE.search(head) and not inside))
+        elif character == "}":
+            start, name, function = open_braces.pop()
+            if function:
+                yield name, line - start + 1
+        head = "" if character in "{};" else head + character
+
+
+def test_functions_of_cpp_are_told_from_scopes():
+    text = "namespace a {\nstruct B {\n  int c() const\n  {\n    if (d) { e(); }\n    return 1;\n  }\n};\n}\n"
+    assert [(name.split()[1], lines) for name, lines in cpp_functions(text)] == [("c()", 4)]
+
+
+@pytest.mark.parametrize("path", [*PYTHON, *CPP], ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_and_functions_are_short(path):
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 400
+    functions = python_functions(text) if path.suffix == ".py" else cpp_functions(text)
+    assert [(name, lines) for name, lines in functions if lines > 40] == []
