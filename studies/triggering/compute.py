@@ -216,9 +216,8 @@ def trigger(
     perturbed = run("perturbed", settings.amplitude)
     erupting = run("erupting", settings.amplitude, weakening, early=FALL)
     control = None if below is None else run("control", settings.amplitude, weakening, start=below)
-    amplitude = ABOVE_NOISE * settings.amplitude
+    packing, amplitude = start.packing, ABOVE_NOISE * settings.amplitude
     strong = run("strong", amplitude, time=min(settings.time, COMPARED_TIME))
-    packing = start.packing
     response = linear_response(
         packing,
         column(strong, "time"),
