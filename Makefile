@@ -2,6 +2,7 @@
 # make test        sets everything up and runs all tests
 # make readers     reads exports by OVITO and VTK, in tests
 # make fuzz        a thousand odd scenes, 300 damaged files, 60 kills; says what went wrong (an hour)
+# make plugin      builds the C++ plugin anew, after an edit of it
 # make check       format, lint and types
 # make benchmark   time per step beside LAMMPS's own granular styles; what each part of a scene costs; where an increment's
 #                  time goes; the onset, solved and scanned; error against run time; growth with size
@@ -20,7 +21,7 @@ PYTHON_SOURCES := $(shell find lammps_inputs analysis pywrap figures studies src
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: reproduce test readers fuzz check format benchmark pictures wheel docs clean
+.PHONY: reproduce test plugin readers fuzz check format benchmark pictures wheel docs clean
 
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
@@ -28,6 +29,8 @@ reproduce: $(VENV)/.installed
 # Tests and checks take Python from src, where links lead to the folders: an edit of Python needs no installation
 test: $(VENV)/.test
 	PYTHONPATH=src $(BIN)/python -m pytest -q -n 2
+
+plugin: $(VENV)/.plugin
 
 # the exports, read by the programs that they are for: half a gigabyte of OVITO and VTK
 readers: $(VENV)/.test

@@ -41,7 +41,7 @@ def onset_seconds(scene: Scene) -> float:
     """CPU seconds of an onset, settling left aside.
 
     Measured with 50 to 1,000 disks up to F_x = 0.01 F_y: 1 s for 100 disks and 30 increments, of which an increment
-    costs as the number of disks to the power of 1.6 (docs/numerics.md has it between 1.4 and 1.7).
+    costs as the number of disks to the power of 1.6 (docs/benchmarks.md has exponents from 1.1 to 1.7).
     """
     return 0.03 * increments(scene) * (disks_of(scene) / 100) ** 1.6
 
