@@ -1,9 +1,8 @@
 r"""Where a pair of eigenvalues enters or leaves the real axis: the root of its discriminant.
 
-Two eigenvalues that meet differ as the square root of the distance to the exceptional point, which root finders and
-scans handle badly. Their discriminant :math:`D(F) = (\lambda_1 - \lambda_2)^2` goes through zero linearly and is smooth
-on both sides (:mod:`~faultgouge.analysis.onset.pair`). A few secant steps bracket its root. Five points close to the
-root then give the last digits, and say how many there are. `smooth_root` does so for any function of the load.
+The discriminant :math:`D(F) = (\lambda_1 - \lambda_2)^2` goes through zero linearly and is smooth on both sides
+(:mod:`~faultgouge.analysis.onset.pair`). A few secant steps bracket its root. Five points close to the root then give
+the last digits, and say how many there are. `smooth_root` does so for any function of the load.
 
 **Coalescence or not.** An edge is a coalescence if D passes through zero along a straight line at distances far below
 the increment; there :math:`|y^H x| \to 0`. A mere crossing touches D = 0 without a change of sign. If D jumps, the
