@@ -122,8 +122,6 @@ class Limits:
     by."""
     depth: int = 2
     """How often parts are divided again; the finest are a sixteenth."""
-    near: int = 12
-    """Modes among which a pair is looked for that clusters announce where the operator has another pair."""
     kept: float = 3e8
     """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision; a larger
     basis never exists as a whole."""

@@ -23,15 +23,13 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.linalg import ArpackError
 
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing import Floats
-from ..sparse_lu import SingularMatrixError
 from .basis import Basis, Cluster, Levels
 from .dense import all_windows
 from .dip import dip_between
-from .edge import Edge, Family, LostPairError, complex_pair_near, edge_from_inside, leads_back
+from .edge import Edge, Family, LostPairError, edge_from_inside, leads_back
 from .modes import Modes
 from .pair import Pair, Place, continued
 from .ranks import ALONE, Ranks
@@ -157,7 +155,7 @@ class Sliced:
                 break
             try:
                 window = self._confirmed(candidate, there, first)
-            except (NoEquilibriumError, LostPairError, DoubtError, SingularMatrixError, ArpackError) as error:
+            except (NoEquilibriumError, LostPairError, DoubtError) as error:
                 window, doubt = None, True
                 lost = lost if isinstance(error, DoubtError) else error
             if window is not None:
@@ -265,8 +263,7 @@ class Sliced:
     def _complex_pair(self, candidate: Candidate, there: Place) -> Pair | None:
         """The pair at a load where it is complex; None if it is surely real, or not before these loads are passed."""
         place = there if candidate.inside == there.fx else self.family.at(candidate.inside)
-        guess = Pair(*place, candidate.right, candidate.left)
-        pair = continued(guess, *place, self.limits) or complex_pair_near(guess, self.limits)
+        pair = continued(Pair(*place, candidate.right, candidate.left), *place, self.limits)
         if pair is not None and pair.discriminant < 0:
             return pair
         if candidate.onset > there.fx:
