@@ -48,48 +48,49 @@ class Step:
 
     Attributes
     ----------
-    pairs : list of (Members or None, Members or None)
-        The pairs that are complex at one end at least, by their modes at the lower and at the upper load; None where
-        they are not recognised.
+    forward : ndarray of int, shape (E,)
+        The mode there of each mode here, -1 where there is none.
+    fates : list of (Pair or None, Pair or None, (Pair, Pair) or None)
+        The pairs that are complex at one end at least: at the lower and at the upper load if complex there, and at both
+        loads if recognised at both.
     """
 
     def __init__(self, here: Modes, there: Modes) -> None:
         self.here, self.there = here, there
         self.forward = assign(here, there)
         backward = {int(image): k for k, image in enumerate(self.forward)}
-        self.pairs: list[tuple[Members | None, Members | None]] = []
+        self.fates: list[tuple[Pair | None, Pair | None, tuple[Pair, Pair] | None]] = []
+        arrived = set()
         for members in here.complex_pairs:
             image = int(self.forward[members[0]]), int(self.forward[members[1]])
-            self.pairs.append((members, image if self._recognised(members, image) else None))
-        arrived = [image for _, image in self.pairs]
+            ends = self._recognised(members, image)
+            if ends is not None and there.conjugate(image):
+                arrived.add(image)
+            self.fates.append((here.pair(members), there.pair(image) if image in arrived else None, ends))
         for image in there.complex_pairs:
             if image not in arrived:
                 members = backward.get(image[0], -1), backward.get(image[1], -1)
-                self.pairs.append((members if self._recognised(members, image) else None, image))
+                self.fates.append((None, there.pair(image), self._recognised(members, image)))
 
-    def _recognised(self, members: Members, image: Members) -> bool:
-        """Whether two modes here, conjugates or both real, are the same pair as two such modes there."""
-        here, there = self.here, self.there
-        known = min(*members, *image) >= 0 and here.together(members) and there.together(image)
-        return known and here.pair(members).same_planes(there.pair(image))
+    def _recognised(self, members: Members, image: Members) -> tuple[Pair, Pair] | None:
+        """Two modes at both loads, conjugates or both real, if they are the same pair."""
+        if min(*members, *image) < 0 or not (self.here.together(members) and self.there.together(image)):
+            return None
+        before, after = self.here.pair(members), self.there.pair(image)
+        return (before, after) if before.same_planes(after) else None
 
     @property
-    def edges(self) -> list[tuple[Members, Members]]:
+    def edges(self) -> list[tuple[Pair, Pair]]:
         """The pairs that are complex at one end and real at the other: those that close, and then those that open."""
-        known = [(a, b) for a, b in self.pairs if a is not None and b is not None]
-        return [(a, b) for a, b in known if self.here.conjugate(a) != self.there.conjugate(b)]
+        return [ends for before, after, ends in self.fates if ends and not (before and after)]
 
-    def courses(self, edge: Callable[[Members, Members], Edge]) -> Iterator[Course]:
+    def courses(self, edge: Callable[[Pair, Pair], Edge]) -> Iterator[Course]:
         """The courses of all these pairs: edges by a function, and half-way for pairs that are not recognised."""
-        here, there = self.here, self.there
-        for members, image in self.pairs:
-            if members is None or image is None:
-                before, after = here.pair(members) if members else None, there.pair(image) if image else None
-                yield before, after, self.halfway(before or after)
-                continue
-            before = here.pair(members) if here.conjugate(members) else None
-            after = there.pair(image) if there.conjugate(image) else None
-            yield before, after, None if before and after else edge(members, image)
+        for before, after, ends in self.fates:
+            if before and after:
+                yield before, after, None
+            else:
+                yield before, after, edge(*ends) if ends else self.halfway(before or after)
 
     def halfway(self, pair: Pair | None) -> Edge:
         """An edge of a pair somewhere in this step."""
@@ -177,9 +178,9 @@ class Dense:
         step = Step(here.modes, there.modes)
         edge = self._solved.get((here.fx, there.fx))
         if edge is not None:
-            return list(step.courses(lambda *_: edge)), []
+            return list(step.courses(lambda *ends: edge)), []
         divide = self._between(step) if there.fx - here.fx > self.family.narrowest else []
-        return (None if divide else list(step.courses(lambda *pair: self._edge(step, *pair)))), divide
+        return (None if divide else list(step.courses(lambda *ends: self._edge(step, *ends)))), divide
 
     def record(self, sure: list[Course]) -> None:
         """Carry the open windows over an increment."""
@@ -231,10 +232,9 @@ class Dense:
         """Where a step is to be divided."""
         here, there = step.here, step.there
         halfway = 0.5 * (here.fx + there.fx)
-        middle = halfway if any(None in pair for pair in step.pairs) else step.hidden_window(self.family)
+        middle = halfway if any(ends is None for *_, ends in step.fates) else step.hidden_window(self.family)
         if middle is None and step.edges:
-            members, image = step.edges[0]
-            solution = self._solution(here.pair(members), there.pair(image))
+            solution = self._solution(*step.edges[0])
             if solution is None:
                 middle = halfway
             elif here.fx < solution[1].fx < solution[2].fx < there.fx:
@@ -246,9 +246,8 @@ class Dense:
             return []
         return between(lambda fx: Load(self.family.at(fx)), here.fx, middle, there.fx)
 
-    def _edge(self, step: Step, members: Members, image: Members) -> Edge:
+    def _edge(self, step: Step, here: Pair, there: Pair) -> Edge:
         """The edge of a pair, half the step wide if it cannot be solved for."""
-        here, there = step.here.pair(members), step.there.pair(image)
         solution = self._solution(here, there)
         return step.halfway(there) if solution is None else solution[0]
 
@@ -263,14 +262,8 @@ class Dense:
 def all_windows(family: Family, loads: Floats, screening: Screening | None = None) -> tuple[Window, ...]:
     """All windows of a family of matrices between the first and the last of increasing loads.
 
-    Perturbation theory is of finite order. Should all modes contradict it, the ramp is walked again without it.
-
-    Parameters
-    ----------
-    family : Family
-    loads : ndarray, shape (S,)
-    screening : callable, optional
-        Names the pairs that may meet; a `Screen` by default.
+    `screening` names the pairs that may meet, a `Screen` by default. It is of finite order: should all modes contradict
+    it, the ramp is walked again without it.
     """
     try:
         return _walked(Dense(family, screening or Screen(family.limits)), loads)

@@ -1,9 +1,8 @@
 r"""Where a pair of eigenvalues enters or leaves the real axis: the root of its discriminant.
 
-Two eigenvalues that meet differ as the square root of the distance to the exceptional point, which root finders and
-scans handle badly. Their discriminant :math:`D(F) = (\lambda_1 - \lambda_2)^2` goes through zero linearly and is smooth
-on both sides (:mod:`~faultgouge.analysis.onset.pair`). A few secant steps bracket its root. Five points close to the
-root then give the last digits, and say how many there are. `smooth_root` does so for any function of the load.
+The discriminant :math:`D(F) = (\lambda_1 - \lambda_2)^2` goes through zero linearly and is smooth on both sides
+(:mod:`~faultgouge.analysis.onset.pair`). A few secant steps bracket its root. Five points close to the root then give
+the last digits, and say how many there are. `smooth_root` does so for any function of the load.
 
 **Coalescence or not.** An edge is a coalescence if D passes through zero along a straight line at distances far below
 the increment; there :math:`|y^H x| \to 0`. A mere crossing touches D = 0 without a change of sign. If D jumps, the
@@ -13,21 +12,17 @@ change".
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.sparse import csc_array, csr_array, eye_array
-from scipy.sparse.linalg import LinearOperator, eigs
+from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError
 from ..packing import Floats
-from ..sparse_lu import symmetric_lu
-from ..spectrum import believable, unit_rounding
 from .limits import LIMITS, Limits
-from .modes import Modes, Operator, span
+from .modes import Modes, Operator
 from .pair import Pair, Place, continued
 
 Kind = Literal["coalescence", "contact change", "start"]
@@ -234,29 +229,3 @@ def leads_back(family: Family, outside: Pair, inside: Pair) -> bool:
     """Whether a real pair becomes the complex one from which it was followed."""
     returned = continued(outside, inside.fx, inside.matrix, family.limits)
     return returned is not None and returned.discriminant < 0 and returned.same_planes(inside)
-
-
-def complex_pair_near(guess: Pair, limits: Limits = LIMITS) -> Pair | None:
-    """A complex pair among the modes about a guess that is no good, as where a contact opened; None if all are real.
-
-    By ARPACK with shift and inversion.
-    """
-    matrix, shift = guess.matrix, guess.mean + 0.1 * guess.spread
-    factors = symmetric_lu(csc_array(matrix - shift * eye_array(matrix.shape[0])))
-    found = []
-    for trans, operator in (("N", matrix), ("T", matrix.T)):
-        inverse = LinearOperator(matrix.shape, matvec=partial(factors.solve, trans=trans), dtype=np.float64)
-        start = np.random.default_rng(0).standard_normal(matrix.shape[0])
-        found.append(eigs(operator, limits.near, sigma=shift, OPinv=inverse, v0=start))
-    (values, right), (others, left) = found
-    rounding = unit_rounding(matrix.data)
-    for k in np.argsort(np.abs(values - guess.mean)):
-        same = int(np.argmin(np.abs(others - values[k].conj())))  # y^H A = lambda y^H is A^T y = conj(lambda) y
-        overlap = abs(np.vdot(left[:, same], right[:, k]))
-        if values[k].imag > 0 and believable(values[k], overlap, rounding):
-            rough = Pair(guess.fx, matrix, span(right[:, [k]]), span(left[:, [same]]))
-            pair = continued(rough, guess.fx, matrix, limits)
-            if pair is None:
-                raise LostPairError.of(rough, f"at F_x = {guess.fx:.10g}")
-            return pair
-    return None

@@ -5,11 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limits:
-    """What the search takes for small, near, many and long.
-
-    The defaults are meant for packings. Tests choose others to lead a small family of matrices down the way of a large
-    one.
-    """
+    """What the search takes for small, near, many and long; the defaults are meant for packings."""
 
     # Sizes at which the way changes
 
@@ -81,8 +77,8 @@ class Limits:
     """Modes of a slice on either side beyond those of its clusters, in second order. What is farther away changes
     levels by less than (coupling / spacing)^2 / 30 of their spacing."""
     mixing: float = 0.1
-    """Typical coupling within clusters, in level spacings, up to which a basis is used: with the modes outside at least
-    `margin` spacings away, (mixing / margin)^2 = 2.5e-5 of the coupling is what the second order leaves out."""
+    """Typical coupling within clusters, in level spacings, up to which a basis is used: with other modes `margin`
+    spacings away, the second order leaves out (mixing / margin)^2 = 2.5e-5 of the coupling."""
 
     # Slices of the spectrum
 
@@ -99,15 +95,13 @@ class Limits:
     last_look: int = 200
     """Blocks at the most."""
     drift: float = 1e-14
-    """Product of a new vector with the first block from which on blocks are made orthogonal twice. It is rounding at
-    first, 1e-16, and grows once an eigenvector has been found to all digits; the product with that eigenvector is
-    larger by the root of their number and seen a few blocks late. The vectors of a slice are orthogonal to some 1e-12,
-    and to 1.2e-11 at the worst (77 slices of seven matrices of 400 to 29,000 coordinates)."""
+    """Product of a new vector with the first block from which on blocks are made orthogonal twice: rounding at first,
+    1e-16, it grows once an eigenvector has been found to all digits. The vectors of a slice are then orthogonal to
+    1.2e-11 at the worst (77 slices of seven matrices of 400 to 29,000 coordinates)."""
     accurate: float = 1e-2
-    """Residual of the eigenvectors of a slice, in mean distances of eigenvalues. It is asked for in the inverse, in
-    which modes far from the shift weigh less: with S itself up to 0.2 was measured (29,000 coordinates). It enters an
-    eigenvalue as its square over the distance of modes outside, ten such distances and more: 4e-6 at the most was
-    measured. An eigenvalue may be off its Rayleigh quotient with S by as much."""
+    """Residual of the eigenvectors of a slice, in mean distances of eigenvalues, as of the inverse. It enters an
+    eigenvalue as its square over the distance of modes outside: 4e-6 at the most was measured (29,000 coordinates). An
+    eigenvalue may be off its Rayleigh quotient with S by as much."""
 
     # The search in slices
 
@@ -118,10 +112,8 @@ class Limits:
     """Narrowest windows of clusters that are looked for, in increments: the clusters' own error is larger."""
     excess: float = 0.2
     """What is added to the antisymmetric couplings of a cluster, in units of mixing^2 times the spacing of its levels.
-    Whether two modes turn complex is decided by the difference of their symmetric and antisymmetric coupling, which may
-    be far smaller than both. Modes beyond a slice, and the third order, change the difference by about a tenth of that
-    unit (360 disks, mixing of 0.17: 0.02 where the unit is 0.37). So pairs are announced from a little before, and the
-    operator decides."""
+    Modes beyond a slice, and the third order, change the difference of both couplings, which decides, by about a tenth
+    of that unit (360 disks). So pairs are announced from a little before, and the operator decides."""
     dips: int = 12
     """Loads at which the discriminant of an announced pair is looked at before its sign is in doubt. One or two tell of
     an avoided crossing."""
@@ -130,8 +122,6 @@ class Limits:
     by."""
     depth: int = 2
     """How often parts are divided again; the finest are a sixteenth."""
-    near: int = 12
-    """Modes among which a pair is looked for that clusters announce where the operator has another pair."""
     kept: float = 3e8
     """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision; a larger
     basis never exists as a whole."""

@@ -11,22 +11,19 @@ are smooth functions of the load where the two eigenvectors become parallel, at 
 **Continuation.** The bases of a neighbouring operator are improved by inverse iteration,
 :math:`V \leftarrow (A - \sigma)^{-1} V`, :math:`U \leftarrow (A - \sigma)^{-T} U`, with one factorisation for all
 steps. The error falls by :math:`|\lambda - \sigma| / |\lambda_3 - \sigma|` a step, :math:`\lambda_3` the closest of the
-other eigenvalues. The shift stands off the pair by the size of B - mean: closer to a coalescence the common eigenvector
-would dominate the inverse, and rounding would drown the second direction. A third eigenvalue may be closer to that
-shift than the pair is; then shifts on the other side and nearer by are tried. A complex pair is also found by its
-eigenvectors, with its own eigenvalue as the shift: no other eigenvalue is nearer than the real axis.
+other eigenvalues. The shift stands off the pair by the size of B - mean, or the common eigenvector would dominate the
+inverse close to a coalescence. If a third eigenvalue is closer to that shift, others are tried. A complex pair is also
+found by its eigenvectors, with its own eigenvalue as the shift: no other eigenvalue is nearer than the real axis.
 
-**Acceptance.** The residuals :math:`A V - V (V^T A V)`, and those on the left, must be at the level of rounding. Then V
-and U belong to an operator that differs from A by no more; and as B takes both, the error of D is the product of the
-two residuals over the distance of the other modes. The planes must also be those of the pair that is followed.
+**Acceptance.** The residuals :math:`A V - V (V^T A V)`, and those on the left, must be at the level of rounding: the
+error of D is their product over the distance of the other modes. The planes must also be those of the pair.
 
 **Large operators.** There a factorisation costs as much as a hundred solutions. The factors P of a neighbour serve as
 well in *residual inverse iteration* (Neumaier, SIAM J. Numer. Anal. 22, 914 (1985)),
 
 .. math:: V \leftarrow V - P^{-1} (A V - V (V^T A V)) ,
 
-which is inverse iteration where :math:`P = A - \sigma` and ends at an invariant subspace of A whatever P is. So sparse
-factors need no pivoting.
+which ends at an invariant subspace of A whatever P is. So sparse factors need no pivoting.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -182,7 +179,7 @@ def continued(pair: Pair, fx: float, matrix: csr_array, limits: Limits = LIMITS)
     Returns
     -------
     Pair or None
-        None if the iteration does not converge to these planes: other modes are too close, or the neighbour is too far.
+        None if the iteration does not converge to these planes.
     """
     for planes, inverse, most in _iterations(pair, replace(pair, fx=fx, matrix=matrix), limits):
         found = _invariant(matrix, planes, most, limits)

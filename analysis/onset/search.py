@@ -137,28 +137,23 @@ def find_onset(
 ) -> Onset:
     """The windows of complex eigenvalues between the smallest and the largest load.
 
-    Of a packing of up to `Limits.all_windows` disks these are all windows. Of a larger packing it is the first, and
-    loads beyond it are not asked for.
+    Of a packing of up to `Limits.all_windows` disks these are all; of a larger one it is the first.
 
     Parameters
     ----------
     equilibrium : callable
-        fx -> Packing in equilibrium. It is called with the given loads in increasing order, and between calls
-        for the loads a and b with loads between a and b, in any order; there it best starts from its
-        equilibrium at a. Where there is none in between it may raise a NoEquilibriumError: the search then closes
-        in on it from either side, and an edge in what is left is known to half its width. All other errors reach the
-        caller.
+        fx -> Packing in equilibrium. It is called with the given loads in increasing order, and between calls for the
+        loads a and b with loads between these, in any order. There it may raise a NoEquilibriumError, and the search
+        goes around it. All other errors reach the caller.
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
     narrowest : float, optional
-        Windows narrower than this are not looked for, force; 1e-7 of the largest |load| by default. Such a
-        pair would grow more slowly than any run can show. Of a large packing it is no less than a thousandth of an
-        increment.
+        Windows narrower than this are not looked for, force; 1e-7 of the largest |load| by default. Of a large packing
+        it is no less than a thousandth of an increment.
     modes : tuple of (int, int), optional
         Search these modes alone, and for their first window: numbers of the first one and of the first one beyond, by
-        frequency, the lowest being 0. The modes of the symmetric part are counted, at the load where the search
-        stands. Parts of a spectrum that are searched apart, on machines of their own, have together the same first
-        window as all of it.
+        frequency, the lowest being 0, of the symmetric part at the load where the search stands. Parts that are
+        searched apart, on machines of their own, have together the same first window as all.
     watch : callable, optional
         Told in words what is being looked at in a large packing.
     ranks : Ranks, optional

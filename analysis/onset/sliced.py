@@ -19,18 +19,17 @@ its kind, so a pair is followed from inside of its window to the edge.
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.linalg import ArpackError
 
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing import Floats
-from ..sparse_lu import SingularMatrixError
 from .basis import Basis, Cluster, Levels
 from .dense import all_windows
 from .dip import dip_between
-from .edge import Edge, Family, LostPairError, complex_pair_near, edge_from_inside, leads_back
+from .edge import Edge, Family, LostPairError, edge_from_inside, leads_back
 from .modes import Modes
 from .pair import Pair, Place, continued
 from .ranks import ALONE, Ranks
@@ -44,18 +43,11 @@ At = tuple[float, Levels]
 """A load and the operator there in a basis."""
 
 
-@dataclass(frozen=True)
-class FirstWindow:
-    """What is found of the first window.
+class FirstWindow(NamedTuple):
+    """The first window, whose fx_end is None where the pair is complex at the next load; None if there is none.
 
-    Attributes
-    ----------
-    window : Window or None
-        None if all eigenvalues are real. Its fx_end is None if the pair is complex at the load above the onset, of the
-        finest increments that were made.
-    doubtful : tuple of (float, float)
-        The finest increments on which clusters announce a pair that the operator was not seen to have: an earlier
-        window may hide there.
+    `doubtful` are the finest increments before it on which clusters announce a pair that the operator was not seen to
+    have.
     """
 
     window: Window | None
@@ -149,10 +141,9 @@ class Sliced:
             return []
 
     def _earliest(self, candidates: list[Candidate], there: Place, finest: bool) -> tuple[Window | None, bool]:
-        """The first window of the operator itself, and whether that is in doubt.
+        """The first window of the operator itself, and whether that is in doubt, at which the search ends.
 
-        At the first doubt the search ends, except on the finest increments. There an error, of a complex pair that
-        cannot be followed or a load without equilibrium, is raised if no window has been found beside it.
+        On the finest increments it goes on, and an error is raised if no window has been found beside it.
         """
         here, reach = self._passed[-1], 2 * self.limits.reach
         first: Window | None = None
@@ -164,7 +155,7 @@ class Sliced:
                 break
             try:
                 window = self._confirmed(candidate, there, first)
-            except (NoEquilibriumError, LostPairError, DoubtError, SingularMatrixError, ArpackError) as error:
+            except (NoEquilibriumError, LostPairError, DoubtError) as error:
                 window, doubt = None, True
                 lost = lost if isinstance(error, DoubtError) else error
             if window is not None:
@@ -272,8 +263,7 @@ class Sliced:
     def _complex_pair(self, candidate: Candidate, there: Place) -> Pair | None:
         """The pair at a load where it is complex; None if it is surely real, or not before these loads are passed."""
         place = there if candidate.inside == there.fx else self.family.at(candidate.inside)
-        guess = Pair(*place, candidate.right, candidate.left)
-        pair = continued(guess, *place, self.limits) or complex_pair_near(guess, self.limits)
+        pair = continued(Pair(*place, candidate.right, candidate.left), *place, self.limits)
         if pair is not None and pair.discriminant < 0:
             return pair
         if candidate.onset > there.fx:
@@ -310,10 +300,9 @@ def first_window(
     watch: Watch = lambda says: None,
     ranks: Ranks = ALONE,
 ) -> FirstWindow:
-    """The first window of complex eigenvalues of a family of large matrices, without all their eigenvalues.
+    """The first window of a family of large matrices; arguments are as of :func:`~faultgouge.analysis.find_onset`.
 
-    `loads` increase. Those beyond the one above the onset are not asked for, except those of `Limits.ahead` increments;
-    `modes`, `watch` and `ranks` are those of :func:`~faultgouge.analysis.find_onset`.
+    Loads beyond the one above the onset are not asked for, except those of `Limits.ahead` increments.
 
     Raises
     ------
@@ -322,10 +311,8 @@ def first_window(
     LostPairError
         If a complex pair cannot be followed to its onset, not even in the finest parts of its increment, and no other
         window is found there.
-    SliceError
-        If a part of the spectrum is not found.
-    ValueError
-        If the packing has none of these modes.
+    SliceError, ValueError
+        If a part of the spectrum is not found, or the packing has none of these modes.
     """
     oracle = Sliced(family, modes, watch, ranks)
     here = family.at(loads[0])

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import count, pairwise
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -192,13 +192,12 @@ class _Spectrum:
         top = float(eigsh(self.matrix, k=1, which="LA", tol=1e-3, v0=start, return_eigenvectors=False)[0])
         places = np.array([-self.bound, -1e-9 * self.bound, 1.01 * top])
         numbers = np.array([0, *self.counted(pool, places[1:2]), size])
-        for turn in count():
+        while True:
             wanted = (numbers[1:] > first) & (numbers[:-1] < stop)
             wide = np.flatnonzero(wanted & (np.diff(numbers) > self.limits.coarse) & (np.diff(places) > 1e-6 * top))
             if len(wide) == 0:
                 break
-            share = self._share(numbers[wide], numbers[wide + 1], first, stop) if turn % 2 == 0 else 0.5
-            between = places[wide] + share * (places[wide + 1] - places[wide])
+            between = places[wide] + 0.5 * (places[wide + 1] - places[wide])
             numbers = np.insert(numbers, wide + 1, self.counted(pool, between))
             places = np.insert(places, wide + 1, between)
         numbers, last = np.unique(numbers[::-1], return_index=True)
@@ -207,17 +206,6 @@ class _Spectrum:
         borders = PchipInterpolator(numbers, places[::-1][last])(ends)
         middles = 0.5 * (borders[:-1] + borders[1:])
         return [(float(middle), (int(a), int(b))) for middle, (a, b) in zip(middles, pairwise(ends), strict=True)]
-
-    def _share(self, low: Indices, high: Indices, first: int, stop: int) -> Floats:
-        """Where to divide intervals that hold the eigenvalues of these numbers, as if these lay there evenly.
-
-        In halves, except where little of an interval is wanted: then that little, and half of `Limits.coarse` on either
-        side, is cut off.
-        """
-        room = self.limits.coarse // 2
-        start, end = np.maximum(low, first - room), np.minimum(high, stop + room)
-        target = np.where(start > low, start, np.where(end < high, end, 0.5 * (low + high)))
-        return np.asarray((target - low) / (high - low))
 
     def slice_about(self, shift: float, own: tuple[int, int], margin: int) -> Slice:
         """The eigenvalues of these numbers, which are about the shift, by block Lanczos."""

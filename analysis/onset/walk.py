@@ -17,14 +17,9 @@ from typing import Protocol, TypeVar
 
 from ..errors import NoEquilibriumError
 
-At = TypeVar("At")
-"""What an oracle has of a load: the operator, or all of its modes."""
-
-Announced = TypeVar("Announced")
-"""What an oracle announces of an increment."""
-
-Sure = TypeVar("Sure")
-"""What an oracle is sure of."""
+At = TypeVar("At")  # what an oracle has of a load: the operator, or all of its modes
+Announced = TypeVar("Announced")  # what an oracle announces of an increment
+Sure = TypeVar("Sure")  # what an oracle is sure of
 
 
 class Oracle(Protocol[At, Announced, Sure]):

@@ -26,16 +26,13 @@ class Window:
         The double eigenvalue at the onset (the real part of the pair if it does not coalesce there), 1 /
         time^2.
     error : float
-        Uncertainty of fx_onset: twice the scatter of the discriminant over its slope for a coalescence, the
-        bracket otherwise; and what the equilibria's residual r amounts to. A packing out of balance by r is
-        the exact equilibrium of other loads, and if the discriminant is as sensitive to any force as to those
-        of the n top disks, fx is uncertain by r / n^(1/2). How the path of equilibria depends on the
-        increments is not in it.
+        Uncertainty of fx_onset: twice the scatter of the discriminant over its slope for a coalescence, the bracket
+        otherwise; and r / n^(1/2) for equilibria of residual r with n top disks: what is out of balance by r is exact
+        at other loads. How the path of equilibria depends on the increments is not in it.
     end_error : float or None
         The same for fx_end.
     overlap : float
-        Smallest |y^H x| met at the onset; it vanishes at an exceptional point, to the root of the rounding
-        error.
+        Smallest |y^H x| met at the onset; at an exceptional point it is the root of the rounding error.
     kind : {"coalescence", "contact change", "start"}
         What begins the window: two real eigenvalues that meet; a jump of the equilibrium; or nothing, as the pair is
         complex at the smallest load.
