@@ -113,6 +113,7 @@ def path(ramp):
 
 
 @pytest.mark.parametrize(("cn", "onset", "digits"), [(1.0, 0.0218328, 1e-7), (10.0, 0.02235, 1e-5)])
+@pytest.mark.slow
 def test_reference_packing_with_normal_dashpots(path, cn, onset, digits):
     """The onsets that an independent computation had found, and LAPACK's root of the same to 1e-9."""
     damped = dissipating(path, cn=cn)
@@ -132,6 +133,7 @@ def undamped(path):
 
 
 @pytest.mark.parametrize(("cn", "ct"), [(1.0, 0.0), (0.0, 1.0)])
+@pytest.mark.slow
 def test_limit_of_weak_dashpots(path, undamped, cn, ct):
     """From the undamped pair, and from dashpots of 1e-3."""
     predicted = weak_limit(dissipating(path, cn, ct), [0.019, 0.02, 0.021], undamped)
@@ -143,6 +145,7 @@ def test_limit_of_weak_dashpots(path, undamped, cn, ct):
     assert predicted.frequency == pytest.approx(measured.frequency, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_balanced_dashpots_leave_the_onset_alone(path, undamped):
     ratio = balancing_ratio(path(undamped.fx_onset), undamped)
     assert ratio > 0
@@ -152,6 +155,7 @@ def test_balanced_dashpots_leave_the_onset_alone(path, undamped):
     assert max(off) < undamped.fx_onset - 1e-10
 
 
+@pytest.mark.slow
 def test_drag_shifts_the_onset_to_where_the_growth_exceeds_it(path, undamped):
     """The closed form of the pair against all modes; 2 |Im omega| = 1/tau to second order."""
     tau = 100.0

@@ -171,6 +171,7 @@ def pairs(packings):
     return pair_forms(packings, DOUBLE_EIGENVALUE)
 
 
+@pytest.mark.slow
 def test_pair_is_the_normal_form_without_an_approximation(packings, pairs):
     for packing, pair in zip(packings, pairs, strict=True):
         operator = np.asarray(full_operator(packing) @ np.eye(300))

@@ -10,6 +10,7 @@ ONSETS = {1.0: 0.0218330564080, 0.8: 0.0191432059561}
 
 
 @pytest.mark.parametrize("case", [0, 1])
+@pytest.mark.slow
 def test_loaded_packing(reference, ramp, case):
     """Newton stops at 3e-11 of force; over stiffnesses of 1e3 and slips of 1e-6 these digits are left."""
     expected = reference["cases"][case]

@@ -66,6 +66,7 @@ def near(ramp):
     return [quasistatic.equilibrium(coarse(0.02), 0.0205), quasistatic.equilibrium(coarse(0.021), 0.0218)]
 
 
+@pytest.mark.slow
 def test_the_gain_is_the_largest_singular_value(near):
     """Of the propagator of a real packing at its time, and at others around; the start is one that reaches it."""
     for packing in near:
@@ -93,6 +94,7 @@ def test_it_grows_towards_the_onset_and_dissipation_takes_it_away(near):
     assert 1 <= transient_gain(damped).gain < 0.5 * close
 
 
+@pytest.mark.slow
 def test_drag_takes_no_more_than_its_share(near):
     """Drag damps all modes alike: it leaves at least exp(-t/tau) of the gain at its time, but for the phase."""
     free = transient_gain(near[0])
@@ -102,6 +104,7 @@ def test_drag_takes_no_more_than_its_share(near):
         assert dragged.gain > 1.5
 
 
+@pytest.mark.slow
 def test_energy_counts_velocities_as_well(near):
     """The start has energy 1/2, and what it becomes has the gain times as much; no less than a start at rest."""
     found = transient_gain(near[0], "energy")

@@ -61,12 +61,14 @@ def test_ramp_as_json(faultgouge, tmp_path):
 
 
 @pytest.mark.ranks
+@pytest.mark.slow
 def test_two_ranks_write_the_same_run(faultgouge, tmp_path):
     assert faultgouge("ramp", "scene.toml", "-o", "one.h5").returncode == 0
     assert faultgouge("ramp", "scene.toml", "-o", "two.h5", ranks=2).returncode == 0
     assert_same_datasets(tmp_path / "one.h5", tmp_path / "two.h5")
 
 
+@pytest.mark.slow
 def test_a_ramp_that_was_cut_off_goes_on(faultgouge, tmp_path):
     assert faultgouge("ramp", "scene.toml", "-o", "whole.h5").returncode == 0
     (tmp_path / "scene.toml").write_text(SCENE.replace("until = 4e-3", "until = 2e-3"))
@@ -76,6 +78,7 @@ def test_a_ramp_that_was_cut_off_goes_on(faultgouge, tmp_path):
     assert_same_datasets(tmp_path / "whole.h5", tmp_path / "parts.h5")
 
 
+@pytest.mark.slow
 def test_run_of_another_scene_is_not_continued(faultgouge, tmp_path):
     assert faultgouge("settle", "scene.toml").returncode == 0
     (tmp_path / "scene.toml").write_text(SCENE.replace("fy = 3.0", "fy = 3.00001"))
@@ -84,6 +87,7 @@ def test_run_of_another_scene_is_not_continued(faultgouge, tmp_path):
     assert "run.h5 holds a run of another scene (load.fy is 3.0 there and 3.00001 here)" in done.stderr
 
 
+@pytest.mark.slow
 def test_perturb_writes_the_series(faultgouge, tmp_path):
     done = faultgouge("perturb", "scene.toml", "--json")
     assert done.returncode == 0, done.stderr
@@ -96,6 +100,7 @@ def test_perturb_writes_the_series(faultgouge, tmp_path):
         assert file.series("undamped")["msd"].tolist() == series["msd"]
 
 
+@pytest.mark.slow
 def test_spectrum_from_run_file_and_from_memory(faultgouge, tmp_path):
     assert faultgouge("ramp", "scene.toml").returncode == 0
     printed = json.loads(faultgouge("spectrum", "run.h5", "--json").stdout)
@@ -106,6 +111,7 @@ def test_spectrum_from_run_file_and_from_memory(faultgouge, tmp_path):
 
 
 @pytest.mark.ranks
+@pytest.mark.slow
 def test_spectrum_of_a_decks_dumps(faultgouge, lmp, tmp_path):
     done = lmp(DECKS / "ramp.in", "-var", "decks", str(DECKS), "-var", "until", "2e-3", ranks=2)
     assert done.returncode == 0, done.stdout[-2000:]
@@ -117,6 +123,7 @@ def test_spectrum_of_a_decks_dumps(faultgouge, lmp, tmp_path):
     assert printed["residual"] < 1.2e-10
 
 
+@pytest.mark.slow
 def test_onset_as_json(faultgouge, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE.replace("until = 4e-3", "until = 0.022"))
     done = faultgouge("onset", "scene.toml", "--json")
@@ -126,6 +133,7 @@ def test_onset_as_json(faultgouge, tmp_path):
     assert result["windows"][0].keys() >= {"fx_onset", "fx_end", "lambda", "error"}
 
 
+@pytest.mark.slow
 def test_onset_among_some_modes(faultgouge, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE.replace("until = 4e-3", "until = 0.022"))
     done = faultgouge("onset", "scene.toml", "--modes", "0:285", "--json")
@@ -191,6 +199,7 @@ def test_bad_file_is_refused(faultgouge, arguments, says):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_every_command_has_help_with_an_example(faultgouge):
     commands = ["settle", "ramp", "perturb", "onset", "spectrum", "explain", "report", "stability", "reproduce"]
     overview = faultgouge("--help").stdout

@@ -28,6 +28,7 @@ def _scene(tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
 
 
+@pytest.mark.slow
 def test_spectrum_says_how_far_a_stable_packing_moves(faultgouge, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE.replace(f'file = "{REFERENCE}"', "disks = 30\nseed = 4"))
     assert faultgouge("ramp", "scene.toml").returncode == 0
@@ -43,6 +44,7 @@ def test_spectrum_says_how_far_a_stable_packing_moves(faultgouge, tmp_path):
     assert f"{energy.gain:.6g} in energy" in said
 
 
+@pytest.mark.slow
 def test_onset_with_dissipation_as_json(faultgouge, tmp_path):
     """All modes at four loads; no contact changes on the way, and the onset hangs on the increment by 2e-11."""
     scene = SCENE.replace("until = 4e-3", "until = 0.022").replace("step = 1e-3", "step = 5.5e-3")
@@ -69,6 +71,7 @@ def test_onset_with_dissipation_as_json(faultgouge, tmp_path):
         ("ct = 1.0", ("--modes", "0:10"), 2, "--modes goes without [damping]"),
     ],
 )
+@pytest.mark.slow
 def test_what_there_is_no_onset_of(faultgouge, tmp_path, damping, arguments, code, says):
     (tmp_path / "scene.toml").write_text(SCENE + f"[damping]\n{damping}\n")
     done = faultgouge("onset", "scene.toml", *arguments)

@@ -85,6 +85,7 @@ def scene(tmp_path):
 @pytest.mark.ranks
 @pytest.mark.parametrize(("ranks", "rank"), [(1, -1), (2, -1), (2, 0), (2, 1)])
 @pytest.mark.parametrize("call", [1, 30])
+@pytest.mark.slow
 def test_its_sentence_reaches_the_command(scene, ranks, rank, call):
     command = [sys.executable, "-c", FAILING, str(call), str(rank)]
     if ranks > 1:
@@ -98,6 +99,7 @@ def test_its_sentence_reaches_the_command(scene, ranks, rank, call):
 @pytest.mark.ranks
 @pytest.mark.parametrize("search", [[], ["--modes", "0:39"]], ids=["all_windows", "slices"])
 @pytest.mark.parametrize("ranks", ["1", "2"])
+@pytest.mark.slow
 def test_no_call_is_taken_for_a_missing_onset(scene, ranks, search):
     command = [BIN / "mpiexec", "-n", ranks, sys.executable, "-c", EVERY_CALL, *search]
     done = subprocess.run(command, cwd=scene, capture_output=True, text=True, timeout=300)

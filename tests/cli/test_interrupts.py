@@ -75,6 +75,7 @@ def equilibria(path):
 @pytest.mark.parametrize(
     ("number", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
 )
+@pytest.mark.slow
 def test_a_ramp_says_what_is_kept(tmp_path, ranks, number, code, word):
     (tmp_path / "scene.toml").write_text(SCENE)
     command = [BIN / "faultgouge", "ramp", "scene.toml"]
@@ -94,6 +95,7 @@ def test_a_ramp_says_what_is_kept(tmp_path, ranks, number, code, word):
         assert not run.complete
 
 
+@pytest.mark.slow
 def test_a_terminal_interrupts_all_processes_of_the_command(tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
     command = [BIN / "faultgouge", "perturb", "scene.toml"]
@@ -127,6 +129,7 @@ def simulates(folder):
         ("stability --quick -o out", "out has the cases that were finished; the same command begins anew and replaces"),
     ],
 )
+@pytest.mark.slow
 def test_what_begins_anew_says_so(tmp_path, command, says):
     (tmp_path / "scene.toml").write_text(SCENE)
     arguments = [BIN / "faultgouge", *command.split()]
@@ -152,6 +155,7 @@ guarded(work)
 """
 
 
+@pytest.mark.slow
 def test_a_long_call_of_a_library_does_not_hold_the_signal(tmp_path):
     command = [sys.executable, "-c", IN_A_LIBRARY]
     begun = (tmp_path / "begun").exists
@@ -201,6 +205,7 @@ def test_what_a_library_ends_is_said(tmp_path, ends, code, says):
     assert len(done.stderr.splitlines()) == (1 if says else 0)
 
 
+@pytest.mark.slow
 def test_the_work_ends_with_its_guard(tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
     running = subprocess.Popen(

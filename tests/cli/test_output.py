@@ -40,6 +40,7 @@ def written_by(faultgouge, tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_nothing_but_the_result_without_output(written_by, tmp_path):
     assert written_by("ramp", "") == ["run.h5", "scene.toml"]
     assert written_by("perturb", "") == ["perturb.h5", "run.h5", "scene.toml"]
@@ -58,6 +59,7 @@ def test_dumps_hold_the_equilibria(written_by, tmp_path):
             assert dumped.fx == stored.fx
 
 
+@pytest.mark.slow
 def test_trajectory_is_that_of_the_displacements(written_by, tmp_path):
     written_by("perturb", "[output]\ntrajectory = true\n")
     with RunFile(tmp_path / "perturb.h5") as file:

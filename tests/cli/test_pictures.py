@@ -50,6 +50,7 @@ def folder(tmp_path_factory, faultgouge_in):
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+@pytest.mark.slow
 def test_a_packing(folder, suffix, faultgouge_in):
     done = faultgouge_in(folder, "draw", "ramp.h5", "--frame", "2", "-o", f"packing.{suffix}")
     assert done.returncode == 0, done.stderr
@@ -57,6 +58,7 @@ def test_a_packing(folder, suffix, faultgouge_in):
     assert (folder / f"packing.{suffix}").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_the_pair_before_and_after_the_onset(folder, faultgouge_in):
     before = faultgouge_in(folder, "draw", "ramp.h5", "--frame", "3", "--mode", "pair", "-o", "before.png")
     assert before.returncode == 0, before.stderr
@@ -66,6 +68,7 @@ def test_the_pair_before_and_after_the_onset(folder, faultgouge_in):
     assert re.search(r"mode \d+: lambda = [\d.]+ \+- [\d.]+ i, participation ratio 0\.\d+, rotation", after.stderr)
 
 
+@pytest.mark.slow
 def test_films_of_a_run_a_ramp_and_a_mode(folder, faultgouge_in):
     for name, more in (("perturb", ()), ("ramp", ()), ("ramp", ("--mode", "pair"))):
         command = ("movie", f"{name}.h5", *more, "--seconds", "1", "--rate", "5", "--dots", "50", "-o", "film.gif")
@@ -87,6 +90,7 @@ def test_films_of_a_run_a_ramp_and_a_mode(folder, faultgouge_in):
         (("movie", "perturb.h5", "--span", "5", "6"), "its times go from 0 to"),
     ],
 )
+@pytest.mark.slow
 def test_bad_input_is_refused_in_a_sentence(folder, command, says, faultgouge_in):
     done = faultgouge_in(folder, *command)
     assert done.returncode == 2

@@ -12,6 +12,7 @@ def _short_minutes(monkeypatch):
     monkeypatch.setattr(terminal, "EVERY", 0.02)
 
 
+@pytest.mark.slow
 def test_one_long_call_is_not_silent(capsys):
     with terminal.status("settling") as show:
         time.sleep(0.5)

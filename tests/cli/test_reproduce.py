@@ -89,6 +89,7 @@ def test_reproduce(faultgouge, tmp_path):
     assert rows["time in which the fastest motion grows e-fold"].endswith(" s")
 
 
+@pytest.mark.slow
 def test_a_ramp_that_is_killed_goes_on(tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
     command = [BIN / "faultgouge", "ramp", "scene.toml", "-o"]

@@ -58,6 +58,7 @@ def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.slow
 def test_the_commands_there_and_back(faultgouge, tmp_path, stored, sheared, suffix):
     need(suffix)
     done = faultgouge("export", stored, "-o", f"packing{suffix}")
@@ -167,6 +168,7 @@ def test_mdanalysis_and_gsd_read_it(tmp_path, sheared):
         np.testing.assert_allclose(apart, 0, atol=2e-6)  # float32
 
 
+@pytest.mark.slow
 def test_what_an_export_is_refused_for(faultgouge, stored):
     for words, says in (
         (("-o", "packing.pdb"), "exports are .vtp, .xyz, .data, .gsd"),

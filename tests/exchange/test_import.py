@@ -113,6 +113,7 @@ def test_what_mdanalysis_reads_with_radii(tmp_path, sheared):
     assert "float32" in disks.remark
 
 
+@pytest.mark.slow
 def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packing):
     """Numbers with five digits: a hundredth of an overlap, and forces of the order of the load."""
     packing = reference_packing(1.0)
@@ -230,6 +231,7 @@ def test_bad_input_is_refused_in_one_sentence(tmp_path, faultgouge, sheared, cas
     assert not (tmp_path / "packing.h5").exists()
 
 
+@pytest.mark.slow
 def test_options_that_do_not_fit(tmp_path, faultgouge, sheared):
     (tmp_path / "a.dump").write_text(dump(sheared))
     (tmp_path / "scene.toml").write_text("[law]\nkn = 2e5\n[load]\nfy = 3.0\n")

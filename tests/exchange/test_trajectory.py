@@ -47,6 +47,7 @@ def opened(path, count):
     return universe
 
 
+@pytest.mark.slow
 def test_mdanalysis_steps_through_it(run):
     path, packing = run
     universe = opened(path, len(packing))

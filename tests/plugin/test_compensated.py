@@ -151,6 +151,7 @@ def test_stable_run_stays_at_the_rounding_of_low_parts(equilibrium):
     assert 0 < largest < 1e-38
 
 
+@pytest.mark.slow
 def test_response_is_linear_down_to_1e_14(equilibrium):
     packing, response = equilibrium.packing, []
     amplitudes = np.geomspace(1e-14, 1e-8, 7)

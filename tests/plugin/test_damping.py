@@ -140,6 +140,7 @@ def test_second_order_in_the_time_step(exponent, parts):
     assert 3.7 < coarse / fine < 4.3
 
 
+@pytest.mark.slow
 def test_energy_falls_as_the_matrix_says(reference_packing):
     """Without friction there is an energy; what it loses is the integral of v C v, to second order in the step."""
     start, errors = reference_packing(0.0), []
@@ -282,6 +283,7 @@ def test_adapted_dashpots_are_dashpots_from_the_start(lmp, tmp_path):
 
 
 @pytest.mark.ranks
+@pytest.mark.slow
 def test_deck_with_damping_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path):
     written = []
     settings = ["-var", "fx", "0.01", "-var", "time", "2.0", "-var", "amplitude", "1e-6"]

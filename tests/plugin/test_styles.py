@@ -107,6 +107,7 @@ def test_unknown_parameter_is_refused_by_adapt(lmp):
 
 
 @pytest.mark.ranks
+@pytest.mark.slow
 def test_weakening_friction_is_the_same_on_two_ranks(lmp, tmp_path):
     written = []
     settings = ["-var", "fx", "0.01", "-var", "time", "2.0", "-var", "amplitude", "1e-6", "-var", "v_ss", "2e-9"]

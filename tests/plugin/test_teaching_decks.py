@@ -23,6 +23,7 @@ def positions(dump: Path) -> np.ndarray:
 
 
 @pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.slow
 def test_teaching_deck_equals_the_deck_of_parts(lmp, tmp_path, stage):
     data, taught, composed, options = STAGES[stage]
     done = lmp(DECKS / "teaching" / f"{stage}.in", "-var", "data", str(DECKS / data))

@@ -38,6 +38,7 @@ def scene(precision, forced):
     ("precision", "forced"),
     [("double", "cosine"), ("compensated", "cosine"), ("double", "moving floor"), ("compensated", "sweep")],
 )
+@pytest.mark.slow
 def test_it_goes_on_to_the_bit(precision, forced, tmp_path):
     wanted = scene(precision, forced)
     *_, start = reach(wanted, wanted.perturb.fx)

@@ -297,11 +297,13 @@ def test_help_imports_nothing_heavy(tmp_path):
     assert run_command(tmp_path, "--help") == []
 
 
+@pytest.mark.slow
 def test_a_spectrum_needs_no_lammps(tmp_path):
     run_command(tmp_path, "settle", "scene.toml", "-o", "run.h5")
     assert run_command(tmp_path, "spectrum", "run.h5") == ["numpy", "scipy", "h5py"]
 
 
+@pytest.mark.slow
 def test_help_costs_little_more_than_the_libraries_that_print_it():
     """0.12 s on an idle machine; here a ratio of processor times, which a busy one leaves as it is."""
 
@@ -325,6 +327,7 @@ def datasets(path):
 
 
 @pytest.mark.parametrize(("command", "output"), [("ramp", "dumps"), ("perturb", "trajectory")])
+@pytest.mark.slow
 def test_output_changes_no_dataset(tmp_path, command, output):
     run_command(tmp_path, command, "scene.toml", "-o", "plain.h5")
     scene = tmp_path / "scene.toml"

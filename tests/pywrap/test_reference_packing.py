@@ -62,12 +62,14 @@ def test_newton_ramp(reference, reference_packing, number, increment):
 
 
 @pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.slow
 def test_overdamped_ramp(reference, reference_packing, number):
     case = reference["cases"][number]
     compare(ramped(reference_packing(case["mu"]), "overdamped", 1e-3)[-1].packing, case, rtol=1e-6, rtol_asymmetry=1e-6)
 
 
 @pytest.mark.parametrize(("mu", "sliding"), [(1.0, False), (0.05, True)])
+@pytest.mark.slow
 def test_newton_and_overdamped_dynamics_agree(reference_packing, mu, sliding):
     """With and without contacts at the bound: on a monotonic ramp they slide one way, whatever the path in a step."""
     newton, overdamped = (ramped(reference_packing(mu), method, 2e-3)[-1] for method in ("newton", "overdamped"))

@@ -108,6 +108,7 @@ def test_time_step_of_a_large_packing_is_that_of_all_eigenvalues(settled):
 
 
 @pytest.mark.ranks
+@pytest.mark.slow
 def test_same_packing_on_two_ranks(settled, tmp_path):
     script = (
         "import sys, numpy as np\n"

@@ -26,6 +26,7 @@ def ramp():
         yield found
 
 
+@pytest.mark.slow
 def test_weak_normal_dashpots_lower_the_onset(ramp):
     """From 0.0150098 to between 0.0148 and 0.0149, for C_N = 0.1 and 1 alike."""
     weak, stronger = over_strength(ramp, "cn", [0.1, 1.0], start=0.0139)
@@ -35,12 +36,14 @@ def test_weak_normal_dashpots_lower_the_onset(ramp):
     assert weak.onset == pytest.approx(weak.predicted, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_drag_raises_the_onset_to_its_crossover(ramp):
     (found,) = over_strength(ramp, "drag", [1e-2], start=0.0139)
     assert found.onset == pytest.approx(0.0150163, abs=1e-7)
     assert found.onset == pytest.approx(found.predicted, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_limit_of_weak_dashpots_is_predicted(ramp):
     """Two ratios of one packing anew, and they are those of the table."""
     known = {(each["cn"], each["ct"]): each for each in table("weak") if each["seed"] == 1}
@@ -58,6 +61,7 @@ def test_the_table_of_weak_dashpots():
     assert max(abs(each["predicted"] / each["measured"] - 1) for each in rows) < 1e-3
 
 
+@pytest.mark.slow
 def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp):
     far, dragged, near, _ = over_distance(ramp, [1e-2, 1e-3], [(0.0, 0.0), (0.0, 0.1)])
     assert dragged.gain < 0.5 * far.gain
@@ -66,6 +70,7 @@ def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp):
     assert far.gain <= far.bound
 
 
+@pytest.mark.slow
 def test_above_the_damped_onset_there_is_no_largest_gain(ramp):
     """1e-3 below the undamped onset weak dashpots make the packing unstable."""
     plain, damped = over_distance(ramp, [1e-3], [(0.0, 0.0), (1.0, 0.0)])

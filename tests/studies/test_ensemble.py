@@ -128,6 +128,7 @@ def test_first_onset_is_that_of_the_whole_ramp(scene):
     assert path[-1].fx - scene.ramp.step <= end.reach <= path[-1].fx
 
 
+@pytest.mark.slow
 def test_an_ensemble_goes_on_where_it_was_cut_off(scene, tmp_path):
     first = study.ensemble(scene, 1, tmp_path, silent)
     lines = tmp_path / "results.jsonl"
@@ -194,6 +195,7 @@ def test_stored_packings_make_no_ensemble(tmp_path):
 
 
 @pytest.mark.ranks
+@pytest.mark.slow
 def test_ranks_share_the_packings(faultgouge, tmp_path):
     toml = """
     [packing]

@@ -57,6 +57,7 @@ def included(explanation):
     return {part.name for part in explanation.parts if part.included}
 
 
+@pytest.mark.slow
 def test_what_is_in(paper, frictionless):
     always = {"floor", "periodicity"}
     assert included(paper) == always | {"tangential history", "dynamic friction", "perturbation"}
@@ -180,6 +181,7 @@ def test_turns_begin_with_either():
     assert order == ["with", "without", "without", "with"] * 2
 
 
+@pytest.mark.slow
 def test_command_prints_a_table(faultgouge):
     done = faultgouge("explain", SCENES / "minimal.toml")
     assert done.returncode == 0, done.stderr

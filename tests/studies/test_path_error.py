@@ -58,6 +58,7 @@ def test_stated_intervals_contain_the_extrapolated_onset(mu):
             assert found.error < 1e-7
 
 
+@pytest.mark.slow
 def test_a_contact_that_slides_before_the_onset_is_covered():
     """Of this packing a contact reaches the Coulomb bound before the onset: the error is bounded, not extrapolated."""
     found = {}
@@ -80,6 +81,7 @@ def test_a_contact_that_slides_before_the_onset_is_covered():
         assert error < 1e-10
 
 
+@pytest.mark.slow
 def test_onsets_with_dissipation_state_the_whole_error():
     """Beside them stands the undamped onset, with its whole error."""
     found = {}

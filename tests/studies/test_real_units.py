@@ -43,6 +43,7 @@ impact_velocity = "1 m/s"
 
 
 @pytest.mark.parametrize("damping", ["", "[damping]\ncn = 1.0\n"])
+@pytest.mark.slow
 def test_onset_in_si(tmp_path, damping):
     (tmp_path / "scene.toml").write_text(SCENE + damping)
     done = subprocess.run(

@@ -214,6 +214,7 @@ def test_parts_of_the_modes_are_merged(tmp_path):
     assert any("1200:1500" in line for line in said)
 
 
+@pytest.mark.slow
 def test_the_dry_run_counts_and_computes_nothing(faultgouge, tmp_path):
     (tmp_path / "sweep.toml").write_text(TOML)
     done = faultgouge("sweep", "sweep.toml", "-o", "out", "--dry-run")

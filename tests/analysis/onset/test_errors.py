@@ -45,6 +45,7 @@ def jumping(f):
 
 @pytest.mark.parametrize("search", [small, large])
 @pytest.mark.parametrize("operator", [crossing(0.62, -1e-4), jumping])
+@pytest.mark.slow
 def test_an_error_at_any_call_reaches_the_caller(search, operator):
     counting = Failing(operator)
     assert search(counting)
@@ -58,6 +59,7 @@ def test_an_error_at_any_call_reaches_the_caller(search, operator):
 
 @pytest.mark.parametrize("disks", [300, 50])
 @pytest.mark.parametrize("error", [LostEngineError, MemoryError])
+@pytest.mark.slow
 def test_an_engine_that_fails_is_no_packing_without_onset(ramp, disks, error):
     """Of equilibria along a ramp, with the search of a small packing and with that of a large one."""
     path, limits = ramp(1.0, 1e-3, 22), Limits(all_windows=disks)

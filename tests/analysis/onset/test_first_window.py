@@ -116,6 +116,7 @@ def test_pair_that_is_announced_and_not_found_is_told_of():
     assert searched(jumping, [0.0, 1.0]) == FirstWindow(None)
 
 
+@pytest.mark.slow
 def test_doubtful_increments_come_with_the_onset(ramp):
     """Couplings so much enlarged that clusters announce pairs that stay real, and nobody looks at these."""
     path = ramp(1.0, 1e-3, 22)

@@ -30,6 +30,7 @@ def network(size, seed):
 
 
 @pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.slow
 def test_slices_are_the_whole_spectrum(workers):
     matrix = network(34, 1)
     expected, basis = np.linalg.eigh(matrix.toarray())
@@ -75,6 +76,7 @@ def test_part_of_the_spectrum(modes):
     assert few < 0.5 * (len(shifts) - few)
 
 
+@pytest.mark.slow
 def test_degenerate_eigenvalues_are_all_found():
     """A square lattice on a torus, stiffer along one side: most eigenvalues are fourfold."""
     along = 2 * np.eye(34) - np.roll(np.eye(34), 1, axis=0) - np.roll(np.eye(34), -1, axis=0)
@@ -85,6 +87,7 @@ def test_degenerate_eigenvalues_are_all_found():
     np.testing.assert_allclose(values, expected, rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_missing_eigenvalue_is_noticed():
     """An inertia that is one too high from some shift on, as if an eigenvalue had been overlooked."""
 
@@ -96,6 +99,7 @@ def test_missing_eigenvalue_is_noticed():
         list(slices(network(34, 2), 20, factorise=wrong))
 
 
+@pytest.mark.slow
 def test_inaccurate_factors_are_noticed():
     """Factors of a matrix that is off by 2e-4: half of a mean distance of eigenvalues at their upper end."""
 
@@ -170,6 +174,7 @@ def test_ranks_that_leave_out_an_eigenvalue_at_their_border_notice():
             each.result()
 
 
+@pytest.mark.slow
 def test_ranks_find_the_same_first_window_to_the_bit():
     here, there = network(20, 6), network(20, 7)
     turn = np.random.default_rng(0).standard_normal((400, 400))

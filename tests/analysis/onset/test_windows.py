@@ -169,6 +169,7 @@ def test_no_onset_is_said_so(ramp):
 
 
 @pytest.mark.parametrize("mu", [1.0, 0.8])
+@pytest.mark.slow
 def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
     """The same windows as from all modes at every load, which are computed next to the edges alone."""
     path, decomposed, decompose = ramp(mu, 1e-3, 22), [], Modes.of
