@@ -23,6 +23,15 @@ def test_deck_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path, deck, precisio
     assert written[0] == written[1]
 
 
+@pytest.mark.ranks
+def test_ranks_share_the_disks_evenly(lmp):
+    """The box is three times as high as the disks, and LAMMPS cuts its height first."""
+    done = lmp(f"include {DECKS}/system.in\nrun 0", "-var", "decks", str(DECKS), ranks=2)
+    assert "1 by 2 by 1 MPI processor grid" in done.stdout
+    (share,) = (line.split() for line in done.stdout.splitlines() if line.startswith("Nlocal:"))
+    assert float(share[3]) <= 1.1 * float(share[1])  # the most beside the mean
+
+
 MODEL = """
 units lj
 dimension {dimension}
