@@ -31,6 +31,7 @@ def cosine(omega, duration, rows):
 
 
 @pytest.mark.parametrize("kind", ["packing", "damped"])
+@pytest.mark.slow
 def test_sampled_cosine_gives_the_response_to_a_cosine(kind, request):
     """Up to the chords of the cosine: (omega h)^2/8 of its height."""
     packing, step = request.getfixturevalue(kind), 2e-3

@@ -206,6 +206,7 @@ def test_epsilon_is_linear_in_the_load(pairs):
 
 
 @pytest.mark.parametrize("damped", [False, True])
+@pytest.mark.slow
 def test_whole_packing_follows_its_pair(packings, pairs, damped):
     """All 285 modes, started across the coalescing vectors: the normal form to the rounding of the operator."""
     at = int(np.argmin(np.abs(DISTANCES - 1e-4)))

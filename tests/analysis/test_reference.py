@@ -51,6 +51,7 @@ def test_newton_is_quadratic_to_the_rounding_floor(bed):
 
 @pytest.mark.parametrize(("increment", "count", "first"), [(1e-3, 22, 0), (2.5e-4, 88, 76)])
 @pytest.mark.parametrize("mu", [1.0, 0.8])
+@pytest.mark.slow
 def test_onset(reference, ramp, mu, increment, count, first):
     """The increment does not matter: nine digits from either, and the stated error covers what is left."""
     last = {1.0: count, 0.8: round(0.02 / increment)}[mu]

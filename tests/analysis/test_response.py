@@ -248,6 +248,7 @@ def test_dashpots_and_drag_against_the_exponential(cluster, dissipation):
     np.testing.assert_allclose(found.velocity, known[:, 18:36], atol=1e-11 * np.abs(known[:, 18:36]).max())
 
 
+@pytest.mark.slow
 def test_what_is_left_of_a_sudden_start_is_the_transfer_function(equilibrium):
     """The layer's velocity per unit of force, in and out of resonance, after the transient has died out."""
     packing = dissipative(equilibrium, cn=20.0, ct=10.0, tau=5.0)

@@ -260,6 +260,7 @@ def changed(name, place, value):
         lambda file: file.create_dataset("faultgouge/undamped/empty", (5000,), "f8", chunks=(1000,)),
     ],
 )
+@pytest.mark.slow
 def test_what_is_not_as_it_should_be_is_refused(sound, edit):
     unsealed(sound)
     with h5py.File(sound, "r+") as file:

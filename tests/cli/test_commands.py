@@ -47,6 +47,7 @@ def assert_same_datasets(one, other):
         assert np.array_equal(value, other[name], equal_nan=value.dtype.kind == "f"), name
 
 
+@pytest.mark.slow
 def test_ramp_as_json(faultgouge, tmp_path):
     done = faultgouge("ramp", "scene.toml", "--json")
     assert done.returncode == 0, done.stderr
@@ -147,6 +148,7 @@ def test_onset_among_some_modes(faultgouge, tmp_path):
         assert says in done.stderr
 
 
+@pytest.mark.slow
 def test_no_onset_is_a_failed_computation(faultgouge):
     done = faultgouge("onset", "scene.toml")
     assert done.returncode == 1
@@ -172,6 +174,7 @@ def test_no_onset_is_a_failed_computation(faultgouge):
     ],
     ids=lambda value: value[1][:30] if isinstance(value, tuple) else "",
 )
+@pytest.mark.slow
 def test_bad_input_is_refused_in_one_sentence(faultgouge, tmp_path, change, says):
     (tmp_path / "scene.toml").write_text(SCENE.replace(*change))
     done = faultgouge("perturb", "scene.toml")
@@ -192,6 +195,7 @@ def test_bad_input_is_refused_in_one_sentence(faultgouge, tmp_path, change, says
         (("rampp", "scene.toml"), "rampp"),
     ],
 )
+@pytest.mark.slow
 def test_bad_file_is_refused(faultgouge, arguments, says):
     done = faultgouge(*arguments)
     assert done.returncode == 2

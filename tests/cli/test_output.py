@@ -48,6 +48,7 @@ def test_nothing_but_the_result_without_output(written_by, tmp_path):
         file.series("trajectory")
 
 
+@pytest.mark.slow
 def test_dumps_hold_the_equilibria(written_by, tmp_path):
     written = written_by("ramp", "[output]\ndumps = true\n")
     assert {f"run.{k}.{kind}" for k in (1, 2) for kind in ("disks", "contacts", "params")} <= set(written)

@@ -119,6 +119,7 @@ def test_version_in_both_ways():
         assert re.fullmatch(r"faultgouge \S+ \(LAMMPS \S+\)\n", done.stdout), done.stderr
 
 
+@pytest.mark.slow
 def test_a_packing_shows_itself(folder):
     with RunFile(folder / "ramp.h5") as file:
         packing, same, other = file.packing(1), file.packing(1), file.packing(2)

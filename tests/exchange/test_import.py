@@ -38,6 +38,7 @@ def dump(packing, step=0, columns="id type x y z radius", count=None, z=0.0):
     return "\n".join([*head, *rows]) + "\n"
 
 
+@pytest.mark.slow
 def test_csv_with_slips_is_the_same_packing(tmp_path, faultgouge, sheared):
     (tmp_path / "packing.csv").write_text(csv(sheared))
     c = sheared.contacts
@@ -220,6 +221,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
+@pytest.mark.slow
 def test_bad_input_is_refused_in_one_sentence(tmp_path, faultgouge, sheared, case):
     name, text, says = BAD[case]
     (tmp_path / name).write_text(text(sheared))

@@ -66,6 +66,7 @@ def test_mdanalysis_steps_through_it(run):
         np.testing.assert_array_equal(frame.positions[:, :2], place[k].astype(np.float32))
 
 
+@pytest.mark.slow
 def test_its_mean_square_displacement_is_ours(run):
     from MDAnalysis.analysis.msd import EinsteinMSD
 

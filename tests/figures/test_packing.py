@@ -163,6 +163,7 @@ def test_disks_are_round(packing):
     assert draw_packing(packing).axes[0].get_aspect() == 1.0
 
 
+@pytest.mark.slow
 def test_saved_twice_gives_the_same_bytes(tmp_path, packing):
     first = save(draw_packing(packing), tmp_path / "packing.mu1.0")
     second = save(draw_packing(packing), tmp_path / "again")

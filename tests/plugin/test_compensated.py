@@ -66,6 +66,7 @@ def equilibrium(reference_packing):
 @pytest.mark.parametrize("radii", [(0.5, 0.7), (0.02, 1.0), (0.1, 0.3)])
 @pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
 @pytest.mark.parametrize("mu", [0.0, 0.5])
+@pytest.mark.slow
 def test_force_of_two_disks(overlap, radii, mu, exponent):
     """A force is right to its last place, at any overlap, inside of the box and across its end."""
     rng = np.random.default_rng(3)
@@ -140,6 +141,7 @@ def test_state_goes_through_lammps_to_the_bit(equilibrium):
             engine.displace(packing, 1e-4 * np.ones(3 * len(packing)))
 
 
+@pytest.mark.slow
 def test_stable_run_stays_at_the_rounding_of_low_parts(equilibrium):
     packing = equilibrium.packing
     largest = 0.0

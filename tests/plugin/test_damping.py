@@ -265,6 +265,7 @@ MOVE = "\nfix move all nve/disc 1.0\n"
         ),
     ],
 )
+@pytest.mark.slow
 def test_what_is_refused(lmp, extra, says):
     done = lmp(MODEL.format(decks=DECKS, fx=0.0, precision="double", extra=extra) + "run 1\n")
     assert done.returncode != 0

@@ -114,6 +114,7 @@ def test_model_of_the_refusals_runs(lmp):
     ],
     ids=lambda value: str(next(iter(value.values())))[:40] if isinstance(value, dict) else "",
 )
+@pytest.mark.slow
 def test_refused(lmp, change, says):
     if "width" in change:
         change = {**change, "fix": "fix 1 all nve/disc 1.0\nneighbor 0.05 bin"}

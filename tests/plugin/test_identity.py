@@ -87,6 +87,7 @@ def trajectory(lmp, tmp_path, defaults):
         "pair/local",
     ],
 )
+@pytest.mark.slow
 def test_same_trajectory(trajectory, changes):
     straight = trajectory()
     assert straight[0] != straight[1]
@@ -95,6 +96,7 @@ def test_same_trajectory(trajectory, changes):
 
 @pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.slow
 def test_restart_in_the_same_process(trajectory, defaults, ranks):
     again = (
         """
@@ -112,6 +114,7 @@ fix             move all nve/disc 1.0 {drag} ${{compensated}}
 
 @pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.slow
 def test_restart_in_a_new_process(trajectory, defaults, lmp, tmp_path, ranks):
     straight = trajectory(ranks=ranks, middle="write_restart middle.restart")
     (tmp_path / "end").unlink()
@@ -123,6 +126,7 @@ def test_restart_in_a_new_process(trajectory, defaults, lmp, tmp_path, ranks):
 
 @pytest.mark.parametrize("defaults", ["double", "compensated"], indirect=True)
 @pytest.mark.parametrize("on", ["layer", "floor"])
+@pytest.mark.slow
 def test_signal_through_a_restart(trajectory, defaults, lmp, tmp_path, on):
     """A signal goes by the time of the run, which a restart file keeps."""
     rows = (f"{0.1 * k} {(-1) ** k * 0.3}" for k in range(81))

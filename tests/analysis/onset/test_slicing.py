@@ -56,6 +56,7 @@ def test_slices_are_the_whole_spectrum(workers):
 
 
 @pytest.mark.parametrize("modes", [(0, 100), (500, 760), (1100, 1156), (700, 701)])
+@pytest.mark.slow
 def test_part_of_the_spectrum(modes):
     """The eigenvalues of these numbers, with shifts about them alone."""
     shifts = []

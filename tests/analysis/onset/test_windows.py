@@ -155,6 +155,7 @@ def test_deepest_dip_of_parabolas():
     assert width[0] == 0
 
 
+@pytest.mark.slow
 def test_a_scan_of_the_spectra_agrees_within_its_increment(ramp):
     path = ramp(1.0, 1e-3, 22)
     solved = find_onset(path, path.grid)
