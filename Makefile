@@ -28,17 +28,17 @@ reproduce: $(VENV)/.installed
 
 # Tests and checks take Python from src, where links lead to the folders: an edit of Python needs no installation
 test: $(VENV)/.test
-	PYTHONPATH=src $(BIN)/python -m pytest -q -n 2
+	PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q -n 2
 
 plugin: $(VENV)/.plugin
 
 # the exports, read by the programs that they are for: half a gigabyte of OVITO and VTK
 readers: $(VENV)/.test
 	$(BIN)/python -m pip install --quiet --group readers
-	PYTHONPATH=src $(BIN)/python -m pytest -q tests/exchange
+	PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q tests/exchange
 
 fuzz: $(VENV)/.test
-	PYTHONPATH=src $(BIN)/python -m fuzz
+	PYTHONPATH=$(CURDIR)/src $(BIN)/python -m fuzz
 
 check: $(VENV)/.check
 	$(BIN)/ruff format --check .

@@ -48,3 +48,10 @@ def test_analysis_needs_numpy_scipy_and_h5py_alone():
     assert loaded_by("import faultgouge.analysis") & HEAVY == {"numpy", "scipy", "h5py"}
     others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
     assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.response") & others == set()
+
+
+def test_commands_of_tests_run_the_code_that_is_tested(tmp_path):
+    """With a relative PYTHONPATH a command in another folder would run what is installed."""
+    where = "import faultgouge; print(faultgouge.__file__)"
+    done = subprocess.run([sys.executable, "-c", where], cwd=tmp_path, capture_output=True, text=True, timeout=100)
+    assert done.stdout.strip() == faultgouge.__file__

@@ -64,6 +64,7 @@ def test_what_is_in(paper, frictionless):
     assert included(frictionless) == always | {"signal", "dumps", "per-contact output", "trajectory"}
 
 
+@pytest.mark.slow
 def test_what_each_part_brings(paper, frictionless):
     low = BROUGHT["compensated coordinates"]
     for explanation, compensated in ((paper, low | {"array f_slips (25 columns)"}), (frictionless, low)):
@@ -71,6 +72,7 @@ def test_what_each_part_brings(paper, frictionless):
         assert found == BROUGHT | {"compensated coordinates": compensated}
 
 
+@pytest.mark.slow
 def test_what_is_left_out_is_not_loaded(frictionless):
     loaded = set(frictionless.loaded.everything)
     for name in ("tangential history", "dynamic friction", "dashpots", "drag", "perturbation"):
@@ -78,6 +80,7 @@ def test_what_is_left_out_is_not_loaded(frictionless):
     assert frictionless.loaded.parts == ("system.in", "undamped.in", "signal.in")
 
 
+@pytest.mark.slow
 def test_what_both_compute_agrees_to_the_bit(paper, frictionless):
     for explanation in (paper, frictionless):
         for part in explanation.parts:
@@ -87,6 +90,7 @@ def test_what_both_compute_agrees_to_the_bit(paper, frictionless):
                 assert part.identical, part.name
 
 
+@pytest.mark.slow
 def test_costs_are_ratios_with_their_spread(paper):
     for part in paper.parts:
         low, middle, high = part.cost.ratio
@@ -98,6 +102,7 @@ def test_costs_are_ratios_with_their_spread(paper):
     assert costs["dynamic friction"] > 1.2
 
 
+@pytest.mark.slow
 def test_defaults_are_those_of_the_file(paper):
     assert paper.defaults["friction.B"] == 0.2
     assert paper.defaults["packing.periodic"] is True
@@ -105,6 +110,7 @@ def test_defaults_are_those_of_the_file(paper):
     assert not any(key.startswith("relax") for key in paper.defaults)
 
 
+@pytest.mark.slow
 def test_json_holds_everything(paper):
     copy = json.loads(json.dumps(paper.as_dict()))
     assert [part["name"] for part in copy["parts"]] == list(BROUGHT)

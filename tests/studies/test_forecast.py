@@ -31,6 +31,7 @@ def test_the_jump_is_that_of_a_run_in_lammps():
     assert foreseen.growth < 0.2
 
 
+@pytest.mark.slow
 def test_the_shipped_packing_is_the_one_of_the_rule():
     """`python docs/triggered.py` begins with seed 1."""
     scene = Scene.from_toml(ROOT / "scenes/triggered.toml")
