@@ -66,11 +66,16 @@ def near(ramp):
     return [quasistatic.equilibrium(coarse(0.02), 0.0205), quasistatic.equilibrium(coarse(0.021), 0.0218)]
 
 
+@pytest.fixture(scope="module")
+def gains(near):
+    """Their transient gains, in displacement."""
+    return [transient_gain(packing) for packing in near]
+
+
 @pytest.mark.slow
-def test_the_gain_is_the_largest_singular_value(near):
+def test_the_gain_is_the_largest_singular_value(near, gains):
     """Of the propagator of a real packing at its time, and at others around; the start is one that reaches it."""
-    for packing in near:
-        found = transient_gain(packing)
+    for packing, found in zip(near, gains, strict=True):
         step = 0.02
         around = sampled(packing, "displacement", found.time + np.array([-step, 0, step]))
         assert around[1] == pytest.approx(found.gain, rel=1e-6)
@@ -87,17 +92,17 @@ def test_the_gain_is_the_largest_singular_value(near):
 
 
 @pytest.mark.slow
-def test_it_grows_towards_the_onset_and_dissipation_takes_it_away(near):
-    far, close = (transient_gain(packing).gain for packing in near)
+def test_it_grows_towards_the_onset_and_dissipation_takes_it_away(near, gains):
+    far, close = (found.gain for found in gains)
     assert close > 5 * far > 5
     damped = replace(near[1], law=replace(near[1].law, cn=30.0, ct=30.0), drag_time=20.0)
     assert 1 <= transient_gain(damped).gain < 0.5 * close
 
 
 @pytest.mark.slow
-def test_drag_takes_no_more_than_its_share(near):
+def test_drag_takes_no_more_than_its_share(near, gains):
     """Drag damps all modes alike: it leaves at least exp(-t/tau) of the gain at its time, but for the phase."""
-    free = transient_gain(near[0])
+    free = gains[0]
     for tau in (50.0, 2000.0):
         dragged = transient_gain(replace(near[0], drag_time=tau))
         assert 0.99 * np.exp(-free.time / tau) * free.gain < dragged.gain < free.gain

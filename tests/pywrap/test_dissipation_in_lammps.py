@@ -95,5 +95,4 @@ def test_growth_with_dashpots_is_that_of_the_eigenvalue(path, fx, cn, unstable):
     time, msd = grown(packing, mode, 19.5 / rate, dt)
     growth = fit_growth(time, msd, lower=1e-21, upper=1e-14)
     assert growth.decades > 6  # of 7: the ends are means over stretches
-    print("FIG", fx, cn, dt, rate, growth)
     assert growth.rate == pytest.approx(rate, rel=5e-3)

@@ -38,16 +38,16 @@ def test_weak_normal_dashpots_lower_the_onset(ramp):
 
 @pytest.mark.slow
 def test_drag_raises_the_onset_to_its_crossover(ramp):
-    (found,) = over_strength(ramp, "drag", [1e-2], start=0.0139)
+    (found,) = over_strength(ramp, "drag", [1e-2], start=0.0149)
     assert found.onset == pytest.approx(0.0150163, abs=1e-7)
     assert found.onset == pytest.approx(found.predicted, rel=1e-9)
 
 
 @pytest.mark.slow
 def test_the_limit_of_weak_dashpots_is_predicted(ramp):
-    """Two ratios of one packing anew, and they are those of the table."""
+    """One ratio of one packing anew, tangential dashpots alone, and it is that of the table."""
     known = {(each["cn"], each["ct"]): each for each in table("weak") if each["seed"] == 1}
-    for case in weak_cases(ramp, RATIOS[:2]):
+    for case in weak_cases(ramp, [(0.0, 1.0)]):
         assert case.predicted == pytest.approx(case.measured, rel=1e-3)
         assert case.predicted < case.undamped
         assert case.measured == pytest.approx(known[case.cn, case.ct]["measured"], rel=1e-8)
@@ -61,19 +61,24 @@ def test_the_table_of_weak_dashpots():
     assert max(abs(each["predicted"] / each["measured"] - 1) for each in rows) < 1e-3
 
 
+@pytest.fixture(scope="module")
+def near(ramp):
+    """Gains 1e-3 below the undamped onset, without dissipation and with weak normal dashpots."""
+    return tuple(over_distance(ramp, [1e-3], [(0.0, 0.0), (1.0, 0.0)]))
+
+
 @pytest.mark.slow
-def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp):
-    far, dragged, near, _ = over_distance(ramp, [1e-2, 1e-3], [(0.0, 0.0), (0.0, 0.1)])
+def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp, near):
+    far, dragged = over_distance(ramp, [1e-2], [(0.0, 0.0), (0.0, 0.1)])
     assert dragged.gain < 0.5 * far.gain
     # the inverse of the distance, where one pair has most of it
-    assert 5 < near.gain / far.gain < 20
+    assert 5 < near[0].gain / far.gain < 20
     assert far.gain <= far.bound
 
 
 @pytest.mark.slow
-def test_above_the_damped_onset_there_is_no_largest_gain(ramp):
-    """1e-3 below the undamped onset weak dashpots make the packing unstable."""
-    plain, damped = over_distance(ramp, [1e-3], [(0.0, 0.0), (1.0, 0.0)])
+def test_above_the_damped_onset_there_is_no_largest_gain(near):
+    plain, damped = near
     assert plain.gain > 100
     assert damped.gain is None
 
