@@ -1,7 +1,7 @@
 """Dynamics on several ranks: what each of them sends and holds, of crystals of 100,000 and 1,000,000 disks.
 
-A hexagonal crystal with friction on the floor, under the load, as wide as high, in the box that the driver would give it,
-by the deck system.in. The ranks may be more than the cores: what is counted does not depend on them.
+A hexagonal crystal with friction on the floor, under the load, as wide as high, in the box that the driver would give
+it, by the deck system.in. The ranks may be more than the cores: what is counted does not depend on them.
 
     disks, ghosts   of a rank, the most of all ranks
     messages, kB    that a rank sends in a time step, mean over the steps, the most of all ranks
