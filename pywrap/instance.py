@@ -41,9 +41,13 @@ def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:
     if not instance.has_style("pair", "mindlin/smooth") and plugin.is_file():
         instance.command(f'plugin load "{plugin}"')  # older wheels and LAMMPSes of one's own do not look for plugins
     if not instance.has_style("pair", "mindlin/smooth"):
+        trouble = (
+            f"does not take the plugin {plugin}, which was built for another release, MPI or size of atom IDs"
+            if plugin.is_file()
+            else f"has no plugin, since {plugin} is not there"
+        )
         raise EngineError(
-            f"LAMMPS {instance.version()} does not know pair style mindlin/smooth: the plugin was not loaded; build it "
-            "for this LAMMPS (pip install --no-build-isolation faultgouge), or name the folder of one that is by "
-            "FAULTGOUGE_PLUGIN"
+            f"LAMMPS {instance.version()} {trouble}: build the plugin for this LAMMPS (pip install --no-build-isolation "
+            "faultgouge, or cmake), or name the folder of one that was by FAULTGOUGE_PLUGIN"
         )
     return instance
