@@ -18,6 +18,8 @@ from ..instance import lammps_instance
 from .disks import Disks, of_columns
 
 MAGIC = b"LammpS RestartT"
+MOST_GROUPS = 32
+"""Places for groups in LAMMPS."""
 
 
 def is_restart(path: Path) -> bool:
@@ -59,8 +61,13 @@ def read_restart(path: Path) -> Disks:
 
 def _groups(lammps: Any, order: NDArray[np.intp]) -> dict[str, NDArray[np.bool_]]:
     """Members of the groups, sorted by ID."""
+    # LAMMPS of 2024 counts groups without the places of deleted ones, and then crashes on these: no place is left empty
+    fill = [f"faultgouge_fill_{k}" for k in range(MOST_GROUPS - lammps.lib.lammps_id_count(lammps.lmp, b"group"))]
+    lammps.commands_list([f"group {name} empty" for name in fill])
     groups = {}
     for name in filter(None, lammps.available_ids("group")):
+        if name in fill:
+            continue
         lammps.command(f"variable member atom gmask({name})")
         groups[name] = np.array(lammps.extract_variable("member"))[: len(order)][order] != 0
     return groups
