@@ -11,6 +11,8 @@ def refusal(faultgouge, tmp_path, monkeypatch):
 
     def said(folder):
         monkeypatch.setenv("FAULTGOUGE_PLUGIN", str(folder))
+        # where the LAMMPS of an earlier test found plugins: its module tells all processes that follow
+        monkeypatch.delenv("LAMMPS_PLUGIN_PATH", raising=False)
         (tmp_path / "scene.toml").write_text(SCENE)
         done = faultgouge("settle", "scene.toml", "-o", "run.h5")
         assert done.returncode == 1
