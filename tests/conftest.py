@@ -26,6 +26,12 @@ LIMIT = 1800
 REFERENCE = Path(__file__).parent / "reference" / "packing7.json"
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests of several ranks come first: xdist begins with a long run of tests for each worker, so that one worker has
+    all of these and the other does not wait for its turn."""
+    items.sort(key=lambda item: item.get_closest_marker("ranks") is None)
+
+
 @pytest.fixture(autouse=True)
 def _in_turns(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Tests of several ranks take turns: ranks spin while they wait, and those of two tests would starve each other."""
