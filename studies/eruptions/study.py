@@ -66,7 +66,8 @@ def eruptions(
         flows_beyond = None
         if missing:
             say(f"{len(wanted) - len(missing)} of {len(wanted)} loads are known; ramp up to F_x = {missing[-1]:g}")
-            starts, flows_beyond = _starts(scene, missing, time)
+            # through the known loads as well: the path, and with it the last digits, is that of one run of the command
+            starts, flows_beyond = _starts(scene, [fx for fx in wanted if fx <= missing[-1]], time)
             starts = [
                 each for each in starts if rows.find(fx=each.packing.fx, longest=time, damped=each.damped) is None
             ]

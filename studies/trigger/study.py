@@ -157,7 +157,7 @@ def _measured(
     if len(missing) < len(wanted):
         say(f"{len(wanted) - len(missing)} of {len(wanted)} bisections are in {rows.path} already")
     if missing:
-        packings = equilibria(scene, {each.fx for each in missing})
+        packings = equilibria(scene, {each.fx for each in wanted})  # all: the path is that of one run of the command
         wave, v0 = settings(scene), threshold(scene)
         waves = [
             Wave(packings[each.fx], each.distance, each.omega, wave.time, wave.on, v0, each.predicted)

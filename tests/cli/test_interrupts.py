@@ -27,6 +27,24 @@ until = 0.02
 [perturb]
 fx = 2e-5
 time = 1e4
+[eruptions]
+load = [0.02]
+time = 1e3
+"""
+
+SWEEP = """
+task = "onset"
+[sweep]
+"packing.seed" = "1:50"
+[scene.packing]
+disks = 300
+[scene.law]
+kn = 2e5
+[scene.load]
+fy = 3.0
+[scene.ramp]
+step = 1e-4
+until = 0.02
 """
 
 SOON = 8.0
@@ -127,11 +145,14 @@ def simulates(folder):
         ("reproduce scene.toml -o out", "what is in out so far is kept; the same command begins anew and replaces it"),
         ("report --quick -o out", "out has the studies that were finished; the same command begins anew and replaces"),
         ("stability --quick -o out", "out has the cases that were finished; the same command begins anew and replaces"),
+        ("eruptions scene.toml -o out", "out/eruptions.jsonl has the runs that were over; the same command goes on"),
+        ("sweep sweep.toml -o out", "out/results.jsonl has the scenes that have ended; the same command goes on from"),
     ],
 )
 @pytest.mark.slow
-def test_what_begins_anew_says_so(tmp_path, command, says):
+def test_what_is_kept_is_said(tmp_path, command, says):
     (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "sweep.toml").write_text(SWEEP)
     arguments = [BIN / "faultgouge", *command.split()]
     returned, errors, seconds = interrupted(tmp_path, arguments, signal.SIGINT, lambda: simulates(tmp_path))
     assert returned == 130

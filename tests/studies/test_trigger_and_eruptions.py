@@ -18,6 +18,14 @@ BASE = {
 }
 
 
+def cut_off(folder, lines, name):
+    """A folder as a kill before the last result leaves it."""
+    cut = folder / "cut"
+    cut.mkdir()
+    (cut / name).write_text("".join(lines.splitlines(keepends=True)[:-1]))
+    return cut
+
+
 @pytest.mark.slow
 def test_prediction_is_what_lammps_bisects(tmp_path):
     trigger = {"distance": [0.1, 1e-3], "omega": [1.0, 14.0], "time": 4.0, "runs": 2}
@@ -33,6 +41,7 @@ def test_prediction_is_what_lammps_bisects(tmp_path):
     lines = (tmp_path / "out/trigger.jsonl").read_text()
     assert trigger_map(scene, tmp_path / "out", say=lambda _: None) == result
     assert (tmp_path / "out/trigger.jsonl").read_text() == lines  # nothing was computed again
+    assert trigger_map(scene, cut_off(tmp_path, lines, "trigger.jsonl"), say=lambda _: None) == result
     assert {"map.png", "thresholds.png", "trigger.md"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
@@ -60,6 +69,16 @@ def test_trigger_needs_a_threshold(tmp_path, friction, says):
     with pytest.raises(SceneError, match=says):
         trigger_map(scene, tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_eruptions_that_were_cut_off_are_those_of_one_run(tmp_path):
+    """To the bit, though the loads that are known are not run again."""
+    small = {"packing": {"disks": 30, "seed": 4}, "ramp": {"step": 0.02, "until": 0.3}}
+    scene = Scene.from_mapping({**BASE, **small, "eruptions": {"load": [0.05, 0.25], "time": 10.0}})
+    whole = eruptions(scene, tmp_path / "whole", say=lambda _: None)
+    lines = (tmp_path / "whole/eruptions.jsonl").read_text()
+    assert len(lines.splitlines()) == 2
+    assert eruptions(scene, cut_off(tmp_path, lines, "eruptions.jsonl"), say=lambda _: None) == whole
 
 
 @pytest.mark.ranks

@@ -8,6 +8,7 @@ from typing import Annotated, TypeVar
 
 import typer
 
+from ..guard import keeps
 from .terminal import AsJson, ScenePath, print_json, progress, read_scene, say
 
 T = TypeVar("T")
@@ -32,7 +33,9 @@ def trigger(scene: ScenePath, output: Folder = Path("trigger"), as_json: AsJson 
     def bar(results: Iterable[T], count: int) -> Iterator[T]:
         return progress(results, "bisections", count)
 
-    result = trigger_map(read_scene(scene), output, say, bar)
+    wanted = read_scene(scene)
+    keeps(f"{output}/trigger.jsonl has what was found so far; the same command goes on from there")
+    result = trigger_map(wanted, output, say, bar)
     say(f"written: {output}/trigger.md")
     if as_json:
         print_json(result)
@@ -49,7 +52,9 @@ def eruptions(scene: ScenePath, output: Folder = Path("eruptions"), as_json: AsJ
     def bar(results: Iterable[T], count: int) -> Iterator[T]:
         return progress(results, "runs", count)
 
-    result = run_all(read_scene(scene), output, say, bar)
+    wanted = read_scene(scene)
+    keeps(f"{output}/eruptions.jsonl has the runs that were over; the same command goes on from there")
+    result = run_all(wanted, output, say, bar)
     say(f"written: {output}/eruptions.md")
     if as_json:
         print_json(result)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..guard import keeps
 from ..ranks import is_root
 from .terminal import progress, say
 
@@ -48,6 +49,7 @@ def sweep(
             for line in estimate(wanted.task, missing).words():
                 say(line)
         return
+    keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there")
     rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count))
     if is_root():
         failed = sum(row["says"] is not None for row in rows)
@@ -103,6 +105,7 @@ def genericity(
     from faultgouge.studies.genericity.page import write_page
 
     if not page:
+        keeps(f"{output} has the scenes that have ended; the same command goes on from there")
         compute(output, say, lambda ended, count: progress(ended, "scenes", count), share)
     if is_root():
         say(f"written: {write_page(output)}")
