@@ -19,7 +19,7 @@ MEETING = 3.0
 """Seconds within which all ranks come to an error that all of them meet."""
 
 HEARD = 0.5
-"""Seconds between the sentence and the end of all ranks: mpiexec drops what it has not yet passed on when ranks abort."""
+"""Seconds between the sentence and the end of all ranks: an abort drops what mpiexec has not yet passed on."""
 
 
 def fail(error: Exception) -> NoReturn:
