@@ -12,6 +12,9 @@ from ..work_precision.coverage import Covered
 
 MARKERS = "osD^"
 
+AROUND = ((-29, -3), (-14, 6), (2, -11), (6, -3))
+"""Where the increments of the first arithmetic stand, points, by increasing true error: they lie close together."""
+
 
 @matplotlib.rc_context(fname=STYLE)
 def coverage_figure(cases: Sequence[Covered]) -> Figure:
@@ -26,10 +29,11 @@ def coverage_figure(cases: Sequence[Covered]) -> Figure:
     axes.plot([smallest, largest], [smallest, largest], color=INK, linewidth=0.8)
     axes.fill_between([smallest, largest], [smallest, largest], largest, color=INK, alpha=0.06, linewidth=0)
     for number, arithmetic in enumerate(dict.fromkeys(case.arithmetic for case in cases)):
-        for case in (case for case in cases if case.arithmetic == arithmetic):
+        of_it = sorted((case for case in cases if case.arithmetic == arithmetic), key=lambda case: case.true)
+        for place, case in enumerate(of_it):
             at = (max(case.true, smallest), case.stated)
             axes.plot(*at, MARKERS[number], color=f"C{number}", label=arithmetic, clip_on=False)
-            aside = (5, 3) if number == 0 else (5, -10)
+            aside = AROUND[place % len(AROUND)] if number == 0 else (5, -10)
             axes.annotate(f"{case.increment:g}", at, xytext=aside, textcoords="offset points", fontsize="small")
     axes.text(0.06, 0.94, "covered", transform=axes.transAxes, va="top")
     axes.set(xscale="log", yscale="log", xlim=(smallest, largest), ylim=(smallest, largest))
