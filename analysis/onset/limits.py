@@ -86,9 +86,10 @@ class Limits:
     """Eigenvalues of a slice. Fewer cost more factorisations, more cost more orthogonalisation."""
     coarse: int = 960
     """Eigenvalues between two places at which they are counted; shifts are interpolated in between."""
-    block: int = 8
-    """Vectors that are solved for at a time: 2 ms each at 30,000 coordinates, against 6 ms one by one."""
-    first_look: int = 38
+    block: int = 6
+    """Vectors that are solved for at a time: 2 ms each at 30,000 coordinates, against 6 ms one by one. Larger blocks
+    need more vectors for the same eigenvalues: 276 for a slice, with blocks of eight 304."""
+    first_look: int = 45
     """Blocks of a Krylov space before its eigenvalues are looked at."""
     looks: int = 2
     """Blocks between two looks."""

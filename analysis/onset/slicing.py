@@ -228,15 +228,15 @@ class _Spectrum:
             krylov.extend(self.limits.looks)
         kept = slice(max(0, own[0] - first - margin), min(len(values), own[1] - first + margin))
         start = own[0] - first - kept.start
-        found = vectors[:, order[kept]].T @ krylov.basis[: len(inverse)]
+        found = krylov.basis[: len(inverse)].T @ vectors[:, order[kept]]
         part = Slice(
             first=first + kept.start,
             values=values[kept],
-            vectors=np.ascontiguousarray(found[:, self.place].T),
+            vectors=found[self.place],
             own=slice(start, start + own[1] - own[0]),
             spacing=float(spacing),
         )
-        self.compare(part, found[part.own])
+        self.compare(part, np.ascontiguousarray(found[:, part.own]))
         return part
 
     def compare(self, part: Slice, vectors: Floats) -> None:
@@ -245,7 +245,7 @@ class _Spectrum:
         The Krylov space knows the factors alone; the Rayleigh quotients are of the matrix itself.
         """
         values = part.values[part.own]
-        quotients = np.sum(vectors.T * (self.matrix @ vectors.T), axis=0)
+        quotients = np.einsum("ij,ij->j", vectors, self.matrix @ vectors)
         worst = int(np.argmax(np.abs(quotients - values)))
         if abs(quotients[worst] - values[worst]) > self.limits.accurate * part.spacing:
             number = part.first + part.own.start + worst

@@ -305,7 +305,7 @@ def test_a_spectrum_needs_no_lammps(tmp_path):
 
 
 @pytest.mark.slow
-def test_help_costs_little_more_than_the_libraries_that_print_it():
+def test_help_costs_little_more_than_the_library_that_prints_it():
     """0.12 s on an idle machine; here a ratio of processor times, which a busy one leaves as it is."""
 
     def seconds(*command):
@@ -314,10 +314,10 @@ def test_help_costs_little_more_than_the_libraries_that_print_it():
         after = getrusage(RUSAGE_CHILDREN)
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
-    libraries = (sys.executable, "-c", "import typer, typer.rich_utils, rich.console, rich.markdown")
-    turns = [(seconds(BIN / "faultgouge", "--help"), seconds(*libraries)) for _ in range(5)]
-    # with NumPy it would be more than that
-    assert min(help_time for help_time, _ in turns) < 2.0 * min(bare for _, bare in turns)
+    library = (sys.executable, "-c", "import typer")
+    turns = [(seconds(BIN / "faultgouge", "--help"), seconds(*library)) for _ in range(5)]
+    # 1.7 times; with NumPy it would be 2.9
+    assert min(help_time for help_time, _ in turns) < 2.3 * min(bare for _, bare in turns)
 
 
 def datasets(path):

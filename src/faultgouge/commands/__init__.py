@@ -21,9 +21,9 @@ def program() -> typer.Typer:
     app = typer.Typer(
         no_args_is_help=True,
         pretty_exceptions_enable=False,
-        rich_markup_mode="rich",
+        rich_markup_mode=None,  # Rich would double the time of --help
         help="Remote triggering in a stressed layer of frictional disks: simulate with LAMMPS, analyse, reproduce.",
-        epilog="Example: [bold]faultgouge reproduce -o results[/bold]",
+        epilog="Example: faultgouge reproduce -o results",
     )
     app.callback()(_options)
     for family in FAMILIES:

@@ -14,7 +14,7 @@ from .terminal import say
 app = typer.Typer()
 
 
-@app.command(epilog="Example: [bold]faultgouge init -o scene.toml[/bold]")
+@app.command(epilog="Example: faultgouge init -o scene.toml")
 def init(
     output: Annotated[Path, typer.Option("-o", "--output", help="The scene to write.")] = Path("scene.toml"),
 ) -> None:

@@ -20,7 +20,7 @@ Folder = Annotated[
 app = typer.Typer()
 
 
-@app.command(epilog="Example: [bold]mpiexec -n 3 faultgouge trigger trigger.toml -o trigger[/bold]")
+@app.command(epilog="Example: mpiexec -n 3 faultgouge trigger trigger.toml -o trigger")
 def trigger(scene: ScenePath, output: Folder = Path("trigger"), as_json: AsJson = False) -> None:
     """Which waves trigger how critical a layer: the critical amplitude over frequency and distance from the onset.
 
@@ -41,7 +41,7 @@ def trigger(scene: ScenePath, output: Folder = Path("trigger"), as_json: AsJson 
         print_json(result)
 
 
-@app.command(epilog="Example: [bold]mpiexec -n 3 faultgouge eruptions eruptions.toml -o eruptions[/bold]")
+@app.command(epilog="Example: mpiexec -n 3 faultgouge eruptions eruptions.toml -o eruptions")
 def eruptions(scene: ScenePath, output: Folder = Path("eruptions"), as_json: AsJson = False) -> None:
     """How large: undamped runs from rest at each load of \\[eruptions], until they are over, and what ended the growth.
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 
-@app.command(epilog="Example: [bold]faultgouge spectrum run.h5 --json[/bold]")
+@app.command(epilog="Example: faultgouge spectrum run.h5 --json")
 def spectrum(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.")],
     frame: Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")] = -1,
@@ -107,7 +107,7 @@ def _gain_of(packing: Packing) -> dict[str, Any] | None:
     }
 
 
-@app.command(epilog="Example: [bold]faultgouge onset paper.toml --json[/bold]")
+@app.command(epilog="Example: faultgouge onset paper.toml --json")
 def onset(
     scene: ScenePath,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Also write the JSON to this file.")] = None,

@@ -47,7 +47,7 @@ Slips = Annotated[
 
 @app.command(
     "import",
-    epilog="Example: [bold]faultgouge import pour.data --top 12 --kn 2e5 --fy 3 --relax -o packing.h5[/bold]",
+    epilog="Example: faultgouge import pour.data --top 12 --kn 2e5 --fy 3 --relax -o packing.h5",
 )
 def import_(
     file: Source,
@@ -94,7 +94,7 @@ def import_(
     )
 
 
-@app.command(epilog="Example: [bold]faultgouge export run.h5 --mode pair -o packing.vtp[/bold]")
+@app.command(epilog="Example: faultgouge export run.h5 --mode pair -o packing.vtp")
 def export(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.", show_default=False)

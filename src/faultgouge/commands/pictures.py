@@ -46,7 +46,7 @@ WhichColour = Annotated[
 ]
 
 
-@app.command(epilog="Example: [bold]faultgouge draw run.h5 --mode pair -o mode.svg[/bold]")
+@app.command(epilog="Example: faultgouge draw run.h5 --mode pair -o mode.svg")
 def draw(
     file: PackingFile,
     frame: Frame = -1,
@@ -82,7 +82,7 @@ def draw(
     say(f"{words}\nwritten to {output}")
 
 
-@app.command(epilog="Example: [bold]faultgouge movie perturb.h5 -o eruption.gif[/bold]")
+@app.command(epilog="Example: faultgouge movie perturb.h5 -o eruption.gif")
 def movie(
     file: PackingFile,
     mode: WhichMode = None,

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 
-@app.command(epilog="Example: [bold]faultgouge settle paper.toml -o run.h5[/bold]")
+@app.command(epilog="Example: faultgouge settle paper.toml -o run.h5")
 def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
@@ -36,7 +36,7 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
     )
 
 
-@app.command(epilog="Example: [bold]mpiexec -n 2 faultgouge ramp paper.toml -o run.h5[/bold]")
+@app.command(epilog="Example: mpiexec -n 2 faultgouge ramp paper.toml -o run.h5")
 def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False) -> None:
     """Raise F_x from equilibrium to equilibrium, each stored as it is reached."""
     from faultgouge.pywrap import Record
@@ -59,7 +59,7 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
         print_json({"equilibria": _equilibria(output)})
 
 
-@app.command(epilog="Example: [bold]faultgouge perturb paper.toml -o run.h5[/bold]")
+@app.command(epilog="Example: faultgouge perturb paper.toml -o run.h5")
 def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
     """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t)."""
     from faultgouge.pywrap import Record, reach

@@ -17,7 +17,7 @@ T = TypeVar("T")
 app = typer.Typer()
 
 
-@app.command(epilog="Example: [bold]faultgouge explain paper.toml[/bold]")
+@app.command(epilog="Example: faultgouge explain paper.toml")
 def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     """What a scene includes, what it leaves out, why, and what each part costs.
 
@@ -42,7 +42,7 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
         Console(highlight=False, width=max(console.width, 150)).print(explanation_table(explanation))
 
 
-@app.command(epilog="Example: [bold]faultgouge reproduce -o results[/bold]")
+@app.command(epilog="Example: faultgouge reproduce -o results")
 def reproduce(
     scene: Annotated[
         Path | None, typer.Argument(metavar="[SCENE]", help="Another scene than the one that ships.")
@@ -91,7 +91,7 @@ def reproduce(
     say(f"written: {output}/report.md")
 
 
-@app.command(epilog="Example: [bold]faultgouge report --quick -o report[/bold]")
+@app.command(epilog="Example: faultgouge report --quick -o report")
 def report(
     output: Annotated[Path, typer.Option("-o", "--output", help="The folder for report, figures and numbers.")] = Path(
         "report"
@@ -106,7 +106,7 @@ def report(
     say(f"written: {output}/report.md")
 
 
-@app.command(epilog="Example: [bold]mpiexec -n 2 faultgouge stability -o stability[/bold]")
+@app.command(epilog="Example: mpiexec -n 2 faultgouge stability -o stability")
 def stability(
     output: Annotated[Path, typer.Option("-o", "--output", help="The folder for table, picture and numbers.")] = Path(
         "stability"

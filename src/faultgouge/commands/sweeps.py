@@ -16,7 +16,7 @@ app = typer.Typer()
 Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted one is continued.")]
 
 
-@app.command(epilog="Example: [bold]mpiexec -n 5 faultgouge sweep genericity.toml -o sweep[/bold]")
+@app.command(epilog="Example: mpiexec -n 5 faultgouge sweep genericity.toml -o sweep")
 def sweep(
     file: Annotated[Path, typer.Argument(metavar="SWEEP", help="The sweep, a TOML file.", show_default=False)],
     output: Folder = Path("sweep"),
@@ -56,7 +56,7 @@ def sweep(
         say(f"{len(rows)} scenes, {failed} of them failed; written: {output}/results.csv{draw_sweep(rows, output)}")
 
 
-@app.command(epilog="Example: [bold]faultgouge merge shard1 shard2 shard3 -o whole[/bold]")
+@app.command(epilog="Example: faultgouge merge shard1 shard2 shard3 -o whole")
 def merge(
     parts: Annotated[
         list[Path], typer.Argument(metavar="DIR...", help="Folders of `sweep --shard`, or files of `onset --modes`.")
@@ -84,7 +84,7 @@ def _shard(text: str) -> tuple[int, int]:
     return int(part), int(of)
 
 
-@app.command(epilog="Example: [bold]mpiexec -n 5 faultgouge genericity -o genericity[/bold]")
+@app.command(epilog="Example: mpiexec -n 5 faultgouge genericity -o genericity")
 def genericity(
     output: Folder = Path("genericity"),
     share: Annotated[
