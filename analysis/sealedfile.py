@@ -1,6 +1,6 @@
 """An HDF5 file that grows, sealed and whole at any moment (:mod:`.wholefile`).
 
-The file is kept in memory. When it is saved, all of it replaces the file on the disk. Saving takes a share of the time
+The file is kept in memory. When it is saved, all of it replaces the stored file. Saving takes a share of the time
 at the most, so that a file that grows for long is not written over and over.
 """
 
@@ -83,7 +83,7 @@ class SealedFile:
 
     @property
     def saved(self) -> bool:
-        """Whether the file on the disk has everything."""
+        """Whether the stored file has everything."""
         return not self._unsaved
 
     def save(self) -> None:

@@ -5,6 +5,8 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
+from docutils import nodes
+
 sys.path.insert(0, str(Path(__file__).parent))  # gallery_figures
 
 project = "faultgouge"
@@ -79,7 +81,18 @@ def keep_first_line(app, what, name, obj, options, lines):
         lines[:0] = ["..", ""]
 
 
+NUMBER = re.compile(r"[-+.,()\d]+(e[-+]?\d+)?( (to|±) [-+.,()\d]+(e[-+]?\d+)?)?")
+
+
+def keep_numbers_whole(app, doctree):
+    """Browsers end a line at a hyphen: a cell with 5.11e-13 must not become two lines."""
+    for cell in doctree.findall(nodes.entry):
+        if NUMBER.fullmatch(cell.astext()):
+            cell["classes"].append("number")
+
+
 def setup(app):
+    app.connect("doctree-read", keep_numbers_whole)
     app.connect("autodoc-process-docstring", keep_first_line, priority=90)
     app.connect("autodoc-process-docstring", keep_bars, priority=100)
     app.connect("autodoc-skip-member", leave_out_aliases)

@@ -143,13 +143,14 @@ def draw_gain(curves: Sequence[GainCurve], axes: Axes | None = None) -> Figure:
     for number, curve in enumerate(curves):
         axes.plot(curve.distance, curve.gain, "o-", color=f"C{number}", markersize=3.5, label=curve.label)
     axes.set(xscale="log", yscale="log", xlabel="$(F_x^c - F_x)\\,/\\,F_x^c$", ylabel=r"gain of $|q|^2$")
+    axes.set_ylim(top=30 * max(float(np.nanmax(curve.gain)) for curve in curves))  # room for the legend
     axes.legend(loc="upper right")
     return figure_of(axes)
 
 
 @styled
 def dissipation_figure(dashpots: OnsetCurve, drag: OnsetCurve, gains: Sequence[GainCurve]) -> Figure:
-    """The three panels beside each other.
+    """The three panels: dashpots above, drag and gain below.
 
     Parameters
     ----------
@@ -158,12 +159,11 @@ def dissipation_figure(dashpots: OnsetCurve, drag: OnsetCurve, gains: Sequence[G
     gains : sequence of GainCurve
         As of `draw_gain`.
     """
-    figure = Figure(figsize=(7.4, 3.0), layout="constrained")
-    one, two, three = figure.subplots(1, 3)
-    draw_dashpot_onset(dashpots, one)
-    draw_drag_shift(drag, two)
-    draw_gain(gains, three)
-    titles = ("(a) dashpots lower the onset", "(b) drag raises it", "(c) transient gain below it")
-    for axes, title in zip((one, two, three), titles, strict=True):
-        axes.set_title(title, loc="left", fontsize=8.5)
+    figure = Figure(figsize=(5.2, 4.4), layout="constrained")
+    axes = figure.subplot_mosaic("aa;bc")
+    draw_dashpot_onset(dashpots, axes["a"])
+    draw_drag_shift(drag, axes["b"])
+    draw_gain(gains, axes["c"])
+    for name, title in (("a", "dashpots lower the onset"), ("b", "drag raises it"), ("c", "transient gain below it")):
+        axes[name].set_title(f"({name}) {title}", loc="left", fontsize=8.5)
     return figure

@@ -1,4 +1,4 @@
-r"""What a scene asks for, before any of it is done: steps, increments, memory, disk, time.
+r"""What a scene asks for, before any of it is done: steps, increments, memory, size of files, time.
 
 Two questions. *Can it be at all?* `impossible` finds in the numbers of a scene what no packing bears: overlaps beyond
 the contact law, forces that drown in the rounding of the coordinates, a settling that never ends. *How long does it
@@ -91,8 +91,8 @@ class Estimate:
         Time steps of LAMMPS.
     increments : float
         Equilibria after the settled one.
-    memory, disk : float
-        Bytes in memory at the most, and bytes that are written.
+    memory, written : float
+        Bytes in memory at the most, and bytes of the files.
     seconds : float
         On one core.
     """
@@ -101,7 +101,7 @@ class Estimate:
     steps: float
     increments: float
     memory: float
-    disk: float
+    written: float
     seconds: float
 
     def __str__(self) -> str:
@@ -112,8 +112,8 @@ class Estimate:
             parts.append(f"{_count(self.increments)} increments of F_x")
         if self.memory > 1e9:
             parts.append(f"{_bytes(self.memory)} of memory")
-        if self.disk > 1e9:
-            parts.append(f"{_bytes(self.disk)} on the disk")
+        if self.written > 1e9:
+            parts.append(f"{_bytes(self.written)} of files")
         return f"about {_duration(self.seconds)}: {', '.join(parts)}"
 
 
@@ -174,15 +174,15 @@ def foreseen(scene: Scene, task: Task, packings: int = 1) -> str:
     Raises
     ------
     SceneError
-        If it takes a year, more memory than there is, or a file that no disk holds.
+        If it takes a year, more memory than there is, or a file of more than `LARGEST_FILE`.
     """
     one = estimated(scene, task)
-    work = replace(one, steps=packings * one.steps, seconds=packings * one.seconds, disk=packings * one.disk)
+    work = replace(one, steps=packings * one.steps, seconds=packings * one.seconds, written=packings * one.written)
     if not work.seconds < LONGEST:
         what = "a year and more"
     elif work.memory > _installed_memory():
         what = f"more memory than the {_bytes(_installed_memory())} of this machine"
-    elif work.disk > LARGEST_FILE:
+    elif work.written > LARGEST_FILE:
         what = f"more than the {_bytes(LARGEST_FILE)} that a file may take"
     else:
         what = task if packings == 1 else f"{task}, {packings} packings"

@@ -8,7 +8,7 @@ grows as their number. The paper says only "loosely packed disks". A layer as op
 filled, does not carry: without weight of their own the disks give way, and an upper layer that is loaded alone sinks
 to the floor. A settling from here has to lay a bed first.
 
-Even on a bed a loaded layer may sink, as a heavy liquid does through a light one. Without friction a bed bears shear
+Even on a bed a heavy layer may sink, as a heavy liquid does through a light one. Without friction a bed bears shear
 stresses of a tenth of its pressure at the most, and that pressure is the weight of the layer above. Where the layer is
 thinner than elsewhere the bed is pressed up, the layer slides off the bulge, and gets thinner there; a layer of one or
 two disks differs by more than a tenth from place to place, since it is made of disks, and a wide one will find its weak

@@ -13,8 +13,8 @@ sticks or slides on the way changes K, and the iteration goes on with the new co
 
 Doubles bound what can be reached: a coordinate x is known to :math:`\epsilon |x|`, which changes the force of a
 contact of stiffness k by :math:`k \epsilon |x|`. The rounding floor sums this over the contacts of each disk. An
-equilibrium whose residual no longer falls and is of this order is at the floor. Where the last two residuals show that
-another iteration would gain nothing, it is not made. In compensated arithmetic a coordinate is known to 1e-23, and the
+equilibrium whose residual no longer falls and is of this order is at the floor. No further iteration is made where the
+last two residuals show that it would gain nothing. In compensated arithmetic a coordinate is known to 1e-23, and the
 next bound is the displacement itself, a double: :math:`k \epsilon |q|`. From there on displacements count from the
 iterate. What is left, :math:`q'`, is of order :math:`\epsilon |q|`, and that its slips start at an iterate changes them
 by :math:`|q| |q'|`, which is less than they can resolve.
@@ -188,7 +188,7 @@ class _Course:
             return False
         if residual <= (0.1 * self.floor if self._tolerance is None else self._tolerance):
             return True
-        # What is not rounding falls by no less than it did the time before: it may be far below the floor now.
+        # The next residual falls by at least the factor of this one, rounding apart: it may be far below the floor.
         factor = self._last / self._earlier if self._earlier < np.inf else GAIN
         return residual < self.floor and factor * self._last < 0.1 * self.floor
 

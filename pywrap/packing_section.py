@@ -36,7 +36,7 @@ class GeneratedPacking(Section):
         Seed of the loose start.
     periodic : bool
         Whether x is periodic, which the paper does not say. With false the sides are open, and nothing holds the disks
-        there: that is refused, but for one row of loaded disks side by side.
+        there: that is refused, unless the packing is one row of disks, all of the upper layer.
     settle_friction : bool
         False: settled without friction, which then starts with zero slips, so that K is symmetric at F_x = 0.
         True: settled with friction, so that the packing carries tangential load from the start. The paper

@@ -201,7 +201,7 @@ class Record:
         self._file.append_trajectory(times, positions, low or None)
 
     def _say_saved(self, more: str = "") -> None:
-        """Say what the file on the disk holds, if it holds all."""
+        """Say what the stored file holds, if it holds all."""
         file = self._file
         if file is None or not file.saved or len(file) == 0:
             return

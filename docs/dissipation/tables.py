@@ -1,4 +1,4 @@
-"""The tables of docs/dissipation.md, a record a line; what is there is not computed again.
+"""The tables of docs/dissipation/measured.md, a record a line; what is there is not computed again.
 
 python docs/dissipation/tables.py weak|cn|drag|gain [SEED ..]
 """

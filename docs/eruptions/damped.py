@@ -1,7 +1,7 @@
 """Eruptions with and without weak dashpots, on several paths to the same loads: docs/eruptions/damped.jsonl.
 
 The paths differ in the increment of the ramp. What is there already is not computed again: a path takes half a minute
-of processor time. Prints the table of docs/dissipation.md.
+of processor time. Prints the table of docs/dissipation/measured.md.
 
 python docs/eruptions/damped.py
 """

@@ -16,7 +16,7 @@ packing = last.packing
 print(packing)
 
 # %%
-# Bars are contacts, as wide as their normal force. Their colour says how much of the Coulomb limit they use.
+# Bars are contacts, as wide as their normal force. Their colour says what share of Coulomb's bound they use.
 
 chains = draw_packing(packing)
 

@@ -4,7 +4,7 @@ Python runs a signal's handler between two of its own instructions, and LAMMPS o
 next one; SciPy's `eig` does not even let another thread run. So the process that the shell or mpiexec has
 started forks before anything heavy is imported. Its child does the work. The guard waits for the child and for signals,
 hands SIGINT (Ctrl-C) and SIGTERM on, and gives the child `GRACE` to close files and to end other processes. Nothing is
-lost by that, as results on the disk are whole at any moment (:mod:`faultgouge.analysis.wholefile`). Then the guard says
+lost by that, as files of results are whole at any moment (:mod:`faultgouge.analysis.wholefile`). Then the guard says
 what is kept, in the words that the child has left in memory that both share (`keeps`), and exits with 130 or 143. When
 the guard ends, in whatever way, the kernel kills the child. A child that a library has ended (SIGSEGV, SIGABRT, or
 SIGKILL for want of memory) ends in a sentence as well.

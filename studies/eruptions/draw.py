@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ...figures.series import few_decades, positive
 from ...figures.style import INK, save, styled
 
-MARKERS = {"opens": "o", "slides": "s", "law": "D", "flows": "^", "cut off": "x", "stable": "."}
+MARKERS = {"opens": "o", "slides": "s", "law": "D", "flows": "^", "cut off": "X", "stable": "."}
 WORDS = {
     "opens": "a contact opens",
     "slides": "a contact slides",
@@ -56,6 +57,7 @@ def size_figure(runs: list[dict[str, Any]]) -> Figure:
                     [row["msd"] for row in rows],
                     marker,
                     color="C0",
+                    markersize=4,
                     markerfacecolor="white" if damped else "C0",
                     label=WORDS[ends] + (" (damped)" if damped else ""),
                 )
@@ -68,7 +70,8 @@ def size_figure(runs: list[dict[str, Any]]) -> Figure:
     sizes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     for key, colour, name in (("lost", "C0", "open"), ("sliding", "C2", "slide"), ("gained", "C3", "new")):
         contacts.plot(fx, [row[key] for row in free], ".-", color=colour, linewidth=0.6, label=name)
-    contacts.set(xlabel="$F_x$", ylabel="contacts", xscale="log")
+    contacts.set(xlabel="$F_x$", ylabel="contacts", xscale="log", ylim=(-0.5, max(5, 1.1 * contacts.dataLim.y1)))
+    contacts.yaxis.set_major_locator(MaxNLocator(5, integer=True))
     contacts.legend()
     return figure
 
@@ -76,7 +79,7 @@ def size_figure(runs: list[dict[str, Any]]) -> Figure:
 @styled
 def course_figure(series: dict[float, dict[str, list[float]]]) -> Figure:
     """D(t) of the undamped runs, coloured by their load."""
-    figure = Figure(figsize=(3.4, 2.5), layout="constrained")
+    figure = Figure(figsize=(4.4, 2.7), layout="constrained")
     axes = figure.add_subplot(xscale="log", yscale="log", xlabel="$t$", ylabel="$D(t)$")
     order = sorted(series)
     for k, fx in enumerate(order):

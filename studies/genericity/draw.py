@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from ...analysis.packing import Floats
 from ...figures.style import INK, styled
@@ -36,7 +37,7 @@ def onsets_figure(onsets: Table, predicted: Floats) -> Figure:
         fx = np.linspace(0, 0.03, 100)
         share = np.mean(np.exp(-((fx[:, None] / predicted) ** 2)), axis=1)
         left.plot(fx, share, ":", color=INK, label="two levels")
-    left.set(xlabel="$F_x$", ylabel="packings without an onset", xlim=(0, 0.03), ylim=(0, 1))
+    left.set(xlabel="$F_x$", ylabel="share without an onset", xlim=(0, 0.03), ylim=(0, 1))
     if left.lines:
         left.legend(fontsize=7)
     strong, weak = STEPS[0]
@@ -48,9 +49,16 @@ def onsets_figure(onsets: Table, predicted: Floats) -> Figure:
         marker = "o" if row["ends"] == other["ends"] else ">" if other["ends"] != "onset" else "^"
         same = bool(row["ancestors"]) and row["ancestors"] == other["ancestors"]
         right.plot(float(other["reach"]), float(row["reach"]), marker, color="C0", mfc="C0" if same else "none", ms=3.5)
+    for marker, face, label in (
+        ("o", "C0", "the same two modes"),
+        ("o", "none", "other modes"),
+        ("^", "none", "one beyond"),
+    ):
+        right.plot([], [], marker, color="C0", mfc=face, ms=3.5, label=label)
+    right.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1, handletextpad=0.2)
     right.axline((0, 0), slope=1, color=INK, linewidth=0.6, linestyle=":")
     right.set(xlabel=rf"$F_x^c(\mu = {strong:g})$", ylabel=rf"$F_x^c(\mu = {weak:g})$", aspect="equal")
-    right.set(xlim=(0, 0.031), ylim=(0, 0.031))
+    right.set(xlim=(0, 0.0315), ylim=(0, 0.0315))
     return figure
 
 
@@ -77,7 +85,7 @@ def modes_figure(onsets: Table) -> Figure:
 @styled
 def size_figure(numbers: dict[str, Any]) -> Figure:
     """The onset over the number of disks beside the prediction, and the largest growth rate over the load."""
-    figure = Figure(figsize=(6.8, 3.0), layout="constrained")
+    figure = Figure(figsize=(6.8, 3.0), layout=ConstrainedLayoutEngine(wspace=0.06))
     left, right = figure.subplots(1, 2)
     for marker, (name, found) in zip("os", numbers["sizes"].items(), strict=True):
         rows = [row for row in found["rows"] if row["median"][0] is not None]
@@ -124,7 +132,7 @@ def mechanism_figure(found: dict[str, Any]) -> Figure:
     for number, (name, label) in enumerate(names.items()):
         part = found[name]
         _survival(axes, np.array(part["reach"]), np.array(part["is_onset"], dtype=bool), label, f"C{number}")
-    axes.set(xlabel="$F_x$", ylabel="without an onset", xlim=(0, 0.03), ylim=(0, 1))
+    axes.set(xlabel="$F_x$", ylabel="share without an onset", xlim=(0, 0.03), ylim=(0, 1))
     if axes.lines:
         axes.legend(fontsize=7)
     return figure

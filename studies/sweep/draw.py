@@ -58,12 +58,14 @@ def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
     fx, probability = distribution(reach, onset)
     levels = [0.0, *probability]
     share.step([0.0, *fx, reach.max()], [*levels, levels[-1]], where="post")
-    share.set(xlabel="$F_x$", ylabel="scenes with an onset", xlim=(0, None), ylim=(0, 1))
+    share.set(xlabel="$F_x$", ylabel="share with an onset", xlim=(0, None), ylim=(0, 1))
     for axes, key in zip(panels, keys, strict=True):
         place = _places(axes, key, [row for row, _ in found])
-        axes.plot(place[onset], reach[onset], "o", color="C0", markersize=3)
-        axes.plot(place[~onset], reach[~onset], "^", color="C0", markerfacecolor="none", markersize=3)
+        axes.plot(place[onset], reach[onset], "o", color="C0", markersize=3, label="onset")
+        axes.plot(place[~onset], reach[~onset], "^", color="C0", mfc="none", markersize=3, label="none up to here")
         axes.set(ylabel="$F_x^c$", ylim=(0, None))
+    if panels:
+        panels[0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     return figure
 
 

@@ -8,9 +8,9 @@ one, lies beyond the last equilibrium: they are right-censored observations.
 the weight :math:`w_k = v_{x,k}^2 + v_{y,k}^2 + v_{u,k}^2`, and :math:`1/\sum_k w_k^2` is the *participation*, the
 number of disks that move. The *rotation* is the share :math:`\sum_k v_{u,k}^2`, the *layer* that of the disks of the
 upper layer. In packings whose modes are all computed, *rank* is the number of eigenvalues below the pair, of *modes*
-in all, and *ancestors* are the two modes of the packing at rest, by number, which span most of the pair's plane, with
-their share of it in *ancestry*. At rest K does not depend on mu where the slips are zero: two onsets of one packing at
-different mu are of one pair if their ancestors are the same.
+in all, and *ancestors* are the two modes of the packing at F_x = 0, by number, which span most of the pair's plane,
+with their share of it in *ancestry*. At F_x = 0 K does not depend on mu where slips are zero: two onsets of one packing
+at different mu are of one pair if their ancestors are the same.
 
 **The error** is that of :func:`~faultgouge.analysis.find_onset`: of the solution for the edge and of the equilibria's
 residual. How F_x^c depends on the increments of the ramp is not in it.
@@ -128,7 +128,7 @@ def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
 
 
 def _among_all(packing: Packing, rest: Packing, eigenvalue: float, plane: Floats) -> dict[str, Any]:
-    """Rank of the pair, and the modes of the packing at rest that it has come from."""
+    """Rank of the pair, and the modes of the packing at F_x = 0 that it has come from."""
     operator = full_operator(packing)
     active = np.flatnonzero(np.diff(operator.indptr))
     values = np.sort(eigvals(operator[active][:, active].toarray()).real)

@@ -8,6 +8,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 PROSE = [*PAGES, *sorted((ROOT / "docs").glob("*/*.md"))]
+EXPLANATIONS = ("physics", "numerics", "complex_pairs", "arithmetic", "dissipation")
 NO_PROSE = re.compile(r"^(```|\$\$).*?^(```|\$\$)$|^(\||    ).*?$", re.MULTILINE | re.DOTALL)
 """Blocks of code and formulas, and rows of tables."""
 
@@ -22,6 +23,14 @@ def test_links_lead_somewhere(page):
 def test_no_line_of_prose_is_longer_than_a_screen(page):
     prose = NO_PROSE.sub("", page.read_text())
     assert [line for line in prose.splitlines() if len(line) > 120] == []
+
+
+@pytest.mark.parametrize("page", EXPLANATIONS)
+def test_explanations_are_two_screens_with_a_picture_before_any_number(page):
+    text = (ROOT / "docs" / f"{page}.md").read_text()
+    before = text[: text.index("![")]
+    assert text.count("\n") <= 100
+    assert re.findall(r"\d\.\d|10\^|\b\d\d+", before) == []
 
 
 def test_no_page_has_the_name_of_a_page_that_sphinx_makes():

@@ -43,6 +43,6 @@ def test_no_gain_is_drawn_where_a_motion_grows_for_ever():
     assert np.isnan(damped.get_ydata()).sum() == 3
 
 
-def test_three_panels_beside_each_other():
+def test_three_panels_in_order():
     titles = [axes.get_title(loc="left") for axes in dissipation_figure(DASHPOTS, DRAG, GAINS).axes]
     assert [title[:3] for title in titles] == ["(a)", "(b)", "(c)"]

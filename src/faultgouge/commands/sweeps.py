@@ -29,8 +29,8 @@ def sweep(
 
     A sweep names a task (onset, triggering, ...); below \\[sweep] lists of values
     or ranges for any keys of a scene, as in "packing.seed" = "1:200"; and below
-    \\[scene.SECTION] what all scenes share. Every result is on the disk as it
-    ends, and the same command goes on where it was cut off. A scene that fails
+    \\[scene.SECTION] what all scenes share. Every result is written as it ends,
+    and the same command goes on where it was cut off. A scene that fails
     is a result, too, with its sentence. Of several ranks one hands out the work:
     mpiexec -n 5 keeps 4 cores busy.
     """
