@@ -238,7 +238,7 @@ class ModeFilm(Film):
         ]
         for one, mode in zip(axes, modes, strict=True):
             one.set_title(mode.words, fontsize=7)
-        finish(figure, axes, packing, words if len(modes) > 1 else "growth left out")
+        finish(figure, axes, packing, words if len(modes) > 1 else "one mode, growth left out")
         self._phase = 2 * np.pi * periods / frames
         moving = [part for each in self._artists for part in each.artist.moving]
         super().__init__(figure, moving, frames, dots)

@@ -15,6 +15,9 @@ from .table import Row
 
 SEED = "packing.seed"
 
+COLOURS = 6
+"""Colours of the style: more scenes cannot be told apart."""
+
 Reach = tuple[float, bool]
 """The largest F_x up to which there is no window, and whether that is the onset."""
 
@@ -71,7 +74,7 @@ def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
 
 @styled
 def eruptions_figure(found: Sequence[tuple[Row, dict[str, float]]]) -> Figure:
-    """The mean square displacement D of every run over its load, one colour a scene.
+    """The largest mean square displacement D of every run over its load, one colour a scene.
 
     Parameters
     ----------
@@ -83,11 +86,15 @@ def eruptions_figure(found: Sequence[tuple[Row, dict[str, float]]]) -> Figure:
     Figure
     """
     figure = Figure(figsize=(3.4, 2.6), layout="constrained")
-    axes = figure.add_subplot(xlabel="$F_x$", ylabel="$D$", yscale="log")
+    axes = figure.add_subplot(xlabel="$F_x$", ylabel="largest $D$", yscale="log")
     numbers: dict[str, int] = {}
     for row, run in found:
+        new = row["key"] not in numbers
         number = numbers.setdefault(row["key"], len(numbers))
-        axes.plot(run["fx"], run["msd"], "o", color=f"C{number % 10}", markersize=3)
+        label = ", ".join(f"{key} = {value}" for key, value in row["values"].items()) if new else None
+        axes.plot(run["fx"], run["msd"], "o", color=f"C{number % COLOURS}", markersize=3, label=label)
+    if 1 < len(numbers) <= COLOURS:
+        axes.legend()
     return figure
 
 
