@@ -97,19 +97,22 @@ def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, windo
     WeakLimit or None
         None if the pair grows at the smallest load already, or cannot be followed down to where it does not.
     """
-    followed, loads = _Followed(equilibrium, window), np.asarray(forces, dtype=np.float64)
+    pair_at, loads = _followed(equilibrium, window), np.asarray(forces, dtype=np.float64)
     above = window.fx_onset
+
+    def h(fx: float) -> float:
+        return imbalance(equilibrium(fx), pair_at(fx))
+
     try:
         for below in loads[loads < window.fx_onset][::-1]:
-            if followed.imbalance(float(below)) > 0:
+            if h(float(below)) > 0:
                 break
             above = float(below)
         else:
             return None
         # of a balanced pair h at the coalescence is rounding noise of either sign
-        balanced = followed.imbalance(above) >= 0
-        fx = above if balanced else float(brentq(followed.imbalance, float(below), above, xtol=DIGITS * abs(above)))
-        pair, packing = followed.pair(fx), equilibrium(fx)
+        fx = above if h(above) >= 0 else float(brentq(h, float(below), above, xtol=DIGITS * abs(above)))
+        pair, packing = pair_at(fx), equilibrium(fx)
     except (LostPairError, NoEquilibriumError):
         return None
     g = damping_block(packing, pair)
@@ -138,12 +141,12 @@ def drag_onset(
     float or None
         Force per top disk; None if the drag holds the pair down to the window's end or the ramp's.
     """
-    followed, loads = _Followed(equilibrium, window), np.asarray(forces, dtype=np.float64)
+    pair_at, loads = _followed(equilibrium, window), np.asarray(forces, dtype=np.float64)
     last = loads[-1] if window.fx_end is None else min(window.fx_end, loads[-1])
     below = window.fx_onset
 
     def excess(fx: float) -> float:
-        return drag_excess(followed.pair(fx), drag_time)
+        return drag_excess(pair_at(fx), drag_time)
 
     for above in [*loads[(loads > below) & (loads < last)], last]:
         if excess(float(above)) > 0:
@@ -176,24 +179,10 @@ def balancing_ratio(packing: Packing, window: Window) -> float:
     return float(-along / across) if across else np.inf
 
 
-class _Followed:
-    """An undamped pair along the loads."""
-
-    def __init__(self, equilibrium: Callable[[float], Packing], window: Window) -> None:
-        self.equilibrium = equilibrium
-        self.family = Family(lambda fx: full_operator(equilibrium(fx)), 0.0)
-        self.known = {window.fx_onset: _at_onset(equilibrium(window.fx_onset), window)}
-
-    def pair(self, fx: float) -> Pair:
-        """The pair at a load."""
-        if fx not in self.known:
-            near = self.known[min(self.known, key=lambda each: abs(each - fx))]
-            self.known[fx] = self.family.followed(near, self.family.at(fx))
-        return self.known[fx]
-
-    def imbalance(self, fx: float) -> float:
-        """h at a load."""
-        return imbalance(self.equilibrium(fx), self.pair(fx))
+def _followed(equilibrium: Callable[[float], Packing], window: Window) -> Callable[[float], Pair]:
+    """The undamped pair at any load."""
+    family = Family(lambda fx: full_operator(equilibrium(fx)), 0.0)
+    return family.track({window.fx_onset: _at_onset(equilibrium(window.fx_onset), window)})
 
 
 def _at_onset(packing: Packing, window: Window) -> Pair:

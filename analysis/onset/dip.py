@@ -19,19 +19,9 @@ from .pair import Pair
 def deepest_dip(d0: Floats, s0: Floats, d1: Floats, s1: Floats, bend: float) -> tuple[Floats, Floats]:
     """The widest stretch of 0 < t < 1 on which functions known at both ends may be negative.
 
-    Parameters
-    ----------
-    d0, s0, d1, s1 : ndarray, shape (P,)
-        Values, positive, and slopes at t = 0 and at t = 1.
-    bend : float
-        Of `Limits`.
-
-    Returns
-    -------
-    width : ndarray, shape (P,)
-        Largest possible width in t, at most 1; zero where a function surely stays positive.
-    at : ndarray, shape (P,)
-        Where it is deepest.
+    d0, s0 and d1, s1, each of shape (P,), are values, positive, and slopes at t = 0 and at t = 1; `bend` is that of
+    `Limits`. Returned are the largest possible width in t, zero where a function surely stays positive, and where it is
+    deepest.
     """
     # Parabolas d0 + s0 t + f t^2 and d1 - s1 r + g r^2, r = 1 - t; cubic d0 + s0 t + h t^2 + k t^3.
     f, g = d1 - d0 - s0, d0 - d1 + s1
@@ -53,12 +43,8 @@ def deepest_dip(d0: Floats, s0: Floats, d1: Floats, s1: Floats, bend: float) -> 
 def dip_between(here: Pair, there: Pair, limits: Limits = LIMITS) -> tuple[float, float]:
     """Where the discriminant of a pair may change its sign and back between two loads with the same sign of it.
 
-    Returns
-    -------
-    width : float
-        Of the widest stretch with the other sign that is possible, force; zero if there is surely none.
-    fx : float
-        The load at which D is closest to zero, or deepest beyond.
+    Returned are the width of the widest stretch with the other sign that is possible, force, zero if there is surely
+    none, and the load at which D is closest to zero, or deepest beyond.
     """
     sign, change, increment = np.sign(here.discriminant), there.matrix - here.matrix, there.fx - here.fx
     ends = ((pair.discriminant, pair.slope(change)) for pair in (here, there))

@@ -5,6 +5,7 @@ Modes at neighbouring loads a, b are assigned by :math:`|x_a^H x_b|\,|y_a^H y_b|
 do not swap names. (:math:`|y_a^H x_b|`, the obvious weight, vanishes at an exceptional point, where it is needed most.)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -19,9 +20,7 @@ from ..stiffness import stiffness_matrix
 from .limits import LIMITS, Limits
 from .pair import Pair
 
-Members = tuple[int, int]
-"""The numbers of the two modes of a pair."""
-
+Members = tuple[int, int]  # the numbers of the two modes of a pair
 Operator: TypeAlias = Floats | csr_array
 
 
@@ -44,14 +43,10 @@ def force_bearing(packing: Packing, limits: Limits = LIMITS) -> Packing:
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """The modes of the operator at one load.
+    """The modes of the operator A, shape (n, n), 1 / time^2, at the load fx.
 
     Attributes
     ----------
-    fx : float
-        The load.
-    matrix : scipy.sparse.csr_array, shape (n, n)
-        The operator A, 1 / time^2.
     values : ndarray of complex, shape (E,)
         Eigenvalues by real part, then imaginary part. Complex pairs that are rounding noise have lost their
         imaginary parts.
@@ -119,25 +114,18 @@ class Modes:
             candidates = [*candidates, (int(first), int(second))]
         return max(candidates, key=lambda members: float(weight[list(members)].sum()))
 
-    def about(self, eigenvalue: float) -> Members:
-        """The two modes whose eigenvalues are closest to a real number."""
+    def about(self, eigenvalue: float, among: Sequence[Members] = ()) -> Members:
+        """Of some pairs that with the closest eigenvalue; failing these, the two modes closest to a real number."""
+        if among:
+            return min(among, key=lambda members: abs(self.values[members[0]].real - eigenvalue))
         first, second = np.argsort(np.abs(self.values - eigenvalue))[:2]
         return int(first), int(second)
 
 
 def assign(here: Modes, there: Modes) -> Indices:
-    """Which mode there each mode here has become.
+    """Which mode there each mode here has become, shape (E,); -1 where there are fewer modes there.
 
-    Parameters
-    ----------
-    here, there : Modes
-        Modes at two neighbouring loads.
-
-    Returns
-    -------
-    ndarray of int, shape (E,)
-        Index there; -1 where there are fewer modes there. The assignment maximises the sum of |x^H x'| |y^H
-        y'|.
+    The assignment maximises the sum of |x^H x'| |y^H y'|.
     """
     weight = products(here.right, there.right) * products(here.left, there.left)
     partner = np.full(len(here.values), -1)

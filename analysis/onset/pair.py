@@ -52,14 +52,10 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Two modes of the operator at one load.
+    """Two modes of the operator A, shape (n, n), 1 / time^2, at the load fx.
 
     Attributes
     ----------
-    fx : float
-        The load.
-    matrix : scipy.sparse.csr_array, shape (n, n)
-        The operator A, 1 / time^2.
     right, left : ndarray, shape (n, 2)
         Orthonormal bases V and U of the invariant planes.
     inverse : Inverse or None
@@ -130,14 +126,9 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Inverse:
-    """The inverse of A - sigma, or of a matrix like it.
+    """The inverse of A - sigma, or of a matrix like it: `solve` is (vectors, transposed) -> its product with vectors.
 
-    Attributes
-    ----------
-    solve : callable
-        (vectors, transposed) -> the product of the inverse, or of its transpose, with vectors.
-    exact : bool
-        False for sparse factors, which are of another operator or without pivoting: residuals make up for that.
+    Sparse factors are not exact, being without pivoting or of another operator: residuals make up for that.
     """
 
     solve: Callable[[Any, bool], Any]
@@ -166,21 +157,7 @@ def inverse_of(matrix: csr_array, shift: complex, limits: Limits = LIMITS) -> In
 
 
 def continued(pair: Pair, fx: float, matrix: csr_array, limits: Limits = LIMITS) -> Pair | None:
-    """What a pair has become in a neighbouring operator.
-
-    Parameters
-    ----------
-    pair : Pair
-        The pair in one operator, or a guess of it.
-    fx, matrix
-        The neighbouring load and the operator there.
-    limits : Limits
-
-    Returns
-    -------
-    Pair or None
-        None if the iteration does not converge to these planes.
-    """
+    """What a pair, or a guess of one, has become in a neighbouring operator; None if no iteration ends there."""
     for planes, inverse, most in _iterations(pair, replace(pair, fx=fx, matrix=matrix), limits):
         found = _invariant(matrix, planes, most, limits)
         if found is not None:

@@ -100,25 +100,10 @@ def complex_windows(
     narrowest: float | None = None,
     limits: Limits = LIMITS,
 ) -> tuple[Window, ...]:
-    """All windows of complex eigenvalues of a one-parameter family of matrices.
+    """All windows of complex eigenvalues of a one-parameter family of matrices, by increasing onset.
 
-    Parameters
-    ----------
-    operator : callable
-        fx -> ndarray or sparse array, shape (n, n), in coordinates that do not depend on fx. Zero rows are left
-        out.
-    forces, narrowest, limits
-        As in :func:`find_onset`.
-
-    Returns
-    -------
-    tuple of Window
-        By increasing onset; may be empty.
-
-    Raises
-    ------
-    ValueError
-        If the loads are not at least two increasing numbers.
+    The operator is fx -> ndarray or sparse array, shape (n, n), in coordinates that do not depend on fx. Zero rows are
+    left out. All else is as in :func:`find_onset`.
     """
     loads = increasing(forces)
     narrowest = limits.narrowest * float(np.abs(loads).max()) if narrowest is None else narrowest

@@ -30,10 +30,7 @@ class Oracle(Protocol[At, Announced, Sure]):
         """Whether all that is sought has been found."""
 
     def candidates(self, places: Sequence[At], depth: int) -> Iterable[Announced]:
-        """What may happen on each of the increments between neighbouring places.
-
-        `depth` is how often the increment has been divided of which these are the parts.
-        """
+        """What may happen on each of the increments between neighbouring places."""
 
     def confirm(self, candidates: Announced, here: At, there: At, depth: int) -> tuple[Sure | None, Sequence[At]]:
         """What does happen on one increment, to be recorded, and where to divide the increment if that is in doubt."""
@@ -43,15 +40,9 @@ class Oracle(Protocol[At, Announced, Sure]):
 
 
 def walk(oracle: Oracle[At, Announced, Sure], places: Sequence[At], depth: int = 0) -> None:
-    """Go from the first to the last of several places, or to where the oracle has found what it seeks.
+    """Go from the first to the last of two or more places at increasing loads, or to where the oracle is finished.
 
-    Parameters
-    ----------
-    oracle : Oracle
-    places : sequence
-        At increasing loads, two at least.
-    depth : int
-        How often the increment has been divided of which these are the parts.
+    `depth` is how often the increment has been divided of which these are the parts.
     """
     for (here, there), candidates in zip(pairwise(places), oracle.candidates(places, depth), strict=True):
         sure, between = oracle.confirm(candidates, here, there, depth)

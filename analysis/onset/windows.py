@@ -1,15 +1,12 @@
-"""Windows, intervals of the load on which a pair is complex, and the ledger of those that are open."""
+"""Windows: intervals of the load on which a pair is complex."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import FaultgougeError
 from .edge import Edge, Kind
-from .pair import Pair
 
 
 @dataclass(frozen=True)
@@ -68,57 +65,6 @@ class Window:
             "error": self.error,
             "kind": self.kind,
         }
-
-
-Course = tuple[Pair | None, Pair | None, Edge | None]
-"""A pair over an increment: at the lower and at the upper load, where it is complex, and the edge in between if it is
-complex at one of them alone."""
-
-
-class LostTrackError(FaultgougeError):
-    """The complex pairs of one increment are not those of the increment before."""
-
-
-class Ledger:
-    """The windows that are open at the load reached so far, by their pairs there; and the closed ones."""
-
-    def __init__(self) -> None:
-        self.open: dict[Pair, Edge] | None = None
-        self.closed: list[Window] = []
-
-    def carry(self, courses: Sequence[Course]) -> None:
-        """Go on over an increment, whose courses are those of all pairs that are complex at either end.
-
-        Those that are complex at the smallest load begin there.
-
-        Raises
-        ------
-        LostTrackError
-            If they are not the pairs of the open windows.
-        """
-        if self.open is None:
-            self.open = {before: Edge.start(before) for before, _, _ in courses if before}
-        now: dict[Pair, Edge] = {}
-        for before, after, edge in courses:
-            onset = edge
-            if before is not None:
-                known = before.closest(self.open)
-                if known is None:
-                    raise LostTrackError
-                onset = self.open.pop(known)
-            assert onset is not None
-            if after is None:
-                self.closed.append(Window.between(onset, edge))
-            else:
-                now[after] = onset
-        if self.open:
-            raise LostTrackError
-        self.open = now
-
-    def all(self) -> tuple[Window, ...]:
-        """All windows by increasing onset."""
-        still = [Window.between(onset, None) for onset in (self.open or {}).values()]
-        return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
 
 
 def increasing(forces: ArrayLike) -> NDArray[np.float64]:

@@ -10,8 +10,10 @@ from scipy.sparse import csr_array
 
 from faultgouge.analysis import Contacts, NoEquilibriumError, OnsetError, Packing, complex_windows, find_onset
 from faultgouge.analysis.onset import LIMITS, Family, Limits, Pair, full_operator
+from faultgouge.analysis.onset.basis import Bases
 from faultgouge.analysis.onset.pair import continued
-from faultgouge.analysis.onset.sliced import FirstWindow, Sliced, first_window
+from faultgouge.analysis.onset.ranks import ALONE
+from faultgouge.analysis.onset.sliced import FirstWindow, first_window
 
 
 def searched(operator, loads, limits=LIMITS):
@@ -139,10 +141,10 @@ def test_basis_is_given_up_where_modes_mix_or_disks_move_in(ramp):
         noise * (matrix.toarray() != 0).any(axis=1)[:, None] * (matrix.toarray() != 0).any(axis=0)
     )
     more = csr_array(matrix + csr_array(([1.0], ([58], [58])), shape=matrix.shape))
-    search = Sliced(Family(lambda _: matrix, 0.0))
+    bases = Bases(None, ALONE)
 
     def basis(operator):
-        ((part, _),) = search.bases(operator)
+        ((part, _),) = bases.at(operator)
         return part
 
     first = basis(matrix)
