@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 from .damped_modes import DampedMode, DampedModes, Pencil
 from .damped_step import Step, excursion
 from .errors import FaultgougeError, NoEquilibriumError
-from .onset.edge import sign_change, track
+from .onset.edge import LostPairError, sign_change, track
 from .onset.limits import LIMITS
 from .onset.walk import between, walk
 from .onset.windows import increasing
@@ -236,14 +236,15 @@ class Growing:
 
         def follow(nearest: list[DampedMode], fx: float) -> DampedMode:
             pencil = self.pencil(fx)
-            found = next((image for mode in nearest if (image := mode.at(pencil))), None)
-            if found is None:
-                raise _LostError
-            return found
+            for mode in nearest:
+                found = mode.at(pencil)
+                if found is not None:
+                    return found
+            raise LostPairError
 
         try:
             return _solved(track({here.fx: here, there.fx: there}, follow), here.fx, there.fx)
-        except (_LostError, NoEquilibriumError):
+        except (LostPairError, NoEquilibriumError):
             return None
 
     def record(self, sure: tuple[Step, Crossings]) -> None:
@@ -266,10 +267,6 @@ class Growing:
         self.open = now
 
 
-class _LostError(FaultgougeError):
-    """A mode that can be followed no further."""
-
-
 def _solved(mode: Callable[[float], DampedMode], below: float, above: float) -> Crossing:
     """The root of Re s, or a bracket where Re s jumps."""
     change = sign_change(lambda fx: mode(fx).rate.real, below, above)
@@ -281,7 +278,7 @@ def _solved(mode: Callable[[float], DampedMode], below: float, above: float) -> 
     left, right = (mode(fx) for fx in change.loads)
     across = left.at(right.pencil)
     if across is None or (across.rate.real > 0) != (right.rate.real > 0):
-        raise _LostError  # the equilibrium does not jump there: it is the mode that has become another one
+        raise LostPairError  # the equilibrium does not jump there: it is the mode that has become another one
     return Crossing(change.fx, change.error, right.rate.imag, "contact change")
 
 

@@ -215,8 +215,13 @@ def dynamical_matrix(packing: Packing, form: Form = "consistent") -> tuple[csr_a
         feels no force: its eigenvalue is zero and says nothing.
     """
     matrix = mass_weighted(stiffness_matrix(packing, form), packing)
-    active = np.flatnonzero(np.diff(matrix.indptr))
+    active = active_coordinates(matrix)
     return matrix[active][:, active], active
+
+
+def active_coordinates(matrix: csr_array) -> Indices:
+    """Coordinates that feel a force: the rows that are not zero."""
+    return np.flatnonzero(np.diff(matrix.indptr))
 
 
 def mass_weighted(stiffness: csr_array, packing: Packing) -> csr_array:

@@ -64,13 +64,12 @@ class WeakLimit:
 
 def damping_block(packing: Packing, pair: Pair) -> Floats:
     """G_B of a packing's damping on the bases of a pair, shape (2, 2), 1 / time."""
-    g = mass_weighted(damping_matrix(force_bearing(packing)), packing)
-    return np.asarray(np.linalg.solve(pair.left.T @ pair.right, pair.left.T @ (g @ pair.right)))
+    return pair.block(mass_weighted(damping_matrix(force_bearing(packing)), packing))
 
 
 def imbalance(packing: Packing, pair: Pair) -> float:
     """h of a pair, positive as long as weak damping damps both of its modes."""
-    g, n = damping_block(packing, pair), _traceless(pair)
+    g, n = damping_block(packing, pair), pair.traceless
     return float(np.trace(g) ** 2 * pair.discriminant - 4 * np.trace(n @ g) ** 2)
 
 
@@ -116,7 +115,7 @@ def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, windo
     except (LostPairError, NoEquilibriumError):
         return None
     g = damping_block(packing, pair)
-    sign = -np.sign(np.trace(_traceless(pair) @ g))  # the mode in which the two terms cancel
+    sign = -np.sign(np.trace(pair.traceless @ g))  # the mode in which the two terms cancel
     value = pair.mean + sign * 0.5 * np.sqrt(max(0.0, pair.discriminant))
     return WeakLimit(fx, float(np.sqrt(value)), window.fx_onset)
 
@@ -173,7 +172,7 @@ def balancing_ratio(packing: Packing, window: Window) -> float:
     """
     pair = _at_onset(packing, window)
     along, across = (
-        np.trace(_traceless(pair) @ damping_block(replace(packing, law=replace(packing.law, cn=n, ct=t)), pair))
+        np.trace(pair.traceless @ damping_block(replace(packing, law=replace(packing.law, cn=n, ct=t)), pair))
         for n, t in ((1.0, 0.0), (0.0, 1.0))
     )
     return float(-along / across) if across else np.inf
@@ -191,8 +190,3 @@ def _at_onset(packing: Packing, window: Window) -> Pair:
     modes = Modes.of(*place)
     family = Family(lambda fx: place.matrix, 0.0)
     return family.followed(modes.pair(modes.about(window.eigenvalue)), place)
-
-
-def _traceless(pair: Pair) -> Floats:
-    """N = B - m."""
-    return pair.entries - pair.mean * np.eye(2)

@@ -1,13 +1,10 @@
 """An eigenbasis of the symmetric part of the operator, all of it at once or a slice of the spectrum after the other.
 
 In the eigenvectors X of the symmetric part of A at one load, H(F) = X^T A(F) X is nearly diagonal at the loads about
-it: the antisymmetric part is small, and the modes turn little. X is computed once and serves as long as the couplings
-are small against the spacing of the levels.
-
-Perturbation theory (:mod:`~faultgouge.analysis.onset.screening`) asks for a mode and its neighbours in the spectrum
-alone. So a large operator has a basis for each slice of its spectrum (:mod:`~faultgouge.analysis.onset.slicing`), with
-a margin on either side, and never one of all modes. A *cluster* of neighbouring modes, with all others in second order,
-has the eigenvalues of A up to the third order of the typical coupling over the distance of the modes outside.
+it. X is computed once and serves as long as the couplings are small against the spacing of the levels. A large operator
+has a basis for each slice of its spectrum (:mod:`~faultgouge.analysis.onset.slicing`), with a margin on either side,
+and never one of all modes. A *cluster* of neighbouring modes, with all others in second order, has the eigenvalues of A
+up to the third order of the typical coupling over the distance of the modes outside.
 """
 
 from collections.abc import Iterable, Iterator
@@ -20,6 +17,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array
 
 from ..packing import Floats, Indices
+from ..spectrum import active_coordinates
 from .limits import LIMITS, Limits
 from .ranks import Ranks
 
@@ -85,21 +83,18 @@ class Levels:
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """Eigenvectors of the symmetric part of an operator, all or neighbouring ones.
+    """Eigenvectors of the symmetric part of an operator with `size` coordinates, all or neighbouring ones.
 
     Attributes
     ----------
-    size : int
-        Coordinates of the operator.
     active : ndarray of int, shape (E,)
-        Those whose rows are not zero.
+        Coordinates whose rows are not zero.
     values : ndarray, shape (M,)
         Eigenvalues of the symmetric part, increasing; 1 / time^2.
     vectors : ndarray, shape (E, M)
         Orthonormal eigenvectors in columns.
     own : slice
         The modes that belong to this basis, and to that of no other slice; the rest are margins.
-    limits : Limits
     """
 
     size: int
@@ -112,7 +107,7 @@ class Basis:
     @classmethod
     def of(cls, matrix: csr_array, limits: Limits = LIMITS) -> "Basis":
         """All modes, by LAPACK: the one expensive step, some 10 E^3 operations."""
-        active = np.flatnonzero(np.diff(matrix.indptr))
+        active = active_coordinates(matrix)
         dense = matrix[active][:, active].toarray()
         dense += dense.T.copy()
         dense *= 0.5
@@ -130,7 +125,7 @@ class Basis:
 
     def covers(self, matrix: csr_array) -> bool:
         """Whether an operator acts on the same coordinates."""
-        return np.array_equal(np.flatnonzero(np.diff(matrix.indptr)), self.active)
+        return np.array_equal(active_coordinates(matrix), self.active)
 
     def levels(self, matrix: csr_array) -> Levels:
         """X^T A X of an operator on the same coordinates."""
@@ -189,7 +184,7 @@ class Bases:
 
     def range(self, matrix: csr_array) -> tuple[int, int]:
         """Numbers of the first mode that is looked at and of the first that is not; ValueError if there are none."""
-        count = int(np.count_nonzero(np.diff(matrix.indptr)))
+        count = len(active_coordinates(matrix))
         first, stop = self.modes or (0, count)
         if not 0 <= first < min(stop, count):
             raise ValueError(f"modes {first}:{stop} is no part of the {count} modes of this packing, 0:{count}")
@@ -223,7 +218,7 @@ class Bases:
 
     def _made(self, matrix: csr_array) -> Iterator[Basis]:
         """The bases of slices of the spectrum; a small operator has one, which the first rank makes."""
-        limits, active = self.limits, np.flatnonzero(np.diff(matrix.indptr))
+        limits, active = self.limits, active_coordinates(matrix)
         if len(active) <= limits.one_basis:
             if self.ranks.rank == 0:
                 yield replace(Basis.of(matrix, limits), own=slice(*self.range(matrix)))

@@ -15,7 +15,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_array
 
 from ..packing import Floats, Indices, Packing
-from ..spectrum import Complexes, believable, mass_weighted, unit_rounding
+from ..spectrum import Complexes, active_coordinates, believable, mass_weighted, unit_rounding
 from ..stiffness import stiffness_matrix
 from .limits import LIMITS, Limits
 from .pair import Pair
@@ -67,7 +67,7 @@ class Modes:
     def of(cls, fx: float, matrix: Operator) -> "Modes":
         """Solve the dense eigenproblem, without the coordinates whose rows are zero."""
         sparse = csr_array(matrix)
-        active = np.flatnonzero(np.diff(sparse.indptr))
+        active = active_coordinates(sparse)
         size, count = sparse.shape[0], len(active)
         right, left = np.zeros((2, size, count), dtype=np.complex128)
         if count == 0:
@@ -127,19 +127,25 @@ def assign(here: Modes, there: Modes) -> Indices:
 
     The assignment maximises the sum of |x^H x'| |y^H y'|.
     """
-    weight = products(here.right, there.right) * products(here.left, there.left)
-    partner = np.full(len(here.values), -1)
-    best = weight.argmax(axis=1) if weight.size else partner
-    if weight.size and len(np.unique(best)) == len(best):
-        partner = best  # every mode has its best match: no other assignment has a larger sum
-    else:
-        rows, columns = linear_sum_assignment(weight, maximize=True)
-        partner[rows] = columns
+    partner = matched(products(here.right, there.right) * products(here.left, there.left))
     # Members of one pair have the same weights: let the one above the axis stay above.
     for up, down in here.complex_pairs:
         if partner[up] >= 0 and there.partner[partner[up]] == partner[down] and there.values[partner[up]].imag < 0:
             partner[[up, down]] = partner[[down, up]]
     return partner
+
+
+def matched(weight: Floats) -> Indices:
+    """A column for each row, none twice, with the largest sum of weights; -1 where columns are too few."""
+    column = np.full(len(weight), -1)
+    if not weight.size:
+        return column
+    best = weight.argmax(axis=1)
+    if len(np.unique(best)) == len(best):
+        return best
+    rows, columns = linear_sum_assignment(weight, maximize=True)
+    column[rows] = columns
+    return column
 
 
 def products(a: Complexes, b: Complexes) -> Floats:

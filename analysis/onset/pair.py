@@ -68,10 +68,14 @@ class Pair:
     left: Floats = field(repr=False)
     inverse: "Inverse | None" = field(default=None, repr=False)
 
+    def block(self, matrix: csr_array) -> Floats:
+        """(U^T V)^-1 U^T A V of any matrix on the planes of this pair, shape (2, 2)."""
+        return np.asarray(np.linalg.solve(self.left.T @ self.right, self.left.T @ (matrix @ self.right)))
+
     @cached_property
     def entries(self) -> Floats:
         """The block B, shape (2, 2), 1 / time^2."""
-        return np.linalg.solve(self.left.T @ self.right, self.left.T @ (self.matrix @ self.right))
+        return self.block(self.matrix)
 
     @cached_property
     def mean(self) -> float:
@@ -84,10 +88,15 @@ class Pair:
         b = self.entries
         return float((b[0, 0] - b[1, 1]) ** 2 + 4 * b[0, 1] * b[1, 0])
 
+    @property
+    def traceless(self) -> Floats:
+        """B - mean, shape (2, 2), 1 / time^2."""
+        return self.entries - self.mean * np.eye(2)
+
     @cached_property
     def spread(self) -> float:
         """Frobenius norm of B - mean, 1 / time^2."""
-        return float(np.linalg.norm(self.entries - self.mean * np.eye(2)))
+        return float(np.linalg.norm(self.traceless))
 
     @cached_property
     def overlap(self) -> float:
@@ -107,8 +116,7 @@ class Pair:
 
     def slope(self, change: csr_array) -> float:
         """First-order change of the discriminant with a change of the operator, 1 / time^4."""
-        b = self.entries
-        db = np.linalg.solve(self.left.T @ self.right, self.left.T @ (change @ self.right))
+        b, db = self.entries, self.block(change)
         # The planes turn in first order, which changes invariants of the block in second order only.
         return float(2 * (b[0, 0] - b[1, 1]) * (db[0, 0] - db[1, 1]) + 4 * (db[0, 1] * b[1, 0] + b[0, 1] * db[1, 0]))
 

@@ -18,7 +18,7 @@ from .limits import LIMITS, Limits
 from .modes import Operator, full_operator
 from .ranks import ALONE, Ranks
 from .sliced import FirstWindow, Watch, first_window
-from .windows import Window, increasing
+from .windows import Window, increasing, load_error
 
 
 class OnsetError(FaultgougeError):
@@ -50,8 +50,7 @@ class Onset(Tabled):
     complete : bool
         Whether these are all up to the largest load. Of a large packing only the first is sought.
     doubtful : tuple of (float, float)
-        Of a large packing, increments before the onset in which a pair was expected and not found: an earlier window
-        may hide there, which smaller increments would tell.
+        Of a large packing, increments before the onset in which a pair was expected and not found: take smaller ones.
     modes : tuple of (int, int) or None
         Modes among which the onset was sought; None for all.
     """
@@ -133,8 +132,7 @@ def find_onset(
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
     narrowest : float, optional
-        Windows narrower than this are not looked for, force; 1e-7 of the largest |load| by default. Of a large packing
-        it is no less than a thousandth of an increment.
+        Windows narrower than this are not looked for, force; by default as in `Limits`, `narrowest` and `finest`.
     modes : tuple of (int, int), optional
         Search these modes alone, and for their first window: numbers of the first one and of the first one beyond, by
         frequency, the lowest being 0, of the symmetric part at the load where the search stands. Parts that are
@@ -144,12 +142,6 @@ def find_onset(
     ranks : Ranks, optional
         The processes that search a large packing together. Each makes the same call, and is told the same by
         `equilibrium`.
-    limits : Limits, optional
-        Sizes and tolerances of the search.
-
-    Returns
-    -------
-    Onset
 
     Raises
     ------
@@ -166,7 +158,7 @@ def find_onset(
 
     def operator(fx: float) -> csr_array:
         packing = start if fx == loads[0] else equilibrium(fx)
-        unbalanced[fx] = packing.residual / float(np.sqrt(max(1, packing.top.sum())))
+        unbalanced[fx] = load_error(packing)
         return full_operator(packing, limits)
 
     complete = seeks_all(start, modes, limits)

@@ -264,19 +264,10 @@ def first_window(
     watch: Watch = lambda says: None,
     ranks: Ranks = ALONE,
 ) -> FirstWindow:
-    """The first window of a family of large matrices; arguments are as of :func:`~faultgouge.analysis.find_onset`.
+    """The first window of a family of large matrices; arguments and errors are those of `find_onset`.
 
-    Loads beyond the one above the onset are not asked for, except those of `Limits.ahead` increments.
-
-    Raises
-    ------
-    NoEquilibriumError
-        If the operator raises it at one of the loads, and no window has been found before.
-    LostPairError
-        If a complex pair cannot be followed to its onset, not even in the finest parts of its increment, and no other
-        window is found there.
-    SliceError, ValueError
-        If a part of the spectrum is not found, or the packing has none of these modes.
+    Loads beyond the one above the onset are not asked for, except those of `Limits.ahead` increments. A
+    NoEquilibriumError of the operator at one of them is raised if no window has been found before.
     """
     oracle = Sliced(family, modes, watch, ranks)
     here = family.at(loads[0])

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..packing import Packing
 from .edge import Edge, Kind
 
 
@@ -24,8 +25,7 @@ class Window:
         time^2.
     error : float
         Uncertainty of fx_onset: twice the scatter of the discriminant over its slope for a coalescence, the bracket
-        otherwise; and r / n^(1/2) for equilibria of residual r with n top disks: what is out of balance by r is exact
-        at other loads. How the path of equilibria depends on the increments is not in it.
+        otherwise; and the `load_error` of the equilibria. How their path depends on the increments is not in it.
     end_error : float or None
         The same for fx_end.
     overlap : float
@@ -65,6 +65,11 @@ class Window:
             "error": self.error,
             "kind": self.kind,
         }
+
+
+def load_error(packing: Packing) -> float:
+    """r / n^(1/2) of a residual r with n top disks, force: what is out of balance by r is exact at other loads."""
+    return packing.residual / float(np.sqrt(max(1, packing.top.sum())))
 
 
 def increasing(forces: ArrayLike) -> NDArray[np.float64]:
