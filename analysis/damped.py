@@ -30,8 +30,7 @@ from .damped_step import Step, excursion
 from .errors import FaultgougeError, NoEquilibriumError
 from .onset.edge import LostPairError, sign_change, track
 from .onset.limits import LIMITS
-from .onset.walk import between, walk
-from .onset.windows import increasing
+from .onset.walk import between, increasing, walk
 from .packing import Packing
 
 STEADY = 1e-9

@@ -26,8 +26,8 @@ from scipy.linalg import eig, lu_solve
 from scipy.linalg.lapack import zgetrf
 
 from .onset import force_bearing
+from .onset.edge import load_error
 from .onset.modes import matched
-from .onset.windows import load_error
 from .packing import Floats, Indices, Packing
 from .spectrum import SAFETY, Complexes, unit_rounding
 from .state_space import StateSpace

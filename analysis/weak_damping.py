@@ -35,7 +35,7 @@ from scipy.optimize import brentq
 
 from .damping import damping_matrix
 from .errors import NoEquilibriumError
-from .onset import Family, LostPairError, Modes, Pair, Place, Window, force_bearing, full_operator
+from .onset import Family, LostPairError, Pair, Place, Window, force_bearing, full_operator
 from .packing import Floats, Packing
 from .spectrum import mass_weighted
 
@@ -187,6 +187,5 @@ def _followed(equilibrium: Callable[[float], Packing], window: Window) -> Callab
 def _at_onset(packing: Packing, window: Window) -> Pair:
     """The pair at its coalescence: the plane of two parallel vectors, made invariant by iteration."""
     place = Place(packing.fx, full_operator(packing))
-    modes = Modes.of(*place)
-    family = Family(lambda fx: place.matrix, 0.0)
-    return family.followed(modes.pair(modes.about(window.eigenvalue)), place)
+    guess = place.modes.pair(place.modes.about(window.eigenvalue))
+    return Family(lambda fx: place.matrix, 0.0).followed(guess, place)

@@ -2,8 +2,7 @@
 
 **Few pairs.** On most increments nothing happens, and to know that takes no decomposition. The pairs that
 perturbation theory names (:mod:`~faultgouge.analysis.onset.screening`) are followed one by one. Where at most one of
-them changes, and D and its slopes at both ends tell that nothing hides (:mod:`~faultgouge.analysis.onset.dip`), the
-increment is done.
+them changes, and D and its slopes at both ends tell that nothing hides, the increment is done.
 
 **All modes.** Everywhere else the modes of both ends are assigned to each other, so that they keep their names
 (:func:`~faultgouge.analysis.onset.modes.assign`). A pair that is complex at one end and real at the other has an edge
@@ -13,7 +12,6 @@ left to doubt.
 """
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -22,26 +20,11 @@ from scipy.sparse import csr_array
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing import Floats, Indices
 from ..spectrum import Complexes
-from .dip import deepest_dip, dip_between
-from .edge import Edge, Family, LostPairError, locate
-from .modes import Members, Modes, assign
-from .pair import Pair, Place, continued
+from .edge import Edge, Family, LostPairError, Window, locate
+from .modes import Members, Modes, Place, assign
+from .pair import Pair, continued, deepest_dip, dip_between
 from .screening import Screen, Screening
 from .walk import between, walk
-from .windows import Window
-
-
-class Load:
-    """A load, the operator there, and all of its modes as soon as somebody asks for them."""
-
-    def __init__(self, place: Place) -> None:
-        self.place, self.fx = place, place.fx
-
-    @cached_property
-    def modes(self) -> Modes:
-        """All modes, by LAPACK."""
-        return Modes.of(*self.place)
-
 
 Ends = tuple[Pair, Pair]
 """A pair at both ends of an increment."""
@@ -67,18 +50,18 @@ class Dense:
         self._known: list[Pair] = []  # the few pairs at the load reached so far
         self._solved: dict[tuple[float, float], Edge] = {}
 
-    def candidates(self, places: Sequence[Load], depth: int) -> Iterator[list[Ends] | None]:
+    def candidates(self, places: Sequence[Place], depth: int) -> Iterator[list[Ends] | None]:
         """The pairs that may meet; None where these are not few, or the increment has been divided."""
         for here, there in pairwise(places):
-            planes = self.screening(here.place.matrix, there.place.matrix) if depth == 0 else None
-            pairs = None if planes is None else self._followed(planes, here.place, there.place)
+            planes = self.screening(here.matrix, there.matrix) if depth == 0 else None
+            pairs = None if planes is None else self._followed(planes, here, there)
             if depth == 0:
                 self._known = [after for _, after in pairs or []]
             yield pairs
 
     def confirm(
-        self, candidates: list[Ends] | None, here: Load, there: Load, depth: int
-    ) -> tuple[list[Course] | None, list[Load]]:
+        self, candidates: list[Ends] | None, here: Place, there: Place, depth: int
+    ) -> tuple[list[Course] | None, list[Place]]:
         """The courses of the few pairs if these are plain, else those of all, once nothing can hide any more."""
         courses = None if candidates is None else self._plain(candidates)
         if courses is not None:
@@ -125,9 +108,9 @@ class Dense:
         """The pairs of these planes at both loads; None if one of them cannot be followed, or is within rounding."""
         pairs: list[Ends] = []
         for plane in planes:
-            guess = Pair(*here, plane, plane)
-            a = guess.closest(self._known) or continued(guess, *here, self.family.limits)
-            b = None if a is None else continued(a, *there, self.family.limits)
+            guess = Pair(here.fx, here.matrix, plane, plane)
+            a = guess.closest(self._known) or continued(guess, here.fx, here.matrix, self.family.limits)
+            b = None if a is None else continued(a, there.fx, there.matrix, self.family.limits)
             if a is None or b is None or any(before.same_planes(a) for before, _ in pairs):
                 return None
             if not a.definite or not b.definite:
@@ -161,7 +144,7 @@ class Dense:
 
     # All modes
 
-    def _between(self, step: "Step") -> list[Load]:
+    def _between(self, step: "Step") -> list[Place]:
         """Where a step is to be divided; nowhere if all is known of it."""
         here, there = step.here, step.there
         if (here.fx, there.fx) in self._solved or there.fx - here.fx <= self.family.narrowest:
@@ -177,10 +160,10 @@ class Dense:
                 # What lies on either side of this edge has yet to be looked at.
                 edge, below, above = solution
                 self._solved[below.fx, above.fx] = edge
-                return [Load(Place(side.fx, side.matrix)) for side in (below, above)]
+                return [Place(side.fx, side.matrix) for side in (below, above)]
         if middle is None:
             return []
-        return between(lambda fx: Load(self.family.at(fx)), here.fx, middle, there.fx)
+        return between(self.family.at, here.fx, middle, there.fx)
 
     def _course(self, step: "Step", before: Pair | None, after: Pair | None, ends: Ends | None) -> Course:
         """The course of a pair: its edge is half the step wide if it cannot be solved for."""
@@ -238,7 +221,7 @@ class Step:
         return (before, after) if before.same_planes(after) else None
 
     def hidden_window(self, family: Family) -> float | None:
-        """Load where a window wider than the narrowest, or a gap in one, most likely hides; None if nowhere."""
+        """Place where a window wider than the narrowest, or a gap in one, most likely hides; None if nowhere."""
         here, there = self.here, self.there
         known = np.flatnonzero(self.forward >= 0)
         image = self.forward[known]
@@ -296,9 +279,9 @@ def all_windows(family: Family, loads: Floats, screening: Screening | None = Non
 
 def _walked(oracle: Dense, loads: Floats) -> tuple[Window, ...]:
     """The windows that an oracle finds along a ramp."""
-    here = Load(oracle.family.at(loads[0]))
+    here = oracle.family.at(loads[0])
     for load in loads[1:]:
-        there = Load(oracle.family.at(load))
+        there = oracle.family.at(load)
         walk(oracle, [here, there])
         here = there
     return oracle.windows()

@@ -1,29 +1,26 @@
-r"""Where a pair of eigenvalues enters or leaves the real axis: the root of its discriminant.
+r"""Windows of complex eigenvalues, and their edges: where a pair enters or leaves the real axis.
 
-The discriminant :math:`D(F) = (\lambda_1 - \lambda_2)^2` goes through zero linearly and is smooth on both sides
-(:mod:`~faultgouge.analysis.onset.pair`). A few secant steps bracket its root. Five points close to the root then give
-the last digits, and say how many there are. `sign_change` does so for any function of the load.
-
-**Coalescence or not.** An edge is a coalescence if D passes through zero along a straight line at distances far below
-the increment; there :math:`|y^H x| \to 0`. A mere crossing touches D = 0 without a change of sign. If D jumps, the
-equilibrium itself does: a contact opened, closed or slid. Bisection then locates the jump, and the edge is a "contact
-change".
+At an edge the discriminant D(F) of the pair (:mod:`~faultgouge.analysis.onset.pair`) changes its sign. If it goes
+through zero along a straight line at distances far below the increment, the edge is a *coalescence*;
+there :math:`|y^H x| \to 0`. A few secant steps bracket the root; five points close to it then give the last digits, and
+say how many there are. If D jumps, the equilibrium itself does: a contact opened, closed or slid. Bisection locates
+the jump, and the edge is a *contact change*. A mere crossing touches D = 0 without a change of sign.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError
-from ..packing import Floats
+from ..packing import Floats, Packing
 from .limits import LIMITS, Limits
-from .modes import Modes, Operator
-from .pair import Pair, Place, continued
+from .modes import Operator, Place
+from .pair import Pair, continued
 
 Kind = Literal["coalescence", "contact change", "start"]
 
@@ -60,6 +57,68 @@ class Edge:
         """Of a pair where the equilibrium jumps, or that is not recognised, between two loads: uncertain by half."""
         half, overlap = 0.5 * abs(other - one), min(pair.overlap for pair in pairs)
         return cls(0.5 * (one + other), half, pairs[-1].mean, overlap, "contact change")
+
+
+@dataclass(frozen=True)
+class Window:
+    """An interval of loads on which one pair of eigenvalues is complex.
+
+    Attributes
+    ----------
+    fx_onset : float
+        Load at which the pair becomes complex, force per top disk.
+    fx_end : float or None
+        Load at which it is real again; None if it is complex at the largest load that was looked at.
+    eigenvalue : float
+        The double eigenvalue at the onset (the real part of the pair if it does not coalesce there), 1 /
+        time^2.
+    error : float
+        Uncertainty of fx_onset: twice the scatter of the discriminant over its slope for a coalescence, the bracket
+        otherwise; and the `load_error` of the equilibria. How their path depends on the increments is not in it.
+    end_error : float or None
+        The same for fx_end.
+    overlap : float
+        Smallest |y^H x| met at the onset; at an exceptional point it is the root of the rounding error.
+    kind : {"coalescence", "contact change", "start"}
+        What begins the window: two real eigenvalues that meet; a jump of the equilibrium; or nothing, as the pair is
+        complex at the smallest load.
+    """
+
+    fx_onset: float
+    fx_end: float | None
+    eigenvalue: float
+    error: float
+    end_error: float | None
+    overlap: float
+    kind: Kind
+
+    @classmethod
+    def between(cls, onset: Edge, end: Edge | None) -> "Window":
+        """The window from one edge to another, or to none."""
+        return cls(
+            fx_onset=onset.fx,
+            fx_end=None if end is None else end.fx,
+            eigenvalue=onset.eigenvalue,
+            error=onset.error,
+            end_error=None if end is None else end.error,
+            overlap=onset.overlap,
+            kind=onset.kind,
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """The keys of the JSON contract: fx_onset, fx_end, lambda, error, kind."""
+        return {
+            "fx_onset": self.fx_onset,
+            "fx_end": self.fx_end,
+            "lambda": self.eigenvalue,
+            "error": self.error,
+            "kind": self.kind,
+        }
+
+
+def load_error(packing: Packing) -> float:
+    """r / n^(1/2) of a residual r with n top disks, force: what is out of balance by r is exact at other loads."""
+    return packing.residual / float(np.sqrt(max(1, packing.top.sum())))
 
 
 Followed = TypeVar("Followed")
@@ -103,10 +162,9 @@ class Family:
 
     def followed(self, pair: Pair, place: Place) -> Pair:
         """A pair at another load: continued, found among all modes, or followed in small steps; else LostPairError."""
-        image = continued(pair, *place, self.limits)
+        image = continued(pair, place.fx, place.matrix, self.limits)
         if image is None and place.matrix.shape[0] <= self.limits.all_modes:
-            modes = Modes.of(*place)
-            image = modes.pair(modes.nearest(pair))
+            image = place.modes.pair(place.modes.nearest(pair))
         return image or self._in_steps(pair, place)
 
     def _in_steps(self, pair: Pair, place: Place) -> Pair:

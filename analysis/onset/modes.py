@@ -7,6 +7,7 @@ do not swap names. (:math:`|y_a^H x_b|`, the obvious weight, vanishes at an exce
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -120,6 +121,19 @@ class Modes:
             return min(among, key=lambda members: abs(self.values[members[0]].real - eigenvalue))
         first, second = np.argsort(np.abs(self.values - eigenvalue))[:2]
         return int(first), int(second)
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A load, the operator there, and all of its modes as soon as somebody asks for them."""
+
+    fx: float
+    matrix: csr_array
+
+    @cached_property
+    def modes(self) -> Modes:
+        """All modes, by LAPACK."""
+        return Modes.of(self.fx, self.matrix)
 
 
 def assign(here: Modes, there: Modes) -> Indices:

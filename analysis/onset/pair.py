@@ -1,4 +1,4 @@
-r"""A pair of eigenvalues, and how it is followed from operator to operator without the others.
+r"""A pair of eigenvalues: how it is followed from load to load without the others, and what it may do in between.
 
 **The pair.** On the invariant subspace of two modes the operator A is a 2 x 2 block :math:`B = (U^T V)^{-1} U^T A V`,
 with orthonormal bases V, U of the right and of the left subspace. V, U, half the trace and the *discriminant*
@@ -24,12 +24,17 @@ well in *residual inverse iteration* (Neumaier, SIAM J. Numer. Anal. 22, 914 (19
 .. math:: V \leftarrow V - P^{-1} (A V - V (V^T A V)) ,
 
 which ends at an invariant subspace of A whatever P is. So sparse factors need no pivoting.
+
+**Between two loads** a window narrower than the increment may hide. With A' the difference of both operators,
+:math:`D' = 2 (\lambda_1 - \lambda_2)(\lambda_1' - \lambda_2')` is known at either end from :math:`\lambda' = y^H A' x /
+y^H x`. A cubic goes through both values and slopes, and a parabola through either slope and both values. The lowest
+point of the cubic, less the disagreement of the three, is a bound. Where the bound is negative a window may hide.
 """
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
@@ -41,13 +46,6 @@ from ..spectrum import Complexes, believable, unit_rounding
 from .limits import LIMITS, Limits
 
 Planes = tuple[Floats, Floats]
-
-
-class Place(NamedTuple):
-    """A load and the operator there."""
-
-    fx: float
-    matrix: csr_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,3 +235,40 @@ def _beyond(matrix: csr_array, basis: Floats) -> Floats:
     """A V - V (V^T A V)."""
     image = matrix @ basis
     return np.asarray(image - basis @ (basis.T @ image))
+
+
+def deepest_dip(d0: Floats, s0: Floats, d1: Floats, s1: Floats, bend: float) -> tuple[Floats, Floats]:
+    """The widest stretch of 0 < t < 1 on which functions known at both ends may be negative.
+
+    d0, s0 and d1, s1, each of shape (P,), are values, positive, and slopes at t = 0 and at t = 1; `bend` is that of
+    `Limits`. Returned are the largest possible width in t, zero where a function surely stays positive, and where it is
+    deepest.
+    """
+    # Parabolas d0 + s0 t + f t^2 and d1 - s1 r + g r^2, r = 1 - t; cubic d0 + s0 t + h t^2 + k t^3.
+    f, g = d1 - d0 - s0, d0 - d1 + s1
+    h, k = 3 * (d1 - d0) - 2 * s0 - s1, 2 * (d0 - d1) + s0 + s1
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(np.maximum(h * h - 3 * k * s0, 0.0))
+        t = np.array([-s0 / (2 * f), 1 - s1 / (2 * g), (root - h) / (3 * k)])
+        t = np.clip(np.nan_to_num(t, nan=0.5), 0.0, 1.0)
+        r = 1 - t
+        cubic = d0 + t * (s0 + t * (h + t * k))
+        spread = np.maximum(np.abs(d0 + t * (s0 + t * f) - cubic), np.abs(d1 - r * (s1 - r * g) - cubic))
+        lowest = cubic - spread - bend * np.minimum(d0, d1) * (4 * t * r)
+        deepest = np.argmin(lowest, axis=0), np.arange(len(d0))
+        depth = np.maximum(-lowest[deepest], 0.0)
+        width = np.where(depth > 0, 2 * np.sqrt(depth / np.maximum(np.abs(f), np.abs(g))), 0.0)
+    return np.minimum(width, 1.0), t[deepest]
+
+
+def dip_between(here: Pair, there: Pair, limits: Limits = LIMITS) -> tuple[float, float]:
+    """Where the discriminant of a pair may change its sign and back between two loads with the same sign of it.
+
+    Returned are the width of the widest stretch with the other sign that is possible, force, zero if there is surely
+    none, and the load at which D is closest to zero, or deepest beyond.
+    """
+    sign, change, increment = np.sign(here.discriminant), there.matrix - here.matrix, there.fx - here.fx
+    ends = ((pair.discriminant, pair.slope(change)) for pair in (here, there))
+    d0, s0, d1, s1 = (sign * np.array([number]) for end in ends for number in end)
+    width, at = deepest_dip(d0, s0, d1, s1, limits.bend)
+    return float(width[0]) * increment, here.fx + float(at[0]) * increment

@@ -13,21 +13,19 @@ from ..display import Tabled, windows_rows
 from ..errors import FaultgougeError
 from ..packing import Packing
 from .dense import all_windows
-from .edge import Family
+from .edge import Family, Window, load_error
 from .limits import LIMITS, Limits
 from .modes import Operator, full_operator
 from .ranks import ALONE, Ranks
-from .sliced import FirstWindow, Watch, first_window
-from .windows import Window, increasing, load_error
+from .sliced import Increments, Watch, first_window
+from .walk import increasing
 
 
 class OnsetError(FaultgougeError):
     """No complex pair appears on the given loads."""
 
     @classmethod
-    def among(
-        cls, modes: tuple[int, int] | None, last: float, doubtful: tuple[tuple[float, float], ...]
-    ) -> "OnsetError":
+    def among(cls, modes: tuple[int, int] | None, last: float, doubtful: Increments) -> "OnsetError":
         """The sentence for some modes, or all, up to the last load."""
         which = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
         if not doubtful:
@@ -57,7 +55,7 @@ class Onset(Tabled):
 
     windows: tuple[Window, ...]
     complete: bool = True
-    doubtful: tuple[tuple[float, float], ...] = ()
+    doubtful: Increments = ()
     modes: tuple[int, int] | None = None
 
     def __repr__(self) -> str:
@@ -161,15 +159,16 @@ def find_onset(
         unbalanced[fx] = load_error(packing)
         return full_operator(packing, limits)
 
+    doubtful: Increments
     complete = seeks_all(start, modes, limits)
     if complete:
-        windows, first = complex_windows(operator, loads, narrowest=narrowest, limits=limits), FirstWindow(None)
+        windows, doubtful = complex_windows(operator, loads, narrowest=narrowest, limits=limits), ()
     else:
-        first = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks)
-        windows = () if first.window is None else (first.window,)
+        first, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks)
+        windows = (first,) if first else ()
     if not windows:
-        raise OnsetError.among(modes, float(loads[-1]), first.doubtful)
-    return Onset(tuple(_with_imbalance(window, unbalanced) for window in windows), complete, first.doubtful, modes)
+        raise OnsetError.among(modes, float(loads[-1]), doubtful)
+    return Onset(tuple(_with_imbalance(window, unbalanced) for window in windows), complete, doubtful, modes)
 
 
 def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:

@@ -19,7 +19,6 @@ its kind, so a pair is followed from inside of its window to the edge.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,14 +26,12 @@ from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing import Floats
 from .basis import Bases, Basis, Cluster, Levels, width_and_mixing
 from .dense import all_windows
-from .dip import dip_between
-from .edge import Edge, Family, LostPairError, edge_from_inside, leads_back
-from .modes import Modes
-from .pair import Pair, Place, continued
+from .edge import Edge, Family, LostPairError, Window, edge_from_inside, leads_back
+from .modes import Place
+from .pair import Pair, continued, dip_between
 from .ranks import ALONE, Ranks
 from .screening import may_meet
 from .walk import walk
-from .windows import Window
 
 Watch = Callable[[str], None]
 
@@ -42,15 +39,7 @@ At = tuple[float, Levels]
 """A load and the operator there in a basis."""
 
 
-class FirstWindow(NamedTuple):
-    """The first window, whose fx_end is None where the pair is complex at the next load; None if there is none.
-
-    `doubtful` are the finest increments before it on which clusters announce a pair that the operator was not seen to
-    have.
-    """
-
-    window: Window | None
-    doubtful: tuple[tuple[float, float], ...] = ()
+Increments = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +123,11 @@ class Sliced:
             return (1 - share) * before + share * after
 
         last = there[0] + self.limits.reach * increment
-        for window in all_windows(Family(block, self._narrowest(increment), self.limits), np.array([here[0], last])):
+        family = Family(block, self._narrowest(increment), self.limits)
+        for window in all_windows(family, np.array([here[0], last])):
             end = last if window.fx_end is None else window.fx_end
             inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
-            modes = Modes.of(inside, block(inside))
+            modes = family.at(inside).modes
             pair = modes.pair(modes.about(window.eigenvalue, modes.complex_pairs))
             if cluster.owns(pair.right):
                 right, left = (basis.lifted(cluster.modes, plane) for plane in (pair.right, pair.left))
@@ -228,7 +218,8 @@ class Sliced:
     def _complex_pair(self, candidate: Candidate, there: Place) -> Pair | None:
         """The pair at a load where it is complex; None if it is surely real, or not before these loads are passed."""
         place = there if candidate.inside == there.fx else self.family.at(candidate.inside)
-        pair = continued(Pair(*place, candidate.right, candidate.left), *place, self.limits)
+        guess = Pair(place.fx, place.matrix, candidate.right, candidate.left)
+        pair = continued(guess, place.fx, place.matrix, self.limits)
         if pair is not None and pair.discriminant < 0:
             return pair
         if candidate.onset > there.fx:
@@ -263,11 +254,13 @@ def first_window(
     modes: tuple[int, int] | None = None,
     watch: Watch = lambda says: None,
     ranks: Ranks = ALONE,
-) -> FirstWindow:
-    """The first window of a family of large matrices; arguments and errors are those of `find_onset`.
+) -> tuple[Window | None, Increments]:
+    """The first window of a family of large matrices, if there is one, and the increments before it that are in doubt.
 
-    Loads beyond the one above the onset are not asked for, except those of `Limits.ahead` increments. A
-    NoEquilibriumError of the operator at one of them is raised if no window has been found before.
+    Its end is None where the pair is complex at the next load. On increments in doubt clusters announce a pair that the
+    operator was not seen to have. Arguments and errors are those of `find_onset`. Loads beyond the one above the onset
+    are not asked for, except those of `Limits.ahead` increments; a NoEquilibriumError of the operator at one of them is
+    raised if no window has been found before.
     """
     oracle = Sliced(family, modes, watch, ranks)
     here = family.at(loads[0])
@@ -280,7 +273,7 @@ def first_window(
         done += len(places) - 1
     first = oracle.first
     doubtful = (each for each in oracle.doubtful if first is None or each[0] < first.fx_onset)
-    return FirstWindow(first, tuple(doubtful))
+    return first, tuple(doubtful)
 
 
 def _reached(family: Family, loads: Floats) -> list[Place]:

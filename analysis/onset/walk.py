@@ -15,6 +15,9 @@ from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from ..errors import NoEquilibriumError
 
 At = TypeVar("At")  # what an oracle has of a load: the operator, or all of its modes
@@ -62,3 +65,11 @@ def between(look: Callable[[float], At], below: float, middle: float, above: flo
         except NoEquilibriumError:
             continue
     return []
+
+
+def increasing(forces: ArrayLike) -> NDArray[np.float64]:
+    """Loads as an array; ValueError if they are not at least two finite, increasing numbers."""
+    loads = np.array(forces, dtype=np.float64)
+    if loads.ndim != 1 or len(loads) < 2 or not np.all(np.isfinite(loads)) or np.any(np.diff(loads) <= 0):
+        raise ValueError("The loads of a ramp must be at least two finite, increasing numbers.")
+    return loads
