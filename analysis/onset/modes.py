@@ -11,12 +11,11 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from scipy.linalg import eig
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_array
 
 from ..packing import Floats, Indices, Packing
-from ..spectrum import Complexes, active_coordinates, believable, mass_weighted, unit_rounding
+from ..spectrum import Complexes, all_modes, believable, mass_weighted, unit_rounding
 from ..stiffness import stiffness_matrix
 from .limits import LIMITS, Limits
 from .pair import Pair
@@ -68,18 +67,9 @@ class Modes:
     def of(cls, fx: float, matrix: Operator) -> "Modes":
         """Solve the dense eigenproblem, without the coordinates whose rows are zero."""
         sparse = csr_array(matrix)
-        active = active_coordinates(sparse)
-        size, count = sparse.shape[0], len(active)
-        right, left = np.zeros((2, size, count), dtype=np.complex128)
-        if count == 0:
-            return cls(fx, sparse, np.zeros(0, complex), right, left, np.zeros(0, int))
-        inner = sparse[active][:, active].toarray()
-        values, y, x = eig(inner, left=True, right=True, overwrite_a=True, check_finite=False)
-        order = np.lexsort((values.imag, values.real))
-        values, right[active], left[active] = values[order], x[:, order], y[:, order]
-        rounding = unit_rounding(sparse.data)
-        partner = np.full(count, -1)
-        for k in np.flatnonzero(values.imag > 0):
+        values, right, left = all_modes(sparse)
+        rounding, partner = unit_rounding(sparse.data), np.full(len(values), -1)
+        for k in (int(each) for each in np.flatnonzero(values.imag > 0)):
             conjugate = int(np.argmin(np.abs(values - values[k].conj())))
             if believable(values[k], abs(np.vdot(left[:, k], right[:, k])), rounding):
                 partner[k], partner[conjugate] = conjugate, k
@@ -152,11 +142,6 @@ def assign(here: Modes, there: Modes) -> Indices:
 def matched(weight: Floats) -> Indices:
     """A column for each row, none twice, with the largest sum of weights; -1 where columns are too few."""
     column = np.full(len(weight), -1)
-    if not weight.size:
-        return column
-    best = weight.argmax(axis=1)
-    if len(np.unique(best)) == len(best):
-        return best
     rows, columns = linear_sum_assignment(weight, maximize=True)
     column[rows] = columns
     return column
