@@ -35,7 +35,7 @@ from scipy.optimize import brentq
 
 from .damping import damping_matrix
 from .errors import NoEquilibriumError
-from .onset import Family, LostPairError, Pair, Place, Window, force_bearing, full_operator
+from .onset import Family, LostPairError, Pair, Window, force_bearing, full_operator
 from .packing import Floats, Packing
 from .spectrum import mass_weighted
 
@@ -170,7 +170,7 @@ def balancing_ratio(packing: Packing, window: Window) -> float:
         -tr(N G_N) / tr(N G_T) of unit dashpots of either kind; negative if both destabilise on the same side, so that
         no ratio balances the pair.
     """
-    pair = _at_onset(packing, window)
+    pair = _followed(lambda fx: packing, window)(window.fx_onset)
     along, across = (
         np.trace(pair.traceless @ damping_block(replace(packing, law=replace(packing.law, cn=n, ct=t)), pair))
         for n, t in ((1.0, 0.0), (0.0, 1.0))
@@ -179,13 +179,8 @@ def balancing_ratio(packing: Packing, window: Window) -> float:
 
 
 def _followed(equilibrium: Callable[[float], Packing], window: Window) -> Callable[[float], Pair]:
-    """The undamped pair at any load."""
+    """The undamped pair at any load, from its coalescence: the plane of two parallel vectors, made invariant."""
     family = Family(lambda fx: full_operator(equilibrium(fx)), 0.0)
-    return family.track({window.fx_onset: _at_onset(equilibrium(window.fx_onset), window)})
-
-
-def _at_onset(packing: Packing, window: Window) -> Pair:
-    """The pair at its coalescence: the plane of two parallel vectors, made invariant by iteration."""
-    place = Place(packing.fx, full_operator(packing))
-    guess = place.modes.pair(place.modes.about(window.eigenvalue))
-    return Family(lambda fx: place.matrix, 0.0).followed(guess, place)
+    onset = family.at(window.fx_onset)
+    guess = onset.modes.pair(onset.modes.about(window.eigenvalue))
+    return family.track({onset.fx: family.followed(guess, onset)})

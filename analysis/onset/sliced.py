@@ -38,8 +38,8 @@ Watch = Callable[[str], None]
 At = tuple[float, Levels]
 """A load and the operator there in a basis."""
 
-
 Increments = tuple[tuple[float, float], ...]
+"""From load to load."""
 
 
 @dataclass(frozen=True, eq=False)
