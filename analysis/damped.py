@@ -8,8 +8,8 @@ in general below the undamped onset, however weak the dashpots are (Ziegler, Ing
 Math. 18, 403 (1956); Kirillov and Verhulst, arXiv:0906.1650; :mod:`~faultgouge.analysis.weak_damping`).
 
 **Between two loads** every mode is known at both ends with its slope. A mode whose Re s has another sign at the other
-end has an edge in between: the mode is followed to it by itself (:mod:`~faultgouge.analysis.damped_modes`), and five
-points close to it give the last digits and say how many there are (:func:`~faultgouge.analysis.onset.smooth_root`).
+end has an edge in between: the mode is followed to it by itself (:mod:`~faultgouge.analysis.damped_modes`), and solved
+for as the edges of complex pairs are (:func:`~faultgouge.analysis.onset.edge.sign_change`).
 
 **Windows narrower than the increment** are where two modes nearly meet. What both may do in between is told from the
 ends (:mod:`~faultgouge.analysis.damped_step`). Where that has another number of growing modes than the ends, an
@@ -28,10 +28,9 @@ from numpy.typing import ArrayLike
 from .damped_modes import DampedMode, DampedModes, Pencil
 from .damped_step import Step, excursion
 from .errors import FaultgougeError, NoEquilibriumError
-from .onset.edge import bracketed_jump, jump_width, smooth_root
+from .onset.edge import LostPairError, sign_change, track
 from .onset.limits import LIMITS
-from .onset.walk import between, walk
-from .onset.windows import increasing
+from .onset.walk import between, increasing, walk
 from .packing import Packing
 
 STEADY = 1e-9
@@ -233,22 +232,18 @@ class Growing:
 
     def crossing(self, here: DampedMode, there: DampedMode) -> Crossing | None:
         """Where a mode crosses the axis between two loads; None if it cannot be followed or jumps."""
-        known = {here.fx: here, there.fx: there}
 
-        def mode(fx: float) -> DampedMode:
-            if fx not in known:
-                pencil = self.pencil(fx)
-                for near in sorted(known, key=lambda each: abs(each - fx)):
-                    found = known[near].at(pencil)
-                    if found is not None:
-                        known[fx] = found
-                        return found
-                raise _LostError
-            return known[fx]
+        def follow(nearest: list[DampedMode], fx: float) -> DampedMode:
+            pencil = self.pencil(fx)
+            for mode in nearest:
+                found = mode.at(pencil)
+                if found is not None:
+                    return found
+            raise LostPairError
 
         try:
-            return _root(mode, here.fx, there.fx)
-        except (_LostError, NoEquilibriumError):
+            return _solved(track({here.fx: here, there.fx: there}, follow), here.fx, there.fx)
+        except (LostPairError, NoEquilibriumError):
             return None
 
     def record(self, sure: tuple[Step, Crossings]) -> None:
@@ -271,27 +266,19 @@ class Growing:
         self.open = now
 
 
-class _LostError(FaultgougeError):
-    """A mode that can be followed no further."""
-
-
-def _root(mode: Callable[[float], DampedMode], below: float, above: float) -> Crossing:
+def _solved(mode: Callable[[float], DampedMode], below: float, above: float) -> Crossing:
     """The root of Re s, or a bracket where Re s jumps."""
-
-    def rate(fx: float) -> float:
-        return mode(fx).rate.real
-
-    root = smooth_root(rate, below, above)
-    if root is not None:
-        middle = mode(float(root.loads[2]))
+    change = sign_change(lambda fx: mode(fx).rate.real, below, above)
+    if change.smooth:
+        middle = mode(change.loads[2])
         steady = middle.rate.imag <= STEADY * float(np.sqrt(np.abs(middle.pencil.stiffness).max()))
         kind: Kind = "steady" if steady else "hopf"
-        return Crossing(root.fx, root.error + middle.pencil.balance, middle.rate.imag, kind)
-    left, right = bracketed_jump(rate, below, above, jump_width(below, above))
-    across = mode(left).at(mode(right).pencil)
-    if across is None or (across.rate.real > 0) != (mode(right).rate.real > 0):
-        raise _LostError  # the equilibrium does not jump there: it is the mode that has become another one
-    return Crossing(0.5 * (left + right), 0.5 * (right - left), mode(right).rate.imag, "contact change")
+        return Crossing(change.fx, change.error + middle.pencil.balance, middle.rate.imag, kind)
+    left, right = (mode(fx) for fx in change.loads)
+    across = left.at(right.pencil)
+    if across is None or (across.rate.real > 0) != (right.rate.real > 0):
+        raise LostPairError  # the equilibrium does not jump there: it is the mode that has become another one
+    return Crossing(change.fx, change.error, right.rate.imag, "contact change")
 
 
 def _window(onset: Crossing, end: Crossing | None) -> DampedWindow:

@@ -24,9 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig, lu_solve
 from scipy.linalg.lapack import zgetrf
-from scipy.optimize import linear_sum_assignment
 
 from .onset import force_bearing
+from .onset.edge import load_error
+from .onset.modes import matched
 from .packing import Floats, Indices, Packing
 from .spectrum import SAFETY, Complexes, unit_rounding
 from .state_space import StateSpace
@@ -66,8 +67,7 @@ class Pencil:
     @classmethod
     def of(cls, packing: Packing) -> "Pencil":
         """That of a packing with dashpots or drag."""
-        balance = packing.residual / float(np.sqrt(max(1, packing.top.sum())))
-        return cls.of_system(packing.fx, StateSpace.of(force_bearing(packing)), 3 * len(packing), balance)
+        return cls.of_system(packing.fx, StateSpace.of(force_bearing(packing)), 3 * len(packing), load_error(packing))
 
     @classmethod
     def of_system(cls, fx: float, system: StateSpace, size: int, balance: float = 0.0) -> "Pencil":
@@ -231,18 +231,9 @@ class DampedModes:
 
         Shapes decide, |x^H x'| |y^H y'|, and for shapes that two overdamped motions share, the eigenvalues.
         """
-        partner = np.full(len(self), -1)
-        if not len(self) or not len(other):
-            return partner
         weight = np.abs(self.right.conj().T @ other.right) * np.abs(self.left.conj().T @ other.left)
         a, b = self.rates[:, None], other.rates[None]
-        weight *= 1 - np.abs(a - b) / (np.abs(a) + np.abs(b) + np.finfo(float).tiny)
-        best = weight.argmax(axis=1)
-        if len(np.unique(best)) == len(best):
-            return best
-        rows, columns = linear_sum_assignment(weight, maximize=True)
-        partner[rows] = columns
-        return partner
+        return matched(weight * (1 - np.abs(a - b) / (np.abs(a) + np.abs(b) + np.finfo(float).tiny)))
 
 
 def _factors(matrix: Complexes) -> tuple[Complexes, Indices]:

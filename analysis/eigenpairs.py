@@ -6,13 +6,13 @@ Vectors live in the mass-weighted coordinates of :mod:`~faultgouge.analysis.spec
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eig
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from .packing import Floats, Indices, Packing
-from .spectrum import Complexes, dynamical_matrix, participation_ratio, rotation_share
+from .spectrum import Complexes, all_modes, dynamical_matrix, mass_weighted, participation_ratio, rotation_share
+from .stiffness import stiffness_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +64,7 @@ def normal_modes(packing: Packing) -> Eigenpairs:
     Eigenpairs
         Sorted by real part, then imaginary part, as of :func:`spectrum`.
     """
-    matrix, active = dynamical_matrix(packing)
-    values, left, right = eig(matrix.toarray(), left=True, right=True)
-    order = np.lexsort((values.imag, values.real))
-    spread = np.zeros((2, 3 * len(packing), len(values)), dtype=np.complex128)
-    spread[0, active], spread[1, active] = right[:, order], left[:, order]
-    return Eigenpairs(values[order].astype(np.complex128), spread[0], spread[1], 0)
+    return Eigenpairs(*all_modes(mass_weighted(stiffness_matrix(packing), packing)), 0)
 
 
 def closest_to_meeting(modes: Eigenpairs) -> tuple[int, int, float]:

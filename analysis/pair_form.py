@@ -18,10 +18,6 @@ from .onset import Modes, Pair, full_operator
 from .packing import Floats, Packing
 from .spectrum import Complexes
 
-SAME_PLANE = 0.5
-"""Cosine of the largest angle between the planes of a pair at two neighbouring loads: 60 degrees, beyond which the two
-nearest modes are rather two others."""
-
 
 @dataclass(frozen=True, eq=False)
 class PairForm:
@@ -118,12 +114,12 @@ def pair_eigenvalues(packings: Sequence[Packing], eigenvalue: float) -> Complexe
     Returns
     -------
     ndarray of complex, shape (S, 2)
-        1 / time^2; nan from where on the plane is not recognised any more.
+        1 / time^2; nan from where on the planes are not recognised any more.
     """
     values = np.full((len(packings), 2), np.nan, dtype=np.complex128)
     before: Pair | None = None
     for row, pair in zip(values, _followed(packings, eigenvalue), strict=True):
-        if before is not None and np.linalg.svd(before.right.T @ pair.right, compute_uv=False)[-1] < SAME_PLANE:
+        if before is not None and not before.same_planes(pair):
             break
         root = 0.5 * np.emath.sqrt(pair.discriminant)
         row[:] = pair.mean - root, pair.mean + root

@@ -27,7 +27,7 @@ from scipy.sparse import csr_array
 
 from .damping import damping_matrix
 from .packing import Floats, Indices, Packing
-from .spectrum import Complexes, mass_weighted
+from .spectrum import Complexes, active_coordinates, mass_weighted
 from .stiffness import stiffness_matrix
 
 SOFTEST = 1e-6
@@ -84,7 +84,7 @@ class StateSpace:
     @classmethod
     def of_matrices(cls, stiffness: csr_array, damping: csr_array, root_mass: Floats) -> "StateSpace":
         """Set up the system of A and G, shape (n, n), and of M^(1/2), shape (n,); zero rows of A are left out."""
-        active = np.flatnonzero(np.diff(csr_array(stiffness).indptr))
+        active = active_coordinates(csr_array(stiffness))
         a, g = (csr_array(matrix)[active][:, active].toarray() for matrix in (stiffness, damping))
         values, vectors = eigh(0.5 * (a + a.T)) if len(active) else (np.zeros(0), a)
         least = SOFTEST * np.abs(values).max(initial=0.0)

@@ -35,7 +35,7 @@ from scipy.optimize import brentq
 
 from .damping import damping_matrix
 from .errors import NoEquilibriumError
-from .onset import Family, LostPairError, Modes, Pair, Place, Window, force_bearing, full_operator
+from .onset import Family, LostPairError, Pair, Window, force_bearing, full_operator
 from .packing import Floats, Packing
 from .spectrum import mass_weighted
 
@@ -64,13 +64,12 @@ class WeakLimit:
 
 def damping_block(packing: Packing, pair: Pair) -> Floats:
     """G_B of a packing's damping on the bases of a pair, shape (2, 2), 1 / time."""
-    g = mass_weighted(damping_matrix(force_bearing(packing)), packing)
-    return np.asarray(np.linalg.solve(pair.left.T @ pair.right, pair.left.T @ (g @ pair.right)))
+    return pair.block(mass_weighted(damping_matrix(force_bearing(packing)), packing))
 
 
 def imbalance(packing: Packing, pair: Pair) -> float:
     """h of a pair, positive as long as weak damping damps both of its modes."""
-    g, n = damping_block(packing, pair), _traceless(pair)
+    g, n = damping_block(packing, pair), pair.traceless
     return float(np.trace(g) ** 2 * pair.discriminant - 4 * np.trace(n @ g) ** 2)
 
 
@@ -97,23 +96,26 @@ def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, windo
     WeakLimit or None
         None if the pair grows at the smallest load already, or cannot be followed down to where it does not.
     """
-    followed, loads = _Followed(equilibrium, window), np.asarray(forces, dtype=np.float64)
+    pair_at, loads = _followed(equilibrium, window), np.asarray(forces, dtype=np.float64)
     above = window.fx_onset
+
+    def h(fx: float) -> float:
+        return imbalance(equilibrium(fx), pair_at(fx))
+
     try:
         for below in loads[loads < window.fx_onset][::-1]:
-            if followed.imbalance(float(below)) > 0:
+            if h(float(below)) > 0:
                 break
             above = float(below)
         else:
             return None
         # of a balanced pair h at the coalescence is rounding noise of either sign
-        balanced = followed.imbalance(above) >= 0
-        fx = above if balanced else float(brentq(followed.imbalance, float(below), above, xtol=DIGITS * abs(above)))
-        pair, packing = followed.pair(fx), equilibrium(fx)
+        fx = above if h(above) >= 0 else float(brentq(h, float(below), above, xtol=DIGITS * abs(above)))
+        pair, packing = pair_at(fx), equilibrium(fx)
     except (LostPairError, NoEquilibriumError):
         return None
     g = damping_block(packing, pair)
-    sign = -np.sign(np.trace(_traceless(pair) @ g))  # the mode in which the two terms cancel
+    sign = -np.sign(np.trace(pair.traceless @ g))  # the mode in which the two terms cancel
     value = pair.mean + sign * 0.5 * np.sqrt(max(0.0, pair.discriminant))
     return WeakLimit(fx, float(np.sqrt(value)), window.fx_onset)
 
@@ -138,12 +140,12 @@ def drag_onset(
     float or None
         Force per top disk; None if the drag holds the pair down to the window's end or the ramp's.
     """
-    followed, loads = _Followed(equilibrium, window), np.asarray(forces, dtype=np.float64)
+    pair_at, loads = _followed(equilibrium, window), np.asarray(forces, dtype=np.float64)
     last = loads[-1] if window.fx_end is None else min(window.fx_end, loads[-1])
     below = window.fx_onset
 
     def excess(fx: float) -> float:
-        return drag_excess(followed.pair(fx), drag_time)
+        return drag_excess(pair_at(fx), drag_time)
 
     for above in [*loads[(loads > below) & (loads < last)], last]:
         if excess(float(above)) > 0:
@@ -168,42 +170,17 @@ def balancing_ratio(packing: Packing, window: Window) -> float:
         -tr(N G_N) / tr(N G_T) of unit dashpots of either kind; negative if both destabilise on the same side, so that
         no ratio balances the pair.
     """
-    pair = _at_onset(packing, window)
+    pair = _followed(lambda fx: packing, window)(window.fx_onset)
     along, across = (
-        np.trace(_traceless(pair) @ damping_block(replace(packing, law=replace(packing.law, cn=n, ct=t)), pair))
+        np.trace(pair.traceless @ damping_block(replace(packing, law=replace(packing.law, cn=n, ct=t)), pair))
         for n, t in ((1.0, 0.0), (0.0, 1.0))
     )
     return float(-along / across) if across else np.inf
 
 
-class _Followed:
-    """An undamped pair along the loads."""
-
-    def __init__(self, equilibrium: Callable[[float], Packing], window: Window) -> None:
-        self.equilibrium = equilibrium
-        self.family = Family(lambda fx: full_operator(equilibrium(fx)), 0.0)
-        self.known = {window.fx_onset: _at_onset(equilibrium(window.fx_onset), window)}
-
-    def pair(self, fx: float) -> Pair:
-        """The pair at a load."""
-        if fx not in self.known:
-            near = self.known[min(self.known, key=lambda each: abs(each - fx))]
-            self.known[fx] = self.family.followed(near, self.family.at(fx))
-        return self.known[fx]
-
-    def imbalance(self, fx: float) -> float:
-        """h at a load."""
-        return imbalance(self.equilibrium(fx), self.pair(fx))
-
-
-def _at_onset(packing: Packing, window: Window) -> Pair:
-    """The pair at its coalescence: the plane of two parallel vectors, made invariant by iteration."""
-    place = Place(packing.fx, full_operator(packing))
-    modes = Modes.of(*place)
-    family = Family(lambda fx: place.matrix, 0.0)
-    return family.followed(modes.pair(modes.about(window.eigenvalue)), place)
-
-
-def _traceless(pair: Pair) -> Floats:
-    """N = B - m."""
-    return pair.entries - pair.mean * np.eye(2)
+def _followed(equilibrium: Callable[[float], Packing], window: Window) -> Callable[[float], Pair]:
+    """The undamped pair at any load, from its coalescence: the plane of two parallel vectors, made invariant."""
+    family = Family(lambda fx: full_operator(equilibrium(fx)), 0.0)
+    onset = family.at(window.fx_onset)
+    guess = onset.modes.pair(onset.modes.about(window.eigenvalue))
+    return family.track({onset.fx: family.followed(guess, onset)})

@@ -12,6 +12,7 @@ from ..analysis import Onset, OnsetError, Packing, find_onset
 from ..analysis.digits import with_uncertainty
 from ..analysis.display import Tabled, windows_rows
 from ..analysis.onset import full_operator, seeks_all
+from ..analysis.spectrum import active_coordinates
 from ..pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, SceneError
 from ..pywrap.bed import settle
 from ..pywrap.equilibria import EquilibriumPath, loads
@@ -130,6 +131,6 @@ def _check_modes(packing: Packing, modes: tuple[int, int] | None) -> None:
     """Refuse modes that a packing does not have."""
     if modes is None:
         return
-    count = np.count_nonzero(np.diff(full_operator(packing).indptr))
+    count = len(active_coordinates(full_operator(packing)))
     if modes[0] >= count:
         raise SceneError(f"modes {modes[0]}:{modes[1]} are no part of the {count} modes of the packing, 0:{count}")

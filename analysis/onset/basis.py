@@ -1,16 +1,13 @@
 """An eigenbasis of the symmetric part of the operator, all of it at once or a slice of the spectrum after the other.
 
 In the eigenvectors X of the symmetric part of A at one load, H(F) = X^T A(F) X is nearly diagonal at the loads about
-it: the antisymmetric part is small, and the modes turn little. X is computed once and serves as long as the couplings
-are small against the spacing of the levels.
-
-Perturbation theory (:mod:`~faultgouge.analysis.onset.screening`) asks for a mode and its neighbours in the spectrum
-alone. So a large operator has a basis for each slice of its spectrum (:mod:`~faultgouge.analysis.onset.slicing`), with
-a margin on either side, and never one of all modes. A *cluster* of neighbouring modes, with all others in second order,
-has the eigenvalues of A up to the third order of the typical coupling over the distance of the modes outside.
+it. X is computed once and serves as long as the couplings are small against the spacing of the levels. A large operator
+has a basis for each slice of its spectrum (:mod:`~faultgouge.analysis.onset.slicing`), with a margin on either side,
+and never one of all modes. A *cluster* of neighbouring modes, with all others in second order, has the eigenvalues of A
+up to the third order of the typical coupling over the distance of the modes outside.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -20,20 +17,16 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array
 
 from ..packing import Floats, Indices
+from ..spectrum import active_coordinates
 from .limits import LIMITS, Limits
 from .ranks import Ranks
 
 
 @dataclass(frozen=True, eq=False)
 class Cluster:
-    """Neighbouring modes of a basis.
+    """Neighbouring modes of a basis, margins included; no other cluster owns the first to the last mode of its core.
 
-    Attributes
-    ----------
-    modes : slice
-        Which modes, by increasing eigenvalue, margins included.
-    core : tuple of int
-        The first and the last mode, counted within the cluster, that no other cluster owns.
+    `modes` are counted within the basis, `core` within the cluster.
     """
 
     modes: slice
@@ -49,14 +42,9 @@ class Cluster:
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """An operator in an eigenbasis.
+    """An operator in an eigenbasis: H_ii, shape (E,), and H_ij, shape (E, E), with a zero diagonal; 1 / time^2.
 
-    Attributes
-    ----------
-    diagonal : ndarray, shape (E,)
-        H_ii, 1 / time^2.
-    coupling : ndarray of float32, shape (E, E)
-        H_ij, with a zero diagonal: single precision is plenty for what is compared with distances of levels.
+    Couplings are compared with distances of levels: single precision is plenty.
     """
 
     diagonal: Floats
@@ -95,21 +83,18 @@ class Levels:
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """Eigenvectors of the symmetric part of an operator, all or neighbouring ones.
+    """Eigenvectors of the symmetric part of an operator with `size` coordinates, all or neighbouring ones.
 
     Attributes
     ----------
-    size : int
-        Coordinates of the operator.
     active : ndarray of int, shape (E,)
-        Those whose rows are not zero.
+        Coordinates whose rows are not zero.
     values : ndarray, shape (M,)
         Eigenvalues of the symmetric part, increasing; 1 / time^2.
     vectors : ndarray, shape (E, M)
         Orthonormal eigenvectors in columns.
     own : slice
         The modes that belong to this basis, and to that of no other slice; the rest are margins.
-    limits : Limits
     """
 
     size: int
@@ -122,40 +107,12 @@ class Basis:
     @classmethod
     def of(cls, matrix: csr_array, limits: Limits = LIMITS) -> "Basis":
         """All modes, by LAPACK: the one expensive step, some 10 E^3 operations."""
-        active = np.flatnonzero(np.diff(matrix.indptr))
+        active = active_coordinates(matrix)
         dense = matrix[active][:, active].toarray()
         dense += dense.T.copy()
         dense *= 0.5
         values, vectors = eigh(dense, driver="evd", overwrite_a=True, check_finite=False)
         return cls(matrix.shape[0], active, values, vectors, slice(0, len(values)), limits)
-
-    @classmethod
-    def slices(cls, matrix: csr_array, modes: tuple[int, int], limits: Limits, ranks: Ranks) -> "Iterator[Basis]":
-        """This rank's bases; the own modes of those of all ranks are those of these numbers.
-
-        A small operator has one, which the first rank makes.
-
-        Parameters
-        ----------
-        matrix : scipy.sparse.csr_array, shape (n, n)
-            The operator, 1 / time^2.
-        modes : tuple of (int, int)
-            Numbers of the first mode that is wanted and of the first that is not, the lowest being 0.
-        limits : Limits
-        ranks : Ranks
-            Who shares the slices. All of them must come to the end of their bases.
-        """
-        active = np.flatnonzero(np.diff(matrix.indptr))
-        if len(active) <= limits.one_basis:
-            if ranks.rank == 0:
-                yield replace(cls.of(matrix, limits), own=slice(*modes))
-            return
-        from .slicing import slices  # with libraries that nothing else needs
-
-        inner = matrix[active][:, active]
-        symmetric, margin = csc_array(0.5 * (inner + inner.T)), limits.margin + limits.beyond
-        for part in slices(symmetric, margin, modes, limits, ranks=ranks):
-            yield cls(matrix.shape[0], active, part.values, part.vectors, part.own, limits)
 
     @property
     def clusters(self) -> list[Cluster]:
@@ -168,7 +125,7 @@ class Basis:
 
     def covers(self, matrix: csr_array) -> bool:
         """Whether an operator acts on the same coordinates."""
-        return np.array_equal(np.flatnonzero(np.diff(matrix.indptr)), self.active)
+        return np.array_equal(active_coordinates(matrix), self.active)
 
     def levels(self, matrix: csr_array) -> Levels:
         """X^T A X of an operator on the same coordinates."""
@@ -198,16 +155,77 @@ class Basis:
         return self.vectors.astype(np.float32)
 
     def mixing(self, levels: Levels) -> list[float]:
-        """The typical coupling over the spacing in each cluster: |off-diagonal|_F over the cluster's width."""
-        found = []
-        for cluster in self.clusters:
-            block = levels.block(cluster)
-            width = max(np.ptp(self.values[cluster.modes]), np.finfo(np.float64).tiny)
-            found.append(float(np.linalg.norm(block - np.diag(np.diag(block))) / width))
-        return found
+        """The typical coupling over the spacing in each cluster."""
+        return [width_and_mixing(levels.block(each), self.values[each.modes])[1] for each in self.clusters]
 
     def lifted(self, modes: slice | Indices, vectors: Floats | None = None) -> Floats:
         """Modes of the basis, or combinations of them in columns, as vectors in the coordinates of the operator."""
         full = np.zeros((self.size, 2))
         full[self.active] = self.vectors[:, modes] if vectors is None else self.vectors[:, modes] @ vectors
         return full
+
+
+def width_and_mixing(block: Floats, levels: Floats) -> tuple[float, float]:
+    """Width of the levels of a cluster, 1 / time^2, and |off-diagonal|_F over that, the typical coupling."""
+    width = max(float(np.ptp(levels)), np.finfo(np.float64).tiny)
+    return width, float(np.linalg.norm(block - np.diag(np.diag(block)))) / width
+
+
+class Bases:
+    """This rank's bases along the ramp, kept from increment to increment where there is memory, as long as they serve.
+
+    `modes` are the numbers of the first mode that is looked at and of the first that is not, None for all. The ranks
+    share the slices; all of them must come to the end of their bases.
+    """
+
+    def __init__(self, modes: tuple[int, int] | None, ranks: Ranks, limits: Limits = LIMITS) -> None:
+        self.modes, self.ranks, self.limits = modes, ranks, limits
+        self._kept: list[Basis] = []
+
+    def range(self, matrix: csr_array) -> tuple[int, int]:
+        """Numbers of the first mode that is looked at and of the first that is not; ValueError if there are none."""
+        count = len(active_coordinates(matrix))
+        first, stop = self.modes or (0, count)
+        if not 0 <= first < min(stop, count):
+            raise ValueError(f"modes {first}:{stop} is no part of the {count} modes of this packing, 0:{count}")
+        return first, min(stop, count)
+
+    def keeps(self, matrix: csr_array) -> bool:
+        """Whether there is memory for the bases of all modes that are looked at."""
+        first, stop = self.range(matrix)
+        limits = self.limits
+        margins = 2 * (limits.margin + limits.beyond) * max(1, round((stop - first) / limits.own))
+        return (stop - first + margins) * matrix.shape[0] <= limits.kept
+
+    def at(self, matrix: csr_array) -> Iterable[tuple[Basis, Levels]]:
+        """The bases, those of an earlier load as long as all ranks' serve, and the operator in them."""
+        known = self._serving(matrix)
+        if known is not None:
+            return known
+        bases: Iterable[Basis] = self._made(matrix)
+        if self.keeps(matrix):
+            self._kept = []  # its memory is free before that for the next ones is taken
+            bases = self._kept = list(bases)
+        return ((basis, basis.levels(matrix)) for basis in bases)
+
+    def _serving(self, matrix: csr_array) -> list[tuple[Basis, Levels]] | None:
+        """The bases that are kept and the operator in them; None if those of all ranks do not serve."""
+        covering = all(basis.covers(matrix) for basis in self._kept)
+        known = [(basis, basis.levels(matrix)) for basis in self._kept if covering]
+        mine = [each for basis, levels in known for each in basis.mixing(levels)] if covering else [np.inf]
+        mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
+        return known if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing else None
+
+    def _made(self, matrix: csr_array) -> Iterator[Basis]:
+        """The bases of slices of the spectrum; a small operator has one, which the first rank makes."""
+        limits, active = self.limits, active_coordinates(matrix)
+        if len(active) <= limits.one_basis:
+            if self.ranks.rank == 0:
+                yield replace(Basis.of(matrix, limits), own=slice(*self.range(matrix)))
+            return
+        from .slicing import slices  # with libraries that nothing else needs
+
+        inner = matrix[active][:, active]
+        symmetric, margin = csc_array(0.5 * (inner + inner.T)), limits.margin + limits.beyond
+        for part in slices(symmetric, margin, self.range(matrix), limits, ranks=self.ranks):
+            yield Basis(matrix.shape[0], active, part.values, part.vectors, part.own, limits)

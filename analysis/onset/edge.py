@@ -1,29 +1,26 @@
-r"""Where a pair of eigenvalues enters or leaves the real axis: the root of its discriminant.
+r"""Windows of complex eigenvalues, and their edges: where a pair enters or leaves the real axis.
 
-The discriminant :math:`D(F) = (\lambda_1 - \lambda_2)^2` goes through zero linearly and is smooth on both sides
-(:mod:`~faultgouge.analysis.onset.pair`). A few secant steps bracket its root. Five points close to the root then give
-the last digits, and say how many there are. `smooth_root` does so for any function of the load.
-
-**Coalescence or not.** An edge is a coalescence if D passes through zero along a straight line at distances far below
-the increment; there :math:`|y^H x| \to 0`. A mere crossing touches D = 0 without a change of sign. If D jumps, the
-equilibrium itself does: a contact opened, closed or slid. Bisection then locates the jump, and the edge is a "contact
-change".
+At an edge the discriminant D(F) of the pair (:mod:`~faultgouge.analysis.onset.pair`) changes its sign. If it goes
+through zero along a straight line at distances far below the increment, the edge is a *coalescence*;
+there :math:`|y^H x| \to 0`. A few secant steps bracket the root; five points close to it then give the last digits, and
+say how many there are. If D jumps, the equilibrium itself does: a contact opened, closed or slid. Bisection locates
+the jump, and the edge is a *contact change*. A mere crossing touches D = 0 without a change of sign.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError
-from ..packing import Floats
+from ..packing import Floats, Packing
 from .limits import LIMITS, Limits
-from .modes import Modes, Operator
-from .pair import Pair, Place, continued
+from .modes import Operator, Place
+from .pair import Pair, continued
 
 Kind = Literal["coalescence", "contact change", "start"]
 
@@ -63,17 +60,92 @@ class Edge:
 
 
 @dataclass(frozen=True)
-class Family:
-    """The operator as a function of the load, and how closely the search looks at it.
+class Window:
+    """An interval of loads on which one pair of eigenvalues is complex.
 
     Attributes
     ----------
-    operator : callable
-        fx -> the matrix A, ndarray or sparse, shape (n, n).
-    narrowest : float
-        Windows narrower than this are not looked for, force.
-    limits : Limits
-        All other bounds of the search.
+    fx_onset : float
+        Load at which the pair becomes complex, force per top disk.
+    fx_end : float or None
+        Load at which it is real again; None if it is complex at the largest load that was looked at.
+    eigenvalue : float
+        The double eigenvalue at the onset (the real part of the pair if it does not coalesce there), 1 /
+        time^2.
+    error : float
+        Uncertainty of fx_onset: twice the scatter of the discriminant over its slope for a coalescence, the bracket
+        otherwise; and the `load_error` of the equilibria. How their path depends on the increments is not in it.
+    end_error : float or None
+        The same for fx_end.
+    overlap : float
+        Smallest |y^H x| met at the onset; at an exceptional point it is the root of the rounding error.
+    kind : {"coalescence", "contact change", "start"}
+        What begins the window: two real eigenvalues that meet; a jump of the equilibrium; or nothing, as the pair is
+        complex at the smallest load.
+    """
+
+    fx_onset: float
+    fx_end: float | None
+    eigenvalue: float
+    error: float
+    end_error: float | None
+    overlap: float
+    kind: Kind
+
+    @classmethod
+    def between(cls, onset: Edge, end: Edge | None) -> "Window":
+        """The window from one edge to another, or to none."""
+        return cls(
+            fx_onset=onset.fx,
+            fx_end=None if end is None else end.fx,
+            eigenvalue=onset.eigenvalue,
+            error=onset.error,
+            end_error=None if end is None else end.error,
+            overlap=onset.overlap,
+            kind=onset.kind,
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """The keys of the JSON contract: fx_onset, fx_end, lambda, error, kind."""
+        return {
+            "fx_onset": self.fx_onset,
+            "fx_end": self.fx_end,
+            "lambda": self.eigenvalue,
+            "error": self.error,
+            "kind": self.kind,
+        }
+
+
+def load_error(packing: Packing) -> float:
+    """r / n^(1/2) of a residual r with n top disks, force: what is out of balance by r is exact at other loads."""
+    return packing.residual / float(np.sqrt(max(1, packing.top.sum())))
+
+
+Followed = TypeVar("Followed")
+
+
+def track(
+    known: dict[float, Followed], follow: Callable[[list[Followed], float], Followed]
+) -> Callable[[float], Followed]:
+    """A pair, or a mode, at any load: what is `known` by load, or is followed from there, and then known.
+
+    `follow` is given what is known, the nearest load first, and the new load.
+    """
+
+    def at(fx: float) -> Followed:
+        if fx not in known:
+            known[fx] = follow([known[load] for load in sorted(known, key=lambda load: abs(load - fx))], fx)
+        return known[fx]
+
+    return at
+
+
+@dataclass(frozen=True)
+class Family:
+    """The operator as a function of the load, and how closely the search looks at it.
+
+    `operator` is fx -> the matrix A, ndarray or sparse, shape (n, n); windows narrower than `narrowest`, a force, are
+    not looked for.
     """
 
     operator: Callable[[float], Operator]
@@ -84,18 +156,15 @@ class Family:
         """The operator at a load."""
         return Place(float(fx), csr_array(self.operator(float(fx))))
 
-    def followed(self, pair: Pair, place: Place) -> Pair:
-        """A pair at another load: continued, found among all modes, or followed in small steps.
+    def track(self, known: dict[float, Pair]) -> Callable[[float], Pair]:
+        """A pair at any load, followed from the nearest load where it is known."""
+        return track(known, lambda nearest, fx: self.followed(nearest[0], self.at(fx)))
 
-        Raises
-        ------
-        LostPairError
-            If it can be followed in none of these ways.
-        """
-        image = continued(pair, *place, self.limits)
+    def followed(self, pair: Pair, place: Place) -> Pair:
+        """A pair at another load: continued, found among all modes, or followed in small steps; else LostPairError."""
+        image = continued(pair, place.fx, place.matrix, self.limits)
         if image is None and place.matrix.shape[0] <= self.limits.all_modes:
-            modes = Modes.of(*place)
-            image = modes.pair(modes.nearest(pair))
+            image = place.modes.pair(place.modes.nearest(pair))
         return image or self._in_steps(pair, place)
 
     def _in_steps(self, pair: Pair, place: Place) -> Pair:
@@ -114,54 +183,57 @@ class Family:
         return moving
 
 
-class Root(NamedTuple):
-    """The root of a smooth function of the load, its error, and the loads about it that were looked at."""
+class SignChange(NamedTuple):
+    """Where a function of the load changes its sign: a root, or a jump.
+
+    The error is twice the scatter over the slope of a root, and half of the bracket of a jump. Its loads are the five
+    that give the root, or the two on either side of the jump.
+    """
 
     fx: float
     error: float
-    loads: Floats
+    loads: list[float]
+    smooth: bool
 
 
-def smooth_root(value: Callable[[float], float], below: float, above: float, limits: Limits = LIMITS) -> Root | None:
-    """Where a function of the load that has opposite signs at two loads goes through zero.
+def sign_change(value: Callable[[float], float], below: float, above: float, limits: Limits = LIMITS) -> SignChange:
+    """Where a function of the load that has opposite signs at two loads goes through zero, or jumps."""
+    known: dict[float, float] = {}
 
-    Returns
-    -------
-    Root or None
-        None if the function does not cross zero along a smooth line at any distance: it jumps.
-    """
+    def looked(fx: float) -> float:
+        known[fx] = value(fx)
+        return known[fx]
+
+    root = _smooth_root(looked, below, above, limits)
+    if root is not None:
+        return root
+    width = _jump_width(below, above, limits)
+    left, right = next((a, b) for a, b in pairwise(sorted(known)) if known[a] * known[b] <= 0)
+    while right - left > width:
+        middle = 0.5 * (left + right)
+        left, right = (middle, right) if looked(middle) * known[left] > 0 else (left, middle)
+    return SignChange(0.5 * (left + right), 0.5 * (right - left), [left, right], smooth=False)
+
+
+def _smooth_root(value: Callable[[float], float], below: float, above: float, limits: Limits) -> SignChange | None:
+    """The root; None if the function does not cross zero along a smooth line at any distance."""
     span = above - below
     root = float(brentq(value, below, above, xtol=limits.root * span))
     room = min(root - below, above - root)
     # As near as the noise allows: the function should be straight, and yet stand out of the scatter.
     distance = 1e-3 * min(room, 1e-3 * span)
     while 0 < distance < 0.1 * room:
-        loads: Floats = root + distance * np.arange(-2.0, 3.0)
-        found = _root_of_five(loads, np.array([value(float(fx)) for fx in loads]))
+        loads = [float(fx) for fx in root + distance * np.arange(-2.0, 3.0)]
+        found = _root_of_five(loads, np.array([value(fx) for fx in loads]))
         if found is not None:
-            return Root(*found, loads)
+            return SignChange(*found, loads, smooth=True)
         distance *= 30
     return None
 
 
-def jump_width(here: float, there: float, limits: Limits = LIMITS) -> float:
-    """Width to which a jump between two loads is bracketed, force."""
-    rounding = float(np.spacing(max(abs(here), abs(there))))
-    return max(limits.jump * abs(there - here), 4 * rounding)
-
-
-def bracketed_jump(value: Callable[[float], float], below: float, above: float, width: float) -> tuple[float, float]:
-    """The loads on either side of a jump of a function from one sign to the other, by bisection."""
-    while above - below > width:
-        middle = 0.5 * (below + above)
-        below, above = (middle, above) if value(middle) * value(below) > 0 else (below, middle)
-    return below, above
-
-
-def _root_of_five(loads: Floats, values: Floats) -> tuple[float, float] | None:
-    """Root and error of a parabola through five equidistant points, two degrees of freedom being left for the
-    scatter."""
-    middle, distance = float(loads[2]), float(loads[3] - loads[2])
+def _root_of_five(loads: list[float], values: Floats) -> tuple[float, float] | None:
+    """Root and error of a parabola through five equidistant points: two degrees of freedom tell the scatter."""
+    middle, distance = loads[2], loads[3] - loads[2]
     curve, residuals, *_ = np.polynomial.polynomial.polyfit(np.arange(-2, 3), values, 2, full=True)
     scatter = float(np.sqrt(residuals[0].sum() / 2)) if residuals[0].size else 0.0
     value, slope = float(curve[0]), float(curve[1])
@@ -172,39 +244,34 @@ def _root_of_five(loads: Floats, values: Floats) -> tuple[float, float] | None:
     return middle + shift * distance, 2 * scatter / abs(slope) * distance + float(np.spacing(abs(middle)))
 
 
+def _jump_width(here: float, there: float, limits: Limits) -> float:
+    """Width to which a jump between two loads is bracketed, force."""
+    rounding = float(np.spacing(max(abs(here), abs(there))))
+    return max(limits.jump * abs(there - here), 4 * rounding)
+
+
 def locate(family: Family, here: Pair, there: Pair) -> tuple[Edge, Pair, Pair]:
-    """The root of D of a pair between two loads, and the pair close by on either side."""
+    """The edge of a pair that is real at one of two loads and complex at the other, and the pair on either side of it.
+
+    A LostPairError is raised if the ends are not one pair.
+    """
     if here.discriminant * there.discriminant >= 0:
         # One end is within rounding of the coalescence: the edge is there, to within D over its slope.
         end = min(here, there, key=lambda pair: abs(pair.discriminant))
         slope = abs(there.discriminant - here.discriminant) / (there.fx - here.fx)
         return Edge(end.fx, abs(end.discriminant) / slope, end.mean, end.overlap, "coalescence"), here, there
-    known = {here.fx: here, there.fx: there}
-
-    def pair(fx: float) -> Pair:
-        if fx not in known:
-            known[fx] = family.followed(known[min(known, key=lambda each: abs(each - fx))], family.at(fx))
-        return known[fx]
-
-    root = smooth_root(lambda fx: pair(fx).discriminant, here.fx, there.fx, family.limits)
-    if root is None:
-        return _located_jump(family, pair, known)
-    points = [pair(float(fx)) for fx in root.loads]
-    mean, overlap = float(np.mean([point.mean for point in points])), min(point.overlap for point in points)
-    return Edge(root.fx, root.error, mean, overlap, "coalescence"), points[0], points[-1]
-
-
-def _located_jump(family: Family, pair: Callable[[float], Pair], known: dict[float, Pair]) -> tuple[Edge, Pair, Pair]:
-    """The edge of a pair whose discriminant jumps between loads that are known, by bisection."""
-    order = sorted(known)
-    width = jump_width(order[0], order[-1], family.limits)
-    below, above = next((a, b) for a, b in pairwise(order) if known[a].discriminant * known[b].discriminant <= 0)
-    below, above = bracketed_jump(lambda fx: pair(fx).discriminant, below, above, width)
+    pair = family.track({here.fx: here, there.fx: there})
+    change = sign_change(lambda fx: pair(fx).discriminant, here.fx, there.fx, family.limits)
+    points = [pair(fx) for fx in change.loads]
+    below, above = points[0], points[-1]
+    if change.smooth:
+        mean, overlap = float(np.mean([point.mean for point in points])), min(point.overlap for point in points)
+        return Edge(change.fx, change.error, mean, overlap, "coalescence"), below, above
     # Where the equilibrium does not jump, it is the pair that has become another one on the way.
-    across = family.followed(known[below], Place(above, known[above].matrix))
-    if across.discriminant * known[above].discriminant < 0 or not across.same_planes(known[above]):
-        raise LostPairError.of(known[above], f"at F_x = {above:.10g}")
-    return Edge.between(below, above, known[below], known[above]), known[below], known[above]
+    across = family.followed(below, Place(above.fx, above.matrix))
+    if across.discriminant * above.discriminant < 0 or not across.same_planes(above):
+        raise LostPairError.of(above, f"at F_x = {above.fx:.10g}")
+    return Edge.between(below.fx, above.fx, below, above), below, above
 
 
 def edge_from_inside(family: Family, outside: Pair, inside: Pair) -> Edge:
@@ -213,7 +280,7 @@ def edge_from_inside(family: Family, outside: Pair, inside: Pair) -> Edge:
     The pair is followed from inside, with the increment halved until the pair outside leads back to the one inside.
     Then the root of D lies in between. If no half is short enough, the equilibrium jumps.
     """
-    width = jump_width(outside.fx, inside.fx, family.limits)
+    width = _jump_width(outside.fx, inside.fx, family.limits)
     while abs(inside.fx - outside.fx) > width:
         if leads_back(family, outside, inside):
             try:

@@ -10,10 +10,10 @@ class Limits:
     # Sizes at which the way changes
 
     all_windows: int = 300
-    """Disks up to which all windows are sought, from all eigenvalues: a decomposition takes a second there, and grows
-    with the cube of the number. Beyond, the first window is sought in slices of the spectrum."""
+    """Disks up to which all windows are sought, from all eigenvalues: a second for a decomposition, which grows with
+    the cube of the number. Beyond, the first window is sought in slices of the spectrum."""
     dense_factors: int = 600
-    """Coordinates up to which A - sigma is factorised as a dense matrix, which is faster there than sparse factors."""
+    """Coordinates up to which a dense factorisation of A - sigma is faster than a sparse one."""
     all_modes: int = 900
     """Coordinates up to which a pair that cannot be continued is looked for among all modes: a second there."""
     one_basis: int = 1000
@@ -22,28 +22,25 @@ class Limits:
     # The operator
 
     unknown_force: float = 10.0
-    """A contact counts from a force of so many times the packing's imbalance: ten, for a disk between two contacts
-    without force, whose forces cancel in part."""
+    """A contact counts from this times the packing's imbalance: a disk may rest between two contacts without force,
+    whose forces cancel in part."""
     small_force: float = 1e-6
     """And in any case from this share of the largest force, so that a packing out of balance keeps its contacts."""
 
     # Windows between two loads
 
     narrowest: float = 1e-7
-    """Narrowest window that is looked for, in units of the largest load, where the caller names none: the pair would
-    grow more slowly than any run can show."""
+    """Narrowest window, in units of the largest load: its pair would grow more slowly than any run can show."""
     bend: float = 0.05
-    """Curvature of the operator that two values and slopes of D do not show, as a share of the smaller value of D: more
-    than enough for loads between which modes are recognised at all."""
+    """Curvature that two values and slopes of D do not show, as a share of the smaller D: more than enough for loads
+    between which modes are recognised at all."""
 
     # The edge of a window
 
     root: float = 1e-7
-    """Width to which the root of D is bracketed, in increments: a tenth of the distance of the five points whose
-    parabola gives the last digits."""
+    """Width to which the root of D is bracketed, in increments: a tenth of the distance of the five points about it."""
     jump: float = 1e-9
-    """Width to which a jump of the equilibrium is bracketed, in increments. The place of a jump depends on the path,
-    and with the path on the increment, by far more."""
+    """Width to which a jump is bracketed, in increments; its place depends on the path's increment by far more."""
     shortest: float = 2.0**-6
     """Shortest steps, in shares of the straight line from one operator to another, in which a pair is followed."""
 
@@ -52,8 +49,7 @@ class Limits:
     steps: int = 40
     """Iterations before a shift is given up: a solution costs a hundredth of a dense decomposition."""
     steps_on: int = 12
-    """The same with the factors of a neighbour: four solutions a step, against the hundred that a factorisation
-    costs."""
+    """The same with the factors of a neighbour: four solutions a step, against a hundred for a factorisation."""
     pace: int = 5
     """Steps by which the pace is judged: the iteration slows down while farther modes go, and then keeps its pace."""
     offsets: tuple[float, ...] = (1.0, -1.0, 0.1, -0.1)
@@ -96,9 +92,9 @@ class Limits:
     last_look: int = 200
     """Blocks at the most."""
     drift: float = 1e-14
-    """Product of a new vector with the first block from which on blocks are made orthogonal twice: rounding at first,
-    1e-16, it grows once an eigenvector has been found to all digits. The vectors of a slice are then orthogonal to
-    1.2e-11 at the worst (77 slices of seven matrices of 400 to 29,000 coordinates)."""
+    """Product of a new vector with the first block from which on blocks are made orthogonal twice. It grows from
+    rounding, 1e-16, once an eigenvector is known to all digits. The vectors of a slice are then orthogonal to 1.2e-11
+    at the worst (77 slices of seven matrices of 400 to 29,000 coordinates)."""
     accurate: float = 1e-2
     """Residual of the eigenvectors of a slice, in mean distances of eigenvalues, as of the inverse. It enters an
     eigenvalue as its square over the distance of modes outside: 4e-6 at the most was measured (29,000 coordinates). An
@@ -112,20 +108,18 @@ class Limits:
     finest: float = 1e-3
     """Narrowest windows of clusters that are looked for, in increments: the clusters' own error is larger."""
     excess: float = 0.2
-    """What is added to the antisymmetric couplings of a cluster, in units of mixing^2 times the spacing of its levels.
-    Modes beyond a slice, and the third order, change the difference of both couplings, which decides, by about a tenth
-    of that unit (360 disks). So pairs are announced from a little before, and the operator decides."""
+    """What is added to the antisymmetric couplings of a cluster, in units of mixing^2 times the spacing of its levels,
+    so that pairs are announced early, and the operator decides. Modes beyond a slice, and the third order, change the
+    difference of both couplings by a tenth of that unit (360 disks)."""
     dips: int = 12
-    """Loads at which the discriminant of an announced pair is looked at before its sign is in doubt. One or two tell of
-    an avoided crossing."""
+    """Looks at the discriminant of an announced pair before its sign is in doubt; an avoided crossing takes one or
+    two."""
     parts: int = 4
-    """Parts of an increment on which clusters have been wrong: four cost little more than two while a basis passes
-    by."""
+    """Parts of a doubtful increment: four cost little more than two while a basis passes by."""
     depth: int = 2
     """How often parts are divided again; the finest are a sixteenth."""
     kept: float = 3e8
-    """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision; a larger
-    basis never exists as a whole."""
+    """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision."""
     ahead: int = 2
     """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
     chunk: int = 512

@@ -5,23 +5,22 @@ Modes at neighbouring loads a, b are assigned by :math:`|x_a^H x_b|\,|y_a^H y_b|
 do not swap names. (:math:`|y_a^H x_b|`, the obvious weight, vanishes at an exceptional point, where it is needed most.)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from scipy.linalg import eig
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_array
 
 from ..packing import Floats, Indices, Packing
-from ..spectrum import Complexes, believable, mass_weighted, unit_rounding
+from ..spectrum import Complexes, all_modes, believable, mass_weighted, unit_rounding
 from ..stiffness import stiffness_matrix
 from .limits import LIMITS, Limits
 from .pair import Pair
 
-Members = tuple[int, int]
-"""The numbers of the two modes of a pair."""
-
+Members = tuple[int, int]  # the numbers of the two modes of a pair
 Operator: TypeAlias = Floats | csr_array
 
 
@@ -44,14 +43,10 @@ def force_bearing(packing: Packing, limits: Limits = LIMITS) -> Packing:
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """The modes of the operator at one load.
+    """The modes of the operator A, shape (n, n), 1 / time^2, at the load fx.
 
     Attributes
     ----------
-    fx : float
-        The load.
-    matrix : scipy.sparse.csr_array, shape (n, n)
-        The operator A, 1 / time^2.
     values : ndarray of complex, shape (E,)
         Eigenvalues by real part, then imaginary part. Complex pairs that are rounding noise have lost their
         imaginary parts.
@@ -72,18 +67,9 @@ class Modes:
     def of(cls, fx: float, matrix: Operator) -> "Modes":
         """Solve the dense eigenproblem, without the coordinates whose rows are zero."""
         sparse = csr_array(matrix)
-        active = np.flatnonzero(np.diff(sparse.indptr))
-        size, count = sparse.shape[0], len(active)
-        right, left = np.zeros((2, size, count), dtype=np.complex128)
-        if count == 0:
-            return cls(fx, sparse, np.zeros(0, complex), right, left, np.zeros(0, int))
-        inner = sparse[active][:, active].toarray()
-        values, y, x = eig(inner, left=True, right=True, overwrite_a=True, check_finite=False)
-        order = np.lexsort((values.imag, values.real))
-        values, right[active], left[active] = values[order], x[:, order], y[:, order]
-        rounding = unit_rounding(sparse.data)
-        partner = np.full(count, -1)
-        for k in np.flatnonzero(values.imag > 0):
+        values, right, left = all_modes(sparse)
+        rounding, partner = unit_rounding(sparse.data), np.full(len(values), -1)
+        for k in (int(each) for each in np.flatnonzero(values.imag > 0)):
             conjugate = int(np.argmin(np.abs(values - values[k].conj())))
             if believable(values[k], abs(np.vdot(left[:, k], right[:, k])), rounding):
                 partner[k], partner[conjugate] = conjugate, k
@@ -119,39 +105,46 @@ class Modes:
             candidates = [*candidates, (int(first), int(second))]
         return max(candidates, key=lambda members: float(weight[list(members)].sum()))
 
-    def about(self, eigenvalue: float) -> Members:
-        """The two modes whose eigenvalues are closest to a real number."""
+    def about(self, eigenvalue: float, among: Sequence[Members] = ()) -> Members:
+        """Of some pairs that with the closest eigenvalue; failing these, the two modes closest to a real number."""
+        if among:
+            return min(among, key=lambda members: abs(self.values[members[0]].real - eigenvalue))
         first, second = np.argsort(np.abs(self.values - eigenvalue))[:2]
         return int(first), int(second)
 
 
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A load, the operator there, and all of its modes as soon as somebody asks for them."""
+
+    fx: float
+    matrix: csr_array
+
+    @cached_property
+    def modes(self) -> Modes:
+        """All modes, by LAPACK."""
+        return Modes.of(self.fx, self.matrix)
+
+
 def assign(here: Modes, there: Modes) -> Indices:
-    """Which mode there each mode here has become.
+    """Which mode there each mode here has become, shape (E,); -1 where there are fewer modes there.
 
-    Parameters
-    ----------
-    here, there : Modes
-        Modes at two neighbouring loads.
-
-    Returns
-    -------
-    ndarray of int, shape (E,)
-        Index there; -1 where there are fewer modes there. The assignment maximises the sum of |x^H x'| |y^H
-        y'|.
+    The assignment maximises the sum of |x^H x'| |y^H y'|.
     """
-    weight = products(here.right, there.right) * products(here.left, there.left)
-    partner = np.full(len(here.values), -1)
-    best = weight.argmax(axis=1) if weight.size else partner
-    if weight.size and len(np.unique(best)) == len(best):
-        partner = best  # every mode has its best match: no other assignment has a larger sum
-    else:
-        rows, columns = linear_sum_assignment(weight, maximize=True)
-        partner[rows] = columns
+    partner = matched(products(here.right, there.right) * products(here.left, there.left))
     # Members of one pair have the same weights: let the one above the axis stay above.
     for up, down in here.complex_pairs:
         if partner[up] >= 0 and there.partner[partner[up]] == partner[down] and there.values[partner[up]].imag < 0:
             partner[[up, down]] = partner[[down, up]]
     return partner
+
+
+def matched(weight: Floats) -> Indices:
+    """A column for each row, none twice, with the largest sum of weights; -1 where columns are too few."""
+    column = np.full(len(weight), -1)
+    rows, columns = linear_sum_assignment(weight, maximize=True)
+    column[rows] = columns
+    return column
 
 
 def products(a: Complexes, b: Complexes) -> Floats:

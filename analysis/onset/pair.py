@@ -1,4 +1,4 @@
-r"""A pair of eigenvalues, and how it is followed from operator to operator without the others.
+r"""A pair of eigenvalues: how it is followed from load to load without the others, and what it may do in between.
 
 **The pair.** On the invariant subspace of two modes the operator A is a 2 x 2 block :math:`B = (U^T V)^{-1} U^T A V`,
 with orthonormal bases V, U of the right and of the left subspace. V, U, half the trace and the *discriminant*
@@ -24,12 +24,17 @@ well in *residual inverse iteration* (Neumaier, SIAM J. Numer. Anal. 22, 914 (19
 .. math:: V \leftarrow V - P^{-1} (A V - V (V^T A V)) ,
 
 which ends at an invariant subspace of A whatever P is. So sparse factors need no pivoting.
+
+**Between two loads** a window narrower than the increment may hide. With A' the difference of both operators,
+:math:`D' = 2 (\lambda_1 - \lambda_2)(\lambda_1' - \lambda_2')` is known at either end from :math:`\lambda' = y^H A' x /
+y^H x`. A cubic goes through both values and slopes, and a parabola through either slope and both values. The lowest
+point of the cubic, less the disagreement of the three, is a bound. Where the bound is negative a window may hide.
 """
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
@@ -43,23 +48,12 @@ from .limits import LIMITS, Limits
 Planes = tuple[Floats, Floats]
 
 
-class Place(NamedTuple):
-    """A load and the operator there."""
-
-    fx: float
-    matrix: csr_array
-
-
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Two modes of the operator at one load.
+    """Two modes of the operator A, shape (n, n), 1 / time^2, at the load fx.
 
     Attributes
     ----------
-    fx : float
-        The load.
-    matrix : scipy.sparse.csr_array, shape (n, n)
-        The operator A, 1 / time^2.
     right, left : ndarray, shape (n, 2)
         Orthonormal bases V and U of the invariant planes.
     inverse : Inverse or None
@@ -72,10 +66,14 @@ class Pair:
     left: Floats = field(repr=False)
     inverse: "Inverse | None" = field(default=None, repr=False)
 
+    def block(self, matrix: csr_array) -> Floats:
+        """(U^T V)^-1 U^T A V of any matrix on the planes of this pair, shape (2, 2)."""
+        return np.asarray(np.linalg.solve(self.left.T @ self.right, self.left.T @ (matrix @ self.right)))
+
     @cached_property
     def entries(self) -> Floats:
         """The block B, shape (2, 2), 1 / time^2."""
-        return np.linalg.solve(self.left.T @ self.right, self.left.T @ (self.matrix @ self.right))
+        return self.block(self.matrix)
 
     @cached_property
     def mean(self) -> float:
@@ -88,10 +86,15 @@ class Pair:
         b = self.entries
         return float((b[0, 0] - b[1, 1]) ** 2 + 4 * b[0, 1] * b[1, 0])
 
+    @property
+    def traceless(self) -> Floats:
+        """B - mean, shape (2, 2), 1 / time^2."""
+        return self.entries - self.mean * np.eye(2)
+
     @cached_property
     def spread(self) -> float:
         """Frobenius norm of B - mean, 1 / time^2."""
-        return float(np.linalg.norm(self.entries - self.mean * np.eye(2)))
+        return float(np.linalg.norm(self.traceless))
 
     @cached_property
     def overlap(self) -> float:
@@ -111,8 +114,7 @@ class Pair:
 
     def slope(self, change: csr_array) -> float:
         """First-order change of the discriminant with a change of the operator, 1 / time^4."""
-        b = self.entries
-        db = np.linalg.solve(self.left.T @ self.right, self.left.T @ (change @ self.right))
+        b, db = self.entries, self.block(change)
         # The planes turn in first order, which changes invariants of the block in second order only.
         return float(2 * (b[0, 0] - b[1, 1]) * (db[0, 0] - db[1, 1]) + 4 * (db[0, 1] * b[1, 0] + b[0, 1] * db[1, 0]))
 
@@ -130,14 +132,9 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Inverse:
-    """The inverse of A - sigma, or of a matrix like it.
+    """The inverse of A - sigma, or of a matrix like it: `solve` is (vectors, transposed) -> its product with vectors.
 
-    Attributes
-    ----------
-    solve : callable
-        (vectors, transposed) -> the product of the inverse, or of its transpose, with vectors.
-    exact : bool
-        False for sparse factors, which are of another operator or without pivoting: residuals make up for that.
+    Sparse factors are not exact, being without pivoting or of another operator: residuals make up for that.
     """
 
     solve: Callable[[Any, bool], Any]
@@ -166,21 +163,7 @@ def inverse_of(matrix: csr_array, shift: complex, limits: Limits = LIMITS) -> In
 
 
 def continued(pair: Pair, fx: float, matrix: csr_array, limits: Limits = LIMITS) -> Pair | None:
-    """What a pair has become in a neighbouring operator.
-
-    Parameters
-    ----------
-    pair : Pair
-        The pair in one operator, or a guess of it.
-    fx, matrix
-        The neighbouring load and the operator there.
-    limits : Limits
-
-    Returns
-    -------
-    Pair or None
-        None if the iteration does not converge to these planes.
-    """
+    """What a pair, or a guess of one, has become in a neighbouring operator; None if no iteration ends there."""
     for planes, inverse, most in _iterations(pair, replace(pair, fx=fx, matrix=matrix), limits):
         found = _invariant(matrix, planes, most, limits)
         if found is not None:
@@ -252,3 +235,40 @@ def _beyond(matrix: csr_array, basis: Floats) -> Floats:
     """A V - V (V^T A V)."""
     image = matrix @ basis
     return np.asarray(image - basis @ (basis.T @ image))
+
+
+def deepest_dip(d0: Floats, s0: Floats, d1: Floats, s1: Floats, bend: float) -> tuple[Floats, Floats]:
+    """The widest stretch of 0 < t < 1 on which functions known at both ends may be negative.
+
+    d0, s0 and d1, s1, each of shape (P,), are values, positive, and slopes at t = 0 and at t = 1; `bend` is that of
+    `Limits`. Returned are the largest possible width in t, zero where a function surely stays positive, and where it is
+    deepest.
+    """
+    # Parabolas d0 + s0 t + f t^2 and d1 - s1 r + g r^2, r = 1 - t; cubic d0 + s0 t + h t^2 + k t^3.
+    f, g = d1 - d0 - s0, d0 - d1 + s1
+    h, k = 3 * (d1 - d0) - 2 * s0 - s1, 2 * (d0 - d1) + s0 + s1
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(np.maximum(h * h - 3 * k * s0, 0.0))
+        t = np.array([-s0 / (2 * f), 1 - s1 / (2 * g), (root - h) / (3 * k)])
+        t = np.clip(np.nan_to_num(t, nan=0.5), 0.0, 1.0)
+        r = 1 - t
+        cubic = d0 + t * (s0 + t * (h + t * k))
+        spread = np.maximum(np.abs(d0 + t * (s0 + t * f) - cubic), np.abs(d1 - r * (s1 - r * g) - cubic))
+        lowest = cubic - spread - bend * np.minimum(d0, d1) * (4 * t * r)
+        deepest = np.argmin(lowest, axis=0), np.arange(len(d0))
+        depth = np.maximum(-lowest[deepest], 0.0)
+        width = np.where(depth > 0, 2 * np.sqrt(depth / np.maximum(np.abs(f), np.abs(g))), 0.0)
+    return np.minimum(width, 1.0), t[deepest]
+
+
+def dip_between(here: Pair, there: Pair, limits: Limits = LIMITS) -> tuple[float, float]:
+    """Where the discriminant of a pair may change its sign and back between two loads with the same sign of it.
+
+    Returned are the width of the widest stretch with the other sign that is possible, force, zero if there is surely
+    none, and the load at which D is closest to zero, or deepest beyond.
+    """
+    sign, change, increment = np.sign(here.discriminant), there.matrix - here.matrix, there.fx - here.fx
+    ends = ((pair.discriminant, pair.slope(change)) for pair in (here, there))
+    d0, s0, d1, s1 = (sign * np.array([number]) for end in ends for number in end)
+    width, at = deepest_dip(d0, s0, d1, s1, limits.bend)
+    return float(width[0]) * increment, here.fx + float(at[0]) * increment

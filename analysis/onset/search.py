@@ -13,21 +13,19 @@ from ..display import Tabled, windows_rows
 from ..errors import FaultgougeError
 from ..packing import Packing
 from .dense import all_windows
-from .edge import Family
+from .edge import Family, Window, load_error
 from .limits import LIMITS, Limits
 from .modes import Operator, full_operator
 from .ranks import ALONE, Ranks
-from .sliced import FirstWindow, Watch, first_window
-from .windows import Window, increasing
+from .sliced import Increments, Watch, first_window
+from .walk import increasing
 
 
 class OnsetError(FaultgougeError):
     """No complex pair appears on the given loads."""
 
     @classmethod
-    def among(
-        cls, modes: tuple[int, int] | None, last: float, doubtful: tuple[tuple[float, float], ...]
-    ) -> "OnsetError":
+    def among(cls, modes: tuple[int, int] | None, last: float, doubtful: Increments) -> "OnsetError":
         """The sentence for some modes, or all, up to the last load."""
         which = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
         if not doubtful:
@@ -50,15 +48,14 @@ class Onset(Tabled):
     complete : bool
         Whether these are all up to the largest load. Of a large packing only the first is sought.
     doubtful : tuple of (float, float)
-        Of a large packing, increments before the onset in which a pair was expected and not found: an earlier window
-        may hide there, which smaller increments would tell.
+        Of a large packing, increments before the onset in which a pair was expected and not found: take smaller ones.
     modes : tuple of (int, int) or None
         Modes among which the onset was sought; None for all.
     """
 
     windows: tuple[Window, ...]
     complete: bool = True
-    doubtful: tuple[tuple[float, float], ...] = ()
+    doubtful: Increments = ()
     modes: tuple[int, int] | None = None
 
     def __repr__(self) -> str:
@@ -100,25 +97,10 @@ def complex_windows(
     narrowest: float | None = None,
     limits: Limits = LIMITS,
 ) -> tuple[Window, ...]:
-    """All windows of complex eigenvalues of a one-parameter family of matrices.
+    """All windows of complex eigenvalues of a one-parameter family of matrices, by increasing onset.
 
-    Parameters
-    ----------
-    operator : callable
-        fx -> ndarray or sparse array, shape (n, n), in coordinates that do not depend on fx. Zero rows are left
-        out.
-    forces, narrowest, limits
-        As in :func:`find_onset`.
-
-    Returns
-    -------
-    tuple of Window
-        By increasing onset; may be empty.
-
-    Raises
-    ------
-    ValueError
-        If the loads are not at least two increasing numbers.
+    The operator is fx -> ndarray or sparse array, shape (n, n), in coordinates that do not depend on fx. Zero rows are
+    left out. All else is as in :func:`find_onset`.
     """
     loads = increasing(forces)
     narrowest = limits.narrowest * float(np.abs(loads).max()) if narrowest is None else narrowest
@@ -148,8 +130,7 @@ def find_onset(
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
     narrowest : float, optional
-        Windows narrower than this are not looked for, force; 1e-7 of the largest |load| by default. Of a large packing
-        it is no less than a thousandth of an increment.
+        Windows narrower than this are not looked for, force; by default as in `Limits`, `narrowest` and `finest`.
     modes : tuple of (int, int), optional
         Search these modes alone, and for their first window: numbers of the first one and of the first one beyond, by
         frequency, the lowest being 0, of the symmetric part at the load where the search stands. Parts that are
@@ -159,12 +140,6 @@ def find_onset(
     ranks : Ranks, optional
         The processes that search a large packing together. Each makes the same call, and is told the same by
         `equilibrium`.
-    limits : Limits, optional
-        Sizes and tolerances of the search.
-
-    Returns
-    -------
-    Onset
 
     Raises
     ------
@@ -181,18 +156,19 @@ def find_onset(
 
     def operator(fx: float) -> csr_array:
         packing = start if fx == loads[0] else equilibrium(fx)
-        unbalanced[fx] = packing.residual / float(np.sqrt(max(1, packing.top.sum())))
+        unbalanced[fx] = load_error(packing)
         return full_operator(packing, limits)
 
+    doubtful: Increments
     complete = seeks_all(start, modes, limits)
     if complete:
-        windows, first = complex_windows(operator, loads, narrowest=narrowest, limits=limits), FirstWindow(None)
+        windows, doubtful = complex_windows(operator, loads, narrowest=narrowest, limits=limits), ()
     else:
-        first = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks)
-        windows = () if first.window is None else (first.window,)
+        first, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks)
+        windows = (first,) if first else ()
     if not windows:
-        raise OnsetError.among(modes, float(loads[-1]), first.doubtful)
-    return Onset(tuple(_with_imbalance(window, unbalanced) for window in windows), complete, first.doubtful, modes)
+        raise OnsetError.among(modes, float(loads[-1]), doubtful)
+    return Onset(tuple(_with_imbalance(window, unbalanced) for window in windows), complete, doubtful, modes)
 
 
 def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:

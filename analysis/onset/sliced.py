@@ -16,42 +16,30 @@ confirmed ones (packings of 1,000 disks, increments of 1e-3).
 its kind, so a pair is followed from inside of its window to the edge.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing import Floats
-from .basis import Basis, Cluster, Levels
+from .basis import Bases, Basis, Cluster, Levels, width_and_mixing
 from .dense import all_windows
-from .dip import dip_between
-from .edge import Edge, Family, LostPairError, edge_from_inside, leads_back
-from .modes import Modes
-from .pair import Pair, Place, continued
+from .edge import Edge, Family, LostPairError, Window, edge_from_inside, leads_back
+from .modes import Place
+from .pair import Pair, continued, dip_between
 from .ranks import ALONE, Ranks
 from .screening import may_meet
 from .walk import walk
-from .windows import Window
 
 Watch = Callable[[str], None]
 
 At = tuple[float, Levels]
 """A load and the operator there in a basis."""
 
-
-class FirstWindow(NamedTuple):
-    """The first window, whose fx_end is None where the pair is complex at the next load; None if there is none.
-
-    `doubtful` are the finest increments before it on which clusters announce a pair that the operator was not seen to
-    have.
-    """
-
-    window: Window | None
-    doubtful: tuple[tuple[float, float], ...] = ()
+Increments = tuple[tuple[float, float], ...]
+"""From load to load."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,18 +59,12 @@ class DoubtError(FaultgougeError):
 class Sliced:
     """The oracle; its places are operators, and what it is sure of is a window."""
 
-    def __init__(
-        self,
-        family: Family,
-        modes: tuple[int, int] | None = None,
-        watch: Watch = lambda says: None,
-        ranks: Ranks = ALONE,
-    ) -> None:
-        self.family, self.limits, self.modes, self.watch, self.ranks = family, family.limits, modes, watch, ranks
+    def __init__(self, family: Family, modes: tuple[int, int] | None, watch: Watch, ranks: Ranks) -> None:
+        self.family, self.limits, self.watch, self.ranks = family, family.limits, watch, ranks
+        self.bases = Bases(modes, ranks, family.limits)
         self.first: Window | None = None
         self.doubtful: list[tuple[float, float]] = []
         self._passed: list[Place] = []
-        self._kept: list[Basis] = []
 
     @property
     def finished(self) -> bool:
@@ -94,6 +76,8 @@ class Sliced:
         if self.first is None or sure.fx_onset < self.first.fx_onset:
             self.first = sure
 
+    # What clusters announce
+
     def candidates(self, places: Sequence[Place], depth: int) -> list[list[Candidate]]:
         """The pairs that turn complex in their clusters on each increment, by increasing onset: those of all ranks."""
         everyone = self.ranks.together(lambda: self._found(places))
@@ -103,10 +87,10 @@ class Sliced:
     def _found(self, places: Sequence[Place]) -> list[list[Candidate]]:
         """The same from this rank's bases, in the order of the spectrum."""
         found: list[list[Candidate]] = [[] for _ in places[1:]]
-        first, stop = self.range(places[0].matrix)
+        first, stop = self.bases.range(places[0].matrix)
         done, wanted = 0, -(-(stop - first) // self.ranks.size)
         failure: FaultgougeError | None = None
-        for basis, levels in self.bases(places[0].matrix):
+        for basis, levels in self.bases.at(places[0].matrix):
             done += basis.own.stop - basis.own.start
             self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {done} of {wanted} modes")
             try:
@@ -118,6 +102,42 @@ class Sliced:
         if failure is not None:
             raise failure
         return found
+
+    def _announced(self, basis: Basis, here: At, there: At) -> Iterator[Candidate]:
+        """The pairs of a basis that turn complex in their clusters."""
+        named = may_meet(here[1], here[1].beyond(there[1], 1 + self.limits.reach), self.limits.slack)
+        for cluster in basis.clusters:
+            first, last = (cluster.modes.start + end for end in cluster.core)
+            if np.any((named >= first) & (named <= last)):
+                yield from self._searched(basis, cluster, here, there)
+
+    def _searched(self, basis: Basis, cluster: Cluster, here: At, there: At) -> Iterator[Candidate]:
+        """The windows of one cluster, with its blocks interpolated between two loads."""
+        increment = there[0] - here[0]
+        before, after = (levels.block(cluster) for _, levels in (here, there))
+        if len(before) < len(basis.active):
+            before, after = (_exceeding(block, self.limits.excess) for block in (before, after))
+
+        def block(fx: float) -> Floats:
+            share = (fx - here[0]) / increment
+            return (1 - share) * before + share * after
+
+        last = there[0] + self.limits.reach * increment
+        family = Family(block, self._narrowest(increment), self.limits)
+        for window in all_windows(family, np.array([here[0], last])):
+            end = last if window.fx_end is None else window.fx_end
+            inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
+            modes = family.at(inside).modes
+            pair = modes.pair(modes.about(window.eigenvalue, modes.complex_pairs))
+            if cluster.owns(pair.right):
+                right, left = (basis.lifted(cluster.modes, plane) for plane in (pair.right, pair.left))
+                yield Candidate(window.fx_onset, min(inside, there[0]), right, left)
+
+    def _narrowest(self, increment: float) -> float:
+        """The narrowest windows that are looked for on an increment, force."""
+        return max(self.family.narrowest, self.limits.finest * increment)
+
+    # What the operator has
 
     def confirm(
         self, candidates: list[Candidate], here: Place, there: Place, depth: int
@@ -169,89 +189,24 @@ class Sliced:
             raise lost
         return first, doubt
 
-    # The bases
-
-    def range(self, matrix: csr_array) -> tuple[int, int]:
-        """Numbers of the first mode that is looked at and of the first that is not."""
-        count = int(np.count_nonzero(np.diff(matrix.indptr)))
-        first, stop = self.modes or (0, count)
-        if not 0 <= first < min(stop, count):
-            raise ValueError(f"modes {first}:{stop} is no part of the {count} modes of this packing, 0:{count}")
-        return first, min(stop, count)
-
-    def keeps(self, matrix: csr_array) -> bool:
-        """Whether the basis is kept from increment to increment."""
-        first, stop = self.range(matrix)
-        limits = self.limits
-        margins = 2 * (limits.margin + limits.beyond) * max(1, round((stop - first) / limits.own))
-        return (stop - first + margins) * matrix.shape[0] <= limits.kept
-
-    def bases(self, matrix: csr_array) -> Iterable[tuple[Basis, Levels]]:
-        """This rank's bases, those of an earlier load as long as all ranks' serve, and the operator in them."""
-        known = self._serving(matrix)
-        if known is not None:
-            return known
-        bases: Iterable[Basis] = Basis.slices(matrix, self.range(matrix), self.limits, self.ranks)
-        if self.keeps(matrix):
-            self._kept = []  # its memory is free before that for the next ones is taken
-            bases = self._kept = list(bases)
-        return ((basis, basis.levels(matrix)) for basis in bases)
-
-    def _serving(self, matrix: csr_array) -> list[tuple[Basis, Levels]] | None:
-        """The bases that are kept and the operator in them; None if those of all ranks do not serve."""
-        covering = all(basis.covers(matrix) for basis in self._kept)
-        known = [(basis, basis.levels(matrix)) for basis in self._kept if covering]
-        mine = [each for basis, levels in known for each in basis.mixing(levels)] if covering else [np.inf]
-        mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
-        return known if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing else None
-
-    # What clusters announce
-
-    def _announced(self, basis: Basis, here: At, there: At) -> Iterator[Candidate]:
-        """The pairs of a basis that turn complex in their clusters."""
-        named = may_meet(here[1], here[1].beyond(there[1], 1 + self.limits.reach), self.limits.slack)
-        for cluster in basis.clusters:
-            first, last = (cluster.modes.start + end for end in cluster.core)
-            if np.any((named >= first) & (named <= last)):
-                yield from self._searched(basis, cluster, here, there)
-
-    def _searched(self, basis: Basis, cluster: Cluster, here: At, there: At) -> Iterator[Candidate]:
-        """The windows of one cluster, with its blocks interpolated between two loads."""
-        increment, limits = there[0] - here[0], self.limits
-        before, after = (levels.block(cluster) for _, levels in (here, there))
-        if len(before) < len(basis.active):
-            before, after = (_exceeding(block, limits.excess) for block in (before, after))
-
-        def block(fx: float) -> Floats:
-            share = (fx - here[0]) / increment
-            return (1 - share) * before + share * after
-
-        reach = there[0] + limits.reach * increment
-        family = Family(block, max(self.family.narrowest, limits.finest * increment), limits)
-        for window in all_windows(family, np.array([here[0], reach])):
-            end = reach if window.fx_end is None else window.fx_end
-            inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
-            pair = _nearest(Modes.of(inside, block(inside)), window.eigenvalue)
-            if cluster.owns(pair.right):
-                right, left = (basis.lifted(cluster.modes, plane) for plane in (pair.right, pair.left))
-                yield Candidate(window.fx_onset, min(inside, there[0]), right, left)
-
-    # What the operator has
-
     def _confirmed(self, candidate: Candidate, there: Place, first: Window | None) -> Window | None:
         """The window of the operator itself in place of that of a cluster; None if it is none, or not the first."""
         self.watch(f"a pair that turns complex about F_x = {candidate.onset:.6g}: its onset")
         inside = self._complex_pair(candidate, there)
         if inside is None or (first is not None and self._later(inside, first)):
             return None
-        above = inside if inside.fx == there.fx else self.family.followed(inside, there)
+        above = self._followed(inside, there)
         end = edge_from_inside(self.family, above, inside) if above.discriminant > 0 else None
         for place in reversed(self._passed):
-            below = inside if inside.fx == place.fx else self.family.followed(inside, place)
+            below = self._followed(inside, place)
             if below.discriminant > 0:
                 return Window.between(edge_from_inside(self.family, below, inside), end)
             inside = below
         return Window.between(Edge.start(inside), end)
+
+    def _followed(self, pair: Pair, place: Place) -> Pair:
+        """A pair at the same load, or another one."""
+        return pair if pair.fx == place.fx else self.family.followed(pair, place)
 
     def _later(self, inside: Pair, first: Window) -> bool:
         """Whether a pair is still real where the first window so far opens."""
@@ -263,7 +218,8 @@ class Sliced:
     def _complex_pair(self, candidate: Candidate, there: Place) -> Pair | None:
         """The pair at a load where it is complex; None if it is surely real, or not before these loads are passed."""
         place = there if candidate.inside == there.fx else self.family.at(candidate.inside)
-        pair = continued(Pair(*place, candidate.right, candidate.left), *place, self.limits)
+        guess = Pair(place.fx, place.matrix, candidate.right, candidate.left)
+        pair = continued(guess, place.fx, place.matrix, self.limits)
         if pair is not None and pair.discriminant < 0:
             return pair
         if candidate.onset > there.fx:
@@ -277,19 +233,18 @@ class Sliced:
 
     def _dipping(self, start: Pair, there: Place) -> Pair | None:
         """A pair where it is complex, from a load where it is real; None if it surely is so on all of the increment."""
-        here, limits = self._passed[-1], self.limits
-        narrowest = max(self.family.narrowest, limits.finest * (there.fx - here.fx))
-        pairs = [start, *(self.family.followed(start, place) for place in (here, there) if place.fx != start.fx)]
-        for _ in range(limits.dips):
-            complex_ones = [pair for pair in pairs if pair.discriminant < 0]
-            if complex_ones:
-                return complex_ones[0]
-            pairs.sort(key=lambda pair: pair.fx)
-            width, fx = max(dip_between(below, above, limits) for below, above in pairwise(pairs))
-            if width <= narrowest:
+        here = self._passed[-1]
+        known = {each.fx: each for each in (self._followed(start, here), start, self._followed(start, there))}
+        pair = self.family.track(known)
+        for _ in range(self.limits.dips):
+            pairs = [known[fx] for fx in sorted(known)]
+            inside = next((each for each in pairs if each.discriminant < 0), None)
+            if inside is not None:
+                return inside
+            width, fx = max(dip_between(below, above, self.limits) for below, above in pairwise(pairs))
+            if width <= self._narrowest(there.fx - here.fx):
                 return None
-            nearest = min(pairs, key=lambda pair: abs(pair.fx - fx))
-            pairs.append(self.family.followed(nearest, self.family.at(fx)))
+            pair(fx)
         raise DoubtError
 
 
@@ -299,24 +254,17 @@ def first_window(
     modes: tuple[int, int] | None = None,
     watch: Watch = lambda says: None,
     ranks: Ranks = ALONE,
-) -> FirstWindow:
-    """The first window of a family of large matrices; arguments are as of :func:`~faultgouge.analysis.find_onset`.
+) -> tuple[Window | None, Increments]:
+    """The first window of a family of large matrices, if there is one, and the increments before it that are in doubt.
 
-    Loads beyond the one above the onset are not asked for, except those of `Limits.ahead` increments.
-
-    Raises
-    ------
-    NoEquilibriumError
-        If the operator raises it at one of the loads, and no window has been found before.
-    LostPairError
-        If a complex pair cannot be followed to its onset, not even in the finest parts of its increment, and no other
-        window is found there.
-    SliceError, ValueError
-        If a part of the spectrum is not found, or the packing has none of these modes.
+    Its end is None where the pair is complex at the next load. On increments in doubt clusters announce a pair that the
+    operator was not seen to have. Arguments and errors are those of `find_onset`. Loads beyond the one above the onset
+    are not asked for, except those of `Limits.ahead` increments; a NoEquilibriumError of the operator at one of them is
+    raised if no window has been found before.
     """
     oracle = Sliced(family, modes, watch, ranks)
     here = family.at(loads[0])
-    ahead = 1 if oracle.keeps(here.matrix) else family.limits.ahead
+    ahead = 1 if oracle.bases.keeps(here.matrix) else family.limits.ahead
     done = 1
     while done < len(loads) and not oracle.finished:
         places = [here, *_reached(family, loads[done : done + ahead])]
@@ -325,7 +273,7 @@ def first_window(
         done += len(places) - 1
     first = oracle.first
     doubtful = (each for each in oracle.doubtful if first is None or each[0] < first.fx_onset)
-    return FirstWindow(first, tuple(doubtful))
+    return first, tuple(doubtful)
 
 
 def _reached(family: Family, loads: Floats) -> list[Place]:
@@ -341,15 +289,7 @@ def _reached(family: Family, loads: Floats) -> list[Place]:
     return places
 
 
-def _nearest(modes: Modes, eigenvalue: float) -> Pair:
-    """The complex pair, or failing that the two modes, closest to a real eigenvalue."""
-    pairs = modes.complex_pairs or [modes.about(eigenvalue)]
-    return modes.pair(min(pairs, key=lambda members: abs(modes.values[members[0]].real - eigenvalue)))
-
-
 def _exceeding(block: Floats, excess: float) -> Floats:
     """The operator in a cluster with its antisymmetric couplings enlarged by what they may be in error."""
-    levels = np.diag(block)
-    width = max(float(np.ptp(levels)), np.finfo(np.float64).tiny)
-    mixing = float(np.linalg.norm(block - np.diag(levels))) / width
-    return block + excess * mixing**2 * width / len(levels) * np.sign(block - block.T)
+    width, mixing = width_and_mixing(block, np.diag(block))
+    return block + excess * mixing**2 * width / len(block) * np.sign(block - block.T)

@@ -15,6 +15,9 @@ from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from ..errors import NoEquilibriumError
 
 At = TypeVar("At")  # what an oracle has of a load: the operator, or all of its modes
@@ -30,10 +33,7 @@ class Oracle(Protocol[At, Announced, Sure]):
         """Whether all that is sought has been found."""
 
     def candidates(self, places: Sequence[At], depth: int) -> Iterable[Announced]:
-        """What may happen on each of the increments between neighbouring places.
-
-        `depth` is how often the increment has been divided of which these are the parts.
-        """
+        """What may happen on each of the increments between neighbouring places."""
 
     def confirm(self, candidates: Announced, here: At, there: At, depth: int) -> tuple[Sure | None, Sequence[At]]:
         """What does happen on one increment, to be recorded, and where to divide the increment if that is in doubt."""
@@ -43,15 +43,9 @@ class Oracle(Protocol[At, Announced, Sure]):
 
 
 def walk(oracle: Oracle[At, Announced, Sure], places: Sequence[At], depth: int = 0) -> None:
-    """Go from the first to the last of several places, or to where the oracle has found what it seeks.
+    """Go from the first to the last of two or more places at increasing loads, or to where the oracle is finished.
 
-    Parameters
-    ----------
-    oracle : Oracle
-    places : sequence
-        At increasing loads, two at least.
-    depth : int
-        How often the increment has been divided of which these are the parts.
+    `depth` is how often the increment has been divided of which these are the parts.
     """
     for (here, there), candidates in zip(pairwise(places), oracle.candidates(places, depth), strict=True):
         sure, between = oracle.confirm(candidates, here, there, depth)
@@ -71,3 +65,11 @@ def between(look: Callable[[float], At], below: float, middle: float, above: flo
         except NoEquilibriumError:
             continue
     return []
+
+
+def increasing(forces: ArrayLike) -> NDArray[np.float64]:
+    """Loads as an array; ValueError if they are not at least two finite, increasing numbers."""
+    loads = np.array(forces, dtype=np.float64)
+    if loads.ndim != 1 or len(loads) < 2 or not np.all(np.isfinite(loads)) or np.any(np.diff(loads) <= 0):
+        raise ValueError("The loads of a ramp must be at least two finite, increasing numbers.")
+    return loads

@@ -48,6 +48,7 @@ from scipy.sparse import csr_array
 from ...analysis import spectrum
 from ...analysis.onset import force_bearing, full_operator
 from ...analysis.packing import Floats, Indices
+from ...analysis.spectrum import active_coordinates
 from ...pywrap import Engine, Scene
 from ...pywrap.equilibria import EquilibriumPath, loads
 from ...pywrap.refusals import needed
@@ -84,7 +85,7 @@ class Pencil:
     @classmethod
     def between(cls, rest: csr_array, there: csr_array, fx: float) -> Pencil:
         """From the operator at rest and at a small load."""
-        active: Indices = np.flatnonzero(np.diff(rest.indptr))
+        active: Indices = active_coordinates(rest)
         dense = rest[active][:, active].toarray()
         values, inner = eigh(0.5 * (dense + dense.T), driver="evd")
         change = inner.T @ ((there - rest)[active][:, active] @ inner) / fx

@@ -30,6 +30,7 @@ from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_ons
 from ...analysis.eigenpairs import eigenpairs
 from ...analysis.onset import force_bearing, full_operator, seeks_all
 from ...analysis.packing import Floats
+from ...analysis.spectrum import active_coordinates
 from ...pywrap import Engine, Equilibrium, Scene, SceneError
 from ...pywrap.equilibria import EquilibriumPath, loads
 from ...pywrap.refusals import needed
@@ -130,12 +131,12 @@ def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
 def _among_all(packing: Packing, rest: Packing, eigenvalue: float, plane: Floats) -> dict[str, Any]:
     """Rank of the pair, and the modes of the packing at F_x = 0 that it has come from."""
     operator = full_operator(packing)
-    active = np.flatnonzero(np.diff(operator.indptr))
+    active = active_coordinates(operator)
     values = np.sort(eigvals(operator[active][:, active].toarray()).real)
     rank = int(np.count_nonzero(values < eigenvalue * (1 - 1e-6)))
     near = values[max(0, rank - 5) : rank + 7]
     operator = full_operator(rest)
-    active = np.flatnonzero(np.diff(operator.indptr))
+    active = active_coordinates(operator)
     dense = operator[active][:, active].toarray()
     modes = eigh(0.5 * (dense + dense.T))[1]
     weight = np.sum((modes.T @ np.linalg.qr(plane[active])[0]) ** 2, axis=1)

@@ -186,6 +186,6 @@ def test_ranks_find_the_same_first_window_to_the_bit():
 
     loads = np.linspace(0, 1, 5)
     alone = first_window(Family(operator, 0.0, FEW), loads)
-    assert alone.window is not None
+    assert alone[0] is not None
     for each in on_ranks(2, lambda ranks: first_window(Family(operator, 0.0, FEW), loads, ranks=ranks)):
         assert each.result() == alone

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from faultgouge.analysis.onset.edge import smooth_root
+from faultgouge.analysis.onset.edge import sign_change
 from faultgouge.analysis.onset.walk import walk
 
 
@@ -27,7 +27,7 @@ class Negative:
         if depth < self.depth:
             return None, [0.5 * (here + there)]
         self.increments.append((here, there))
-        return (smooth_root(self.function, here, there).fx if changes else None), []
+        return (sign_change(self.function, here, there).fx if changes else None), []
 
     def record(self, sure):
         self.roots.append(sure)

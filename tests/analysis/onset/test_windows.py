@@ -19,8 +19,8 @@ from faultgouge.analysis import (
 from faultgouge.analysis.digits import with_uncertainty
 from faultgouge.analysis.onset import Family, Modes, force_bearing, full_operator
 from faultgouge.analysis.onset.dense import all_windows
-from faultgouge.analysis.onset.dip import deepest_dip
 from faultgouge.analysis.onset.modes import assign
+from faultgouge.analysis.onset.pair import deepest_dip
 from faultgouge.analysis.onset.screening import Screen
 
 
