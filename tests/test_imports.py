@@ -39,9 +39,12 @@ def loaded_by(work: str) -> set[str]:
 
 @pytest.mark.parametrize("words", [["--help"], ["draw", "--help"], ["sweep", "--help"]])
 def test_help_loads_nothing_heavy(words):
-    call = f"from faultgouge.commands import program; program()({words!r}, standalone_mode=False)"
+    argv = f"sys.argv[1:] = {words!r}"
+    loaded = loaded_by(f"{argv}; from faultgouge.commands import program; program()(standalone_mode=False)")
     # for the options of a command typer itself loads pydantic where it is installed
-    assert loaded_by(call) & HEAVY - ({"pydantic"} if len(words) > 1 else set()) == set()
+    assert loaded & HEAVY - ({"pydantic"} if len(words) > 1 else set()) == set()
+    assert "typer" in loaded
+    assert "markdown_it" not in loaded
 
 
 def test_analysis_needs_numpy_scipy_and_h5py_alone():

@@ -7,7 +7,9 @@ the options SCENE, -o and --json, and `say`, `status` and `progress`, which are 
 Errors are raised, never printed: :mod:`faultgouge.ending` says them.
 """
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import Annotated
 
 import typer
@@ -15,9 +17,14 @@ import typer
 FAMILIES = ("beginning", "runs", "eigenvalues", "pictures", "exchange", "studies", "earthquakes", "sweeps")
 """Modules with commands."""
 
+UNUSED = ("rich.markdown", "rich.traceback")
+"""What Typer's help imports of Rich and needs for other markup and for tracebacks alone: a third of its time."""
+
 
 def program() -> typer.Typer:
     """The command ``faultgouge`` with all its commands."""
+    if "--help" in sys.argv or len(sys.argv) == 1:
+        _import_help()
     app = typer.Typer(
         no_args_is_help=True,
         pretty_exceptions_enable=False,
@@ -29,6 +36,19 @@ def program() -> typer.Typer:
     for family in FAMILIES:
         app.add_typer(import_module(f".{family}", __name__).app)
     return app
+
+
+def _import_help() -> None:
+    """Import Typer's help without `UNUSED`."""
+    spared = {name: ModuleType(name) for name in UNUSED if name not in sys.modules}
+    for stand_in in spared.values():
+        stand_in.__getattr__ = lambda name: object  # type: ignore[method-assign]
+    sys.modules.update(spared)
+    try:
+        import_module("typer.rich_utils")
+    finally:
+        for name in spared:
+            del sys.modules[name]
 
 
 def _options(
