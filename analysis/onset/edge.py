@@ -16,7 +16,6 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError
@@ -130,6 +129,8 @@ def smooth_root(value: Callable[[float], float], below: float, above: float, lim
     Root or None
         None if the function does not cross zero along a smooth line at any distance: it jumps.
     """
+    from scipy.optimize import brentq
+
     span = above - below
     root = float(brentq(value, below, above, xtol=limits.root * span))
     room = min(root - below, above - root)

@@ -10,7 +10,6 @@ from typing import TypeAlias
 
 import numpy as np
 from scipy.linalg import eig
-from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_array
 
 from ..packing import Floats, Indices, Packing
@@ -139,6 +138,8 @@ def assign(here: Modes, there: Modes) -> Indices:
         Index there; -1 where there are fewer modes there. The assignment maximises the sum of |x^H x'| |y^H
         y'|.
     """
+    from scipy.optimize import linear_sum_assignment
+
     weight = products(here.right, there.right) * products(here.left, there.left)
     partner = np.full(len(here.values), -1)
     best = weight.argmax(axis=1) if weight.size else partner
