@@ -13,8 +13,8 @@ from pathlib import Path
 # before NumPy is imported: the matrices are small, and workers share the cores
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# MPICH: a rank that waits sleeps and leaves its core to the others, where it would spin; set for these tests alone, since
-# on cores of its own a sleeping rank is slower
+# MPICH: a rank that waits sleeps, and leaves its core to others, where it would spin. It is set for tests alone: with a
+# core for every rank, spinning is faster.
 os.environ.setdefault("MPIR_CVAR_ENABLE_HEAVY_YIELD", "1")
 os.environ.setdefault("MPIR_CVAR_POLLS_BEFORE_YIELD", "100")
 
