@@ -13,10 +13,6 @@ from pathlib import Path
 # before NumPy is imported: the matrices are small, and workers share the cores
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# MPICH: a rank that waits sleeps, and leaves its core to others, where it would spin. It is set for tests alone: with a
-# core for every rank, spinning is faster.
-os.environ.setdefault("MPIR_CVAR_ENABLE_HEAVY_YIELD", "1")
-os.environ.setdefault("MPIR_CVAR_POLLS_BEFORE_YIELD", "100")
 
 import numpy as np
 import pytest
@@ -28,6 +24,18 @@ LIMIT = 1800
 """Seconds for one command on a busy machine."""
 
 REFERENCE = Path(__file__).parent / "reference" / "packing7.json"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """How much of what is chosen at random is tried."""
+    words = "share of `make fuzz`, and of the rows of a study's table, that the tests try (default: 0.03)"
+    parser.addoption("--share", type=float, default=0.03, help=words)
+
+
+@pytest.fixture(scope="session")
+def share_of_all(pytestconfig: pytest.Config) -> float:
+    """The share of what is chosen at random that is tried."""
+    return pytestconfig.getoption("share")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -1,8 +1,9 @@
-"""A tenth of ``make fuzz``, with another seed."""
+"""A share of ``make fuzz``, with another seed."""
 
 import pytest
 
 from fuzz import files, kills, scenes
+from fuzz.__main__ import KINDS
 
 
 def test_damaged_files(tmp_path):
@@ -10,8 +11,9 @@ def test_damaged_files(tmp_path):
 
 
 @pytest.mark.slow
-def test_odd_scenes(tmp_path):
-    assert [pair for pair in scenes.run(100, tmp_path, seed=1) if pair[1]] == []
+def test_odd_scenes(tmp_path, share_of_all):
+    count = round(share_of_all * KINDS["scenes"])
+    assert [pair for pair in scenes.run(count, tmp_path, seed=1) if pair[1]] == []
 
 
 @pytest.mark.ranks
