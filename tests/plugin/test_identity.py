@@ -24,12 +24,12 @@ fix             move all nve/disc 1.0 {drag} ${{compensated}}
 """
 )
 # a layer that is torn off: contacts slide, open and close, disks go round the periodic box, and the
-# neighbour lists are built some 360 times
+# neighbour lists are built some 180 times
 RUN = """
-run             2000
+run             1000
 write_dump      all custom middle id x y {low} vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g
 {middle}
-run             2000
+run             1000
 write_dump      all custom end id x y {low} vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g
 """
 DEFAULTS = {"newton": "on", "sort": "1000", "extra": "", "middle": "", "decks": DECKS}
@@ -143,7 +143,7 @@ def test_restart_in_a_new_process(trajectory, unchanged, defaults, lmp, tmp_path
 @pytest.mark.slow
 def test_signal_through_a_restart(trajectory, unchanged, defaults, lmp, tmp_path, on):
     """A signal goes by the time of the run, which a restart file keeps."""
-    rows = (f"{0.1 * k} {(-1) ** k * 0.3}" for k in range(81))
+    rows = (f"{0.1 * k} {(-1) ** k * 0.3}" for k in range(41))
     (tmp_path / "wave.txt").write_text("\n".join(rows))
     extra = f"variable signal index wave.txt\nvariable on index {on}\ninclude {DECKS}/signal.in"
     straight = trajectory(extra=extra, middle="write_restart middle.restart")
@@ -157,7 +157,7 @@ def test_signal_through_a_restart(trajectory, unchanged, defaults, lmp, tmp_path
 @pytest.mark.parametrize("defaults", ["compensated", "harmonic, damped, compensated"], indirect=True)
 def test_compensated_run_in_one_piece_or_two(lmp, tmp_path, unchanged, defaults):
     """Disks are wrapped into the box at every set-up: on the grid that is exact."""
-    done = lmp((START + RUN[RUN.index("{middle}") :].replace("2000", "4000")).format(**defaults))
+    done = lmp((START + RUN[RUN.index("{middle}") :].replace("1000", "2000")).format(**defaults))
     assert done.returncode == 0, done.stdout[-2000:]
     assert (tmp_path / "end").read_text() == unchanged[1]
 
