@@ -162,6 +162,7 @@ def test_compensated_run_in_one_piece_or_two(lmp, tmp_path, unchanged, defaults)
     assert (tmp_path / "end").read_text() == unchanged[1]
 
 
+@pytest.mark.slow
 def test_restart_without_the_plugin_says_so(lmp, trajectory, monkeypatch):
     trajectory(middle="write_restart middle.restart")
     # the entry point prepends the plugin's folder, so that it is unloaded here instead
