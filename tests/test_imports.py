@@ -53,7 +53,7 @@ def test_analysis_needs_numpy_scipy_and_h5py_alone():
     assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.response") & others == set()
 
 
-def test_a_fifth_of_a_second_of_scipy_waits_until_it_is_used():
+def test_what_of_scipy_is_slow_to_import_waits_until_it_is_used():
     loaded = loaded_by("import faultgouge.analysis, faultgouge.pywrap")
     assert "scipy.sparse" in loaded
     assert loaded & {"scipy.optimize", "scipy.interpolate", "scipy.stats"} == set()
