@@ -6,7 +6,6 @@ Vectors live in the mass-weighted coordinates of :mod:`~faultgouge.analysis.spec
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
@@ -165,6 +164,8 @@ def _sorted_and_paired(
     solves: int,
 ) -> Eigenpairs:
     """Bring left vectors beside the right vectors of the same eigenvalue, spread over all coordinates."""
+    from scipy.optimize import linear_sum_assignment
+
     order = np.lexsort((values.imag, values.real))
     values, right = values[order], right[:, order]
     _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored[None, :]))

@@ -40,7 +40,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq, minimize_scalar
 
 from .packing import Floats
 from .spectrum import Complexes
@@ -186,6 +185,8 @@ class NormalForm:
         ValueError
             If the damping time is not positive, or so short that nothing oscillates.
         """
+        from scipy.optimize import minimize_scalar
+
         gamma = _gamma(damping_time)
         s, d = self._rates(gamma)
         if not (s.imag == 0 and s.real > 0):
@@ -218,6 +219,8 @@ class NormalForm:
         ValueError
             If the undamped amplitude is less than `LEAST_CROSSOVER`.
         """
+        from scipy.optimize import brentq
+
         full = self.amplitude()
         if not LEAST_CROSSOVER <= full < np.inf:
             raise ValueError(f"An amplitude of {full:.3g} shows no crossover: take an epsilon between 0 and 0.1.")

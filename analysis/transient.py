@@ -37,7 +37,6 @@ scaling that makes :math:`|x_k| = |l_k|` the square of this, `bound`, is close t
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from .packing import Floats, Packing
 from .propagator import ACCURACY, Motions, NoGainError, Norm, Propagator
@@ -192,6 +191,8 @@ def _refined(propagator: Propagator, brackets: list[tuple[float, float]]) -> tup
 
 def _top(propagator: Propagator, a: float, b: float) -> float:
     """The time between two others at which the norm of P(t) is largest."""
+    from scipy.optimize import minimize_scalar
+
     if a == b:
         return a
     top = minimize_scalar(

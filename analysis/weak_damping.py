@@ -31,7 +31,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from .damping import damping_matrix
 from .errors import NoEquilibriumError
@@ -96,6 +95,8 @@ def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, windo
     WeakLimit or None
         None if the pair grows at the smallest load already, or cannot be followed down to where it does not.
     """
+    from scipy.optimize import brentq
+
     pair_at, loads = _followed(equilibrium, window), np.asarray(forces, dtype=np.float64)
     above = window.fx_onset
 
@@ -140,6 +141,8 @@ def drag_onset(
     float or None
         Force per top disk; None if the drag holds the pair down to the window's end or the ramp's.
     """
+    from scipy.optimize import brentq
+
     pair_at, loads = _followed(equilibrium, window), np.asarray(forces, dtype=np.float64)
     last = loads[-1] if window.fx_end is None else min(window.fx_end, loads[-1])
     below = window.fx_onset

@@ -62,8 +62,11 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
     """
     stem = Path(stem)
     png, svg = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".svg")
-    for path in (png, svg):
-        save_as(figure, path)
+    save_as(figure, png)
+    engine = figure.get_layout_engine()
+    figure.set_layout_engine("none")  # the SVG keeps the layout of the PNG, which takes as long as the drawing
+    save_as(figure, svg)
+    figure.set_layout_engine(engine or "none")
     return png, svg
 
 

@@ -107,7 +107,7 @@ WORKS = (
         "perturb, compensated, on two ranks",
         'precision = "compensated"\n'
         + SCENE
-        + "[ramp]\nstep = 1e-3\nuntil = 2e-3\n[perturb]\nfx = 1.5e-3\ntime = 1.0\namplitude = 1e-9\nomega = 1.0\n",
+        + "[ramp]\nstep = 1e-3\nuntil = 2e-3\n[perturb]\nfx = 1.5e-3\ntime = 0.5\namplitude = 1e-9\nomega = 1.0\n",
         ("perturb", "scene.toml", "-o", "out/run.h5"),
         "out",
         2,

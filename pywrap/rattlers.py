@@ -19,7 +19,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 from scipy.spatial import cKDTree
 
 from ..analysis import Packing, nearest_image, touching
@@ -90,6 +89,8 @@ def middle_of_cage(packing: Packing, disks: Indices) -> Floats:
 
 def _to_the_middle(branch: Floats, contact: Floats, height: float, radius: float) -> Floats:
     """The move of a disk with these branch vectors to its neighbours, of these lengths at contact, shape (2,)."""
+    from scipy.optimize import linprog
+
     move, room = np.zeros(2), TRAVEL * radius
     for _ in range(ROUNDS):
         distance = np.hypot(branch[:, 0] + move[0], branch[:, 1] + move[1])

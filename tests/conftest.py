@@ -88,6 +88,31 @@ def faultgouge(faultgouge_in, tmp_path: Path) -> Callable[..., subprocess.Comple
 
 
 @pytest.fixture
+def faultgouge_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., subprocess.CompletedProcess]:
+    """Runs the command in tmp_path within this process, without the second that a process of its own takes to start."""
+
+    def run(*words: object) -> subprocess.CompletedProcess:
+        from faultgouge.commands import program
+        from faultgouge.ending import fail
+
+        monkeypatch.chdir(tmp_path)
+        capsys.readouterr()
+        code: object = 0
+        try:
+            program()([str(word) for word in words], standalone_mode=False)
+        except Exception as error:
+            with pytest.raises(SystemExit) as ended:
+                fail(error)
+            code = ended.value.code
+        said = capsys.readouterr()
+        return subprocess.CompletedProcess(words, int(str(code)), said.out, said.err)
+
+    return run
+
+
+@pytest.fixture
 def lmp(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess]:
     """Runs an input script (text or file) with the command line program, in tmp_path.
 

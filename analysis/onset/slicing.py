@@ -22,7 +22,6 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 from scipy.linalg import eigh, qr
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import eigsh
@@ -187,6 +186,8 @@ class _Spectrum:
 
     def shifts(self, pool: ThreadPoolExecutor, first: int, stop: int) -> list[Shift]:
         """The shifts of all slices from the eigenvalue of number `first` on, and before that of number `stop`."""
+        from scipy.interpolate import PchipInterpolator
+
         size = self.matrix.shape[0]
         start = np.random.default_rng(0).standard_normal(size)
         top = float(eigsh(self.matrix, k=1, which="LA", tol=1e-3, v0=start, return_eigenvectors=False)[0])

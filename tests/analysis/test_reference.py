@@ -66,6 +66,7 @@ def test_onset(reference, ramp, mu, increment, count, first):
     assert window.overlap < 1e-3
 
 
+@pytest.mark.slow
 def test_eigenvalue_at_the_onset_is_that_of_the_pair_beside_it(reference, ramp):
     """The reference gives the real part at the first grid point behind the onset, 0.022, not at the onset."""
     (pair,) = spectrum(ramp(1.0, 2.5e-4, 88)(0.022)).pairs

@@ -135,7 +135,7 @@ def test_onset_as_json(faultgouge, tmp_path):
 
 
 @pytest.mark.slow
-def test_onset_among_some_modes(faultgouge, tmp_path):
+def test_onset_among_some_modes(faultgouge, faultgouge_here, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE.replace("until = 4e-3", "until = 0.022"))
     done = faultgouge("onset", "scene.toml", "--modes", "0:285", "--json")
     assert done.returncode == 0, done.stderr
@@ -143,7 +143,7 @@ def test_onset_among_some_modes(faultgouge, tmp_path):
     assert result["modes"] == [0, 285]
     assert result["fx_c"] == pytest.approx(0.0218330564080, rel=1e-9)
     for modes, says in (("600", "as in --modes 0:600"), ("5:5", "as in --modes 0:600"), ("900:910", "are no part of")):
-        done = faultgouge("onset", "scene.toml", "--modes", modes)
+        done = faultgouge_here("onset", "scene.toml", "--modes", modes)
         assert done.returncode == 2
         assert says in done.stderr
 
@@ -175,9 +175,9 @@ def test_no_onset_is_a_failed_computation(faultgouge):
     ids=lambda value: value[1][:30] if isinstance(value, tuple) else "",
 )
 @pytest.mark.slow
-def test_bad_input_is_refused_in_one_sentence(faultgouge, tmp_path, change, says):
+def test_bad_input_is_refused_in_one_sentence(faultgouge_here, tmp_path, change, says):
     (tmp_path / "scene.toml").write_text(SCENE.replace(*change))
-    done = faultgouge("perturb", "scene.toml")
+    done = faultgouge_here("perturb", "scene.toml")
     assert done.returncode == 2
     assert done.stderr.startswith("Error: ")
     assert says in done.stderr
@@ -196,19 +196,19 @@ def test_bad_input_is_refused_in_one_sentence(faultgouge, tmp_path, change, says
     ],
 )
 @pytest.mark.slow
-def test_bad_file_is_refused(faultgouge, arguments, says):
-    done = faultgouge(*arguments)
+def test_bad_file_is_refused(faultgouge_here, arguments, says):
+    done = faultgouge_here(*arguments)
     assert done.returncode == 2
     assert says in done.stderr
     assert "Traceback" not in done.stderr
 
 
 @pytest.mark.slow
-def test_every_command_has_help_with_an_example(faultgouge):
+def test_every_command_has_help_with_an_example(faultgouge, faultgouge_here):
     commands = ["settle", "ramp", "perturb", "onset", "spectrum", "explain", "report", "stability", "reproduce"]
     overview = faultgouge("--help").stdout
     for command in commands:
         assert command in overview
-        done = faultgouge(command, "--help")
+        done = faultgouge_here(command, "--help")
         assert done.returncode == 0
         assert "Example" in done.stdout

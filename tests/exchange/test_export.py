@@ -169,14 +169,14 @@ def test_mdanalysis_and_gsd_read_it(tmp_path, sheared):
 
 
 @pytest.mark.slow
-def test_what_an_export_is_refused_for(faultgouge, stored):
+def test_what_an_export_is_refused_for(faultgouge_here, stored):
     for words, says in (
         (("-o", "packing.pdb"), "exports are .vtp, .xyz, .data, .gsd"),
         (("-o", "packing.data", "--mode", "pair"), "has no room for modes"),
         (("--frame", "3"), "there is no frame 3"),
         (("-o", "nowhere/packing.vtp"), "cannot be written"),
     ):
-        done = faultgouge("export", stored, *words)
+        done = faultgouge_here("export", stored, *words)
         assert done.returncode == (1 if "written" in says else 2)
         assert says in done.stderr
         assert len(done.stderr.strip().splitlines()) == 1

@@ -222,10 +222,10 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 @pytest.mark.slow
-def test_bad_input_is_refused_in_one_sentence(tmp_path, faultgouge, sheared, case):
+def test_bad_input_is_refused_in_one_sentence(tmp_path, faultgouge_here, sheared, case):
     name, text, says = BAD[case]
     (tmp_path / name).write_text(text(sheared))
-    done = faultgouge("import", name, "--top", 1, *LAW)
+    done = faultgouge_here("import", name, "--top", 1, *LAW)
     assert done.returncode == 2, done.stderr
     assert says in done.stderr
     assert name in done.stderr
@@ -234,7 +234,7 @@ def test_bad_input_is_refused_in_one_sentence(tmp_path, faultgouge, sheared, cas
 
 
 @pytest.mark.slow
-def test_options_that_do_not_fit(tmp_path, faultgouge, sheared):
+def test_options_that_do_not_fit(tmp_path, faultgouge_here, sheared):
     (tmp_path / "a.dump").write_text(dump(sheared))
     (tmp_path / "scene.toml").write_text("[law]\nkn = 2e5\n[load]\nfy = 3.0\n")
     for words, says in (
@@ -249,7 +249,7 @@ def test_options_that_do_not_fit(tmp_path, faultgouge, sheared):
         (("b.dump", "--top", "type:2", *LAW), "does not exist"),
         (("a.dump", "--top", "type:2", *LAW, "-o", "a.dump"), "exists"),
     ):
-        done = faultgouge("import", *words)
+        done = faultgouge_here("import", *words)
         assert done.returncode == 2, done.stderr
         assert says in done.stderr
         assert len(done.stderr.strip().splitlines()) == 1

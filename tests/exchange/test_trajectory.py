@@ -85,6 +85,7 @@ def test_its_mean_square_displacement_is_ours(run):
     assert ours[-1] > 1e-9
 
 
+@pytest.mark.slow
 def test_its_radial_distribution_is_ours(run):
     from MDAnalysis.analysis.rdf import InterRDF
 

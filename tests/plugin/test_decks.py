@@ -24,6 +24,7 @@ def test_deck_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path, deck, precisio
 
 
 @pytest.mark.ranks
+@pytest.mark.slow
 def test_ranks_share_the_disks_evenly(lmp):
     """The box is three times as high as the disks, and LAMMPS cuts its height first."""
     done = lmp(f"include {DECKS}/system.in\nrun 0", "-var", "decks", str(DECKS), ranks=2)

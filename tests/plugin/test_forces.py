@@ -37,6 +37,14 @@ def single_contact(position, radius, contacts, mu, compensated=False, exponent=1
     return Packing(position=position, radius=radius, law=law, contacts=contacts, position_low=low)
 
 
+def net_forces(packings):
+    """Forces of packings of the same disks, in one LAMMPS."""
+    with Engine(packings[0]) as engine:
+        for packing in packings:
+            engine.displace(packing, np.zeros(3 * len(packing)))
+            yield engine.net_force
+
+
 @pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
 @pytest.mark.parametrize("compensated", [False, True], ids=["double", "compensated"])
 @pytest.mark.parametrize(("overlap", "radii", "mu"), [*itertools.product(OVERLAPS, RADII, FRICTIONS)])
@@ -48,12 +56,13 @@ def test_two_disks(overlap, radii, mu, compensated, exponent):
     normal = np.array([np.cos(angle), np.sin(angle)])
     centre = np.array([1.0, 3.0])
     position = np.array([centre + distance * normal, centre])
-    for fraction in SLIPS:
-        slip = fraction * mu * KN / KT * overlap
-        packing = single_contact(position, np.array(radii), Contacts([0], [1], [slip]), mu, compensated, exponent)
-        with Engine(packing) as engine:
-            engine.displace(packing, np.zeros(6))
-            force = engine.net_force.reshape(3, 2)
+    slips = [fraction * mu * KN / KT * overlap for fraction in (SLIPS if mu else [0.0])]
+    packings = [
+        single_contact(position, np.array(radii), Contacts([0], [1], [slip]), mu, compensated, exponent)
+        for slip in slips
+    ]
+    for slip, packing, force in zip(slips, packings, net_forces(packings), strict=True):
+        force = force.reshape(3, 2)
         n, tau = packing.geometry.normal[0], packing.geometry.tangent[0]
         branch = position[0] - position[1]
         in_doubles = sum(radii) - np.sqrt(branch @ branch)
@@ -68,12 +77,12 @@ def test_two_disks(overlap, radii, mu, compensated, exponent):
 @pytest.mark.parametrize(("overlap", "radius", "mu"), [*itertools.product(OVERLAPS, [0.5, 0.7], FRICTIONS)])
 def test_disk_on_floor(overlap, radius, mu, exponent):
     position = np.array([[2.0, radius - overlap]])
-    for fraction in SLIPS:
-        slip = fraction * mu * KN / KT * overlap
-        packing = single_contact(position, np.array([radius]), Contacts([0], [-1], [slip]), mu, exponent=exponent)
-        with Engine(packing) as engine:
-            engine.displace(packing, np.zeros(3))
-            force = engine.net_force
+    slips = [fraction * mu * KN / KT * overlap for fraction in (SLIPS if mu else [0.0])]
+    packings = [
+        single_contact(position, np.array([radius]), Contacts([0], [-1], [slip]), mu, exponent=exponent)
+        for slip in slips
+    ]
+    for slip, packing, force in zip(slips, packings, net_forces(packings), strict=True):
         f_n, f_t = law(mu, packing.geometry.overlap[0], slip, exponent)
         close(force, [-f_t, f_n, -f_t])
         assert abs(force[0]) <= mu * f_n

@@ -24,10 +24,12 @@ def refusal(faultgouge, tmp_path, monkeypatch):
     return said
 
 
+@pytest.mark.slow
 def test_no_plugin(refusal, tmp_path):
     assert f"{tmp_path}/mindlinsmoothplugin.so is not there" in refusal(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_plugin_that_lammps_cannot_load(refusal, tmp_path):
     (tmp_path / "mindlinsmoothplugin.so").write_bytes(b"of another machine")
     assert "was built for another release, MPI or size of atom IDs" in refusal(tmp_path)

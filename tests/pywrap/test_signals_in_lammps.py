@@ -85,6 +85,7 @@ def test_deck_takes_a_table_and_is_the_same_on_two_ranks(lmp, tmp_path):
         ("0 1\n1 two\n", "something else than two numbers"),
     ],
 )
+@pytest.mark.slow
 def test_lammps_refuses_a_bad_table(lmp, tmp_path, text, says):
     (tmp_path / "bad.txt").write_text(text)
     done = lmp(DECKS / "perturb.in", "-var", "decks", str(DECKS), "-var", "signal", "bad.txt")

@@ -77,6 +77,7 @@ def test_another_packing_may_be_the_one_that_is_triggered(tmp_path):
     assert "The packing that is triggered" in (tmp_path / "report.md").read_text()
 
 
+@pytest.mark.slow
 def test_a_ramp_that_steps_over_the_window_is_refused(tmp_path):
     """It is narrow: from 0.01159 to 0.01217."""
     (tmp_path / "scene.toml").write_text(SCENE.replace("step = 4e-3\nuntil = 0.012", "step = 1e-2\nuntil = 0.02"))

@@ -205,6 +205,7 @@ def test_files_lose_what_they_are_said_to_lose(settings):
     assert errors[dumps.NO_SLIPS, None] > 1e-5
 
 
+@pytest.mark.slow
 def test_a_study_that_fails_does_not_take_the_others_along(tmp_path):
     def broken(_):
         raise ValueError("the reason")

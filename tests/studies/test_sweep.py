@@ -132,6 +132,7 @@ def test_shards_are_a_partition_and_keep_settlings_together():
     assert not homes[0] & homes[2]
 
 
+@pytest.mark.slow
 def test_a_row_is_what_the_onset_of_its_scene_is(tmp_path):
     run_sweep(sweep_of({"packing.seed": [2], "law.mu": [0.5, 1.0]}), tmp_path, say=silent)
     rows = table(tmp_path)
@@ -271,6 +272,7 @@ def test_one_table_after_kills_on_workers_and_in_shards(tmp_path):
     assert {row["ends"] for row in rows} >= {"onset", "until"}
 
 
+@pytest.mark.slow
 def test_trigger_and_eruptions_as_tasks(tmp_path):
     """Rows of both studies, which come to the sections of their own in the swept scene."""
     more = {"friction": {"v0": 1e-6, "v_ss": "10 v0"}, "trigger": {"distance": [0.1], "omega": [5.0], "runs": 0}}

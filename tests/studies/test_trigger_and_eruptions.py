@@ -71,6 +71,7 @@ def test_trigger_needs_a_threshold(tmp_path, friction, says):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_eruptions_that_were_cut_off_are_those_of_one_run(tmp_path):
     """To the bit, though the loads that are known are not run again."""
     small = {"packing": {"disks": 30, "seed": 4}, "ramp": {"step": 0.02, "until": 0.3}}
