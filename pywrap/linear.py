@@ -229,7 +229,9 @@ class SparseSolver:
     def _iterated(self, nearby: SparseFactors, force: Floats) -> Floats | None:
         """The solution by GMRES; None if that takes too long."""
         active, shape = self._active, self._matrix.shape
-        new = np.setdiff1d(active, nearby.coordinates)
+        known = np.zeros(len(force), dtype=bool)
+        known[nearby.coordinates] = True
+        new = active[~known[active]]
 
         def preconditioned(residual: Floats) -> Floats:
             spread = np.zeros_like(force)
