@@ -20,6 +20,8 @@ PYTHON_SOURCES := $(shell find lammps_inputs analysis pywrap figures studies src
 # one thread a process: the matrices are small, and the ranks share the cores
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
+# byte code is kept: with it the tests start in half the time
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: reproduce test plugin readers fuzz check format benchmark pictures wheel docs clean
 
