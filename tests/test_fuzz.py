@@ -5,17 +5,20 @@ import pytest
 from fuzz import files, kills, scenes
 
 
+@pytest.mark.slow
 def test_damaged_files(tmp_path):
     assert [pair for pair in files.run(30, tmp_path, seed=1) if pair[1]] == []
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_odd_scenes(tmp_path):
-    assert [pair for pair in scenes.run(100, tmp_path, seed=1) if pair[1]] == []
+    assert [pair for pair in scenes.run(100, tmp_path, seed=1, longest=5) if pair[1]] == []
 
 
 @pytest.mark.ranks
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("work", [work.name for work in kills.WORKS])
 def test_killed_commands(tmp_path, work):
     assert [pair for pair in kills.run(1, tmp_path, seed=1, only=work) if pair[1]] == []

@@ -46,12 +46,14 @@ def test_help_loads_nothing_heavy(words):
     assert "rich" not in loaded
 
 
+@pytest.mark.slow
 def test_analysis_needs_numpy_scipy_and_h5py_alone():
     assert loaded_by("import faultgouge.analysis") & HEAVY == {"numpy", "scipy", "h5py"}
     others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
     assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.response") & others == set()
 
 
+@pytest.mark.slow
 def test_what_of_scipy_is_slow_to_import_waits_until_it_is_used():
     loaded = loaded_by("import faultgouge.analysis, faultgouge.pywrap")
     assert "scipy.sparse" in loaded

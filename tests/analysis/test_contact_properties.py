@@ -61,6 +61,7 @@ def largest(matrix):
 
 
 @given(pairs(), FORM)
+@pytest.mark.slow
 def test_translations_are_null_modes_on_both_sides(packing, form):
     here = block(packing, form)
     for q in ([1, 0, 0, 1, 0, 0], [0, 1, 0, 0, 1, 0]):
@@ -70,6 +71,7 @@ def test_translations_are_null_modes_on_both_sides(packing, form):
 
 
 @given(pairs(), FORM)
+@pytest.mark.slow
 def test_rolling_gears_are_a_null_mode(packing, form):
     """Disks that turn against each other with one surface velocity do not slip."""
     here = block(packing, form)
@@ -91,6 +93,7 @@ def test_rigid_rotation_turns_the_forces(packing):
 
 
 @given(pairs(), FORM)
+@pytest.mark.slow
 def test_partners_are_interchangeable(packing, form):
     swapped = Packing(
         position=packing.position[::-1],
@@ -105,6 +108,7 @@ def test_partners_are_interchangeable(packing, form):
 
 
 @given(pairs(), FORM)
+@pytest.mark.slow
 def test_mirror_images(packing, form):
     """x -> -x turns slips, angles and forces along x round, to the bit."""
     mirrored = replace(
@@ -116,6 +120,7 @@ def test_mirror_images(packing, form):
 
 
 @given(pairs(), FORM, st.integers(-8, 8))
+@pytest.mark.slow
 def test_scaling_with_stiffness_and_length(packing, form, power):
     """K ~ k, and K ~ length^(p - 1) of all lengths at once: powers of four are exact."""
     law, here = packing.law, block(packing, form)
@@ -132,6 +137,7 @@ def test_scaling_with_stiffness_and_length(packing, form, power):
 
 
 @given(pairs(), FORM)
+@pytest.mark.slow
 def test_symmetric_where_nothing_is_tangential(packing, form):
     smooth = replace(packing, contacts=Contacts([0], [1], [0.0]))
     here = block(smooth, form)
@@ -140,6 +146,7 @@ def test_symmetric_where_nothing_is_tangential(packing, form):
 
 
 @given(pairs())
+@pytest.mark.slow
 def test_turning_the_frame_turns_the_block(packing):
     """A quarter turn is exact: (x, y) -> (-y, x)."""
     turned = replace(packing, position=packing.position[:, ::-1] * [-1, 1])

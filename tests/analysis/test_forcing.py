@@ -45,6 +45,7 @@ def test_sampled_cosine_gives_the_response_to_a_cosine(kind, request):
 
 
 @pytest.mark.parametrize("kind", ["packing", "damped"])
+@pytest.mark.slow
 def test_impulse_response_gives_velocity_and_transfer_function(kind, request):
     """Its vectors are ill-conditioned by a thousand here, which takes three of fifteen digits."""
     packing = request.getfixturevalue(kind)
@@ -84,6 +85,7 @@ def test_resonance_grows_as_the_time(packing):
     assert np.abs(near).max() == pytest.approx(abs(response.weight[strongest]) * time, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_frequencies_of_the_time_step(packing):
     """A constant push makes each mode oscillate: the sampled response has the frequencies of velocity Verlet."""
     dt = 0.1 / spectrum(packing).omega_max

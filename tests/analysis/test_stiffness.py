@@ -80,6 +80,7 @@ def test_cluster_has_every_state(cluster):
     assert (np.abs(bare) > 2).any()
 
 
+@pytest.mark.slow
 def test_derivative_of_forces_in_a_loaded_packing(ramp):
     """Overlaps of 6e-4 and a step of 1e-8.
 

@@ -98,6 +98,7 @@ def test_bad_input_is_refused_in_a_sentence(folder, command, says, faultgouge_in
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_init_writes_a_scene_that_holds_every_key(faultgouge, tmp_path):
     assert faultgouge("init").returncode == 0
     text = (tmp_path / "scene.toml").read_text()

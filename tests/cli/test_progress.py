@@ -24,6 +24,7 @@ def test_one_long_call_is_not_silent(capsys):
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_progress_counts(capsys):
     for _ in terminal.progress([1, 2], "equilibria", 5, done=3):
         time.sleep(0.5)
@@ -31,6 +32,7 @@ def test_progress_counts(capsys):
     assert set(lines) - {"equilibria: 3 of 5"} == {"equilibria: 4 of 5", "equilibria: 5 of 5"}
 
 
+@pytest.mark.slow
 def test_progress_that_is_left_early_ends_its_lines(capsys):
     for _ in terminal.progress(range(9), "samples"):
         break

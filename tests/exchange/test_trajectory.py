@@ -24,7 +24,7 @@ def run(tmp_path_factory, request):
         "law": {"kn": 2e5},
         "load": {"fy": 3.0},
         "ramp": {"step": 1e-3, "until": 2e-3},
-        "perturb": {"fx": 1e-3, "time": 1.0, "amplitude": 1.0, "omega": 5.0},
+        "perturb": {"fx": 1e-3, "time": 0.3, "amplitude": 1.0, "omega": 5.0},
         "output": {"trajectory": True},
     }
     scene = Scene.from_mapping(mapping)
@@ -104,6 +104,7 @@ def test_its_radial_distribution_is_ours(run):
     assert counts.sum() > 1e4
 
 
+@pytest.mark.slow
 def test_no_equilibrium_follows_a_trajectory(run):
     path, packing = run
     with RunFile(path, "a") as file, pytest.raises(ValueError, match="no equilibrium can follow"):

@@ -61,6 +61,7 @@ def test_a_part_of_a_run(motion):
         motion.between(9.0, 10.0)
 
 
+@pytest.mark.slow
 def test_gif_holds_every_frame(tmp_path, motion):
     film = RunFilm(motion, 7, dots=60)
     write_film(film, tmp_path / "run.gif", 10)
@@ -73,6 +74,7 @@ def test_gif_holds_every_frame(tmp_path, motion):
             assert np.abs(shown - film.frame(number)).mean() < 3
 
 
+@pytest.mark.slow
 def test_frames_differ_and_come_back(motion):
     film = RunFilm(motion, 5, dots=60)
     first, last = film.frame(0), film.frame(4)
@@ -87,6 +89,7 @@ def test_a_ramp_shows_its_equilibria(packing):
     np.testing.assert_array_equal(film.frame(0), film.frame(1))  # each is shown twice
 
 
+@pytest.mark.slow
 def test_mp4_plays(tmp_path, motion):
     ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="the extra `movie` is not installed")
     film = RunFilm(motion, 5, dots=60)
@@ -101,6 +104,7 @@ def test_other_names_are_refused(tmp_path, motion):
         write_film(RunFilm(motion, 2, dots=60), tmp_path / "run.avi")
 
 
+@pytest.mark.slow
 def test_words_stay_within_the_frame(motion, packing):
     loads = [packing.moved(packing.position + k * 1e-4, packing.angle, packing.contacts, fx=0.01 * k) for k in range(3)]
     for film in (RunFilm(motion, 3), RampFilm(loads, 3)):

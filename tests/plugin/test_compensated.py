@@ -119,6 +119,7 @@ def test_doubles_leave_a_million_times_more(equilibrium):
     assert plain.residual > 1e6 * equilibrium.residual
 
 
+@pytest.mark.slow
 def test_overdamped_dynamics_balances_as_well(equilibrium):
     """From 1e-4 away: relaxation is linear, and goes on to 1e-15, where doubles stop at 1e-11."""
     packing = equilibrium.packing

@@ -272,6 +272,7 @@ def test_what_is_refused(lmp, extra, says):
     assert says in done.stdout
 
 
+@pytest.mark.slow
 def test_adapted_dashpots_are_dashpots_from_the_start(lmp, tmp_path):
     dumps = []
     for cn, adapt in ((4.0, ""), (1.0, "variable c equal 4.0\nfix more all adapt 1 pair mindlin/smooth cn * * v_c\n")):

@@ -36,6 +36,7 @@ def thermo(done, columns):
     return np.array(rows)
 
 
+@pytest.mark.slow
 def test_energy_is_conserved_without_friction_to_second_order(lmp):
     """Without friction the forces have the energy that LAMMPS reports, floor included."""
     extra = """
@@ -80,6 +81,7 @@ def test_virial_is_that_of_the_contacts(lmp, tmp_path):
     np.testing.assert_allclose([xx, yy, xy], [stress[0, 0], stress[1, 1], stress[0, 1]], rtol=0, atol=1e-11 * scale)
 
 
+@pytest.mark.slow
 def test_adapted_friction_is_friction_from_the_start(lmp, tmp_path):
     """fix adapt changes mu through extract(): the run is that of a pair style with the other mu."""
     dumps = []

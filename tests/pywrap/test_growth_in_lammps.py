@@ -66,6 +66,7 @@ def test_growth_rate_and_frequency_are_those_of_the_spectrum(reference_packing):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_rounding_noise_grows_by_fifteen_decades(reference_packing):
     """Nothing but noise to begin with: D rises from 1e-25 by fifteen decades, most of them at the spectrum's rate."""
     packing = equilibrium(reference_packing(1.0), 0.024)

@@ -95,6 +95,7 @@ def test_layer_of_a_tenth_comes_to_rest(seed):
     assert packing.position[packing.top, 1].min() > 0.7 * packing.position[:, 1].max()
 
 
+@pytest.mark.slow
 def test_layer_that_still_sinks_when_steps_run_out_is_refused(monkeypatch):
     monkeypatch.setattr(settling, "STEPS", 5000)
     scene = Scene.from_mapping(SCENE | {"packing": SCENE["packing"] | {"top": 8}})
@@ -102,6 +103,7 @@ def test_layer_that_still_sinks_when_steps_run_out_is_refused(monkeypatch):
         settle(scene)
 
 
+@pytest.mark.slow
 def test_time_step_of_a_large_packing_is_that_of_all_eigenvalues(settled):
     # the root of an eigenvalue that is known to 1e-4
     assert time_step(settled.packing) == pytest.approx(

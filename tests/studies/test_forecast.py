@@ -19,6 +19,7 @@ SCENE = {
 }
 
 
+@pytest.mark.slow
 def test_the_jump_is_that_of_a_run_in_lammps():
     """Weak friction from the first step on, and a load so small that disks move by far less than they overlap."""
     scene = Scene.from_mapping(SCENE)

@@ -46,6 +46,7 @@ def whole(mu, precision, increment):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("mu", [1.0, 0.8])
 def test_stated_intervals_contain_the_extrapolated_onset(mu):
     increments = (2e-3, 1e-3, 5e-4, 2.5e-4)
@@ -98,6 +99,7 @@ def test_onsets_with_dissipation_state_the_whole_error():
             assert error < 1e-10
 
 
+@pytest.mark.slow
 def test_one_packing_per_seed_whatever_the_arithmetic():
     mapping = {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
     one, other = (settle(Scene.from_mapping(mapping | {"precision": p})).packing for p in ("double", "compensated"))

@@ -166,6 +166,7 @@ def increment(settings):
         yield relaxation.Increment(engine, start, end)
 
 
+@pytest.mark.slow
 def test_all_ways_lead_to_one_equilibrium(increment):
     step = 0.9 * 2 / spectrum(increment.end).omega_max
     for way, least in (
@@ -228,6 +229,7 @@ def test_a_study_that_fails_does_not_take_the_others_along(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_quick_report(faultgouge, tmp_path):
     done = faultgouge("report", "--quick", "-o", "report")
     assert done.returncode == 0, done.stderr

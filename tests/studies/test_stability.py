@@ -48,6 +48,7 @@ TROUBLE = [
 ]
 
 
+@pytest.mark.slow
 def test_failures_are_told_and_the_others_go_on(tmp_path):
     told = []
     result = stability(tmp_path / "out", say=told.append, cases=TROUBLE)
@@ -110,6 +111,7 @@ def test_outcome_of_a_refusal():
 
 @pytest.mark.ranks
 @pytest.mark.slow
+@pytest.mark.long
 def test_same_table_on_two_ranks(faultgouge, tmp_path):
     one = faultgouge("stability", "--quick", "-o", "one", "--json")
     two = faultgouge("stability", "--quick", "-o", "two", ranks=2)
@@ -121,6 +123,7 @@ def test_same_table_on_two_ranks(faultgouge, tmp_path):
 
 
 @pytest.mark.ranks
+@pytest.mark.slow
 def test_error_of_one_rank_ends_the_others(faultgouge, tmp_path):
     """A contact that the law does not cover is found by the rank that owns it; the other one waits for its forces."""
     (tmp_path / "scene.toml").write_text(

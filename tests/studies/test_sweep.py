@@ -148,6 +148,7 @@ def test_a_row_is_what_the_onset_of_its_scene_is(tmp_path):
     assert rows[0]["contacts"] == rows[1]["contacts"] == str(len(settle(scene).packing.contacts))
 
 
+@pytest.mark.slow
 def test_a_settled_packing_is_shared(tmp_path, monkeypatch):
     from faultgouge.studies.sweep import compute
 
@@ -231,6 +232,7 @@ def test_the_dry_run_counts_and_computes_nothing(faultgouge, tmp_path):
 
 @pytest.mark.ranks
 @pytest.mark.slow
+@pytest.mark.long
 def test_one_table_after_kills_on_workers_and_in_shards(tmp_path):
     """Five kills at random moments with one process and with two workers, and three shards: one table to the byte."""
     (tmp_path / "sweep.toml").write_text(TOML)

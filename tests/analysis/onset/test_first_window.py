@@ -132,6 +132,7 @@ def test_doubtful_increments_come_with_the_onset(ramp):
         find_onset(path, path.grid[20:22], limits=limits)
 
 
+@pytest.mark.slow
 def test_basis_is_given_up_where_modes_mix_or_disks_move_in(ramp):
     path = ramp(1.0, 1e-3, 22)
     matrix = full_operator(path(0.0))

@@ -220,6 +220,7 @@ def test_what_the_screening_misses_is_walked_again():
     assert first.fx_onset == pytest.approx(0.35 / 0.3, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_json(ramp):
     path = ramp(1.0, 1e-3, 22)
     onset = find_onset(path, path.grid[20:])
