@@ -110,7 +110,7 @@ def test_its_sentence_reaches_the_command(scene, ranks, rank, call):
 
 @pytest.mark.ranks
 @pytest.mark.parametrize("search", [[], ["--modes", "0:39"]], ids=["all_windows", "slices"])
-@pytest.mark.parametrize(("ranks", "stride"), [(1, 1), (2, 6)])
+@pytest.mark.parametrize(("ranks", "stride"), [pytest.param(1, 1, marks=pytest.mark.long), (1, 6), (2, 6)])
 @pytest.mark.slow
 def test_no_call_is_taken_for_a_missing_onset(settled, ranks, stride, search):
     """At every call on one rank; two ranks call the same, and every sixth call shows that both hear of it."""

@@ -150,6 +150,7 @@ def simulates(folder):
     ],
 )
 @pytest.mark.slow
+@pytest.mark.long
 def test_what_is_kept_is_said(tmp_path, command, says):
     (tmp_path / "scene.toml").write_text(SCENE)
     (tmp_path / "sweep.toml").write_text(SWEEP)

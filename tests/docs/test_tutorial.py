@@ -11,6 +11,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "tutorial.md"
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_tutorial_prints_what_the_page_shows(tmp_path):
     assert run(PAGE, tmp_path) == []
     pictures = re.findall(r"\]\(pictures/tutorial/([\w.]+)\)", PAGE.read_text())

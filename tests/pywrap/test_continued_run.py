@@ -27,7 +27,7 @@ def scene(precision, forced):
             "packing": {"file": str(REFERENCE)},
             "law": {"kn": 2e5},
             "load": {"fy": 3.0},
-            "perturb": {"fx": 1e-3, "time": 8.0, **FORCED[forced]},
+            "perturb": {"fx": 1e-3, "time": 6.0, **FORCED[forced]},
             "friction": {"v0": 1e-9, "v_ss": 1e-6},
             "output": {"trajectory": True},
         }

@@ -61,6 +61,7 @@ def test_onset_in_si(tmp_path, damping):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_another_packing_may_be_the_one_that_is_triggered(tmp_path):
     """Its onsets, runs and scene are in files and in the summary of their own, and the report says so.
 
