@@ -188,6 +188,7 @@ def test_turns_begin_with_either():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_command_prints_a_table(faultgouge):
     done = faultgouge("explain", SCENES / "minimal.toml")
     assert done.returncode == 0, done.stderr

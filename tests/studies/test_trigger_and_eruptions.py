@@ -84,6 +84,7 @@ def test_eruptions_that_were_cut_off_are_those_of_one_run(tmp_path):
 
 @pytest.mark.ranks
 @pytest.mark.slow
+@pytest.mark.long
 def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(faultgouge, tmp_path):
     """Above the onset, 0.0218, D grows, but not to its end in the time that is given; with strong drag nothing does."""
     text = f"""
