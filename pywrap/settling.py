@@ -223,7 +223,10 @@ def _height(packing: Packing) -> float:
 
 
 def _viscosity(packing: Packing) -> float:
-    """Damping that is critical for the slowest shear wave across the height, mass / time."""
+    """Damping that is critical for the slowest shear wave across the height, mass / time: 2 m omega.
+
+    Its omega is pi c / (2 height), with c = SHEAR d (k / m)^(1/2) and the stiffness k of a contact under the pressure.
+    """
     diameter = 2 * float(packing.radius.mean())
     carried = packing.fy * packing.top.sum() * diameter / _width(packing)
     stiffness = float(packing.law.normal_stiffness(packing.law.overlap_of_force(carried)))
