@@ -1,7 +1,6 @@
 """What tests share: LAMMPS as a user runs it, and the reference packing."""
 
 import fcntl
-import gc
 import json
 import os
 import shlex
@@ -20,9 +19,6 @@ import pytest
 
 from faultgouge.analysis import MindlinLaw, Packing, touching
 
-# no garbage is looked for until the first test: pytest finds thousands of tests a tenth faster
-gc.disable()
-
 BIN = Path(sys.executable).parent
 LIMIT = 1800
 """Seconds for one command on a busy machine."""
@@ -34,11 +30,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests of several ranks come first: xdist begins with a long run of tests for each worker, so that one worker has
     all of these and the other does not wait for its turn."""
     items.sort(key=lambda item: item.get_closest_marker("ranks") is None)
-
-
-def pytest_collection_finish() -> None:
-    """Look for garbage again."""
-    gc.enable()
 
 
 @pytest.fixture(autouse=True)
