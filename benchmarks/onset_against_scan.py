@@ -173,9 +173,8 @@ def main() -> None:
         f"{ratios['stated_error']:10.1e}{ratios['difference']:10.1e}"
     )
     print(
-        f"\nOf the solution, {fast.one_path_seconds:.2f} s on the processor are the onset along one path; the rest is"
+        f"\nThe onset along one path took {fast.one_path_seconds:.2f} s on the processor; the rest is the path's error."
     )
-    print("the error from the path's increments.")
     print(
         f"\nThe first solution in the process: {cold.seconds:.2f} s, {cold.processor_seconds:.2f} s on the processor."
     )

@@ -6,6 +6,7 @@ Prints what went wrong and how often; the exit code is 1 if something did.
 """
 
 import argparse
+import os
 import sys
 import tempfile
 import time
@@ -40,6 +41,8 @@ def main() -> int:
         parser.add_argument(f"--{kind}", type=int, default=count)
     parser.add_argument("--seed", type=int, default=0)
     chosen = vars(parser.parse_args())
+    for library in ("OMP", "OPENBLAS"):  # a process with threads of BLAS is none to fork
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     return int(sum([tried(kind, chosen[kind], chosen["seed"]) for kind in KINDS if chosen[kind]]) > 0)
 
 

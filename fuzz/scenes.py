@@ -83,7 +83,7 @@ OTHERS = [
 
 
 def run(count: int, folder: Path, seed: int, longest: int = LONGEST) -> Iterator[tuple[str, str]]:
-    """Try so many scenes, each for `longest`: what was odd, and what went wrong, empty where nothing did."""
+    """Try so many scenes, each for `longest` seconds of processor time: what was odd, and what went wrong or ""."""
     chance = random.Random(seed)
     for number in range(count):
         scene, section, key = deepcopy(SCENE), *chance.choice([(s, k) for s in SCENE for k in SCENE[s]])
@@ -126,6 +126,7 @@ def _tried(task: str, scene: str, folder: Path, longest: int) -> str:
     """What goes wrong in one run of a command."""
     folder.mkdir()
     (folder / "scene.toml").write_text(scene)
+    (folder / "says").touch()
     process = FORKED.Process(target=_command, args=(task, folder, longest))
     process.start()
     process.join()
@@ -138,7 +139,7 @@ def _command(task: str, folder: Path, longest: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     os.chdir(folder)
     for file, number in ((os.devnull, 1), ("says", 2)):
-        os.dup2(os.open(file, os.O_WRONLY | os.O_CREAT), number)
+        os.dup2(os.open(file, os.O_WRONLY), number)
     sys.argv = ["faultgouge", task, "scene.toml", "-o", "run.json" if task == "onset" else "run.h5"]
     from faultgouge.cli import main
 
