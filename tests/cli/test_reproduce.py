@@ -48,6 +48,7 @@ FIGURES = ("figure1", "figure2", "figure3", "figure4", "figure5a", "figure5b", "
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_reproduce(faultgouge, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
     done = faultgouge("reproduce", "scene.toml", "-o", "results")

@@ -14,6 +14,7 @@ HOWTO = Path(__file__).parents[2] / "docs" / "howto_own_packing.md"
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_from_a_pour_to_the_film_of_the_mode(tmp_path):
     text = HOWTO.read_text()
     deck, scene = re.findall(r"```\n(.*?)```", text, re.DOTALL)

@@ -81,6 +81,7 @@ def grown(packing, mode, time, dt):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("fx", "cn", "unstable"), [(0.0155, 3.0, 1), (0.015, 3.0, 0)])
 def test_growth_with_dashpots_is_that_of_the_eigenvalue(path, fx, cn, unstable):
     """Over six decades of D; at 0.015 it is the dashpots that make the packing unstable."""

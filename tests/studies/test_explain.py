@@ -58,6 +58,7 @@ def included(explanation):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_what_is_in(paper, frictionless):
     always = {"floor", "periodicity"}
     assert included(paper) == always | {"tangential history", "dynamic friction", "perturbation"}
