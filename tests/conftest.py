@@ -6,6 +6,7 @@ pytest reads this file before it starts its workers: what takes long to import i
 from __future__ import annotations
 
 import fcntl
+import gc
 import json
 import os
 import shlex
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+gc.disable()  # until the tests are found: a fifth of that time went into the search for garbage among what is imported
+
 BIN = Path(sys.executable).parent
 LIMIT = 1800
 """Seconds for one command on a busy machine."""
@@ -36,6 +39,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests of several ranks come first: xdist begins with a long run of tests for each worker, so that one worker has
     all of these and the other does not wait for its turn."""
     items.sort(key=lambda item: item.get_closest_marker("ranks") is None)
+
+
+def pytest_collection_finish() -> None:
+    """What has been imported stays."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(autouse=True)

@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from ...analysis.packing import Floats
 from ..statistics import Bools
@@ -68,6 +67,8 @@ def _fit(logs: Floats, reach: Floats, found: Bools, start: Floats | None = None)
 
     In k, k ln c and k slope the likelihood is concave: there is one maximum.
     """
+    from scipy.optimize import minimize  # slow to import
+
     log_reach = np.log(np.maximum(reach, np.finfo(float).tiny))
     columns = np.column_stack([log_reach, -np.ones(len(logs)), -(logs - logs.mean())])
     if np.ptp(logs) == 0:

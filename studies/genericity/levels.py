@@ -42,7 +42,6 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from scipy.linalg import eigh
-from scipy.ndimage import uniform_filter1d
 from scipy.sparse import csr_array
 
 from ...analysis import spectrum
@@ -155,6 +154,8 @@ def entry_factor(ratio: Floats) -> Floats:
 
 def _local(values: Floats) -> Floats:
     """The mean over neighbouring levels."""
+    from scipy.ndimage import uniform_filter1d  # slow to import
+
     return uniform_filter1d(values, AVERAGED, mode="reflect")
 
 

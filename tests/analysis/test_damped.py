@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import quasistatic
 from scipy.linalg import block_diag
-from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import damping_matrix, find_onset, stiffness_matrix
@@ -48,6 +47,8 @@ def crossing(half_width, place=0.4):
 @pytest.mark.parametrize("half_width", [0.2, 1e-2, 1e-3])
 def test_windows_narrower_than_the_increment(half_width, damping):
     """Both ends of the increment are stable; the edges are those of the block by itself."""
+    from scipy.optimize import brentq  # slow to import
+
     block = crossing(half_width)
     found = growing_windows(family(block, damping), [-1.0, 0.0, 1.0, 2.0])
     if growth(block, damping, 0.4) < 0:
@@ -116,6 +117,8 @@ def path(ramp):
 @pytest.mark.slow
 def test_reference_packing_with_normal_dashpots(path, cn, onset, digits):
     """The onsets that an independent computation had found, and LAPACK's root of the same to 1e-9."""
+    from scipy.optimize import brentq  # slow to import
+
     damped = dissipating(path, cn=cn)
     window = damped_windows(damped, [0.0218, 0.0224])[0]
     assert window.fx_onset == pytest.approx(onset, abs=digits)

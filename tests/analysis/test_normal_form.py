@@ -4,7 +4,6 @@ import mpmath
 import numpy as np
 import pytest
 import quasistatic
-from scipy.integrate import solve_ivp
 
 from faultgouge.analysis.normal_form import ORTHOGONAL, NormalForm
 from faultgouge.analysis.onset import full_operator
@@ -31,6 +30,8 @@ def test_eigenvalues(delta, epsilon):
 @pytest.mark.parametrize("tau", [None, 40.0, 0.6])
 @pytest.mark.parametrize("epsilon", [1.0, 0.3, 1e-3, 0.0, -1e-3])
 def test_exact_solutions_against_an_integrator(epsilon, tau):
+    from scipy.integrate import solve_ivp  # slow to import
+
     form, omega, time = NormalForm(0.3, epsilon), 0.37, np.linspace(0, 60, 61)
     start, force = np.array([0.4, -1.1]), np.array([-0.3, 0.8])
 

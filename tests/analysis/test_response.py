@@ -6,7 +6,6 @@ import mpmath
 import numpy as np
 import pytest
 import quasistatic
-from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from transfer import layer_response
 
@@ -106,6 +105,8 @@ def test_three_coalescing_eigenvalues_are_refused():
 @pytest.mark.parametrize("tau", [None, 5.0, 0.05])
 def test_against_an_integrator(tau):
     """tau = 0.05 damps even the fastest mode beyond oscillation."""
+    from scipy.integrate import solve_ivp  # slow to import
+
     matrix, (force, start), time = oblique(0.3), vectors(5), np.linspace(0, 20, 41)
 
     def slope(t, state):
@@ -202,6 +203,8 @@ def test_impossible_oscillators(wrong, says):
 
 def test_masses_and_inertia_of_a_packing(cluster):
     """M q'' = -K q + f cos(omega t) in the packing's own coordinates, with unequal masses."""
+    from scipy.integrate import solve_ivp  # slow to import
+
     stiffness = stiffness_matrix(cluster).toarray()
     mass = np.concatenate([cluster.mass, cluster.mass, cluster.inertia_factor * cluster.mass])
     force = layer_force(cluster, 2.0)
