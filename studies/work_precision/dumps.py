@@ -15,7 +15,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from ...analysis import Packing, RunFile, read_dump, stiffness_matrix, touching
 from ...analysis.contacts import Contacts
@@ -39,6 +38,8 @@ def eigenvalues(packing: Packing) -> Complexes:
 
 def loss(found: Packing, exact: Complexes) -> float:
     """Largest change of an eigenvalue, in units of the largest; eigenvalues are matched to their nearest."""
+    from scipy.optimize import linear_sum_assignment  # slow to import
+
     apart = np.abs(eigenvalues(found)[:, None] - exact)
     return float(apart[linear_sum_assignment(apart)].max() / np.abs(exact).max())
 
