@@ -17,6 +17,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 # byte code is made of what is imported, not of all that is installed
 PIP := $(BIN)/python -m pip install --quiet --no-compile
+PYTEST := PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q
 PLUGIN := pyproject.toml CMakeLists.txt $(wildcard cmake/* pair_mindlin_smooth/*)
 PYTHON_SOURCES := $(shell find lammps_inputs analysis pywrap figures studies src scenes -type f -not -name '*.pyc' -not -name '*.so')
 
@@ -31,19 +32,21 @@ unexport PYTHONDONTWRITEBYTECODE
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
 
-# Tests and checks take Python from src, where links lead to the folders: an edit of Python needs no installation
+# Tests and checks take Python from src, where links lead to the folders: an edit of Python needs no installation.
+# The tests of the analysis come first by themselves: what they import is found within two seconds
 test: $(VENV)/.test
-	PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q -n 2 -m "not long"
+	$(PYTEST) -n 2 -m "not long" tests/analysis
+	$(PYTEST) -n 2 -m "not long" --ignore=tests/analysis
 
 long: $(VENV)/.test
-	PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q -n 2 -m long
+	$(PYTEST) -n 2 -m long
 
 plugin: $(VENV)/.plugin
 
 # the exports, read by the programs that they are for: half a gigabyte of OVITO and VTK
 readers: $(VENV)/.test
 	$(PIP) --group readers
-	PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q tests/exchange
+	$(PYTEST) tests/exchange
 
 fuzz: $(VENV)/.test
 	PYTHONPATH=$(CURDIR)/src $(BIN)/python -m fuzz
