@@ -18,7 +18,7 @@ BIN := $(VENV)/bin
 # byte code is made of what is imported, not of all that is installed
 PIP := $(BIN)/python -m pip install --quiet --no-compile
 PYTEST := PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q
-PLUGIN := pyproject.toml CMakeLists.txt $(wildcard cmake/* pair_mindlin_smooth/*)
+PLUGIN := pyproject.toml CMakeLists.txt $(wildcard cmake/* pair_mindlin_smooth/* analysis/*.cpp)
 PYTHON_SOURCES := $(shell find lammps_inputs analysis pywrap figures studies src scenes -type f -not -name '*.pyc' -not -name '*.so')
 
 # one thread a process: the matrices are small, and the ranks share the cores
@@ -54,13 +54,13 @@ fuzz: $(VENV)/.test
 check: $(VENV)/.check
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/clang-format --dry-run --Werror pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp
+	$(BIN)/clang-format --dry-run --Werror pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp analysis/*.cpp
 	MYPYPATH=src $(BIN)/mypy -p faultgouge
 
 format: $(VENV)/.check
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
-	$(BIN)/clang-format -i pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp
+	$(BIN)/clang-format -i pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp analysis/*.cpp
 
 benchmark: $(VENV)/.installed
 	$(BIN)/python benchmarks/time_per_step.py

@@ -2,7 +2,8 @@
 
 **SuperLU**, which SciPy has. The order of elimination is one of minimum degree on the pattern, and pivots are taken
 from the diagonal. SuperLU would also join small columns of the elimination tree to supernodes and fill them with zeros;
-without that the factors of 300,000 coordinates have three quarters of the entries, and take half of the time.
+without that the factors of 300,000 coordinates have three quarters of the entries, and take half of the time. Of a
+symmetric matrix half of the factors is kept, and :mod:`~faultgouge.analysis.ldlt` solves with them.
 
 **MUMPS**, if python-mumps is installed (``pip install faultgouge[mumps]``), from `MUMPS_FROM` coordinates on. It stores
 half of the factors of a symmetric matrix, and its pivots of two rows keep them accurate. It is not made for several
@@ -19,6 +20,7 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from .errors import FaultgougeError
+from .ldlt import SymmetricFactors, library
 from .packing import Indices
 
 
@@ -79,7 +81,7 @@ def symmetric_lu(
         Share of the largest entry of a column that its diagonal entry must have to be SuperLU's pivot. With 0 it always
         is: the factors are then those of a symmetric matrix, L D L^T, and their accuracy is to be looked at.
     symmetric : bool
-        Whether it is symmetric to the bit.
+        Whether it is symmetric to the bit; real then.
     mumps : bool
         Whether MUMPS may be used: not by several threads at a time, nor where the digits must not depend on it.
 
@@ -90,7 +92,12 @@ def symmetric_lu(
     """
     if mumps and uses_mumps(matrix.shape[0]):
         return MumpsFactors(matrix, symmetric)
-    return SuperLUFactors(_superlu(matrix, "NATURAL" if ordered else "MMD_AT_PLUS_A", pivoting))
+    lu = _superlu(matrix, "NATURAL" if ordered else "MMD_AT_PLUS_A", pivoting)
+    compiled = library() if symmetric and pivoting == 0 else None
+    # where a diagonal entry is zero SuperLU takes another pivot
+    if compiled is None or not np.array_equal(lu.perm_r, lu.perm_c):
+        return SuperLUFactors(lu)
+    return SymmetricFactors.of(lu, compiled)
 
 
 def uses_mumps(size: int) -> bool:

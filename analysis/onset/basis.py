@@ -129,14 +129,12 @@ class Basis:
 
     def levels(self, matrix: csr_array) -> Levels:
         """X^T A X of an operator on the same coordinates."""
-        inner, count, chunk = matrix[self.active][:, self.active], len(self.values), self.limits.chunk
-        coupling = np.empty((count, count), dtype=np.float32)
-        diagonal = np.empty(count)
-        for start in range(0, count, chunk):
-            columns = slice(start, start + chunk)
-            image = inner @ self.vectors[:, columns] - self.vectors[:, columns] * self.values[columns]
-            diagonal[columns] = np.sum(self.vectors[:, columns] * image, axis=0)
-            coupling[:, columns] = self._rough.T @ image.astype(np.float32)
+        inner, count = matrix[self.active][:, self.active], len(self.values)
+        coupling, diagonal = np.zeros((count, count), dtype=np.float32), np.zeros(count)
+        for rows in self.limits.chunks(len(self.active)):
+            image = inner[rows] @ self.vectors - self.vectors[rows] * self.values
+            diagonal += np.einsum("ij,ij->j", self.vectors[rows], image)
+            coupling += self._rough[rows].T @ image.astype(np.float32)
         np.fill_diagonal(coupling, 0.0)
         return Levels(self.values + diagonal, coupling)
 

@@ -83,18 +83,20 @@ class Limits:
     coarse: int = 960
     """Eigenvalues between two places at which they are counted; shifts are interpolated in between."""
     block: int = 6
-    """Vectors that are solved for at a time: 2 ms each at 30,000 coordinates, against 6 ms one by one. Larger blocks
-    need more vectors for the same eigenvalues: 276 for a slice, with blocks of eight 304."""
-    first_look: int = 45
-    """Blocks of a Krylov space before its eigenvalues are looked at."""
+    """Vectors that are solved for at a time: 1.1 ms each at 30,000 coordinates, against 5 ms one by one. Larger blocks
+    need more vectors for the same eigenvalues: 294 for a slice, with blocks of eight 304."""
+    first_look: int = 48
+    """Blocks of a Krylov space before its eigenvalues are looked at: enough for most slices, as a look costs two
+    blocks."""
     looks: int = 2
     """Blocks between two looks."""
     last_look: int = 200
     """Blocks at the most."""
-    drift: float = 1e-14
-    """Product of a new vector with the first block from which on blocks are made orthogonal twice. It grows from
-    rounding, 1e-16, once an eigenvector is known to all digits. The vectors of a slice are then orthogonal to 1.2e-11
-    at the worst (77 slices of seven matrices of 400 to 29,000 coordinates)."""
+    together: int = 2
+    """Blocks that are made orthogonal to all before them at a time: three stray too far in most slices."""
+    strayed: float = 3e-6
+    """Part of a new vector along the basis, up to which the part is taken away afterwards; some 1e-7 at 29,000
+    coordinates. Its square, 1e-11, is what then remains in lengths and angles of the basis."""
     accurate: float = 1e-2
     """Residual of the eigenvectors of a slice, in mean distances of eigenvalues, as of the inverse. It enters an
     eigenvalue as its square over the distance of modes outside: 4e-6 at the most was measured (29,000 coordinates). An
@@ -122,8 +124,12 @@ class Limits:
     """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision."""
     ahead: int = 2
     """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
-    chunk: int = 512
-    """Columns of a basis that are projected at a time, for memory."""
+    chunk: int = 1024
+    """Rows of a basis that are multiplied at a time: what comes out stays in the processor's memory."""
+
+    def chunks(self, size: int) -> list[slice]:
+        """The rows of a basis, so many at a time."""
+        return [slice(first, first + self.chunk) for first in range(0, size, self.chunk)]
 
 
 LIMITS = Limits()

@@ -23,7 +23,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import eigh, qr
-from scipy.sparse import csc_array, eye_array
+from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import eigsh
 from threadpoolctl import threadpool_limits
 
@@ -171,9 +171,9 @@ class _Spectrum:
         self.limits, self.factorise, self.ranks = limits, factorise, ranks
         size = matrix.shape[0]
         self.bound = float(abs(matrix).sum(axis=0).max())  # no eigenvalue is beyond
-        order = minimum_degree(csc_array(matrix + 2 * self.bound * eye_array(size)))
-        self.place: Indices = order
-        self.matrix = csc_array(matrix[np.argsort(order)][:, np.argsort(order)])
+        self.order: Indices = np.argsort(minimum_degree(csc_array(matrix + 2 * self.bound * eye_array(size))))
+        self.given, self.matrix = csr_array(matrix), csc_array(matrix[self.order][:, self.order])
+        self.spare: list[Floats] = []  # memory for bases: fresh memory takes longer than a pass over it
 
     def below(self, shift: float) -> int:
         """How many eigenvalues are below the shift."""
@@ -211,7 +211,9 @@ class _Spectrum:
     def slice_about(self, shift: float, own: tuple[int, int], margin: int) -> Slice:
         """The eigenvalues of these numbers, which are about the shift, by block Lanczos."""
         solve, below = self.factorise(self.matrix, shift)
-        krylov = _Krylov(solve, self.matrix.shape[0], self.limits)
+        size, block = self.matrix.shape[0], self.limits.block
+        basis = self.spare.pop() if self.spare else np.empty((min(self.limits.last_look * block, size), size))
+        krylov = _Krylov(solve, basis, self.limits)
         krylov.extend(self.limits.first_look)
         while True:
             inverse, vectors, residuals = krylov.ritz()
@@ -220,7 +222,7 @@ class _Spectrum:
             values = shift + 1 / inverse[order]
             first = below - np.count_nonzero(inverse < 0)
             # one more at either end, for the comparison with the neighbours
-            ends = max(own[0] - 1, 0) - first, min(own[1] + 1, len(self.place)) - first
+            ends = max(own[0] - 1, 0) - first, min(own[1] + 1, size) - first
             if ends[0] >= 0 and ends[1] <= len(values):
                 inner = slice(*ends)
                 spacing = np.ptp(values[inner]) / (ends[1] - ends[0])
@@ -229,24 +231,29 @@ class _Spectrum:
             krylov.extend(self.limits.looks)
         kept = slice(max(0, own[0] - first - margin), min(len(values), own[1] - first + margin))
         start = own[0] - first - kept.start
-        found = krylov.basis[: len(inverse)].T @ vectors[:, order[kept]]
+        chosen, found = vectors[:, order[kept]], np.empty((size, kept.stop - kept.start))
+        for rows in self.limits.chunks(size):
+            found[self.order[rows]] = basis[: len(inverse), rows].T @ chosen
+        self.spare.append(basis)
         part = Slice(
             first=first + kept.start,
             values=values[kept],
-            vectors=found[self.place],
+            vectors=found,
             own=slice(start, start + own[1] - own[0]),
             spacing=float(spacing),
         )
-        self.compare(part, np.ascontiguousarray(found[:, part.own]))
+        self.compare(part)
         return part
 
-    def compare(self, part: Slice, vectors: Floats) -> None:
+    def compare(self, part: Slice) -> None:
         """Raise an error if a slice's own eigenvalues are not those of the matrix, but of inaccurate factors.
 
         The Krylov space knows the factors alone; the Rayleigh quotients are of the matrix itself.
         """
-        values = part.values[part.own]
-        quotients = np.einsum("ij,ij->j", vectors, self.matrix @ vectors)
+        values, vectors = part.values[part.own], np.ascontiguousarray(part.vectors[:, part.own])
+        quotients = np.zeros(len(values))
+        for rows in self.limits.chunks(len(vectors)):
+            quotients += np.einsum("ij,ij->j", vectors[rows], self.given[rows] @ vectors)
         worst = int(np.argmax(np.abs(quotients - values)))
         if abs(quotients[worst] - values[worst]) > self.limits.accurate * part.spacing:
             number = part.first + part.own.start + worst
@@ -259,38 +266,58 @@ class _Spectrum:
 class _Krylov:
     """An orthonormal basis Q of the block Krylov space of an operator, and the operator in it, H = Q^T A Q.
 
+    A new block is made orthogonal to the last ones at once, and to all others together with the next block: so the
+    basis is read from memory half as often. What a block has by then along the others, its part that strayed, is known
+    when the part is taken away. Where a shift is next to an eigenvalue, and blocks stray too far, they are made anew,
+    from there on fewer at a time (semiorthogonality: Simon, Linear Algebra Appl. 61, 101 (1984)).
+
     The vectors are rows: so the products of many with a few take a third of the time.
     """
 
-    def __init__(self, operator: Solve, size: int, limits: Limits) -> None:
-        self.operator, self.limits, block = operator, limits, limits.block
-        most = min(limits.last_look * block, size)
-        self.basis = np.empty((most, size))  # memory is taken as it is written to
+    def __init__(self, operator: Solve, basis: Floats, limits: Limits) -> None:
+        self.operator, self.basis, self.limits, block = operator, basis, limits, limits.block
+        most, size = basis.shape
         self.projection = np.zeros((most, most))
         start = np.random.default_rng(0).standard_normal((block, size))
         self.basis[:block] = qr(start.T, mode="economic")[0].T
-        self.used, self.next, self.drifting = block, np.zeros((block, block)), False
-        self.scratch = np.empty((block, size))
+        self.next = np.zeros((block, block))
+        self.used = self.firm = block  # vectors, and those of them that are orthogonal to all others
+        self.together = limits.together  # blocks that settle at a time; 0: each is orthogonal to all before it at once
 
     def extend(self, blocks: int) -> None:
-        """So many blocks more, each made orthogonal to all before it."""
-        block = self.limits.block
-        for _ in range(blocks):
-            used = self.used
-            if used + block > len(self.basis):
-                raise SliceError(f"a Krylov space of {used} vectors does not hold the eigenvalues about its shift")
-            known, last = self.basis[:used], slice(used - block, used)
-            image = np.ascontiguousarray(self.operator(self.basis[last].T).T)
-            inside = image @ known.T
-            image -= np.matmul(inside, known, out=self.scratch)
-            if self.drifting:
-                image -= np.matmul(image @ known.T, known, out=self.scratch)
-            self.projection[last, :used] = inside
-            self.projection[:used, last] = inside.T
-            vectors, self.next = qr(image.T, mode="economic", overwrite_a=True)
-            self.basis[used : used + block] = vectors.T
-            self.drifting = self.drifting or bool(np.abs(self.basis[:block] @ vectors).max() > self.limits.drift)
-            self.used += block
+        """So many blocks more, each orthogonal to all before it."""
+        wanted = self.used + blocks * self.limits.block
+        while self.firm < wanted:
+            self._step()
+            if self.used == wanted or self.used >= self.firm + self.together * self.limits.block:
+                self._settle()
+
+    def _step(self) -> None:
+        """One block more, orthogonal to the last ones."""
+        block, used = self.limits.block, self.used
+        if used + block > len(self.basis):
+            raise SliceError(f"a Krylov space of {used} vectors does not hold the eigenvalues about its shift")
+        last, near = slice(used - block, used), slice(max(0, self.firm - 2 * block) if self.together else 0, used)
+        image = np.ascontiguousarray(self.operator(self.basis[last].T).T)
+        inside = image @ self.basis[near].T
+        image -= inside @ self.basis[near]
+        self.projection[last, near] = inside
+        self.projection[near, last] = inside.T
+        vectors, self.next = qr(image.T, mode="economic", overwrite_a=True)
+        self.basis[used : used + block] = vectors.T
+        self.used += block
+
+    def _settle(self) -> None:
+        """Take from the last blocks what they have along those before them, or give these blocks up."""
+        firm, fresh = self.firm, self.basis[self.firm : self.used]
+        products = fresh @ self.basis[: self.used].T
+        strayed, among = products[:, :firm], products[:, firm:] - np.eye(len(fresh))
+        far, limit = np.linalg.norm(strayed, axis=1).max(), self.limits.strayed
+        if self.together and (far > limit or np.abs(among).max() > limit**2):
+            self.used, self.together = firm, self.together - 1
+        else:
+            fresh -= strayed @ self.basis[:firm]
+            self.firm = self.used
 
     def ritz(self) -> tuple[Floats, Floats, Floats]:
         """Eigenvalues and eigenvectors of H, and the residuals of these as vectors of A."""
