@@ -125,7 +125,7 @@ class Limits:
     ahead: int = 2
     """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
     chunk: int = 1024
-    """Rows of a basis that are multiplied at a time: what comes out stays in the processor's memory."""
+    """Rows of a basis that are multiplied at a time: what comes out stays in the cache."""
 
     def chunks(self, size: int) -> list[slice]:
         """The rows of a basis, so many at a time."""
