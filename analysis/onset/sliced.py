@@ -90,13 +90,14 @@ class Sliced:
         first, stop = self.bases.range(places[0].matrix)
         done, wanted = 0, -(-(stop - first) // self.ranks.size)
         failure: FaultgougeError | None = None
+        increments = [(here.fx, there.fx, there.matrix - here.matrix) for here, there in pairwise(places)]
         for basis, levels in self.bases.at(places[0].matrix):
             done += basis.own.stop - basis.own.start
             self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {done} of {wanted} modes")
             try:
-                for announced, (here, there) in zip(found, pairwise(places), strict=True):
-                    before, levels = levels, basis.change(levels, there.matrix - here.matrix)
-                    announced.extend(self._announced(basis, (here.fx, before), (there.fx, levels)))
+                for announced, (here, there, change) in zip(found, increments, strict=True):
+                    before, levels = levels, basis.change(levels, change)
+                    announced.extend(self._announced(basis, (here, before), (there, levels)))
             except FaultgougeError as error:
                 failure = failure or error  # it waits: the ranks meet at the end of their bases
         if failure is not None:
