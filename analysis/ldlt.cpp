@@ -1,34 +1,195 @@
-// Solutions of L D L^T x = b for several right sides at a time, see ldlt.py. L is lower triangular with ones on its
-// diagonal, which is left out, in compressed columns; x, shape (n, sides) by rows, holds b before and x after.
+// Factors L D L^T of a sparse symmetric matrix without pivoting, and solutions with them, see ldlt.py.
 //
 // No fused multiply-add (-ffp-contract=off): results are then the same to the bit on every machine.
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <vector>
+
+#if defined(__x86_64__) && defined(__GLIBC__)    // where the loader chooses between versions
+#define EVERY_MACHINE __attribute__((target_clones("avx2", "default")))
+#else
+#define EVERY_MACHINE
+#endif
+#define INLINE inline __attribute__((always_inline))
+#define EXPORTED extern "C" __attribute__((visibility("default")))
 
 namespace {
 
-struct Factors {
+// Of A, both halves; or of L, which is lower triangular with ones on its diagonal, what is below the diagonal.
+struct Columns {
   int32_t size;
-  const int32_t *start, *row;
-  const double *value, *pivot;
+  const int64_t *start;
+  const int32_t *row;
+  const double *value;
+
+  int32_t count(int32_t column) const { return static_cast<int32_t>(start[column + 1] - start[column]); }
 };
 
-template <int K> inline __attribute__((always_inline)) void solve(const Factors &f, int64_t sides, double *x)
+// Takes K neighbouring columns of a front, which have become those of L D, out of the columns from `from` to `end`.
+template <int K>
+INLINE void take_out(double *front, int64_t rows, int32_t first, const double *pivot, int32_t from, int32_t end)
+{
+  const double *taken = front + first * rows;
+  for (int32_t j = from; j < end; ++j) {
+    double *column = front + j * rows, factor[K];
+    for (int k = 0; k < K; ++k) factor[k] = taken[k * rows + j] / pivot[first + k];
+    for (int64_t i = j; i < rows; ++i) {
+      double sum = 0.0;
+      for (int k = 0; k < K; ++k) sum += factor[k] * taken[k * rows + i];
+      column[i] -= sum;
+    }
+  }
+}
+
+// Eliminates the first columns of a dense front, as many as it has pivots, a panel that stays in the cache at a time.
+EVERY_MACHINE void eliminate(double *front, int64_t rows, int32_t pivots, double *pivot)
+{
+  constexpr int32_t PANEL = 48;
+  for (int32_t begin = 0; begin < pivots; begin += PANEL) {
+    const int32_t end = std::min(begin + PANEL, pivots);
+    for (int32_t k = begin; k < end; ++k) {
+      pivot[k] = front[k * (rows + 1)];
+      take_out<1>(front, rows, k, pivot, k + 1, end);
+    }
+    for (int32_t j = end; j < rows; ++j) {
+      int32_t k = begin;
+      for (; k + 6 <= end; k += 6) take_out<6>(front, rows, k, pivot, j, j + 1);
+      for (; k + 3 <= end; k += 3) take_out<3>(front, rows, k, pivot, j, j + 1);    // the coordinates of a disk
+      for (; k < end; ++k) take_out<1>(front, rows, k, pivot, j, j + 1);
+    }
+  }
+}
+
+// A supernode, neighbouring columns of L of one pattern, is eliminated in a dense front. What that leaves for the rows
+// below, its update, waits until the front of its parent in the elimination tree is assembled.
+class Multifrontal {
+public:
+  Multifrontal(const Columns &matrix, const int32_t *parent, const Columns &lower, int32_t *row, double *value,
+               double *pivot) :
+      matrix(matrix),
+      parent(parent),
+      lower(lower),
+      row(row),
+      value(value),
+      pivot(pivot),
+      place(matrix.size),
+      seen(matrix.size, -1),
+      child(matrix.size, -1),
+      sibling(matrix.size, -1),
+      update(matrix.size)
+  {
+  }
+
+  // Whether all pivots were other than zero.
+  bool factor()
+  {
+    for (int32_t first = 0, next; first < matrix.size; first = next) {
+      next = first + 1;
+      while (next < matrix.size && parent[next - 1] == next && lower.count(next - 1) == lower.count(next) + 1) ++next;
+      find_rows(first, next);
+      assemble(first, next);
+      eliminate(front.data(), static_cast<int64_t>(rows.size()), next - first, pivot + first);
+      if (std::find(pivot + first, pivot + next, 0.0) != pivot + next) return false;
+      store(first, next);
+    }
+    return true;
+  }
+
+private:
+  const Columns &matrix;
+  const int32_t *parent;
+  const Columns &lower;
+  int32_t *row;
+  double *value, *pivot;
+  std::vector<int32_t> rows, place, seen;     // of the front, in order; where they are in it; who has seen them
+  std::vector<int32_t> child, sibling;        // last columns of supernodes
+  std::vector<std::vector<double>> update;    // by last column: the lower half, by columns
+  std::vector<double> front;                  // by columns; its upper half is not used
+  std::vector<int32_t> there;
+
+  double *column(int64_t number) { return front.data() + number * static_cast<int64_t>(rows.size()); }
+
+  void find_rows(int32_t first, int32_t next)
+  {
+    rows.clear();
+    const auto see = [&](const Columns &columns, int32_t j) {
+      for (int64_t p = columns.start[j]; p < columns.start[j + 1]; ++p) {
+        const int32_t i = columns.row[p];
+        if (i < next || seen[i] == first) continue;
+        seen[i] = first;
+        rows.push_back(i);
+      }
+    };
+    for (int32_t j = first; j < next; ++j) {
+      see(matrix, j);
+      for (int32_t c = child[j]; c >= 0; c = sibling[c]) see(lower, c);
+    }
+    std::sort(rows.begin(), rows.end());
+    rows.insert(rows.begin(), next - first, 0);
+    for (int32_t j = first; j < next; ++j) rows[j - first] = j;
+    for (size_t k = 0; k < rows.size(); ++k) place[rows[k]] = static_cast<int32_t>(k);
+  }
+
+  void assemble(int32_t first, int32_t next)
+  {
+    front.assign(rows.size() * rows.size(), 0.0);
+    for (int32_t j = first; j < next; ++j) {
+      for (int64_t p = matrix.start[j]; p < matrix.start[j + 1]; ++p)
+        if (matrix.row[p] >= j) column(j - first)[place[matrix.row[p]]] += matrix.value[p];
+      for (int32_t c = child[j]; c >= 0; c = sibling[c]) add(c);
+    }
+  }
+
+  void add(int32_t from)
+  {
+    there.clear();
+    for (int64_t p = lower.start[from]; p < lower.start[from + 1]; ++p) there.push_back(place[lower.row[p]]);
+    const double *entry = update[from].data();
+    for (size_t j = 0; j < there.size(); ++j) {
+      double *to = column(there[j]);
+      for (size_t i = j; i < there.size(); ++i) to[there[i]] += *entry++;
+    }
+    std::vector<double>().swap(update[from]);
+  }
+
+  void store(int32_t first, int32_t next)
+  {
+    const int32_t size = static_cast<int32_t>(rows.size()), pivots = next - first;
+    for (int32_t j = 0; j < pivots; ++j) {
+      const int64_t start = lower.start[first + j] - (j + 1);
+      for (int32_t k = j + 1; k < size; ++k) {
+        row[start + k] = rows[k];
+        value[start + k] = column(j)[k] / pivot[first + j];
+      }
+    }
+    if (size == pivots) return;
+    const int32_t last = next - 1;
+    update[last].reserve(static_cast<size_t>(size - pivots) * (size - pivots + 1) / 2);
+    for (int32_t j = pivots; j < size; ++j) update[last].insert(update[last].end(), column(j) + j, column(j) + size);
+    sibling[last] = child[parent[last]];
+    child[parent[last]] = last;
+  }
+};
+
+// K right sides, in K of the columns of x.
+template <int K> INLINE void solve(const Columns &lower, const double *pivot, int64_t sides, double *x)
 {
   double now[K];
-  for (int32_t j = 0; j < f.size; ++j) {
+  for (int32_t j = 0; j < lower.size; ++j) {
     for (int k = 0; k < K; ++k) now[k] = x[sides * j + k];
-    for (int32_t p = f.start[j]; p < f.start[j + 1]; ++p) {
-      const double entry = f.value[p];
-      double *below = x + sides * f.row[p];
+    for (int64_t p = lower.start[j]; p < lower.start[j + 1]; ++p) {
+      const double entry = lower.value[p];
+      double *below = x + sides * lower.row[p];
       for (int k = 0; k < K; ++k) below[k] -= entry * now[k];
     }
   }
-  for (int32_t j = f.size - 1; j >= 0; --j) {
-    for (int k = 0; k < K; ++k) now[k] = x[sides * j + k] / f.pivot[j];
-    for (int32_t p = f.start[j]; p < f.start[j + 1]; ++p) {
-      const double entry = f.value[p];
-      const double *below = x + sides * f.row[p];
+  for (int32_t j = lower.size - 1; j >= 0; --j) {
+    for (int k = 0; k < K; ++k) now[k] = x[sides * j + k] / pivot[j];
+    for (int64_t p = lower.start[j]; p < lower.start[j + 1]; ++p) {
+      const double entry = lower.value[p];
+      const double *below = x + sides * lower.row[p];
       for (int k = 0; k < K; ++k) now[k] -= entry * below[k];
     }
     for (int k = 0; k < K; ++k) x[sides * j + k] = now[k];
@@ -37,21 +198,38 @@ template <int K> inline __attribute__((always_inline)) void solve(const Factors 
 
 }    // namespace
 
-#if defined(__x86_64__) && defined(__GLIBC__)    // where the loader chooses between versions
-#define EVERY_MACHINE __attribute__((target_clones("avx2", "default")))
-#else
-#define EVERY_MACHINE
-#endif
-
-extern "C" {
-
-EVERY_MACHINE __attribute__((visibility("default"))) void solve_ldlt(int32_t size, const int32_t *start,
-                                                                     const int32_t *row, const double *value,
-                                                                     const double *pivot, int32_t sides, double *x)
+// The elimination tree of a matrix: the parent of each column, -1 for a root, and its entries of L below the diagonal.
+EXPORTED void elimination_tree(int32_t size, const int64_t *start, const int32_t *row, int32_t *parent, int64_t *below)
 {
-  const Factors factors = {size, start, row, value, pivot};
-  int32_t done = 0;
-  for (; done + 6 <= sides; done += 6) solve<6>(factors, sides, x + done);
-  for (; done < sides; ++done) solve<1>(factors, sides, x + done);
+  std::vector<int32_t> seen(size);
+  for (int32_t k = 0; k < size; ++k) {
+    parent[k] = -1;
+    below[k] = 0;
+    seen[k] = k;
+    for (int64_t p = start[k]; p < start[k + 1]; ++p)
+      for (int32_t i = row[p]; i < k && seen[i] != k; i = parent[i]) {
+        if (parent[i] < 0) parent[i] = k;
+        ++below[i];
+        seen[i] = k;
+      }
+  }
 }
+
+// Fills L and D of a matrix; 0 if a pivot is zero.
+EXPORTED int32_t factor_ldlt(int32_t size, const int64_t *start, const int32_t *row, const double *value,
+                             const int32_t *parent, const int64_t *lower_start, int32_t *lower_row, double *lower_value,
+                             double *pivot)
+{
+  const Columns matrix = {size, start, row, value}, lower = {size, lower_start, lower_row, lower_value};
+  return Multifrontal(matrix, parent, lower, lower_row, lower_value, pivot).factor();
+}
+
+// L D L^T x = b for several right sides: x, shape (n, sides) by rows, holds b before and x after.
+EXPORTED EVERY_MACHINE void solve_ldlt(int32_t size, const int64_t *start, const int32_t *row, const double *value,
+                                       const double *pivot, int32_t sides, double *x)
+{
+  const Columns lower = {size, start, row, value};
+  int32_t done = 0;
+  for (; done + 6 <= sides; done += 6) solve<6>(lower, pivot, sides, x + done);
+  for (; done < sides; ++done) solve<1>(lower, pivot, sides, x + done);
 }

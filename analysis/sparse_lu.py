@@ -3,7 +3,7 @@
 **SuperLU**, which SciPy has. The order of elimination is one of minimum degree on the pattern, and pivots are taken
 from the diagonal. SuperLU would also join small columns of the elimination tree to supernodes and fill them with zeros;
 without that the factors of 300,000 coordinates have three quarters of the entries, and take half of the time. Of a
-symmetric matrix half of the factors is kept, and :mod:`~faultgouge.analysis.ldlt` solves with them.
+symmetric matrix :mod:`~faultgouge.analysis.ldlt` makes one triangle alone.
 
 **MUMPS**, if python-mumps is installed (``pip install faultgouge[mumps]``), from `MUMPS_FROM` coordinates on. It stores
 half of the factors of a symmetric matrix, and its pivots of two rows keep them accurate. It is not made for several
@@ -92,12 +92,10 @@ def symmetric_lu(
     """
     if mumps and uses_mumps(matrix.shape[0]):
         return MumpsFactors(matrix, symmetric)
-    lu = _superlu(matrix, "NATURAL" if ordered else "MMD_AT_PLUS_A", pivoting)
-    compiled = library() if symmetric and pivoting == 0 else None
-    # where a diagonal entry is zero SuperLU takes another pivot
-    if compiled is None or not np.array_equal(lu.perm_r, lu.perm_c):
-        return SuperLUFactors(lu)
-    return SymmetricFactors.of(lu, compiled)
+    compiled = library() if ordered and symmetric and pivoting == 0 else None
+    # where a pivot is zero SuperLU takes another one
+    factors = SymmetricFactors.of(matrix, compiled) if compiled is not None else None
+    return factors or SuperLUFactors(_superlu(matrix, "NATURAL" if ordered else "MMD_AT_PLUS_A", pivoting))
 
 
 def uses_mumps(size: int) -> bool:

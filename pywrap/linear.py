@@ -5,10 +5,11 @@ McKee, and the coordinates of a disk together, all entries lie within a band: of
 44 places of the diagonal. LAPACK factors the band in a quarter of the time that it takes for the full matrix, and what
 it touches leaves Python and LAMMPS in the processor's caches.
 
-To factor K of 100,000 disks takes as long as thirty evaluations of the forces. From one Newton iteration to the next K
-changes a little everywhere, with the load, and much at a few contacts, which close or open. Neither needs new factors:
-with those of a matrix nearby as preconditioner P, :math:`P^{-1} K` is the identity but for something small and for
-something of low rank, and GMRES reduces the residual a hundredfold in some five iterations.
+To factor K of 100,000 disks takes as long as thirty evaluations of the forces, and its symmetric part as long as ten.
+From one Newton iteration to the next K changes a little everywhere, with the load, and much at a few contacts, which
+close or open. Neither needs new factors: with those of a matrix nearby, or of the symmetric part, as preconditioner P,
+:math:`P^{-1} K` is the identity but for something small and for something of low rank, and GMRES reduces the residual a
+hundredfold in some five iterations. Where it does not, K itself is factored.
 
 A fill-reducing order of the matrix itself sees single entries, and those that happen to vanish, as on a crystal, spoil
 it: the coordinates of one disk then no longer count as one. So the order of elimination is found on the graph of disks
@@ -26,7 +27,7 @@ from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from ..analysis.sparse_lu import Factors, SingularMatrixError, minimum_degree, symmetric_lu, uses_mumps
+from ..analysis.sparse_lu import Factors, SingularMatrixError, minimum_degree, symmetric_lu
 from ..analysis.stiffness import SIGNS
 
 Floats = NDArray[np.float64]
@@ -156,12 +157,12 @@ class SparseFactors:
     factors : Factors
         Of the matrix in this order.
     exact : bool
-        False if they are those of its symmetric part.
+        Whether they are of K itself, and not of its symmetric part.
     """
 
     coordinates: Indices
     factors: Factors
-    exact: bool = True
+    exact: bool
 
     def solve(self, force: Floats) -> Floats:
         """The solution on these coordinates, zero on the others, shape (3N,)."""
@@ -194,37 +195,36 @@ class SparseSolver:
         self._matrix = matrix[self._active][:, self._active]
         self._pairs = i, j
         self._factors: SparseFactors | None = None if nearby is None else nearby._factors
+        self._left = [False, True]  # of which matrix factors can still be made: K, its symmetric part
         self.own = False
 
     def solve(self, force: Floats) -> Floats | None:
         """The solution of K dq = F, shape (3N,); None if K is singular."""
         step = self._solved(force)
-        if step is None and not self.own:
+        while step is None and self._left:
             self._factors = None  # before the memory for others is taken
-            self._factors, self.own = self._factored(), True
+            self._factors, self.own = self._factored(symmetric=self._left.pop()), True
             step = self._solved(force)
-        return step if step is not None and np.all(np.isfinite(step)) else None
+        return step
 
     def _solved(self, force: Floats) -> Floats | None:
         """The solution with the factors at hand; None without any, and if they are of no use."""
         if self._factors is None:
             return None
-        if self.own and self._factors.exact:
-            return self._factors.solve(force)
-        return self._iterated(self._factors, force)
+        exact = self.own and self._factors.exact
+        step = self._factors.solve(force) if exact else self._iterated(self._factors, force)
+        return step if step is not None and np.all(np.isfinite(step)) else None
 
-    def _factored(self) -> SparseFactors | None:
+    def _factored(self, symmetric: bool) -> SparseFactors | None:
+        order = elimination_order(*self._pairs, len(self._stiffness) // 3, self._active)
+        matrix = 0.5 * (self._matrix + self._matrix.T) if symmetric else self._matrix
+        inside = csc_array(matrix[order][:, order])
         try:
-            if uses_mumps(len(self._active)):
-                # the symmetric part takes half of the time and of the memory, and GMRES knows the rest
-                half = csc_array(0.5 * (self._matrix + self._matrix.T))
-                return SparseFactors(self._active, symmetric_lu(half, symmetric=True), exact=False)
-            order = elimination_order(*self._pairs, len(self._stiffness) // 3, self._active)
-            # nearly symmetric: pivots on the diagonal where good
-            factors = symmetric_lu(csc_array(self._matrix[order][:, order]), ordered=True, pivoting=0.01)
+            # nearly symmetric: pivots of K itself on the diagonal where good
+            factors = symmetric_lu(inside, ordered=True, symmetric=symmetric, pivoting=0.0 if symmetric else 0.01)
         except SingularMatrixError:
             return None
-        return SparseFactors(self._active[order], factors)
+        return SparseFactors(self._active[order], factors, exact=not symmetric)
 
     def _iterated(self, nearby: SparseFactors, force: Floats) -> Floats | None:
         """The solution by GMRES; None if that takes too long."""

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.sparse import csc_array, diags_array, eye_array, kron
 
 from faultgouge.analysis import sparse_lu
@@ -36,10 +38,11 @@ def test_solutions(ordered, pivoting, backend):
     np.testing.assert_allclose(matrix @ step, force, rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("ordered", [False, True])
 @pytest.mark.parametrize("shift", [-20.0, -3.0, 0.1, 4.0, 20.0])
-def test_pivots_tell_how_many_eigenvalues_are_negative(shift, backend):
+def test_pivots_tell_how_many_eigenvalues_are_negative(shift, ordered, backend):
     matrix = lattice(10)
-    factors = symmetric_lu(csc_array(matrix - shift * eye_array(300)), symmetric=True)
+    factors = symmetric_lu(csc_array(matrix - shift * eye_array(300)), ordered=ordered, symmetric=True)
     assert factors.negative == np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < shift)
 
 
@@ -53,47 +56,76 @@ def test_solutions_of_the_transpose(unit, backend):
         np.testing.assert_allclose(turned @ factors.solve(right + 0 * unit, trans), right, rtol=0, atol=1e-11)
 
 
-def test_singular_matrix_is_said_to_be_one(backend):
+@pytest.mark.parametrize("ordered", [False, True])
+def test_singular_matrix_is_said_to_be_one(ordered, backend):
     matrix = lattice(12).tolil()
     matrix[7, :] = matrix[:, 7] = 0
     with pytest.raises(SingularMatrixError, match="432 rows"):
-        symmetric_lu(csc_array(matrix), symmetric=True)
+        symmetric_lu(csc_array(matrix), ordered=ordered, symmetric=True)
 
 
-@pytest.mark.parametrize("ordered", [False, True])
+def in_order_of_elimination(matrix):
+    """The same matrix in an order of minimum degree."""
+    size = matrix.shape[0]
+    order = np.argsort(minimum_degree(csc_array(matrix + 40 * eye_array(size))))
+    return csc_array(matrix[order][:, order])
+
+
+def dense(factors):
+    """L and D of factors."""
+    size = len(factors.pivot)
+    lower = csc_array((factors.value, factors.row, factors.start), shape=(size, size))
+    return lower.toarray() + np.eye(size), np.diag(factors.pivot)
+
+
 @pytest.mark.parametrize("shape", [(432,), (432, 1), (432, 5), (432, 6), (432, 13)])
-def test_compiled_solutions_are_those_of_superlu(shape, ordered, monkeypatch):
+def test_compiled_factors_solve_as_those_of_superlu_do(shape, monkeypatch):
     """An indefinite matrix, and numbers of right sides below, at and above the six that are solved for at a time."""
-    matrix = csc_array(lattice(12) - 3 * eye_array(432))
+    matrix = in_order_of_elimination(csc_array(lattice(12) - 3 * eye_array(432)))
     right = np.random.default_rng(2).standard_normal(shape)
-    compiled = symmetric_lu(matrix, ordered=ordered, symmetric=True)
+    compiled = symmetric_lu(matrix, ordered=True, symmetric=True)
     monkeypatch.setattr(sparse_lu, "library", lambda: None)
-    superlu = symmetric_lu(matrix, ordered=ordered, symmetric=True)
+    superlu = symmetric_lu(matrix, ordered=True, symmetric=True)
     assert (type(compiled), type(superlu)) == (SymmetricFactors, SuperLUFactors)
     assert compiled.negative == superlu.negative
-    expected, order = superlu.solve(right), np.argsort(superlu.lu.perm_c)
-    found = compiled.solve(right)
-    # the same L, but D L^T in place of U: both are off by u times the growth of the factors, 1e3 here, and the
-    # condition, 6e3, at the most
+    expected, found = superlu.solve(right), compiled.solve(right)
+    # both are off by u times the growth of the factors, 1e3 here, and the condition, 6e3, at the most
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
-    # |A x - b| <= 3 n u |L| |D| |L^T| |x| (Higham, Accuracy and Stability of Numerical Algorithms, 2002, theorem 9.4)
-    lower = abs(csc_array((compiled.value, compiled.row, compiled.start), shape=matrix.shape) + eye_array(432))
-    size = lower @ (np.abs(compiled.pivot) * (lower.T @ np.abs(np.reshape(found, (432, -1)))[order]).T).T
-    residual = np.abs(matrix @ found - right).reshape(432, -1)[order]
-    assert np.all(residual <= 3 * 432 * np.finfo(float).eps * size)
+    # |A x - b| <= 5 n u |L| |D| |L^T| |x| (Higham, Accuracy and Stability of Numerical Algorithms, 2002, theorems 9.3
+    # and 9.4, which count 3 n for L U)
+    lower, diagonal = np.abs(dense(compiled))
+    size = lower @ diagonal @ lower.T @ np.abs(np.reshape(found, (432, -1)))
+    assert np.all(np.abs(matrix @ found - right).reshape(432, -1) <= 5 * 432 * np.finfo(float).eps * size)
+
+
+@given(size=st.integers(1, 90), entries=st.floats(0, 1), seed=st.integers(0, 1000))
+def test_compiled_factors_are_those_of_the_matrix(size, entries, seed):
+    """Any pattern: full and empty, of one tree of elimination and of many, from one column to two panels of a front."""
+    rng = np.random.default_rng(seed)
+    some = np.where(rng.random((size, size)) < entries, rng.uniform(-1, 1, (size, size)), 0.0)
+    # diagonally dominant, of either sign
+    matrix = some + some.T + np.diag(rng.choice([-1, 1], size) * (2 * size + 1.0))
+    factors = symmetric_lu(csc_array(matrix), ordered=True, symmetric=True)
+    assert isinstance(factors, SymmetricFactors)
+    lower, diagonal = dense(factors)
+    # |L D L^T - A| <= n u |L| |D| |L^T| (Higham, theorem 9.3)
+    bound = (size + 2) * np.finfo(float).eps * np.abs(lower) @ np.abs(diagonal) @ np.abs(lower).T
+    assert np.all(np.abs(lower @ diagonal @ lower.T - matrix) <= 2 * bound)  # the product here is off by as much
+    assert factors.negative == np.count_nonzero(np.diag(matrix) < 0)
 
 
 def test_order_and_memory_of_right_sides_do_not_matter():
     matrix = csc_array(lattice(8) + 20 * eye_array(192))
     right = np.random.default_rng(3).standard_normal((192, 12))
-    solve = symmetric_lu(matrix, symmetric=True).solve
+    solve = symmetric_lu(matrix, ordered=True, symmetric=True).solve
     for other in (np.asfortranarray(right), np.repeat(right, 2, axis=1)[:, ::2]):
         assert np.array_equal(solve(other), solve(right))
 
 
 def test_pivots_off_the_diagonal_are_left_to_superlu():
     matrix = csc_array(np.array([[0.0, 1.0], [1.0, 0.0]]))
-    np.testing.assert_array_equal(symmetric_lu(matrix, symmetric=True).solve(np.array([2.0, 3.0])), [3.0, 2.0])
+    found = symmetric_lu(matrix, ordered=True, symmetric=True).solve(np.array([2.0, 3.0]))
+    np.testing.assert_array_equal(found, [3.0, 2.0])
 
 
 def test_mumps_is_left_alone_where_it_may_not_be_used(backend):
