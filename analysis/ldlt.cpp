@@ -173,26 +173,102 @@ private:
   }
 };
 
-// K right sides, in K of the columns of x.
-template <int K> INLINE void solve(const Columns &lower, const double *pivot, int64_t sides, double *x)
-{
-  double now[K];
-  for (int32_t j = 0; j < lower.size; ++j) {
-    for (int k = 0; k < K; ++k) now[k] = x[sides * j + k];
-    for (int64_t p = lower.start[j]; p < lower.start[j + 1]; ++p) {
-      const double entry = lower.value[p];
-      double *below = x + sides * lower.row[p];
-      for (int k = 0; k < K; ++k) below[k] -= entry * now[k];
+// As members: a template argument would lose the attributes.
+struct Alone {
+  typedef double Number;
+};
+struct Pair {
+  typedef double Number __attribute__((vector_size(16), aligned(8), may_alias));
+};
+
+// C neighbouring columns of one pattern, and S numbers, or pairs of numbers, of each row of x.
+template <int C, int S, class Kind> struct Run {
+  typedef typename Kind::Number Number;
+  const Columns &lower;
+  const double *pivot;
+  int64_t sides;
+  double *x;
+
+  INLINE Number *row(int64_t number) const { return reinterpret_cast<Number *>(x + number * sides); }
+  // The entry of L in one of the columns and in the row of a later one.
+  INLINE double inside(int32_t j, int column, int later) const
+  {
+    return lower.value[lower.start[j + column] + later - column - 1];
+  }
+  // The entries of L in a column below those of the other columns.
+  INLINE const double *below(int32_t j, int column) const
+  {
+    return lower.value + lower.start[j + column] + C - 1 - column;
+  }
+
+  INLINE void forward(int32_t j) const
+  {
+    Number now[C][S];
+    const double *entry[C];
+    for (int c = 0; c < C; ++c) {
+      entry[c] = below(j, c);
+      for (int s = 0; s < S; ++s) {
+        now[c][s] = row(j + c)[s];
+        for (int earlier = 0; earlier < c; ++earlier) now[c][s] -= inside(j, earlier, c) * now[earlier][s];
+        row(j + c)[s] = now[c][s];
+      }
+    }
+    const int32_t *place = lower.row + lower.start[j + C - 1], rows = lower.count(j + C - 1);
+    for (int32_t p = 0; p < rows; ++p) {
+      Number *to = row(place[p]);
+      for (int s = 0; s < S; ++s) {
+        Number sum = entry[0][p] * now[0][s];
+        for (int c = 1; c < C; ++c) sum += entry[c][p] * now[c][s];
+        to[s] -= sum;
+      }
     }
   }
-  for (int32_t j = lower.size - 1; j >= 0; --j) {
-    for (int k = 0; k < K; ++k) now[k] = x[sides * j + k] / pivot[j];
-    for (int64_t p = lower.start[j]; p < lower.start[j + 1]; ++p) {
-      const double entry = lower.value[p];
-      const double *below = x + sides * lower.row[p];
-      for (int k = 0; k < K; ++k) now[k] -= entry * below[k];
+
+  INLINE void backward(int32_t j) const
+  {
+    Number now[C][S];
+    const double *entry[C];
+    for (int c = 0; c < C; ++c) {
+      entry[c] = below(j, c);
+      for (int s = 0; s < S; ++s) now[c][s] = row(j + c)[s] / pivot[j + c];
     }
-    for (int k = 0; k < K; ++k) x[sides * j + k] = now[k];
+    const int32_t *place = lower.row + lower.start[j + C - 1], rows = lower.count(j + C - 1);
+    for (int32_t p = 0; p < rows; ++p) {
+      const Number *from = row(place[p]);
+      for (int s = 0; s < S; ++s) {
+        const Number known = from[s];
+        for (int c = 0; c < C; ++c) now[c][s] -= entry[c][p] * known;
+      }
+    }
+    for (int c = C - 1; c >= 0; --c)
+      for (int s = 0; s < S; ++s) {
+        for (int later = c + 1; later < C; ++later) now[c][s] -= inside(j, c, later) * now[later][s];
+        row(j + c)[s] = now[c][s];
+      }
+  }
+};
+
+// Whether the three columns from j on, such as the coordinates of a disk, have one pattern.
+INLINE bool triple(const Columns &lower, int32_t j)
+{
+  if (j < 0 || j + 3 > lower.size || lower.count(j) < 2) return false;
+  return lower.row[lower.start[j]] == j + 1 && lower.row[lower.start[j] + 1] == j + 2 &&
+         lower.count(j + 1) + 1 == lower.count(j) && lower.count(j + 2) + 2 == lower.count(j);
+}
+
+template <int S, class Kind> void solve(const Columns &lower, const double *pivot, int64_t sides, double *x)
+{
+  const Run<1, S, Kind> one = {lower, pivot, sides, x};
+  const Run<3, S, Kind> three = {lower, pivot, sides, x};
+  for (int32_t j = 0; j < lower.size;) {
+    const bool all = triple(lower, j);
+    all ? three.forward(j) : one.forward(j);
+    j += all ? 3 : 1;
+  }
+  for (int32_t j = lower.size; j > 0;) {
+    const bool all = triple(lower, j - 3);
+    j -= all ? 3 : 1;
+    all ? three.backward(j) : one.backward(j);
   }
 }
 
@@ -225,11 +301,11 @@ EXPORTED int32_t factor_ldlt(int32_t size, const int64_t *start, const int32_t *
 }
 
 // L D L^T x = b for several right sides: x, shape (n, sides) by rows, holds b before and x after.
-EXPORTED EVERY_MACHINE void solve_ldlt(int32_t size, const int64_t *start, const int32_t *row, const double *value,
-                                       const double *pivot, int32_t sides, double *x)
+EXPORTED void solve_ldlt(int32_t size, const int64_t *start, const int32_t *row, const double *value,
+                         const double *pivot, int32_t sides, double *x)
 {
   const Columns lower = {size, start, row, value};
   int32_t done = 0;
-  for (; done + 6 <= sides; done += 6) solve<6>(lower, pivot, sides, x + done);
-  for (; done < sides; ++done) solve<1>(lower, pivot, sides, x + done);
+  for (; done + 6 <= sides; done += 6) solve<3, Pair>(lower, pivot, sides, x + done);
+  for (; done < sides; ++done) solve<1, Alone>(lower, pivot, sides, x + done);
 }
