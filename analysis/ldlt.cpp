@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <new>
 #include <vector>
 
 #if defined(__x86_64__) && defined(__GLIBC__)    // where the loader chooses between versions
@@ -291,13 +292,17 @@ EXPORTED void elimination_tree(int32_t size, const int64_t *start, const int32_t
   }
 }
 
-// Fills L and D of a matrix; 0 if a pivot is zero.
+// Fills L and D of a matrix: 1 if it has, 0 if a pivot is zero, -1 without enough memory.
 EXPORTED int32_t factor_ldlt(int32_t size, const int64_t *start, const int32_t *row, const double *value,
                              const int32_t *parent, const int64_t *lower_start, int32_t *lower_row, double *lower_value,
                              double *pivot)
 {
   const Columns matrix = {size, start, row, value}, lower = {size, lower_start, lower_row, lower_value};
-  return Multifrontal(matrix, parent, lower, lower_row, lower_value, pivot).factor();
+  try {
+    return Multifrontal(matrix, parent, lower, lower_row, lower_value, pivot).factor();
+  } catch (const std::bad_alloc &) {
+    return -1;
+  }
 }
 
 // L D L^T x = b for several right sides: x, shape (n, sides) by rows, holds b before and x after.

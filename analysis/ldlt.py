@@ -1,10 +1,10 @@
-r"""Factors :math:`L D L^T` of a sparse symmetric matrix without pivoting, and solutions for several right sides at a time.
+r"""Factors :math:`L D L^T` of a sparse symmetric matrix without pivoting, and solutions for many right sides.
 
-SuperLU makes :math:`L` and :math:`U` of any matrix. The library of `ldlt.cpp`, built with the plugin, uses the symmetry:
-U is :math:`D L^T`. It takes a fifth of SuperLU's time for the factors and half for the solutions (29,000 coordinates of
-a packing). The method is multifrontal (Liu, SIAM Rev. 34, 82 (1992)). Neighbouring columns of one pattern, such as
-those of a disk, are eliminated together in a small dense matrix, their front. What the front leaves for other rows is
-added to the front of the parent in the elimination tree.
+SuperLU makes :math:`L` and :math:`U` of any matrix. The library of `ldlt.cpp`, built with the plugin, uses the
+symmetry: U is :math:`D L^T`. Factors and solutions take two fifths of SuperLU's time (docs/benchmarks.md). The method
+is multifrontal (Liu, SIAM Rev. 34, 82 (1992)). Neighbouring columns of one pattern, such as those of a disk, are
+eliminated together in a small dense matrix, their front. What the front leaves for other rows is added to the front
+of the parent in the elimination tree.
 """
 
 import ctypes
@@ -60,7 +60,13 @@ class SymmetricFactors:
 
     @classmethod
     def of(cls, matrix: csc_array, library: ctypes.CDLL) -> "SymmetricFactors | None":
-        """Those of a matrix that is symmetric to the bit, in the order of elimination; None if a pivot is zero."""
+        """Those of a matrix that is symmetric to the bit, in the order of elimination; None if a pivot is zero.
+
+        Raises
+        ------
+        MemoryError
+            If there is none for the fronts.
+        """
         size = matrix.shape[0]
         columns = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int32, copy=False)
         parent, below, start = np.empty(size, np.int32), np.empty(size, np.int64), np.zeros(size + 1, np.int64)
@@ -68,8 +74,10 @@ class SymmetricFactors:
         np.cumsum(below, out=start[1:])
         factors = cls(library, start, np.empty(start[-1], np.int32), np.empty(start[-1]), np.empty(size))
         entries = np.ascontiguousarray(matrix.data, dtype=np.float64)
-        good = library.factor_ldlt(size, *_places(*columns, entries, parent), *factors._parts)
-        return factors if good else None
+        made = library.factor_ldlt(size, *_places(*columns, entries, parent), *factors._parts)
+        if made < 0:
+            raise MemoryError(f"the fronts of a matrix of {size} rows")
+        return factors if made else None
 
     def solve(self, right: Any, trans: str = "N") -> Any:
         """The solution of A x = b, shape (n,) or (n, k); `trans` makes no difference."""

@@ -1,13 +1,15 @@
 """Sparse factors of large matrices with a symmetric pattern, such as K: the one place where they are made.
 
-**SuperLU**, which SciPy has. The order of elimination is one of minimum degree on the pattern, and pivots are taken
-from the diagonal. SuperLU would also join small columns of the elimination tree to supernodes and fill them with zeros;
-without that the factors of 300,000 coordinates have three quarters of the entries, and take half of the time. Of a
-symmetric matrix :mod:`~faultgouge.analysis.ldlt` makes one triangle alone.
+**Symmetric matrices** in an order of elimination are factored by :mod:`~faultgouge.analysis.ldlt`, without pivoting.
 
-**MUMPS**, if python-mumps is installed (``pip install faultgouge[mumps]``), from `MUMPS_FROM` coordinates on. It stores
-half of the factors of a symmetric matrix, and its pivots of two rows keep them accurate. It is not made for several
-threads at a time, so that threads that factor beside each other use SuperLU.
+**SuperLU**, which SciPy has, factors all others, and finds orders of elimination of minimum degree on the pattern. Its
+pivots are taken from the diagonal. SuperLU would also join small columns of the elimination tree to supernodes and fill
+them with zeros; without that the factors of 300,000 coordinates have three quarters of the entries, and take half of
+the time.
+
+**MUMPS**, if python-mumps is installed (``pip install faultgouge[mumps]``), from `MUMPS_FROM` coordinates on. Nested
+dissection gives its factors fewer entries, and pivots of two rows keep them accurate. It is not made for several
+threads at a time, so that threads that factor beside each other do not use it.
 """
 
 from dataclasses import dataclass
@@ -35,8 +37,8 @@ class SingularMatrixError(FaultgougeError):
 
 SYMMETRIC: dict[str, Any] = {"relax": 1, "options": {"SymmetricMode": True}}
 
-MUMPS_FROM = 60_000
-"""Coordinates from which on MUMPS is used: at 30,000 it gains nothing (docs/benchmarks.md)."""
+MUMPS_FROM = 1_000_000
+"""Coordinates from which on MUMPS is used: it takes as long there, and half of the memory (docs/benchmarks.md)."""
 
 
 class Factors(Protocol):

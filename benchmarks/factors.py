@@ -1,4 +1,4 @@
-"""Sparse factors of crystals by SuperLU and by MUMPS: of a shifted symmetric operator, and an increment of the load.
+"""Sparse factors of crystals, ours, by SuperLU and by MUMPS: of a shifted symmetric operator, and in an increment.
 
     python benchmarks/factors.py COLUMNS
 
@@ -64,8 +64,9 @@ def main() -> None:
     columns = int(sys.argv[1])
     packing = crystal(columns, columns)
     matrix = shifted(packing)
-    for name, smallest in (("MUMPS", 0), ("SuperLU", matrix.shape[0] + 1)):
-        sparse_lu.MUMPS_FROM = smallest
+    own, never = sparse_lu.library, matrix.shape[0] + 1
+    for name, smallest, library in (("L D L^T", never, own), ("SuperLU", never, lambda: None), ("MUMPS", 0, own)):
+        sparse_lu.MUMPS_FROM, sparse_lu.library = smallest, library
         print(f"{name}: {len(packing)} disks, {factors(matrix, smallest == 0)}; {increment(packing)}", flush=True)
 
 

@@ -3,7 +3,7 @@
 Contacts below the rounding floor are left out, since their stiffness is noise, and so are the coordinates that nothing
 holds then. A contact that has closed since the displacement began has no slip, however long the displacement: its
 tangential force is no function of it, and has no part in K. A small matrix is a band and goes to LAPACK, a large one is
-sparse and goes to SuperLU.
+sparse (:mod:`~faultgouge.pywrap.linear`).
 """
 
 from typing import NamedTuple

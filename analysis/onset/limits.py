@@ -83,8 +83,8 @@ class Limits:
     coarse: int = 960
     """Eigenvalues between two places at which they are counted; shifts are interpolated in between."""
     block: int = 6
-    """Vectors that are solved for at a time: 1.1 ms each at 30,000 coordinates, against 5 ms one by one. Larger blocks
-    need more vectors for the same eigenvalues: 294 for a slice, with blocks of eight 304."""
+    """Vectors that are solved for at a time: 0.7 ms each at 30,000 coordinates, against 2.6 ms one by one. Larger
+    blocks need more vectors for the same eigenvalues: 288 for a slice, with blocks of eight 304."""
     first_look: int = 48
     """Blocks of a Krylov space before its eigenvalues are looked at: enough for most slices, as a look costs two
     blocks."""
