@@ -104,7 +104,7 @@ private:
   const Columns &lower;
   int32_t *row;
   double *value, *pivot;
-  std::vector<int32_t> rows, place, seen;     // of the front, in order; where they are in it; who has seen them
+  std::vector<int32_t> rows, place, seen;     // of the front; where they are in it; which front saw them last
   std::vector<int32_t> child, sibling;        // last columns of supernodes
   std::vector<std::vector<double>> update;    // by last column: the lower half, by columns
   std::vector<double> front;                  // by columns; its upper half is not used
