@@ -149,7 +149,9 @@ def recorded_ramp(scene: Scene, mu: float, path: Path) -> OnsetRun:
     one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
     path.unlink(missing_ok=True)
     with Record(path, one) as record:
-        return onset_run(one, mu, reached=record.append, near_onset=NEARBY * _last_load(scene))
+        run = onset_run(one, mu, reached=record.append, near_onset=NEARBY * _last_load(scene))
+        record.finish()
+    return run
 
 
 def _last_load(scene: Scene) -> float:

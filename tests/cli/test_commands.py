@@ -1,6 +1,7 @@
 """The command line as a user types it: results, errors in one sentence, exit codes."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import RunFile, read_dump, spectrum
+from faultgouge.pywrap import Record, Scene, settle
 from faultgouge.pywrap.decks import DECKS
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
@@ -77,6 +79,21 @@ def test_a_ramp_that_was_cut_off_goes_on(faultgouge, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
     assert faultgouge("ramp", "scene.toml", "-o", "parts.h5").returncode == 0
     assert_same_datasets(tmp_path / "whole.h5", tmp_path / "parts.h5")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("loads", [(0.0,), (0.0, 1e-3)], ids=["settled", "with a ramp"])
+def test_settle_finishes_a_settling_and_no_ramp(faultgouge, tmp_path, loads):
+    scene = Scene.from_toml(tmp_path / "scene.toml")
+    settled = settle(scene)
+    with Record(tmp_path / "run.h5", scene) as record:  # as a kill between the packing and the end leaves it
+        for fx in loads:
+            record.append(replace(settled, packing=replace(settled.packing, fx=fx)))
+    done = faultgouge("settle", "scene.toml")
+    assert done.returncode == 0, done.stderr
+    with RunFile(tmp_path / "run.h5") as file:
+        assert len(file) == len(loads)
+        assert file.complete == (loads == (0.0,))
 
 
 @pytest.mark.slow

@@ -57,6 +57,10 @@ def test_reproduce(faultgouge, tmp_path):
     for name in (*FIGURES, "response"):
         for suffix in (".png", ".svg"):
             assert (results / (name + suffix)).stat().st_size > 5_000
+    assert list(results.rglob("*.h5"))
+    for path in results.rglob("*.h5"):
+        with h5py.File(path) as file:
+            assert file.attrs["complete"]
     report = (results / "report.md").read_text()
     for assumption in ("side boundaries", "upper layer", "inertia", "time step", "f_min", "settling"):
         assert assumption in report

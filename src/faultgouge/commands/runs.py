@@ -25,14 +25,13 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
 
     wanted = read_scene(scene, "settle")
     with Record(output, wanted, saved=keeps) as record:
-        new = record.last is None
-        packing = _settled(wanted, record).packing
-        if new:
+        last = _settled(wanted, record)
+        if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
-    assert record.last is not None
+    packing = last.packing
     say(
         f"{len(packing)} disks, {len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers; "
-        f"residual {record.last.residual:.2g} (rounding floor {record.last.floor:.2g}); written to {output}"
+        f"residual {last.residual:.2g} (rounding floor {last.floor:.2g}); written to {output}"
     )
 
 
