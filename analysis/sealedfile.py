@@ -101,13 +101,11 @@ class SealedFile:
         """
         if not self._writable:
             raise ValueError(f"{self.path} is open for reading alone.")
-        outer, self._sound = self._sound, False
+        outer, self._sound, self._unsaved = self._sound, False, True
         yield
         self._sound = outer
-        if outer:
-            self._unsaved = True
-            if monotonic() >= self._next_save:
-                self.save()
+        if outer and monotonic() >= self._next_save:
+            self.save()
 
     def put_checkpoint(self, **arrays: NDArray | int) -> None:
         """Keep the state of a run that is under way, in place of the last one; none for a run that is over."""

@@ -142,8 +142,10 @@ def _hand_on(child: int, number: int) -> NoReturn:
             break
         time.sleep(0.01)
     else:
-        if sys.stderr.isatty() and not _shared[CLOSED]:
-            sys.stderr.write("\x1b[?25h\n")  # the cursor, which a progress bar has hidden
+        if not _shared[CLOSED]:
+            os.kill(child, signal.SIGSTOP)  # so that it writes no more than is said to be kept
+            if sys.stderr.isatty():
+                sys.stderr.write("\x1b[?25h\n")  # the cursor, which a progress bar has hidden
     _interrupted(number, begin)
 
 
