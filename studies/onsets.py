@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +65,7 @@ def onset_run(
     near_onset: NDArray[np.float64] | None = None,
     modes: tuple[int, int] | None = None,
     watch: Watch = lambda says: None,
+    folder: Path | None = None,
 ) -> OnsetRun:
     """Ramp a scene for one friction coefficient and find the onset.
 
@@ -85,6 +87,9 @@ def onset_run(
         Search these modes alone, see :func:`~faultgouge.analysis.find_onset`.
     watch : callable, optional
         Told in words what is under way in a large packing.
+    folder : Path, optional
+        Where the search of a large packing leaves what it finds, and goes on from, see
+        :func:`~faultgouge.analysis.find_onset`.
 
     Raises
     ------
@@ -111,7 +116,7 @@ def onset_run(
             forces = np.array([each.fx for each in path.kept])
         flows = len(forces) < len(wanted)
         try:
-            onset = find_onset(path, forces, modes=modes, watch=watch, ranks=searching())
+            onset = find_onset(path, forces, modes=modes, watch=watch, ranks=searching(), folder=folder)
         except (OnsetError, NoEquilibriumError) as error:
             if not flows and isinstance(error, OnsetError):
                 raise

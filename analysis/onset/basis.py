@@ -7,7 +7,7 @@ and never one of all modes. A *cluster* of neighbouring modes, with all others i
 up to the third order of the typical coupling over the distance of the modes outside.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -18,6 +18,7 @@ from scipy.sparse import csc_array, csr_array
 
 from ..packing import Floats, Indices
 from ..spectrum import active_coordinates
+from .found import Border
 from .limits import LIMITS, Limits
 from .ranks import Ranks
 
@@ -95,6 +96,8 @@ class Basis:
         Orthonormal eigenvectors in columns.
     own : slice
         The modes that belong to this basis, and to that of no other slice; the rest are margins.
+    first : int
+        Number in the whole spectrum of the first of `values`.
     """
 
     size: int
@@ -102,6 +105,7 @@ class Basis:
     values: Floats = field(repr=False)
     vectors: Floats = field(repr=False)
     own: slice
+    first: int = 0
     limits: Limits = field(default=LIMITS, repr=False)
 
     @classmethod
@@ -112,7 +116,12 @@ class Basis:
         dense += dense.T.copy()
         dense *= 0.5
         values, vectors = eigh(dense, driver="evd", overwrite_a=True, check_finite=False)
-        return cls(matrix.shape[0], active, values, vectors, slice(0, len(values)), limits)
+        return cls(matrix.shape[0], active, values, vectors, slice(0, len(values)), limits=limits)
+
+    @property
+    def border(self) -> Border:
+        """What the bases of neighbouring slices must agree on."""
+        return Border.of(self.first, self.values, self.own)
 
     @property
     def clusters(self) -> list[Cluster]:
@@ -195,12 +204,15 @@ class Bases:
         margins = 2 * (limits.margin + limits.beyond) * max(1, round((stop - first) / limits.own))
         return (stop - first + margins) * matrix.shape[0] <= limits.kept
 
-    def at(self, matrix: csr_array) -> Iterable[tuple[Basis, Levels]]:
-        """The bases, those of an earlier load as long as all ranks' serve, and the operator in them."""
-        known = self._serving(matrix)
-        if known is not None:
-            return known
-        bases: Iterable[Basis] = self._made(matrix)
+    def at(self, matrix: csr_array, known: Sequence[Border] = ()) -> Iterable[tuple[Basis, Levels]]:
+        """The bases, those of an earlier load as long as all ranks' serve, and the operator in them.
+
+        Where they are not kept, those of the slices that are `known` are left out.
+        """
+        serving = self._serving(matrix)
+        if serving is not None:
+            return serving
+        bases: Iterable[Basis] = self._made(matrix, known)
         if self.keeps(matrix):
             self._kept = []  # its memory is free before that for the next ones is taken
             bases = self._kept = list(bases)
@@ -214,16 +226,16 @@ class Bases:
         mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
         return known if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing else None
 
-    def _made(self, matrix: csr_array) -> Iterator[Basis]:
+    def _made(self, matrix: csr_array, known: Sequence[Border]) -> Iterator[Basis]:
         """The bases of slices of the spectrum; a small operator has one, which the first rank makes."""
         limits, active = self.limits, active_coordinates(matrix)
         if len(active) <= limits.one_basis:
-            if self.ranks.rank == 0:
+            if self.ranks.rank == 0 and not known:
                 yield replace(Basis.of(matrix, limits), own=slice(*self.range(matrix)))
             return
         from .slicing import slices  # with libraries that nothing else needs
 
         inner = matrix[active][:, active]
         symmetric, margin = csc_array(0.5 * (inner + inner.T)), limits.margin + limits.beyond
-        for part in slices(symmetric, margin, self.range(matrix), limits, ranks=self.ranks):
-            yield Basis(matrix.shape[0], active, part.values, part.vectors, part.own, limits)
+        for part in slices(symmetric, margin, self.range(matrix), limits, ranks=self.ranks, known=known):
+            yield Basis(matrix.shape[0], active, part.values, part.vectors, part.own, part.first, limits)

@@ -49,11 +49,13 @@ class Ranks:
         Raises
         ------
         FaultgougeError
-            The first one that a rank has met, on all ranks.
+            The first one that a rank has met, on all ranks; at once one of those that end all ranks (`one_rank`).
         """
         try:
             mine: tuple[Mine | None, FaultgougeError | None] = work(), None
         except FaultgougeError as error:
+            if error.one_rank:
+                raise
             mine = None, error
         everyone: Sequence[Any] = self.gather(mine)
         for _, met in everyone:

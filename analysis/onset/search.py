@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -115,6 +116,7 @@ def find_onset(
     modes: tuple[int, int] | None = None,
     watch: Watch = lambda says: None,
     ranks: Ranks = ALONE,
+    folder: Path | None = None,
     limits: Limits = LIMITS,
 ) -> Onset:
     """The windows of complex eigenvalues between the smallest and the largest load.
@@ -140,6 +142,9 @@ def find_onset(
     ranks : Ranks, optional
         The processes that search a large packing together. Each makes the same call, and is told the same by
         `equilibrium`.
+    folder : Path, optional
+        Where a search whose bases are too large to be kept in memory leaves what it finds, slice by slice. A search of
+        the same loads, operators and modes goes on from there, to the bit. All ranks write to it.
 
     Raises
     ------
@@ -147,6 +152,8 @@ def find_onset(
         If all eigenvalues are real at every load.
     LostPairError, SliceError
         Of a large packing, if a pair cannot be followed, or a part of the spectrum is not found.
+    OutputError, DamagedSliceError
+        If a file in the folder cannot be written, or read.
     ValueError
         If the loads are not at least two increasing numbers, or the packing has none of the modes.
     """
@@ -164,7 +171,7 @@ def find_onset(
     if complete:
         windows, doubtful = complex_windows(operator, loads, narrowest=narrowest, limits=limits), ()
     else:
-        first, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks)
+        first, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks, folder)
         windows = (first,) if first else ()
     if not windows:
         raise OnsetError.among(modes, float(loads[-1]), doubtful)

@@ -17,16 +17,18 @@ its kind, so a pair is followed from inside of its window to the edge.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
+from pathlib import Path
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing import Floats
 from .basis import Bases, Basis, Cluster, Levels, width_and_mixing
 from .dense import all_windows
 from .edge import Edge, Family, LostPairError, Window, edge_from_inside, leads_back
+from .found import Border, Candidate, Found, keep, kept, pass_folder
 from .modes import Place
 from .pair import Pair, continued, dip_between
 from .ranks import ALONE, Ranks
@@ -42,16 +44,6 @@ Increments = tuple[tuple[float, float], ...]
 """From load to load."""
 
 
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """The planes of a pair that turns complex in its cluster: from where on, and a load at which it still is."""
-
-    onset: float
-    inside: float
-    right: Floats
-    left: Floats
-
-
 class DoubtError(FaultgougeError):
     """The clusters announce what the operator does not have."""
 
@@ -59,8 +51,11 @@ class DoubtError(FaultgougeError):
 class Sliced:
     """The oracle; its places are operators, and what it is sure of is a window."""
 
-    def __init__(self, family: Family, modes: tuple[int, int] | None, watch: Watch, ranks: Ranks) -> None:
+    def __init__(
+        self, family: Family, modes: tuple[int, int] | None, watch: Watch, ranks: Ranks, folder: Path | None
+    ) -> None:
         self.family, self.limits, self.watch, self.ranks = family, family.limits, watch, ranks
+        self.folder = folder
         self.bases = Bases(modes, ranks, family.limits)
         self.first: Window | None = None
         self.doubtful: list[tuple[float, float]] = []
@@ -80,29 +75,49 @@ class Sliced:
 
     def candidates(self, places: Sequence[Place], depth: int) -> list[list[Candidate]]:
         """The pairs that turn complex in their clusters on each increment, by increasing onset: those of all ranks."""
-        everyone = self.ranks.together(lambda: self._found(places))
-        merged = ([candidate for each in one for candidate in each] for one in zip(*everyone, strict=True))
-        return [sorted(each, key=lambda candidate: candidate.onset) for each in merged]
+        folder = self._pass_folder(places)
+        known = self.ranks.together(lambda: kept(folder) if folder and self.ranks.rank == 0 else [])[0]
+        fresh = self.ranks.together(lambda: self._found(places, [each.border for each in known], folder))
+        found = sorted(chain(known, *fresh), key=lambda each: each.border.modes)
+        increments = zip(*(each.candidates for each in found), strict=True)
+        return [sorted(chain(*each), key=lambda candidate: candidate.onset) for each in increments]
 
-    def _found(self, places: Sequence[Place]) -> list[list[Candidate]]:
-        """The same from this rank's bases, in the order of the spectrum."""
-        found: list[list[Candidate]] = [[] for _ in places[1:]]
+    def _pass_folder(self, places: Sequence[Place]) -> Path | None:
+        """Where what is found is kept; nowhere if bases are, which the slices beyond then need."""
+        matrix = places[0].matrix
+        if self.folder is None or self.bases.keeps(matrix):
+            return None
+        return pass_folder(self.folder, places, self.bases.range(matrix), self.limits)
+
+    def _found(self, places: Sequence[Place], known: Sequence[Border], folder: Path | None) -> list[Found]:
+        """What this rank's slices have, without those that are known."""
+        found: list[Found] = []
         first, stop = self.bases.range(places[0].matrix)
-        done, wanted = 0, -(-(stop - first) // self.ranks.size)
+        before = sum(each.modes[1] - each.modes[0] for each in known)
+        done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
         failure: FaultgougeError | None = None
         increments = [(here.fx, there.fx, there.matrix - here.matrix) for here, there in pairwise(places)]
-        for basis, levels in self.bases.at(places[0].matrix):
+        for basis, levels in self.bases.at(places[0].matrix, known):
             done += basis.own.stop - basis.own.start
-            self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {done} of {wanted} modes")
+            self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {min(done, wanted)} of {wanted} modes")
             try:
-                for announced, (here, there, change) in zip(found, increments, strict=True):
-                    before, levels = levels, basis.change(levels, change)
-                    announced.extend(self._announced(basis, (here, before), (there, levels)))
+                found.append(Found(basis.border, list(self._along(basis, levels, increments))))
             except FaultgougeError as error:
                 failure = failure or error  # it waits: the ranks meet at the end of their bases
+                continue
+            if folder is not None:
+                keep(folder, found[-1])
         if failure is not None:
             raise failure
         return found
+
+    def _along(
+        self, basis: Basis, levels: Levels, increments: Sequence[tuple[float, float, csr_array]]
+    ) -> Iterator[list[Candidate]]:
+        """The pairs of a basis that turn complex in their clusters, increment by increment."""
+        for here, there, change in increments:
+            before, levels = levels, basis.change(levels, change)
+            yield list(self._announced(basis, (here, before), (there, levels)))
 
     def _announced(self, basis: Basis, here: At, there: At) -> Iterator[Candidate]:
         """The pairs of a basis that turn complex in their clusters."""
@@ -255,6 +270,7 @@ def first_window(
     modes: tuple[int, int] | None = None,
     watch: Watch = lambda says: None,
     ranks: Ranks = ALONE,
+    folder: Path | None = None,
 ) -> tuple[Window | None, Increments]:
     """The first window of a family of large matrices, if there is one, and the increments before it that are in doubt.
 
@@ -263,7 +279,7 @@ def first_window(
     are not asked for, except those of `Limits.ahead` increments; a NoEquilibriumError of the operator at one of them is
     raised if no window has been found before.
     """
-    oracle = Sliced(family, modes, watch, ranks)
+    oracle = Sliced(family, modes, watch, ranks, folder)
     here = family.at(loads[0])
     ahead = 1 if oracle.bases.keeps(here.matrix) else family.limits.ahead
     done = 1

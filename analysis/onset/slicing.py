@@ -11,15 +11,16 @@ serves the slice, and slices know nothing of each other, so that threads share t
 are as many as there are eigenvalues below :math:`\sigma`. So every eigenvalue of a slice has its number in the whole
 spectrum. Where two slices meet both must give the same eigenvalue the same number.
 
-Several ranks count together, and each finds a run of neighbouring slices (:mod:`~faultgouge.analysis.onset.ranks`).
+Several ranks count together, and each finds a run of neighbouring slices (:mod:`~faultgouge.analysis.onset.ranks`) of
+those that no earlier search has left (:mod:`~faultgouge.analysis.onset.found`).
 """
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from scipy.linalg import eigh, qr
@@ -30,6 +31,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import FaultgougeError
 from ..packing import Floats, Indices
 from ..sparse_lu import minimum_degree, symmetric_lu
+from .found import Border
 from .limits import LIMITS, Limits
 from .ranks import ALONE, Ranks
 
@@ -53,15 +55,17 @@ class Slice:
         Orthonormal eigenvectors in columns.
     own : slice
         Which of the M belong to this slice and to no other.
-    spacing : float
-        Mean distance of these and of the next ones on either side.
     """
 
     first: int
     values: Floats
     vectors: Floats
     own: slice
-    spacing: float
+
+    @property
+    def border(self) -> Border:
+        """What its neighbours must agree on."""
+        return Border.of(self.first, self.values, self.own)
 
 
 Solve = Callable[[Floats], Floats]
@@ -87,6 +91,7 @@ def slices(
     limits: Limits = LIMITS,
     factorise: Callable[[csc_array, float], Factored] | None = None,
     ranks: Ranks = ALONE,
+    known: Sequence[Border] = (),
 ) -> Iterator[Slice]:
     """Eigenvalues and eigenvectors of a symmetric matrix, slice by slice in the order of the spectrum.
 
@@ -103,6 +108,8 @@ def slices(
     ranks : Ranks
         Who shares the slices; those of this rank are found. Its threads are also the slices at the most that are under
         way beyond the one that is asked for. All ranks must come to the end of their slices.
+    known : sequence of Border
+        Slices that need not be found again.
 
     Raises
     ------
@@ -110,24 +117,26 @@ def slices(
         If eigenvalues do not converge, or neighbouring slices disagree.
     """
     spectrum = _Spectrum(matrix, limits, factorise or partial(factored, mumps=ranks.workers == 1), ranks)
-    ends: list[Slice] = []
+    mine: list[Border] = []
     failure: FaultgougeError | None = None
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(ranks.workers) as pool:
         shifts = spectrum.shifts(pool, *(modes or (0, matrix.shape[0])))
+        found = {each.modes for each in known}
+        wanted = [each for each in shifts if each[1] not in found]
         try:
-            for part in _in_turn(pool, ranks.workers, spectrum, shifts[ranks.part(len(shifts))], margin):
-                ends = [*ends[:1], replace(part, vectors=np.empty((0, 0)))]
+            for part in _in_turn(pool, ranks.workers, spectrum, wanted[ranks.part(len(wanted))], margin):
+                mine.append(part.border)
                 yield part
         except FaultgougeError as error:
             failure = error
 
-    def borders() -> list[Slice]:
+    def borders() -> list[Border]:
         if failure is not None:
             raise failure
-        return ends
+        return mine
 
-    for before, after in pairwise([each for each in ranks.together(borders) if each]):
-        _compare(before[-1], after[0])
+    for before, after in pairwise(sorted(chain(known, *ranks.together(borders)))):
+        _compare(before, after)
 
 
 Shift = tuple[float, tuple[int, int]]
@@ -137,28 +146,21 @@ Shift = tuple[float, tuple[int, int]]
 def _in_turn(
     pool: ThreadPoolExecutor, workers: int, spectrum: "_Spectrum", shifts: Sequence[Shift], margin: int
 ) -> Iterator[Slice]:
-    """Neighbouring slices in their order, each compared with the one before it."""
+    """Slices in their order."""
     waiting: deque[Future[Slice]] = deque()
-    before: Slice | None = None
     for place in range(len(shifts) + workers):
         if place < len(shifts):
             waiting.append(pool.submit(spectrum.slice_about, *shifts[place], margin))
         if place >= workers and waiting:
-            after = waiting.popleft().result()
-            if before is not None:
-                _compare(before, after)
-            yield after
-            before = after
+            yield waiting.popleft().result()
 
 
-def _compare(before: Slice, after: Slice) -> None:
+def _compare(before: Border, after: Border) -> None:
     """Raise an error if the second slice gives its first eigenvalue another number than the slice before it."""
-    number = after.first + after.own.start
-    here, there = after.values[after.own.start], before.values[number - before.first]
-    if abs(here - there) > 0.01 * after.spacing:
+    if not abs(after.first - before.beyond) <= 0.01 * after.spacing:
         raise SliceError(
-            f"the eigenvalue of number {number} is {there:.10g} from one shift and {here:.10g} from the next: "
-            "one is missing in between"
+            f"the eigenvalue of number {after.modes[0]} is {before.beyond:.10g} from one shift and {after.first:.10g} "
+            "from the next: one is missing in between"
         )
 
 
@@ -240,7 +242,6 @@ class _Spectrum:
             values=values[kept],
             vectors=found,
             own=slice(start, start + own[1] - own[0]),
-            spacing=float(spacing),
         )
         self.compare(part)
         return part
@@ -255,7 +256,7 @@ class _Spectrum:
         for rows in self.limits.chunks(len(vectors)):
             quotients += np.einsum("ij,ij->j", vectors[rows], self.given[rows] @ vectors)
         worst = int(np.argmax(np.abs(quotients - values)))
-        if abs(quotients[worst] - values[worst]) > self.limits.accurate * part.spacing:
+        if abs(quotients[worst] - values[worst]) > self.limits.accurate * part.border.spacing:
             number = part.first + part.own.start + worst
             raise SliceError(
                 f"the eigenvalue of number {number} is {values[worst]:.10g} from the factors and "

@@ -1,6 +1,7 @@
 """Ctrl-C and SIGTERM: one sentence, 130 or 143, and soon, whatever the command is doing."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -161,6 +162,48 @@ def test_what_is_kept_is_said(tmp_path, command, says):
     *ahead, last = errors.strip().splitlines()
     assert last.startswith(f"Error: interrupted: {says}")
     assert not any(line.startswith(("Error", "Traceback")) for line in ahead)
+
+
+LARGE = """
+[packing]
+disks = 5000
+seed = 1
+width = 84.3
+[law]
+kn = 2e5
+[load]
+fy = 3.0
+[ramp]
+step = 4e-4
+until = 0.02
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_a_long_search_goes_on_to_the_bit(tmp_path):
+    """Killed, interrupted and continued on one process; and in one piece."""
+    (tmp_path / "scene.toml").write_text(LARGE)
+    subprocess.run([BIN / "faultgouge", "settle", "scene.toml"], cwd=tmp_path, check=True, capture_output=True)
+    settled = re.sub("disks.*\nseed.*\nwidth.*", 'file = "run.h5"', LARGE)
+    (tmp_path / "settled.toml").write_text(settled)
+    command = [BIN / "faultgouge", "onset", "settled.toml", "-o", "onset.json"]
+    slices = tmp_path / "onset.json.slices"
+
+    def known():
+        return len(list(slices.glob("*/*.npz")))
+
+    returned, *_ = interrupted(tmp_path, command, signal.SIGKILL, lambda: known() >= 10, group=True)
+    assert returned == -signal.SIGKILL
+    first = known()
+    returned, errors, _ = interrupted(tmp_path, command, signal.SIGINT, lambda: known() >= first + 10)
+    assert returned == 130
+    says = "Error: interrupted: onset.json.slices has what was found so far; the same command goes on from there."
+    assert errors.splitlines()[-1] == says
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    assert not slices.exists()
+    subprocess.run([*command[:-1], "whole.json"], cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "onset.json").read_bytes() == (tmp_path / "whole.json").read_bytes()
 
 
 IN_A_LIBRARY = """

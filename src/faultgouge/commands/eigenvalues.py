@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..guard import keeps
 from ..ranks import is_root
 from .terminal import AsJson, ScenePath, print_json, read_scene, say, status, stored_packing
 
@@ -110,7 +112,10 @@ def _gain_of(packing: Packing) -> dict[str, Any] | None:
 @app.command(epilog="Example: faultgouge onset paper.toml --json")
 def onset(
     scene: ScenePath,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Also write the JSON to this file.")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Also write the JSON to this file; a long search that is cut off goes on."),
+    ] = None,
     modes: Annotated[
         str | None,
         typer.Option(
@@ -126,32 +131,42 @@ def onset(
     With a section [damping]: the windows in which some motion grows in spite of
     the dissipation, or because of it, and beside them the undamped onset.
     """
-    from faultgouge.analysis.digits import with_uncertainty
     from faultgouge.analysis.wholefile import check_folder, write_text
-    from faultgouge.studies.onsets import onset_run
 
     wanted, part = read_scene(scene, "onset"), None if modes is None else _modes(modes)
+    if part is not None and wanted.damping is not None:
+        raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if output:
         check_folder(output)
-    found: list[dict[str, Any]] = []
-    if wanted.damping is not None:
-        if part is not None:
-            raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
-        found = [_damped_onset(wanted, mu) for mu in wanted.law.mus]
-    for mu in wanted.law.mus if not found else ():
-        with status(f"mu = {mu:g}") as show:
-            run = onset_run(wanted, mu, modes=part, watch=partial(_under_way, show, f"mu = {mu:g}"))
-        real = _in_si(wanted, [(each.fx_onset, abs(each.eigenvalue) ** 0.5) for each in run.onset.windows])
-        found.append({"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond} | real)
-        among = "" if part is None else f" among the modes {part[0]}:{part[1]}"
-        say(f"mu = {mu:g}: F_x^c = {with_uncertainty(run.onset.fx_c, run.onset.error)}{among}")
-        _show_windows(run.onset.windows, real.get("si", []))
-        _say_doubtful(run.onset.doubtful)
+    of_a_mu = _damped_onset if wanted.damping is not None else partial(_undamped_onset, part, _search_folder(output))
+    found = [of_a_mu(wanted, mu) for mu in wanted.law.mus]
     result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
     if output and is_root():
         write_text(output, json.dumps(result, indent=1) + "\n")
+        shutil.rmtree(f"{output}.slices", ignore_errors=True)
     if as_json:
         print_json(result)
+
+
+def _search_folder(output: Path | None) -> Path | None:
+    """Where a long search leaves what it finds; nowhere if its result goes to no file, or to a device."""
+    return None if output is None or (output.exists() and not output.is_file()) else Path(f"{output}.slices")
+
+
+def _undamped_onset(modes: tuple[int, int] | None, folder: Path | None, scene: Scene, mu: float) -> dict[str, Any]:
+    """The onset of a scene, as its JSON; and what a user reads of it."""
+    from faultgouge.analysis.digits import with_uncertainty
+    from faultgouge.studies.onsets import onset_run
+
+    with status(f"mu = {mu:g}") as show:
+        watch = partial(_under_way, show, f"mu = {mu:g}", folder=folder)
+        run = onset_run(scene, mu, modes=modes, watch=watch, folder=folder)
+    real = _in_si(scene, [(each.fx_onset, abs(each.eigenvalue) ** 0.5) for each in run.onset.windows])
+    among = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
+    say(f"mu = {mu:g}: F_x^c = {with_uncertainty(run.onset.fx_c, run.onset.error)}{among}")
+    _show_windows(run.onset.windows, real.get("si", []))
+    _say_doubtful(run.onset.doubtful)
+    return {"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond} | real
 
 
 def _damped_onset(scene: Scene, mu: float) -> dict[str, Any]:
@@ -216,8 +231,10 @@ def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]]) -> 
     Console(stderr=True, highlight=False).print(table)
 
 
-def _under_way(show: Callable[[str], None], what: str, now: str) -> None:
+def _under_way(show: Callable[[str], None], what: str, now: str, folder: Path | None = None) -> None:
     show(f"{what}: {now}")
+    if folder is not None and folder.is_dir():
+        keeps(f"{folder} has what was found so far; the same command goes on from there")
 
 
 def _modes(text: str) -> tuple[int, int]:

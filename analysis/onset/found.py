@@ -1,0 +1,121 @@
+"""What a search finds in the slices of a spectrum, and the folder that keeps it.
+
+A *pass* goes through all slices of the spectrum, for a few neighbouring loads. A slice of 100,000 disks takes 13 s, and
+leaves little: the pairs that may turn complex, and the eigenvalues that neighbouring slices must agree on. So each
+slice has a file, which the rank that has searched the slice writes in one step; and a search that was cut off goes on.
+
+The folder of a pass is named by a checksum of the loads, of the operators there, of the modes and of the limits. What
+was found for another packing is not taken for this one.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+
+from ..errors import FaultgougeError
+from ..packing import Floats
+from ..wholefile import make_folder, write_whole
+from .limits import Limits
+from .modes import Place
+
+
+class DamagedSliceError(FaultgougeError):
+    """The file of a slice cannot be read: one sentence."""
+
+
+class Border(NamedTuple):
+    """What neighbouring slices must agree on.
+
+    Attributes
+    ----------
+    modes : tuple of (int, int)
+        Numbers in the whole spectrum of the slice's first eigenvalue and of the first one beyond.
+    first, beyond : float
+        These eigenvalues; nan beyond the end of the spectrum.
+    spacing : float
+        Mean distance of the slice's eigenvalues and of the next ones on either side.
+    """
+
+    modes: tuple[int, int]
+    first: float
+    beyond: float
+    spacing: float
+
+    @classmethod
+    def of(cls, number: int, values: Floats, own: slice) -> "Border":
+        """Of increasing eigenvalues, the first of which has this number in the spectrum; `own` are the slice's."""
+        near = values[max(0, own.start - 1) : own.stop + 1]
+        beyond = float(values[own.stop]) if own.stop < len(values) else float("nan")
+        modes = number + own.start, number + own.stop
+        return cls(modes, float(values[own.start]), beyond, float(np.ptp(near)) / len(near))
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """The planes of a pair that turns complex in its cluster: from where on, and a load at which it still is."""
+
+    onset: float
+    inside: float
+    right: Floats
+    left: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A slice, and the pairs that turn complex in its clusters, increment by increment."""
+
+    border: Border
+    candidates: Sequence[Sequence[Candidate]]
+
+
+def pass_folder(parent: Path, places: Sequence[Place], modes: tuple[int, int], limits: Limits) -> Path:
+    """Where what is found on the increments between some loads is kept."""
+    digest = hashlib.sha256(repr((modes, limits)).encode())
+    for place in places:
+        digest.update(repr(place.fx).encode())
+        for array in (place.matrix.data, place.matrix.indices, place.matrix.indptr):
+            digest.update(np.ascontiguousarray(array).data)
+    return parent / digest.hexdigest()[:16]
+
+
+def keep(folder: Path, found: Found) -> None:
+    """Write what has been found in a slice; an OutputError if that cannot be."""
+    flat = [(k, each) for k, candidates in enumerate(found.candidates) for each in candidates]
+    content = BytesIO()
+    np.savez(
+        content,
+        modes=found.border.modes,
+        border=found.border[1:],
+        increments=len(found.candidates),
+        increment=[k for k, _ in flat],
+        loads=[(each.onset, each.inside) for _, each in flat],
+        planes=[(each.right, each.left) for _, each in flat],
+    )
+    make_folder(folder)
+    first, stop = found.border.modes
+    write_whole(folder / f"{first}-{stop}.npz", content.getvalue())
+
+
+def kept(folder: Path) -> list[Found]:
+    """What a folder has, by the order of the spectrum; a DamagedSliceError if a file is not one of these."""
+    return sorted((_read(path) for path in folder.glob("*.npz")), key=lambda each: each.border.modes)
+
+
+def _read(path: Path) -> Found:
+    try:
+        with np.load(path) as data:
+            first, stop = (int(number) for number in data["modes"])
+            candidates: list[list[Candidate]] = [[] for _ in range(int(data["increments"]))]
+            for k, loads, planes in zip(data["increment"], data["loads"], data["planes"], strict=True):
+                candidates[int(k)].append(Candidate(float(loads[0]), float(loads[1]), *planes))
+            return Found(Border((first, stop), *(float(each) for each in data["border"])), candidates)
+    except (OSError, EOFError, ValueError, TypeError, LookupError, BadZipFile) as error:
+        raise DamagedSliceError(
+            f"{path} is damaged: delete the file, so that its part of the spectrum is searched again."
+        ) from error

@@ -1,0 +1,181 @@
+"""A search that is cut off goes on, to the bit, from what it has left in a folder."""
+
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_slicing import FEW, on_ranks
+
+from faultgouge.analysis import FaultgougeError
+from faultgouge.analysis.errors import OutputError
+from faultgouge.analysis.onset import Family, Ranks, full_operator
+from faultgouge.analysis.onset.found import Border, Candidate, DamagedSliceError, Found, keep, kept
+from faultgouge.analysis.onset.sliced import first_window
+from faultgouge.analysis.onset.slicing import SliceError
+
+PASSING = replace(FEW, kept=0)
+"""Slices of 24 modes, in bases that are not kept in memory."""
+
+
+class CutOffError(Exception):
+    """The search ends here, as at a kill."""
+
+
+def cut_off_after(slices):
+    """A watch that lets so many slices pass."""
+    seen = []
+
+    def watch(says):
+        if says.endswith("modes"):
+            seen.append(says)
+            if len(seen) > slices:
+                raise CutOffError
+
+    return watch
+
+
+def counting(seen):
+    """A watch that takes down what is said of slices."""
+    return lambda says: seen.append(says) if says.endswith("modes") else None
+
+
+@pytest.fixture(scope="module")
+def search(ramp):
+    """The search of the reference packing, from a little before its onset on, for some friction coefficient."""
+
+    def make(mu=1.0):
+        path = ramp(mu, 1e-3, 22)
+        family = Family(lambda fx: full_operator(path(fx)), 0.0, PASSING)
+        return lambda **how: first_window(family, np.array(path.grid[18:]), **how)
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def whole(search):
+    """The window of a search in one piece, and what it says of its slices."""
+    seen = []
+    return search()(watch=counting(seen)), seen
+
+
+def files(folder):
+    return sorted(folder.glob("*/*.npz"))
+
+
+@pytest.mark.slow
+def test_a_search_goes_on_to_the_bit(search, whole, tmp_path):
+    expected, all_said = whole
+    with pytest.raises(CutOffError):
+        search()(watch=cut_off_after(8), folder=tmp_path)
+    assert len(files(tmp_path)) == 8
+    said = []
+    assert search()(watch=counting(said), folder=tmp_path) == expected
+    assert said == all_said[8:]
+    assert len(files(tmp_path)) == len(all_said)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_other_ranks_go_on(search, whole, tmp_path, ranks):
+    expected, all_said = whole
+    with pytest.raises(CutOffError):
+        search()(watch=cut_off_after(5), folder=tmp_path)
+    said = []
+    for each in on_ranks(ranks, lambda mine: search()(watch=counting(said), ranks=mine, folder=tmp_path)):
+        assert each.result() == expected
+    assert len(said) == len(all_said) - 5
+    nothing = []
+    assert search()(watch=counting(nothing), folder=tmp_path) == expected
+    assert nothing == []
+
+
+@pytest.mark.slow
+def test_what_was_found_for_other_operators_is_left_alone(search, whole, tmp_path):
+    with pytest.raises(CutOffError):
+        search(0.8)(watch=cut_off_after(3), folder=tmp_path)
+    others = files(tmp_path)
+    said = []
+    assert search()(watch=counting(said), folder=tmp_path) == whole[0]
+    assert said == whole[1]
+    assert len(others) == 3
+    assert set(others) < set(files(tmp_path))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", "half"])
+def test_damaged_file_is_named(search, whole, tmp_path, content):
+    with pytest.raises(CutOffError):
+        search()(watch=cut_off_after(3), folder=tmp_path)
+    damaged = files(tmp_path)[1]
+    damaged.write_bytes(damaged.read_bytes()[:200] if content == "half" else content)
+    with pytest.raises(DamagedSliceError, match=rf"{damaged} is damaged: delete the file"):
+        search()(folder=tmp_path)
+    damaged.unlink()
+    assert search()(folder=tmp_path) == whole[0]
+
+
+@pytest.mark.slow
+def test_kept_slices_are_compared_with_the_others(search, tmp_path):
+    with pytest.raises(CutOffError):
+        search()(watch=cut_off_after(3), folder=tmp_path)
+    path = files(tmp_path)[0].parent
+    last = kept(path)[-1]
+    keep(path, replace(last, border=last.border._replace(beyond=last.border.beyond + last.border.spacing)))
+    with pytest.raises(SliceError, match=rf"number {last.border.modes[1]} .* one is missing in between"):
+        search()(folder=tmp_path)
+
+
+@pytest.mark.slow
+def test_a_folder_that_cannot_be_written_ends_the_search_at_once(search, tmp_path):
+    (tmp_path / "occupied").touch()
+    seen = []
+    with pytest.raises(OutputError, match="cannot be made a folder"):
+        search()(watch=counting(seen), folder=tmp_path / "occupied")
+    assert len(seen) == 1
+
+
+def test_an_error_that_ends_all_ranks_does_not_wait_for_them():
+    def work():
+        raise OutputError("a full disk")
+
+    gathered = []
+    with pytest.raises(OutputError, match="a full disk"):
+        Ranks(0, 2, gathered.append).together(work)
+    assert gathered == []
+
+    def met():
+        raise FaultgougeError("of this rank")
+
+    with pytest.raises(FaultgougeError, match="of this rank"):
+        Ranks(0, 2, lambda mine: [mine, (None, None)]).together(met)
+
+
+NUMBERS = st.floats(allow_nan=False)
+MODES = st.integers(0, 10**7)
+
+
+@st.composite
+def found(draw):
+    size = draw(st.integers(2, 5))
+    plane = st.lists(NUMBERS, min_size=2 * size, max_size=2 * size).map(lambda all_: np.reshape(all_, (size, 2)))
+    candidate = st.builds(Candidate, NUMBERS, NUMBERS, plane, plane)
+    border = st.builds(Border, st.tuples(MODES, MODES), NUMBERS, NUMBERS, NUMBERS)
+    candidates = st.lists(st.lists(candidate, max_size=2), min_size=1, max_size=3)
+    return Found(draw(border), draw(candidates))
+
+
+@settings(max_examples=30, deadline=None)
+@given(found())
+def test_what_is_kept_comes_back_to_the_bit(tmp_path_factory, found):
+    folder = tmp_path_factory.mktemp("pass")
+    keep(folder, found)
+    (back,) = kept(folder)
+    assert back.border == found.border
+    assert [len(each) for each in back.candidates] == [len(each) for each in found.candidates]
+    for one, other in zip(chain(*back.candidates), chain(*found.candidates), strict=True):
+        assert (one.onset, one.inside) == (other.onset, other.inside)
+        assert np.array_equal(one.right, other.right)
+        assert np.array_equal(one.left, other.left)
