@@ -126,6 +126,7 @@ def slices(
         try:
             for part in _in_turn(pool, ranks.workers, spectrum, wanted[ranks.part(len(wanted))], margin):
                 mine.append(part.border)
+                _compare(*mine[-2:])
                 yield part
         except FaultgougeError as error:
             failure = error
@@ -135,8 +136,7 @@ def slices(
             raise failure
         return mine
 
-    for before, after in pairwise(sorted(chain(known, *ranks.together(borders)))):
-        _compare(before, after)
+    _compare(*sorted(chain(known, *ranks.together(borders))))
 
 
 Shift = tuple[float, tuple[int, int]]
@@ -155,13 +155,14 @@ def _in_turn(
             yield waiting.popleft().result()
 
 
-def _compare(before: Border, after: Border) -> None:
-    """Raise an error if the second slice gives its first eigenvalue another number than the slice before it."""
-    if not abs(after.first - before.beyond) <= 0.01 * after.spacing:
-        raise SliceError(
-            f"the eigenvalue of number {after.modes[0]} is {before.beyond:.10g} from one shift and {after.first:.10g} "
-            "from the next: one is missing in between"
-        )
+def _compare(*borders: Border) -> None:
+    """Raise an error if a slice gives its first eigenvalue another number than the slice just before it."""
+    for before, after in pairwise(borders):
+        if after.modes[0] == before.modes[1] and not abs(after.first - before.beyond) <= 0.01 * after.spacing:
+            raise SliceError(
+                f"the eigenvalue of number {after.modes[0]} is {before.beyond:.10g} from one shift and "
+                f"{after.first:.10g} from the next: one is missing in between"
+            )
 
 
 class _Spectrum:
