@@ -97,9 +97,11 @@ class Sliced:
         done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
         failure: FaultgougeError | None = None
         increments = [(here.fx, there.fx, there.matrix - here.matrix) for here, there in pairwise(places)]
+        where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
+        self.watch(f"{where}: modes are counted; {before} of {stop - first} are known")
         for basis, levels in self.bases.at(places[0].matrix, known):
             done += basis.own.stop - basis.own.start
-            self.watch(f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}: {min(done, wanted)} of {wanted} modes")
+            self.watch(f"{where}: {min(done, wanted)} of {wanted} modes")
             try:
                 found.append(Found(basis.border, list(self._along(basis, levels, increments))))
             except FaultgougeError as error:
