@@ -7,7 +7,7 @@ and never one of all modes. A *cluster* of neighbouring modes, with all others i
 up to the third order of the typical coupling over the distance of the modes outside.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -18,7 +18,7 @@ from scipy.sparse import csc_array, csr_array
 
 from ..packing import Floats, Indices
 from ..spectrum import active_coordinates
-from .found import Border
+from .found import NEW_PASS, Border, Pass
 from .limits import LIMITS, Limits
 from .ranks import Ranks
 
@@ -204,10 +204,10 @@ class Bases:
         margins = 2 * (limits.margin + limits.beyond) * max(1, round((stop - first) / limits.own))
         return (stop - first + margins) * matrix.shape[0] <= limits.kept
 
-    def at(self, matrix: csr_array, known: Sequence[Border] = ()) -> Iterable[tuple[Basis, Levels]]:
+    def at(self, matrix: csr_array, known: Pass = NEW_PASS) -> Iterable[tuple[Basis, Levels]]:
         """The bases, those of an earlier load as long as all ranks' serve, and the operator in them.
 
-        Where they are not kept, those of the slices that are `known` are left out.
+        Where they are not kept, those of the slices that are known are left out.
         """
         serving = self._serving(matrix)
         if serving is not None:
@@ -226,11 +226,11 @@ class Bases:
         mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
         return known if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing else None
 
-    def _made(self, matrix: csr_array, known: Sequence[Border]) -> Iterator[Basis]:
+    def _made(self, matrix: csr_array, known: Pass) -> Iterator[Basis]:
         """The bases of slices of the spectrum; a small operator has one, which the first rank makes."""
         limits, active = self.limits, active_coordinates(matrix)
         if len(active) <= limits.one_basis:
-            if self.ranks.rank == 0 and not known:
+            if self.ranks.rank == 0 and not known.found:
                 yield replace(Basis.of(matrix, limits), own=slice(*self.range(matrix)))
             return
         from .slicing import slices  # with libraries that nothing else needs

@@ -9,20 +9,28 @@ was found for another packing is not taken for this one.
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from zipfile import BadZipFile
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import FaultgougeError
 from ..packing import Floats
 from ..wholefile import make_folder, write_whole
 from .limits import Limits
 from .modes import Place
+
+Shift = tuple[float, tuple[int, int]]
+"""The shift of a slice, and the numbers of the first eigenvalue that belongs to it and of the first that does not."""
+
+SHIFTS = "shifts.npz"
+"""The file of all shifts: to find these, eigenvalues are counted, which takes minutes for 100,000 disks."""
 
 
 class DamagedSliceError(FaultgougeError):
@@ -74,6 +82,66 @@ class Found:
     candidates: Sequence[Sequence[Candidate]]
 
 
+@dataclass(frozen=True)
+class Pass:
+    """What is known of a pass, on all ranks, and the folder in which more is kept; none by default.
+
+    Attributes
+    ----------
+    folder : Path or None
+        Of the files.
+    found : sequence of Found
+        The slices that need not be searched again, by the order of the spectrum.
+    shifts : sequence of Shift
+        Those of all slices; empty where they have to be found.
+    """
+
+    folder: Path | None = None
+    found: Sequence[Found] = ()
+    shifts: Sequence[Shift] = ()
+
+    @classmethod
+    def read(cls, folder: Path) -> "Pass":
+        """What a folder has, if it is there; a DamagedSliceError if a file is not one of these."""
+        found = sorted((_found(path) for path in folder.glob("*-*.npz")), key=lambda each: each.border.modes)
+        shifts = folder / SHIFTS
+        return cls(folder, found, _shifts(shifts) if shifts.exists() else ())
+
+    @property
+    def borders(self) -> list[Border]:
+        """Those of the known slices."""
+        return [each.border for each in self.found]
+
+    def keep(self, found: Found) -> None:
+        """Write what has been found in a slice, if there is a folder; an OutputError if that cannot be."""
+        flat = [(k, each) for k, candidates in enumerate(found.candidates) for each in candidates]
+        first, stop = found.border.modes
+        self._write(
+            f"{first}-{stop}.npz",
+            modes=found.border.modes,
+            border=found.border[1:],
+            increments=len(found.candidates),
+            increment=[k for k, _ in flat],
+            loads=[(each.onset, each.inside) for _, each in flat],
+            planes=[(each.right, each.left) for _, each in flat],
+        )
+
+    def keep_shifts(self, shifts: Sequence[Shift]) -> None:
+        """Write the shifts of all slices, if there is a folder; an OutputError if that cannot be."""
+        self._write(SHIFTS, shift=[shift for shift, _ in shifts], modes=[modes for _, modes in shifts])
+
+    def _write(self, name: str, **arrays: Any) -> None:
+        if self.folder is not None:
+            content = BytesIO()
+            np.savez(content, **arrays)
+            make_folder(self.folder)
+            write_whole(self.folder / name, content.getvalue())
+
+
+NEW_PASS = Pass()
+"""Of which nothing is known, nor kept."""
+
+
 def pass_folder(parent: Path, places: Sequence[Place], modes: tuple[int, int], limits: Limits) -> Path:
     """Where what is found on the increments between some loads is kept."""
     digest = hashlib.sha256(repr((modes, limits)).encode())
@@ -84,38 +152,27 @@ def pass_folder(parent: Path, places: Sequence[Place], modes: tuple[int, int], l
     return parent / digest.hexdigest()[:16]
 
 
-def keep(folder: Path, found: Found) -> None:
-    """Write what has been found in a slice; an OutputError if that cannot be."""
-    flat = [(k, each) for k, candidates in enumerate(found.candidates) for each in candidates]
-    content = BytesIO()
-    np.savez(
-        content,
-        modes=found.border.modes,
-        border=found.border[1:],
-        increments=len(found.candidates),
-        increment=[k for k, _ in flat],
-        loads=[(each.onset, each.inside) for _, each in flat],
-        planes=[(each.right, each.left) for _, each in flat],
-    )
-    make_folder(folder)
-    first, stop = found.border.modes
-    write_whole(folder / f"{first}-{stop}.npz", content.getvalue())
+def _found(path: Path) -> Found:
+    with _opened(path) as data:
+        first, stop = (int(number) for number in data["modes"])
+        candidates: list[list[Candidate]] = [[] for _ in range(int(data["increments"]))]
+        for k, loads, planes in zip(data["increment"], data["loads"], data["planes"], strict=True):
+            candidates[int(k)].append(Candidate(float(loads[0]), float(loads[1]), *planes))
+        return Found(Border((first, stop), *(float(each) for each in data["border"])), candidates)
 
 
-def kept(folder: Path) -> list[Found]:
-    """What a folder has, by the order of the spectrum; a DamagedSliceError if a file is not one of these."""
-    return sorted((_read(path) for path in folder.glob("*.npz")), key=lambda each: each.border.modes)
+def _shifts(path: Path) -> list[Shift]:
+    with _opened(path) as data:
+        pairs = zip(data["shift"], data["modes"], strict=True)
+        return [(float(shift), (int(first), int(stop))) for shift, (first, stop) in pairs]
 
 
-def _read(path: Path) -> Found:
+@contextmanager
+def _opened(path: Path) -> Iterator[Mapping[str, NDArray]]:
     try:
         with np.load(path) as data:
-            first, stop = (int(number) for number in data["modes"])
-            candidates: list[list[Candidate]] = [[] for _ in range(int(data["increments"]))]
-            for k, loads, planes in zip(data["increment"], data["loads"], data["planes"], strict=True):
-                candidates[int(k)].append(Candidate(float(loads[0]), float(loads[1]), *planes))
-            return Found(Border((first, stop), *(float(each) for each in data["border"])), candidates)
+            yield data
     except (OSError, EOFError, ValueError, TypeError, LookupError, BadZipFile) as error:
         raise DamagedSliceError(
-            f"{path} is damaged: delete the file, so that its part of the spectrum is searched again."
+            f"{path} is damaged: delete the file, and what it had is searched for again."
         ) from error

@@ -28,7 +28,7 @@ from ..packing import Floats
 from .basis import Bases, Basis, Cluster, Levels, width_and_mixing
 from .dense import all_windows
 from .edge import Edge, Family, LostPairError, Window, edge_from_inside, leads_back
-from .found import Border, Candidate, Found, keep, kept, pass_folder
+from .found import NEW_PASS, Candidate, Found, Pass, pass_folder
 from .modes import Place
 from .pair import Pair, continued, dip_between
 from .ranks import ALONE, Ranks
@@ -75,30 +75,30 @@ class Sliced:
 
     def candidates(self, places: Sequence[Place], depth: int) -> list[list[Candidate]]:
         """The pairs that turn complex in their clusters on each increment, by increasing onset: those of all ranks."""
-        folder = self._pass_folder(places)
-        known = self.ranks.together(lambda: kept(folder) if folder and self.ranks.rank == 0 else [])[0]
-        fresh = self.ranks.together(lambda: self._found(places, [each.border for each in known], folder))
-        found = sorted(chain(known, *fresh), key=lambda each: each.border.modes)
+        known = self._known(places)
+        fresh = self.ranks.together(lambda: self._found(places, known))
+        found = sorted(chain(known.found, *fresh), key=lambda each: each.border.modes)
         increments = zip(*(each.candidates for each in found), strict=True)
         return [sorted(chain(*each), key=lambda candidate: candidate.onset) for each in increments]
 
-    def _pass_folder(self, places: Sequence[Place]) -> Path | None:
-        """Where what is found is kept; nowhere if bases are, which the slices beyond then need."""
+    def _known(self, places: Sequence[Place]) -> Pass:
+        """What an earlier search has left; nothing if bases are kept, as the increments beyond need these."""
         matrix = places[0].matrix
         if self.folder is None or self.bases.keeps(matrix):
-            return None
-        return pass_folder(self.folder, places, self.bases.range(matrix), self.limits)
+            return NEW_PASS
+        folder = pass_folder(self.folder, places, self.bases.range(matrix), self.limits)
+        return self.ranks.together(lambda: Pass.read(folder) if self.ranks.rank == 0 else NEW_PASS)[0]
 
-    def _found(self, places: Sequence[Place], known: Sequence[Border], folder: Path | None) -> list[Found]:
+    def _found(self, places: Sequence[Place], known: Pass) -> list[Found]:
         """What this rank's slices have, without those that are known."""
         found: list[Found] = []
         first, stop = self.bases.range(places[0].matrix)
-        before = sum(each.modes[1] - each.modes[0] for each in known)
+        before = sum(each.modes[1] - each.modes[0] for each in known.borders)
         done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
         failure: FaultgougeError | None = None
         increments = [(here.fx, there.fx, there.matrix - here.matrix) for here, there in pairwise(places)]
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
-        self.watch(f"{where}: modes are counted; {before} of {stop - first} are known")
+        self.watch(f"{where}: {before} of {stop - first} modes are known" if before else f"{where}: modes are counted")
         for basis, levels in self.bases.at(places[0].matrix, known):
             done += basis.own.stop - basis.own.start
             self.watch(f"{where}: {min(done, wanted)} of {wanted} modes")
@@ -107,8 +107,7 @@ class Sliced:
             except FaultgougeError as error:
                 failure = failure or error  # it waits: the ranks meet at the end of their bases
                 continue
-            if folder is not None:
-                keep(folder, found[-1])
+            known.keep(found[-1])
         if failure is not None:
             raise failure
         return found

@@ -31,7 +31,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import FaultgougeError
 from ..packing import Floats, Indices
 from ..sparse_lu import minimum_degree, symmetric_lu
-from .found import Border
+from .found import NEW_PASS, Border, Pass, Shift
 from .limits import LIMITS, Limits
 from .ranks import ALONE, Ranks
 
@@ -91,7 +91,7 @@ def slices(
     limits: Limits = LIMITS,
     factorise: Callable[[csc_array, float], Factored] | None = None,
     ranks: Ranks = ALONE,
-    known: Sequence[Border] = (),
+    known: Pass = NEW_PASS,
 ) -> Iterator[Slice]:
     """Eigenvalues and eigenvectors of a symmetric matrix, slice by slice in the order of the spectrum.
 
@@ -108,8 +108,8 @@ def slices(
     ranks : Ranks
         Who shares the slices; those of this rank are found. Its threads are also the slices at the most that are under
         way beyond the one that is asked for. All ranks must come to the end of their slices.
-    known : sequence of Border
-        Slices that need not be found again.
+    known : Pass
+        The slices in it are left out. The shifts are taken from it; if it has none, the first rank keeps them there.
 
     Raises
     ------
@@ -120,8 +120,10 @@ def slices(
     mine: list[Border] = []
     failure: FaultgougeError | None = None
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(ranks.workers) as pool:
-        shifts = spectrum.shifts(pool, *(modes or (0, matrix.shape[0])))
-        found = {each.modes for each in known}
+        shifts = known.shifts or spectrum.shifts(pool, *(modes or (0, matrix.shape[0])))
+        if ranks.rank == 0 and not known.shifts:
+            known.keep_shifts(shifts)
+        found = {each.modes for each in known.borders}
         wanted = [each for each in shifts if each[1] not in found]
         try:
             for part in _in_turn(pool, ranks.workers, spectrum, wanted[ranks.part(len(wanted))], margin):
@@ -136,11 +138,7 @@ def slices(
             raise failure
         return mine
 
-    _compare(*sorted(chain(known, *ranks.together(borders))))
-
-
-Shift = tuple[float, tuple[int, int]]
-"""A shift, and the numbers of the first eigenvalue that belongs to it and of the first that does not."""
+    _compare(*sorted(chain(known.borders, *ranks.together(borders))))
 
 
 def _in_turn(
