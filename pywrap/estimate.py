@@ -54,6 +54,10 @@ TRIGGERING_RUNS = 4
 """Runs of [perturb] in the triggering part of reproduce: with and without a perturbation, an eruption, its control."""
 BYTES_KEPT = 600
 """Memory of one equilibrium that is kept, for each disk: positions, contacts, and what is computed of them once."""
+BYTES_SEARCHED = 50_000
+"""Of the search in slices of the spectrum, for each disk, in two threads: 5.0 to 5.4 GB for 100,000 disks."""
+BYTES_OF_BASES = 150, 3.6e9
+"""Of eigenvectors that are kept, for each disk squared; and the most of them, beyond which they are not kept."""
 BYTES_WRITTEN = 150
 """Of one equilibrium in run.h5, for each disk."""
 BYTES_AT_ALL = 4000
@@ -155,6 +159,9 @@ def estimated(scene: Scene, task: Task) -> Estimate:
         kept = increments + 1
     seconds += steps * (SECONDS_A_STEP[0] + SECONDS_A_STEP[1] * disks)
     memory = disks * (BYTES_AT_ALL + kept * BYTES_KEPT)
+    if task in ("onset", "reproduce") and disks > DENSE:
+        # the ramp ends at the first onset, and few equilibria are kept
+        memory = max(memory, disks * BYTES_AT_ALL + _searched_bytes(disks))
     written = 0.0 if task == "onset" else disks * BYTES_WRITTEN * (increments + 1)
     return Estimate(disks, steps, increments, memory, written, seconds)
 
@@ -230,6 +237,12 @@ def impossible(scene: Scene) -> tuple[str, str] | None:
 
 def _disks(scene: Scene) -> int:
     return scene.packing.disks
+
+
+def _searched_bytes(disks: int) -> float:
+    """Memory of the search in slices of the spectrum."""
+    bases = BYTES_OF_BASES[0] * disks**2
+    return disks * BYTES_SEARCHED + (bases if bases < BYTES_OF_BASES[1] else 0.0)
 
 
 def _exponent(scene: Scene) -> float:

@@ -95,3 +95,11 @@ def test_a_loop_of_links_and_deep_brackets_are_refused(tmp_path):
     for name in ("a.json", "deep.json", "long.json"):
         with pytest.raises(SceneError, match=name):
             Scene.from_mapping({**SCENE, "packing": {"file": name}}, tmp_path)
+
+
+@pytest.mark.parametrize(("disks", "measured"), [(3000, 1.7e9), (10_000, 0.9e9), (30_000, 1.7e9), (100_000, 5.2e9)])
+def test_memory_of_a_search_in_slices(disks, measured):
+    """Against peaks of the whole process in two threads (docs/benchmarks.md), within a factor of two."""
+    scene = deepcopy(SCENE) | {"packing": {"disks": disks, "width": 1.2 * disks**0.5, "seed": 3}}
+    memory = estimated(Scene.from_mapping(scene), "onset").memory
+    assert measured / 2 < memory < 2 * measured
