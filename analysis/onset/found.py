@@ -4,14 +4,15 @@ A *pass* goes through all slices of the spectrum, for a few neighbouring loads. 
 leaves little: the pairs that may turn complex, and the eigenvalues that neighbouring slices must agree on. So each
 slice has a file, which the rank that has searched the slice writes in one step; and a search that was cut off goes on.
 
-The folder of a pass is named by a checksum of the loads, of the operators there, of the modes and of the limits. What
-was found for another packing is not taken for this one.
+The folder of a pass is named by a checksum of the loads, of the operators there, of the modes and of the limits, and of
+the version of this program. What was found for another packing, or by another version, is not taken for this one.
 """
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +21,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FaultgougeError
+from ..errors import BadInputError
 from ..packing import Floats
 from ..wholefile import make_folder, write_whole
 from .limits import Limits
@@ -33,7 +34,7 @@ SHIFTS = "shifts.npz"
 """The file of all shifts: to find these, eigenvalues are counted, which takes minutes for 100,000 disks."""
 
 
-class DamagedSliceError(FaultgougeError):
+class DamagedSliceError(BadInputError):
     """The file of a slice cannot be read: one sentence."""
 
 
@@ -45,9 +46,9 @@ class Border(NamedTuple):
     modes : tuple of (int, int)
         Numbers in the whole spectrum of the slice's first eigenvalue and of the first one beyond.
     first, beyond : float
-        These eigenvalues; nan beyond the end of the spectrum.
+        These eigenvalues, 1 / time^2; nan beyond the end of the spectrum.
     spacing : float
-        Mean distance of the slice's eigenvalues and of the next ones on either side.
+        Mean distance of the slice's eigenvalues and of the next ones on either side, 1 / time^2.
     """
 
     modes: tuple[int, int]
@@ -66,7 +67,15 @@ class Border(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """The planes of a pair that turns complex in its cluster: from where on, and a load at which it still is."""
+    """A pair that turns complex in its cluster.
+
+    Attributes
+    ----------
+    onset, inside : float
+        The load from which on the pair is complex, and one at which it still is; force per top disk.
+    right, left : ndarray, shape (n, 2)
+        Its planes, in the n coordinates of the operator.
+    """
 
     onset: float
     inside: float
@@ -76,7 +85,15 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A slice, and the pairs that turn complex in its clusters, increment by increment."""
+    """What a search has found in a slice.
+
+    Attributes
+    ----------
+    border : Border
+        Which slice it is.
+    candidates : sequence of sequence of Candidate
+        The pairs that turn complex in its clusters, increment by increment.
+    """
 
     border: Border
     candidates: Sequence[Sequence[Candidate]]
@@ -144,7 +161,7 @@ NEW_PASS = Pass()
 
 def pass_folder(parent: Path, places: Sequence[Place], modes: tuple[int, int], limits: Limits) -> Path:
     """Where what is found on the increments between some loads is kept."""
-    digest = hashlib.sha256(repr((modes, limits)).encode())
+    digest = hashlib.sha256(repr((version("faultgouge"), modes, limits)).encode())
     for place in places:
         digest.update(repr(place.fx).encode())
         for array in (place.matrix.data, place.matrix.indices, place.matrix.indptr):
@@ -172,7 +189,7 @@ def _opened(path: Path) -> Iterator[Mapping[str, NDArray]]:
     try:
         with np.load(path) as data:
             yield data
-    except (OSError, EOFError, ValueError, TypeError, LookupError, BadZipFile) as error:
+    except (OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, BadZipFile) as error:
         raise DamagedSliceError(
             f"{path} is damaged: delete the file, and what it had is searched for again."
         ) from error

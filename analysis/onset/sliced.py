@@ -98,7 +98,7 @@ class Sliced:
         failure: FaultgougeError | None = None
         increments = [(here.fx, there.fx, there.matrix - here.matrix) for here, there in pairwise(places)]
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
-        self.watch(f"{where}: {before} of {stop - first} modes are known" if before else f"{where}: modes are counted")
+        self.watch(f"{where}: {f'{before} of {stop - first} modes are known' if known.shifts else 'modes are counted'}")
         for basis, levels in self.bases.at(places[0].matrix, known):
             done += basis.own.stop - basis.own.start
             self.watch(f"{where}: {min(done, wanted)} of {wanted} modes")

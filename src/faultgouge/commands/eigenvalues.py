@@ -138,12 +138,14 @@ def onset(
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if output:
         check_folder(output)
-    of_a_mu = _damped_onset if wanted.damping is not None else partial(_undamped_onset, part, _search_folder(output))
+    folder = _search_folder(output)
+    of_a_mu = _damped_onset if wanted.damping is not None else partial(_undamped_onset, part, folder)
     found = [of_a_mu(wanted, mu) for mu in wanted.law.mus]
     result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
     if output and is_root():
         write_text(output, json.dumps(result, indent=1) + "\n")
-        shutil.rmtree(f"{output}.slices", ignore_errors=True)
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
     if as_json:
         print_json(result)
 

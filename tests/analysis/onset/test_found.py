@@ -180,3 +180,24 @@ def test_what_is_kept_comes_back_to_the_bit(tmp_path_factory, found):
         assert (one.onset, one.inside) == (other.onset, other.inside)
         assert np.array_equal(one.right, other.right)
         assert np.array_equal(one.left, other.left)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.data())
+def test_no_flipped_bit_goes_unnoticed(tmp_path_factory, data):
+    """What is read is what was written (some bytes of a zip file mean nothing), or the damage is said."""
+    folder = tmp_path_factory.mktemp("pass")
+    plane = np.arange(6.0).reshape(3, 2)
+    Pass(folder).keep(Found(Border((3, 9), 1.5, 2.5, 0.1), [[Candidate(0.1, 0.2, plane, -plane)], []]))
+    (path,) = folder.iterdir()
+    content = bytearray(path.read_bytes())
+    content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.sampled_from([1, 16, 128]))
+    path.write_bytes(content)
+    try:
+        (back,) = Pass.read(folder).found
+    except DamagedSliceError:
+        return
+    ((candidate,), nothing) = back.candidates
+    assert (back.border, nothing) == (((3, 9), 1.5, 2.5, 0.1), [])
+    assert (candidate.onset, candidate.inside) == (0.1, 0.2)
+    assert np.array_equal([candidate.right, candidate.left], [plane, -plane])
