@@ -18,8 +18,8 @@ BIN := $(VENV)/bin
 # byte code is made of what is imported, not of all that is installed
 PIP := $(BIN)/python -m pip install --quiet --no-compile
 PYTEST := PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q
-PLUGIN := pyproject.toml CMakeLists.txt $(wildcard cmake/* pair_mindlin_smooth/* analysis/*.cpp)
-PYTHON_SOURCES := $(shell find lammps_inputs analysis pywrap figures studies src scenes -type f -not -name '*.pyc' -not -name '*.so')
+PLUGIN := pyproject.toml CMakeLists.txt $(wildcard cmake/* pair_mindlin_smooth/* analysis/factors/*.cpp)
+PYTHON_SOURCES := $(shell find lammps_inputs analysis pywrap figures studies assessment src scenes -type f -not -name '*.pyc' -not -name '*.so')
 
 # one thread a process: the matrices are small, and the ranks share the cores
 export OMP_NUM_THREADS ?= 1
@@ -54,13 +54,13 @@ fuzz: $(VENV)/.test
 check: $(VENV)/.check
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/clang-format --dry-run --Werror pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp analysis/*.cpp
+	$(BIN)/clang-format --dry-run --Werror pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp analysis/factors/*.cpp
 	MYPYPATH=src $(BIN)/mypy -p faultgouge
 
 format: $(VENV)/.check
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
-	$(BIN)/clang-format -i pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp analysis/*.cpp
+	$(BIN)/clang-format -i pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp analysis/factors/*.cpp
 
 benchmark: $(VENV)/.installed
 	$(BIN)/python benchmarks/time_per_step.py

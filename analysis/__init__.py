@@ -6,21 +6,23 @@ eigenvalues), `damping` (the damping matrix), `onset` (where they become complex
 it). `runfile`, `dumps` and `files` read and write packings.
 """
 
-from .contacts import FLOOR, Contacts
-from .damped import DampedOnsetError, DampedWindow, damped_windows
-from .damping import damping_matrix, largest_damping_rate
-from .dumps import read_dump
-from .eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
+from .damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows
 from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
-from .files import read_packing
-from .geometry import ContactGeometry, nearest_image, touching
-from .growth import Growth, fit_growth, mean_square_displacement
-from .law import MindlinLaw
+from .files.by_hand import read_packing
+from .files.dumps import read_dump
+from .files.runfile import RunFile
+from .motion.growth import Growth, fit_growth, mean_square_displacement
+from .motion.response import layer_force, linear_response
+from .motion.transient import NoGainError, TransientGain, transient_gain
 from .onset import Onset, OnsetError, Window, complex_windows, find_onset
-from .packing import Packing
-from .response import layer_force, linear_response
-from .runfile import RunFile
-from .spectrum import (
+from .operators.damping import damping_matrix, largest_damping_rate
+from .operators.stiffness import stiffness_matrix
+from .packing.contacts import FLOOR, Contacts
+from .packing.geometry import ContactGeometry, nearest_image, touching
+from .packing.law import MindlinLaw
+from .packing.packing import Packing
+from .spectrum.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
+from .spectrum.spectrum import (
     ComplexPair,
     Spectrum,
     discrete_frequency,
@@ -30,8 +32,6 @@ from .spectrum import (
     spectrum,
     stable_timestep,
 )
-from .stiffness import stiffness_matrix
-from .transient import NoGainError, TransientGain, transient_gain
 
 __all__ = [
     "FLOOR",

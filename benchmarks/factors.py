@@ -16,12 +16,13 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csc_array, eye_array
 
-from faultgouge.analysis import Packing, sparse_lu
+from faultgouge.analysis import Packing
+from faultgouge.analysis.factors import sparse_lu
+from faultgouge.analysis.factors.sparse_lu import minimum_degree, symmetric_lu
 from faultgouge.analysis.onset import LIMITS, full_operator
-from faultgouge.analysis.sparse_lu import minimum_degree, symmetric_lu
+from faultgouge.assessment.stability.cases.packings import crystal
 from faultgouge.pywrap import Engine, Equilibrium, equilibrate
-from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.studies.stability_cases.packings import crystal
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 
 clock = time.process_time
 

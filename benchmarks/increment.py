@@ -26,7 +26,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, linear, settle
+from faultgouge.analysis.factors import linear
+from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 
 PACKING = Path(__file__).parents[1] / "tests" / "reference" / "packing7.json"
 STEP, INCREMENTS, ROUNDS = 1e-3, 20, 10

@@ -32,7 +32,7 @@ from typing import Literal
 
 from faultgouge.analysis import spectrum
 from faultgouge.pywrap import Equilibrium, Scene, ramp
-from faultgouge.studies.onsets import onset_run
+from faultgouge.pywrap.onset.undamped import onset_run
 
 PACKING = Path(__file__).parents[1] / "tests" / "reference" / "packing7.json"
 EXACT = 0.021833056408038582

@@ -53,7 +53,7 @@ def one_rank(data: str, decks: str, steps: int) -> None:
     """What a process of mpiexec does; rank 0 prints the row."""
     from mpi4py import MPI
 
-    from faultgouge.pywrap.instance import lammps_instance
+    from faultgouge.pywrap.lammps.instance import lammps_instance
 
     counts = [ctypes.c_long.in_dll(ctypes.CDLL(None), name) for name in ("messages_sent", "bytes_sent", "collectives")]
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -86,7 +86,7 @@ def measured(data: Path, ranks: int, decks: Path, steps: int, library: Path) -> 
 
 def main() -> None:
     """Print the table."""
-    from faultgouge.pywrap.decks import DECKS
+    from faultgouge.pywrap.lammps.decks import DECKS
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--disks", type=int, nargs="+", default=[100_000, 1_000_000])

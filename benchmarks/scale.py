@@ -39,12 +39,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from faultgouge.analysis import OnsetError, Packing, RunFile, find_onset, stiffness_matrix
+from faultgouge.assessment.stability.cases.packings import crystal
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate, settle
-from faultgouge.pywrap.equilibria import EquilibriumPath
-from faultgouge.pywrap.newton_matrix import factored
-from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.pywrap.undamped import time_step
-from faultgouge.studies.stability_cases.packings import crystal
+from faultgouge.pywrap.equilibria.newton_matrix import factored
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+from faultgouge.pywrap.runs.path import EquilibriumPath
+from faultgouge.pywrap.runs.undamped import time_step
 
 Row = dict[str, float | int | None]
 

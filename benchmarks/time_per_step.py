@@ -19,7 +19,7 @@ import tempfile
 from pathlib import Path
 
 from faultgouge.pywrap import Scene, settle
-from faultgouge.pywrap.data_file import data_file
+from faultgouge.pywrap.lammps.data_file import data_file
 
 BIN = Path(sys.executable).parent
 

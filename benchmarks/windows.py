@@ -32,7 +32,7 @@ from typing import Any
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError
 from faultgouge.pywrap import Scene
-from faultgouge.studies.onsets import onset_run
+from faultgouge.pywrap.onset.undamped import onset_run
 
 HERE = Path(__file__).parent
 GROUPS = ("reference", "paper", "small", "large")

@@ -114,7 +114,7 @@ def unstable_pair(packing: Packing, modes: Eigenpairs, believed: Sequence[comple
         All its modes.
     believed : sequence of complex
         Eigenvalues of the complex pairs that are no rounding noise, fastest growing first, as of
-        :func:`~faultgouge.analysis.spectrum`.
+        :func:`~faultgouge.analysis.spectrum.spectrum`.
 
     Returns
     -------

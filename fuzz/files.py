@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, PackingFileError, RunFile
-from faultgouge.analysis.wholefile import HEADER_SIZE
+from faultgouge.analysis.files.wholefile import HEADER_SIZE
 
 LONGEST = 20.0
 """Seconds that opening a file may take."""

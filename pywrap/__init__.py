@@ -6,21 +6,21 @@ LAMMPS with one packing in it, and `quasistatic` takes it from equilibrium to eq
 over `equilibrate`.
 """
 
-from .private_mpi import prepare
+from .lammps.private_mpi import prepare
 
 prepare()  # before mpi4py.MPI is imported
 
 # ruff: noqa: E402 - the imports below need it
 from ..analysis import NoEquilibriumError
-from .bed import settle
-from .engine import Engine
-from .equilibria import ramp, reach
-from .instance import EngineError
-from .quasistatic import Equilibrium, equilibrate
-from .recording import Record
-from .refusals import SceneError
-from .scene import Scene
-from .undamped import Sample, perturb
+from .equilibria.quasistatic import Equilibrium, equilibrate
+from .lammps.engine import Engine
+from .lammps.instance import EngineError
+from .runs.path import ramp, reach
+from .runs.recording import Record
+from .runs.undamped import Sample, perturb
+from .scenes.refusals import SceneError
+from .scenes.scene import Scene
+from .settling.bed import settle
 
 __all__ = [
     "Engine",

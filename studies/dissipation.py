@@ -1,9 +1,9 @@
 r"""What dissipation does to the onset of packings, and to the transient gain below it.
 
 As :math:`C \to 0` with a fixed ratio :math:`C_N : C_T` the damped onset tends to a load below the undamped one
-(:mod:`~faultgouge.analysis.weak_damping`), and as the dashpots get stronger it rises, in the end beyond. Drag alone
-raises it from the beginning. Below the onset the transient gain (:mod:`~faultgouge.analysis.transient`) grows as a
-power of the distance, and dissipation limits it.
+(:mod:`~faultgouge.analysis.damped_onset.weak`), and as the dashpots get stronger it rises, in the end beyond. Drag
+alone raises it from the beginning. Below the onset the transient gain (:mod:`~faultgouge.analysis.motion.transient`)
+grows as a power of the distance, and dissipation limits it.
 
 Every function yields its records one by one, so that a long study is kept as it goes.
 """
@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analysis import OnsetError, Packing, Window
-from ..analysis.damped import damped_windows, dissipating
-from ..analysis.transient import NoGainError, transient_gain
-from ..analysis.weak_damping import drag_onset, weak_limit
+from ..analysis.damped_onset.weak import drag_onset, weak_limit
+from ..analysis.damped_onset.windows import damped_windows, dissipating
+from ..analysis.motion.transient import NoGainError, transient_gain
 from ..pywrap import Scene
-from .damped_onset import Ramped
+from ..pywrap.onset.damped import Ramped
 
 RATIOS = ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.1), (0.1, 1.0))
 """C_N : C_T of the study of weak dashpots."""

@@ -56,7 +56,7 @@ def test_help_loads_nothing_heavy(words):
 def test_analysis_needs_numpy_scipy_and_h5py_alone():
     assert loaded_by("import faultgouge.analysis") & HEAVY == {"numpy", "scipy", "h5py"}
     others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
-    assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.response") & others == set()
+    assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.motion.response") & others == set()
 
 
 @pytest.mark.slow

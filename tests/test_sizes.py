@@ -7,9 +7,20 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("analysis", "pywrap", "figures", "studies", "src/faultgouge", "tests", "benchmarks", "fuzz", "docs")
+FOLDERS = (
+    "analysis",
+    "pywrap",
+    "figures",
+    "studies",
+    "assessment",
+    "src/faultgouge",
+    "tests",
+    "benchmarks",
+    "fuzz",
+    "docs",
+)
 PYTHON = sorted({path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py") if "_build" not in path.parts})
-CPP = sorted([*(ROOT / "pair_mindlin_smooth").glob("*.[ch]*"), *(ROOT / "analysis").glob("*.cpp")])
+CPP = sorted([*(ROOT / "pair_mindlin_smooth").glob("*.[ch]*"), *(ROOT / "analysis").rglob("*.cpp")])
 SCOPE = re.compile(r"\b(namespace|class|struct|enum|union)\b[^()]*$")
 
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array
 
-from ..packing import Floats, Indices
-from ..spectrum import active_coordinates
+from ..packing.packing import Floats, Indices
+from ..spectrum.spectrum import active_coordinates
 from .found import NEW_PASS, Border, Pass
 from .limits import LIMITS, Limits
 from .ranks import Ranks

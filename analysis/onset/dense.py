@@ -18,8 +18,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError, NoEquilibriumError
-from ..packing import Floats, Indices
-from ..spectrum import Complexes
+from ..packing.packing import Floats, Indices
+from ..spectrum.spectrum import Complexes
 from .edge import Edge, Family, LostPairError, Window, locate
 from .modes import Members, Modes, Place, assign
 from .pair import Pair, continued, deepest_dip, dip_between

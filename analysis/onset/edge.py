@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError
-from ..packing import Floats, Packing
+from ..packing.packing import Floats, Packing
 from .limits import LIMITS, Limits
 from .modes import Operator, Place
 from .pair import Pair, continued

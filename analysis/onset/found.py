@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BadInputError
-from ..packing import Floats
-from ..wholefile import make_folder, write_whole
+from ..files.wholefile import make_folder, write_whole
+from ..packing.packing import Floats
 from .limits import Limits
 from .modes import Place
 

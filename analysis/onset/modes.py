@@ -13,9 +13,9 @@ from typing import TypeAlias
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..packing import Floats, Indices, Packing
-from ..spectrum import Complexes, all_modes, believable, mass_weighted, unit_rounding
-from ..stiffness import stiffness_matrix
+from ..operators.stiffness import stiffness_matrix
+from ..packing.packing import Floats, Indices, Packing
+from ..spectrum.spectrum import Complexes, all_modes, believable, mass_weighted, unit_rounding
 from .limits import LIMITS, Limits
 from .pair import Pair
 

@@ -40,9 +40,9 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import csc_array, csr_array, eye_array
 
-from ..packing import Floats
-from ..sparse_lu import SingularMatrixError, symmetric_lu
-from ..spectrum import Complexes, believable, unit_rounding
+from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
+from ..packing.packing import Floats
+from ..spectrum.spectrum import Complexes, believable, unit_rounding
 from .limits import LIMITS, Limits
 
 Planes = tuple[Floats, Floats]

@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ..packing import Floats, Indices
+from ..packing.packing import Floats, Indices
 from .basis import Basis, Levels
 from .limits import LIMITS, Limits
 

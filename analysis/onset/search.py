@@ -1,6 +1,6 @@
 """What a user asks for: the onset along a ramp, and the windows of a family of matrices."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from ..digits import with_uncertainty
-from ..display import Tabled, windows_rows
 from ..errors import FaultgougeError
-from ..packing import Packing
+from ..packing.packing import Packing
+from ..tabled import Tabled
 from .dense import all_windows
 from .edge import Family, Window, load_error
 from .limits import LIMITS, Limits
@@ -36,6 +36,16 @@ class OnsetError(FaultgougeError):
             f"No pair of eigenvalues{which} was found to become complex up to fx = {last:.17g}, but one was expected "
             f"between {below:.10g} and {above:.10g}: take smaller increments, or raise the largest load."
         )
+
+
+def windows_rows(windows: Sequence[Window]) -> dict[str, str]:
+    """Windows of complex eigenvalues in words: where each begins, and what it is."""
+    rows = {}
+    for each in windows:
+        end = "the end" if each.fx_end is None else f"{each.fx_end:.8g}"
+        begin = f"from {with_uncertainty(each.fx_onset, each.error)}"
+        rows[begin] = f"to {end}, lambda = {each.eigenvalue:.6g}, {each.kind}"
+    return rows
 
 
 @dataclass(frozen=True)

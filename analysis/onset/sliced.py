@@ -24,7 +24,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError, NoEquilibriumError
-from ..packing import Floats
+from ..packing.packing import Floats
 from .basis import Bases, Basis, Cluster, Levels, width_and_mixing
 from .dense import all_windows
 from .edge import Edge, Family, LostPairError, Window, edge_from_inside, leads_back

@@ -29,8 +29,8 @@ from scipy.sparse.linalg import eigsh
 from threadpoolctl import threadpool_limits
 
 from ..errors import FaultgougeError
-from ..packing import Floats, Indices
-from ..sparse_lu import minimum_degree, symmetric_lu
+from ..factors.sparse_lu import minimum_degree, symmetric_lu
+from ..packing.packing import Floats, Indices
 from .found import NEW_PASS, Border, Pass, Shift
 from .limits import LIMITS, Limits
 from .ranks import ALONE, Ranks

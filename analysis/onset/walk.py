@@ -8,7 +8,7 @@ The walker knows loads and nothing of matrices. For each increment it asks an *o
    increment in the same way, and only what is sure is recorded.
 
 The oracles are :mod:`~faultgouge.analysis.onset.dense` and :mod:`~faultgouge.analysis.onset.sliced`, and that of
-growing motion, :mod:`~faultgouge.analysis.damped`.
+growing motion, :mod:`~faultgouge.analysis.damped_onset.windows`.
 """
 
 from collections.abc import Callable, Iterable, Sequence

@@ -14,7 +14,7 @@ import numpy as np
 
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.pywrap import Scene
-from faultgouge.studies.damped_onset import ramped
+from faultgouge.pywrap.onset.damped import ramped
 from faultgouge.studies.dissipation import RATIOS, over_distance, over_strength, seeded, weak_cases
 
 HERE = Path(__file__).parent

@@ -7,10 +7,10 @@ Two real eigenvalues of the stability operator meet at the onset :math:`F_x^c` a
 
 import numpy as np
 
-from faultgouge.analysis.pair_form import pair_eigenvalues
+from faultgouge.analysis.onset.pair_form import pair_eigenvalues
 from faultgouge.figures import PairCurve, draw_pair
 from faultgouge.pywrap import Scene
-from faultgouge.studies.onsets import onset_run
+from faultgouge.pywrap.onset.undamped import onset_run
 
 scene = Scene.from_mapping(
     {

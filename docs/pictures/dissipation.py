@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.power_law import fit_power_law
+from faultgouge.analysis.motion.power_law import fit_power_law
 from faultgouge.figures.dissipation import GainCurve, OnsetCurve, dissipation_figure
 from faultgouge.figures.style import save_as
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis import Packing, PackingFileError
-from ..data_file import box_lines
+from ..lammps.data_file import box_lines
 from .disks import Disks, of_columns, sphere_volume
 from .quantities import ModeVectors
 from .record import contact_rows, given, scalars, slips_of

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis import PackingFileError, read_dump
-from ...analysis.dumps import DumpFrame, dump_frames
+from ...analysis.files.dumps import DumpFrame, dump_frames
 from .disks import Disks, of_columns
 from .record import contact_rows, scalars, slips_of
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...analysis import PackingFileError
-from ...analysis.wholefile import BEGINNINGS
+from ...analysis.files.wholefile import BEGINNINGS
 from .disks import Disks
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing
-from ...analysis.runfile import LAW_DEFAULTS
+from ...analysis.files.runfile import LAW_DEFAULTS
 from .disks import Slips
 
 KEYS = ("kn", "kt", "mu", "exponent", "cn", "ct", "tau", "fx", "fy", "inertia_factor")

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ...analysis import PackingFileError
-from ..instance import lammps_instance
+from ..lammps.instance import lammps_instance
 from .disks import Disks, of_columns
 
 MAGIC = b"LammpS RestartT"

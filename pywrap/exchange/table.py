@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import PackingFileError
-from ...analysis.dumps import CONTACT, dump_frames
+from ...analysis.files.dumps import CONTACT, dump_frames
 from .disks import Disks, Slips, of_columns
 
 Floats = NDArray[np.float64]

@@ -2,8 +2,15 @@
 
 ``faultgouge.analysis`` takes a configuration and gives its Jacobian, spectrum, onset and growth;
 ``faultgouge.pywrap`` drives LAMMPS from a scene to stored configurations; ``faultgouge.studies`` puts
-results on paper.
+results on paper; ``faultgouge.assessment`` measures errors, run time and limits.
 """
+
+import sys
+
+if "IPython" in sys.modules:
+    from .notebook import show_packings
+
+    show_packings()
 
 
 def __getattr__(name: str) -> str:

@@ -1,13 +1,13 @@
 """A command works in a process of its own, and a guard beside it ends with it: in one sentence, within two seconds.
 
 Python runs a signal's handler between two of its own instructions, and LAMMPS or LAPACK may be minutes away from the
-next one; SciPy's `eig` does not even let another thread run. So the process that the shell or mpiexec has
-started forks before anything heavy is imported. Its child does the work. The guard waits for the child and for signals,
-hands SIGINT (Ctrl-C) and SIGTERM on, and gives the child `GRACE` to close files and to end other processes. Nothing is
-lost by that, as files of results are whole at any moment (:mod:`faultgouge.analysis.wholefile`). Then the guard says
-what is kept, in the words that the child has left in memory that both share (`keeps`), and exits with 130 or 143. When
-the guard ends, in whatever way, the kernel kills the child. A child that a library has ended (SIGSEGV, SIGABRT, or
-SIGKILL for want of memory) ends in a sentence as well.
+next one; SciPy's `eig` does not even let another thread run. So the process that the shell or mpiexec has started
+forks before anything heavy is imported. Its child does the work. The guard waits for the child and for signals, hands
+SIGINT (Ctrl-C) and SIGTERM on, and gives the child `GRACE` to close files and to end other processes. Nothing is lost
+by that, as files of results are whole at any moment (:mod:`faultgouge.analysis.files.wholefile`). Then the guard says
+what is kept, in the words that the child has left in memory that both share (`keeps`), and exits with 130 or 143.
+When the guard ends, in whatever way, the kernel kills the child. A child that a library has ended (SIGSEGV, SIGABRT,
+or SIGKILL for want of memory) ends in a sentence as well.
 
 Under mpiexec every rank has its guard. mpiexec hands a signal to all ranks and kills the others once the work of one is
 gone, so the guards end `TOGETHER`, and the work after them. Rank 0 alone speaks.

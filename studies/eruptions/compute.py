@@ -32,12 +32,12 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from ...analysis import Packing, mean_square_displacement, nearest_image, spectrum
-from ...analysis.packing import Floats
-from ...analysis.propagator import SLOW
-from ...analysis.state_space import StateSpace
+from ...analysis.motion.propagator import SLOW
+from ...analysis.motion.state_space import StateSpace
+from ...analysis.packing.packing import Floats
 from ...pywrap import Engine
-from ...pywrap.dynamics import Dynamics, Motion
-from ...pywrap.undamped import time_step
+from ...pywrap.lammps.dynamics import Dynamics, Motion
+from ...pywrap.runs.undamped import time_step
 
 DECADES = 24.0
 """Decades of D between its noise, 1e-27 in the first steps, and the square of a tenth of an overlap."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..pages import render
+from ...figures.pages import render
 from .compute import DECADES, OVER, QUIET
 from .draw import WORDS
 

@@ -11,13 +11,13 @@ from mpi4py import MPI
 
 from ...analysis import NoEquilibriumError
 from ...pywrap import Engine, Equilibrium, Scene, SceneError
-from ...pywrap.bed import settle
-from ...pywrap.equilibria import EquilibriumPath, loads
-from ...pywrap.refusals import needed
-from ...pywrap.study_sections import Eruptions
-from ...pywrap.units import real_units
+from ...pywrap.onset.sharing import Progress, Say, shared_out
+from ...pywrap.runs.path import EquilibriumPath, loads
+from ...pywrap.scenes.refusals import needed
+from ...pywrap.scenes.study_sections import Eruptions
+from ...pywrap.scenes.units import real_units
+from ...pywrap.settling.bed import settle
 from ..rows import Rows
-from ..sharing import Progress, Say, shared_out
 from . import draw, page
 from .compute import Start, erupt
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from ...analysis.wholefile import write_text
-from ...pywrap.sections import Law
+from ...analysis.files.wholefile import write_text
+from ...pywrap.scenes.sections import Law
 from ..sweep.compute import LINES, Progress, Say, run_sweep, stored
 from .sets import SHARES, sets
 

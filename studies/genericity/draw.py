@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from ...analysis.packing import Floats
+from ...analysis.packing.packing import Floats
 from ...figures.style import INK, styled
 from ..statistics import distribution
 from .numbers import STEPS

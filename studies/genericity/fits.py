@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.packing import Floats
+from ...analysis.packing.packing import Floats
 from ..statistics import Bools
 
 DRAWS = 300

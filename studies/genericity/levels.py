@@ -46,11 +46,11 @@ from scipy.sparse import csr_array
 
 from ...analysis import spectrum
 from ...analysis.onset import force_bearing, full_operator
-from ...analysis.packing import Floats, Indices
-from ...analysis.spectrum import active_coordinates
+from ...analysis.packing.packing import Floats, Indices
+from ...analysis.spectrum.spectrum import active_coordinates
 from ...pywrap import Engine, Scene
-from ...pywrap.equilibria import EquilibriumPath, loads
-from ...pywrap.refusals import needed
+from ...pywrap.runs.path import EquilibriumPath, loads
+from ...pywrap.scenes.refusals import needed
 from ..sweep.onset import Start
 
 AVERAGED = 21

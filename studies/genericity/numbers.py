@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.packing import Floats
+from ...analysis.packing.packing import Floats
 from ..statistics import median_interval, quartiles, share
 from .fits import shape, size_law
 from .sets import FRICTION

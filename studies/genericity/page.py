@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.wholefile import write_text
+from ...analysis.files.wholefile import write_text
+from ...figures.pages import render
 from ...figures.style import save_as
-from ..pages import render
 from .draw import mechanism_figure, modes_figure, onsets_figure, size_figure
 from .numbers import LOADS, numbers, read_tables
 from .sets import PACKINGS, SIZES

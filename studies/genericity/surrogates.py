@@ -30,11 +30,11 @@ from scipy.sparse import coo_array, csr_array
 
 from ...analysis import NoEquilibriumError, Packing
 from ...analysis.onset import complex_windows, force_bearing
-from ...analysis.packing import Floats
-from ...analysis.spectrum import mass_weighted
-from ...analysis.stiffness import stiffness_matrix
+from ...analysis.operators.stiffness import stiffness_matrix
+from ...analysis.packing.packing import Floats
+from ...analysis.spectrum.spectrum import mass_weighted
 from ...pywrap import Engine, Scene
-from ...pywrap.equilibria import EquilibriumPath, loads
+from ...pywrap.runs.path import EquilibriumPath, loads
 from ..sweep.onset import Start
 from .levels import Pencil, pencil_of
 

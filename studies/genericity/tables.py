@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.packing import Floats
+from ...analysis.packing.packing import Floats
 from ..statistics import Bools
 
 

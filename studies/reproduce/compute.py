@@ -23,14 +23,14 @@ from ...analysis import (
     fit_growth,
     spectrum,
 )
-from ...analysis.pair_form import pair_eigenvalues
+from ...analysis.onset.pair_form import pair_eigenvalues
 from ...figures.pair import PairCurve
 from ...pywrap import Engine, Equilibrium, Record, Sample, Scene, SceneError, reach
-from ...pywrap.equilibria import next_equilibrium
-from ...pywrap.refusals import needed
-from ...pywrap.sections import Friction, Perturb
-from ...pywrap.undamped import perturb, time_step
-from ..onsets import OnsetRun, onset_run
+from ...pywrap.onset.undamped import OnsetRun, onset_run
+from ...pywrap.runs.path import next_equilibrium
+from ...pywrap.runs.undamped import perturb, time_step
+from ...pywrap.scenes.refusals import needed
+from ...pywrap.scenes.sections import Friction, Perturb
 from ..triggering import Sensitivity, Triggering, sensitivity, trigger
 from ..triggering import summary as triggering_summary
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from itertools import pairwise
 
 from ...analysis import Packing
+from ...figures.pages import render
 from ...pywrap import Scene
-from ..onsets import OnsetRun
-from ..pages import render
+from ...pywrap.onset.undamped import OnsetRun
 from ..triggering.page import section
 from .compute import GrowthRun, TriggeringRun
 from .si import si_rows

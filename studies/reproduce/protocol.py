@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ...analysis.digits import with_uncertainty
-from ...analysis.wholefile import make_folder, write_text
+from ...analysis.files.wholefile import make_folder, write_text
 from ...pywrap import Scene
-from ..onsets import OnsetRun
+from ...pywrap.onset.undamped import OnsetRun
 from .compute import growth_run, onsets_of, pair_curve, recorded_ramp, summary_of, triggering_run
 from .draw import figures, triggering_figures
 from .page import report

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ...pywrap import Scene
-from ...pywrap.units import RealUnits, dashpot, quality_factor, real_units
-from ..onsets import OnsetRun
+from ...pywrap.onset.undamped import OnsetRun
+from ...pywrap.scenes.units import RealUnits, dashpot, quality_factor, real_units
 from ..triggering import Triggering, column
 from .compute import GrowthRun, TriggeringRun
 

@@ -28,9 +28,9 @@ from scipy.sparse.linalg import ArpackError
 from threadpoolctl import threadpool_limits
 
 from ...analysis import FaultgougeError, Packing
-from ...analysis.wholefile import make_folder, write_text
+from ...analysis.files.wholefile import make_folder, write_text
 from ...pywrap import Equilibrium, Scene, SceneError, settle
-from ...pywrap.bed import settled_bed
+from ...pywrap.settling.bed import settled_bed
 from .points import Point, Sweep, shard
 from .table import write_tables
 from .tasks import TASKS

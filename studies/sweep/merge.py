@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ...analysis.digits import with_uncertainty
-from ...analysis.wholefile import make_folder, write_text
+from ...analysis.files.wholefile import make_folder, write_text
 from ...pywrap import SceneError
 from .compute import ASKED, LINES, Say, stored
 from .points import Sweep

@@ -27,13 +27,13 @@ from mpi4py import MPI
 from scipy.linalg import eigh, eigvals
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
-from ...analysis.eigenpairs import eigenpairs
 from ...analysis.onset import force_bearing, full_operator, seeks_all
-from ...analysis.packing import Floats
-from ...analysis.spectrum import active_coordinates
+from ...analysis.packing.packing import Floats
+from ...analysis.spectrum.eigenpairs import eigenpairs
+from ...analysis.spectrum.spectrum import active_coordinates
 from ...pywrap import Engine, Equilibrium, Scene, SceneError
-from ...pywrap.equilibria import EquilibriumPath, loads
-from ...pywrap.refusals import needed
+from ...pywrap.runs.path import EquilibriumPath, loads
+from ...pywrap.scenes.refusals import needed
 
 Ends = Literal["onset", "until", "flows"]
 

@@ -27,14 +27,14 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError, Packing, spectrum
-from ...analysis.packing import Floats
+from ...analysis.packing.packing import Floats
 from ...pywrap import Engine, Equilibrium, Sample, Scene
-from ...pywrap.dynamics import Weakening
-from ...pywrap.equilibria import EquilibriumPath, next_equilibrium
-from ...pywrap.refusals import needed
-from ...pywrap.sections import Friction, Perturb
-from ...pywrap.undamped import perturb, weakening_of
-from ..path_error import with_path_error
+from ...pywrap.lammps.dynamics import Weakening
+from ...pywrap.onset.path_error import with_path_error
+from ...pywrap.runs.path import EquilibriumPath, next_equilibrium
+from ...pywrap.runs.undamped import perturb, weakening_of
+from ...pywrap.scenes.refusals import needed
+from ...pywrap.scenes.sections import Friction, Perturb
 from ..triggering import GROWTH_FACTOR, column, jump
 from .onset import Ends, Start, first_window
 

@@ -6,8 +6,8 @@ amplitude a of the wave :math:`a \cos\omega t`, which begins at t = 0 on a packi
 .. math:: a_c(\omega, F_x) = \frac{v_0}{\max_{0 \le t \le T} |v(t)|}, \qquad v(t)\ \text{for}\ a = 1,
 
 on, T being the time for which the wave lasts. v(t) follows from K, and from C and M, alone
-(:mod:`~faultgouge.analysis.forcing`), transient and all: without dissipation what the beginning of the wave has set
-off never dies, and where the wave is slow nearly all of v is such free motion.
+(:mod:`~faultgouge.analysis.motion.forcing`), transient and all: without dissipation what the beginning of the wave
+has set off never dies, and where the wave is slow nearly all of v is such free motion.
 
 In LAMMPS, the same wave triggers or does not; a bisection in the amplitude finds where. Nothing of the linear theory is
 in these runs. The wave is a force on each disk of the upper layer, or an acceleration of the floor.
@@ -25,15 +25,15 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from ...analysis import Packing, spectrum
-from ...analysis.forcing import floor_force, impulse_response
-from ...analysis.packing import Floats
-from ...analysis.response import layer_force
+from ...analysis.motion.forcing import floor_force, impulse_response
+from ...analysis.motion.response import layer_force
+from ...analysis.packing.packing import Floats
 from ...pywrap import Engine, Scene, SceneError
-from ...pywrap.bed import settle
-from ...pywrap.equilibria import EquilibriumPath, loads
-from ...pywrap.study_sections import Trigger
-from ...pywrap.undamped import time_step
-from ...pywrap.units import RealUnits
+from ...pywrap.runs.path import EquilibriumPath, loads
+from ...pywrap.runs.undamped import time_step
+from ...pywrap.scenes.study_sections import Trigger
+from ...pywrap.scenes.units import RealUnits
+from ...pywrap.settling.bed import settle
 
 COUNT = 24
 """Frequencies of a map whose scene names none."""

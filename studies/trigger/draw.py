@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from ...analysis.packing import Floats
+from ...analysis.packing.packing import Floats
 from ...figures.style import INK, save, styled
 
 WAVE = {"layer": "amplitude of the force $a$", "floor": "acceleration of the floor $a$"}

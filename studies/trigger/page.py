@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...figures.pages import render
 from ...pywrap import Scene
-from ..pages import render
 
 
 def page(scene: Scene, result: dict[str, Any]) -> str:

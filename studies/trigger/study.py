@@ -8,9 +8,9 @@ from typing import Any
 
 from ...analysis.digits import with_uncertainty
 from ...pywrap import Scene, SceneError
-from ...pywrap.units import real_units
+from ...pywrap.onset.sharing import Progress, Say, Share, shared_out
+from ...pywrap.scenes.units import real_units
 from ..rows import Rows
-from ..sharing import Progress, Say, Share, shared_out
 from . import draw, page
 from .compute import (
     Measured,
@@ -114,12 +114,12 @@ def _onset(scene: Scene, rows: Rows, say: Say) -> dict[str, Any]:
     say("onset")
     mu, undamped = scene.law.mus[0], None
     if scene.damping is None:
-        from ..onsets import onset_run
+        from ...pywrap.onset.undamped import onset_run
 
         onset = onset_run(scene, mu).onset
         fx_c, error = onset.fx_c, onset.error
     else:
-        from ..damped_onset import damped_onset_run
+        from ...pywrap.onset.damped import damped_onset_run
 
         run = damped_onset_run(scene, mu)
         fx_c, error, undamped = run.fx_c, run.error, None if run.undamped is None else run.undamped.fx_c

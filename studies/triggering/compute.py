@@ -24,15 +24,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Growth, RunFile, fit_growth
-from ...analysis.normal_form import LEAST_CROSSOVER
-from ...analysis.pair_form import PairForm, pair_forms
-from ...analysis.power_law import PowerLaw, fit_power_law
-from ...analysis.response import Response, layer_force, linear_response
+from ...analysis.motion.power_law import PowerLaw, fit_power_law
+from ...analysis.motion.response import Response, layer_force, linear_response
+from ...analysis.onset.pair_form import PairForm, pair_forms
+from ...analysis.spectrum.normal_form import LEAST_CROSSOVER
 from ...pywrap import Equilibrium, Sample, Scene
-from ...pywrap.dynamics import Weakening
-from ...pywrap.sections import Friction, Perturb
-from ...pywrap.undamped import perturb, time_step, weakening_of
-from ..onsets import OnsetRun
+from ...pywrap.lammps.dynamics import Weakening
+from ...pywrap.onset.undamped import OnsetRun
+from ...pywrap.runs.undamped import perturb, time_step, weakening_of
+from ...pywrap.scenes.sections import Friction, Perturb
 from .forecast import JUMP_SHARE, Forecast, forecast
 
 Floats = NDArray[np.float64]

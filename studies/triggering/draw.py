@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...analysis.pair_form import PairForm
+from ...analysis.onset.pair_form import PairForm
 from ...figures.series import draw_series, few_decades, positive
 from ...figures.style import INK, save, styled
 from . import draw_friction, draw_response

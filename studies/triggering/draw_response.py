@@ -9,7 +9,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from ...analysis.digits import with_uncertainty
-from ...analysis.power_law import PowerLaw
+from ...analysis.motion.power_law import PowerLaw
 from ...figures.series import few_decades, positive, scientific
 from ...figures.style import INK, styled
 

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...analysis import NoEquilibriumError, OnsetError, spectrum
-from ...analysis.response import LinearMotion
+from ...analysis.motion.response import LinearMotion
 from ...pywrap import Equilibrium, Scene, SceneError, reach
-from ...pywrap.refusals import needed
-from ..onsets import onset_run
+from ...pywrap.onset.undamped import onset_run
+from ...pywrap.scenes.refusals import needed
 
 JUMP_SHARE = 0.05
 """Share of the run with mu(v) that shows the jump: 10 of 200 time units, where the slowest modes of 100 disks have

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...figures.pages import render
 from ...pywrap import Scene
-from ...pywrap.refusals import needed
-from ..pages import render
+from ...pywrap.scenes.refusals import needed
 from .compute import ABOVE_NOISE, Sensitivity, Triggering, column, jump, summary
 
 

@@ -7,10 +7,10 @@ from scipy.linalg import block_diag
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import damping_matrix, find_onset, stiffness_matrix
-from faultgouge.analysis.damped import damped_windows, dissipating, growing_windows
-from faultgouge.analysis.damped_modes import DampedModes, Pencil
-from faultgouge.analysis.state_space import StateSpace
-from faultgouge.analysis.weak_damping import balancing_ratio, drag_onset, weak_limit
+from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil
+from faultgouge.analysis.damped_onset.weak import balancing_ratio, drag_onset, weak_limit
+from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating, growing_windows
+from faultgouge.analysis.motion.state_space import StateSpace
 
 RNG = np.random.default_rng(11)
 TURN = np.linalg.qr(RNG.normal(size=(8, 8)))[0]

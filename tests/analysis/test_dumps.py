@@ -8,7 +8,7 @@ import pytest
 from test_runfile import assert_identical
 
 from faultgouge.analysis import Contacts, PackingFileError, read_dump, read_packing
-from faultgouge.analysis.dumps import dump_frames
+from faultgouge.analysis.files.dumps import dump_frames
 
 DISK_COLUMNS = "id type x y radius mass d_theta fx fy tqz floor_slip floor_overlap"
 CONTACT_COLUMNS = "id1 id2 f_n f_t slip"

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from transfer import layer_response
 
-from faultgouge.analysis.forcing import floor_force, impulse_response, sampled_response
-from faultgouge.analysis.response import layer_force, linear_response
-from faultgouge.analysis.signals import Signal, SignalError, pulse, sweep
-from faultgouge.analysis.spectrum import discrete_frequency, spectrum
+from faultgouge.analysis.motion.forcing import floor_force, impulse_response, sampled_response
+from faultgouge.analysis.motion.response import layer_force, linear_response
+from faultgouge.analysis.motion.signals import Signal, SignalError, pulse, sweep
+from faultgouge.analysis.spectrum.spectrum import discrete_frequency, spectrum
 
 OMEGA = 5.0
 NEAR_ONSET = 0.0218  # F_x^c = 0.021833056408

@@ -10,9 +10,9 @@ from scipy.linalg import expm
 from transfer import layer_response
 
 from faultgouge.analysis import damping_matrix, mean_square_displacement, spectrum, stiffness_matrix
-from faultgouge.analysis.matrix_functions import Modes
-from faultgouge.analysis.oscillator import Oscillator
-from faultgouge.analysis.response import layer_force, linear_response
+from faultgouge.analysis.motion.matrix_functions import Modes
+from faultgouge.analysis.motion.oscillator import Oscillator
+from faultgouge.analysis.motion.response import layer_force, linear_response
 
 OMEGA = 0.7
 DISTANCES = [1e-2, 1e-6, 1e-12, 0.0, -1e-6]

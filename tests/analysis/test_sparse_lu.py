@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import csc_array, diags_array, eye_array, kron
 
-from faultgouge.analysis import sparse_lu
-from faultgouge.analysis.ldlt import SymmetricFactors
-from faultgouge.analysis.sparse_lu import SingularMatrixError, SuperLUFactors, minimum_degree, symmetric_lu
+from faultgouge.analysis.factors import sparse_lu
+from faultgouge.analysis.factors.ldlt import SymmetricFactors
+from faultgouge.analysis.factors.sparse_lu import SingularMatrixError, SuperLUFactors, minimum_degree, symmetric_lu
 
 
 def lattice(side):

@@ -8,7 +8,7 @@ import quasistatic
 from scipy.linalg import eigh, expm, solve_triangular
 
 from faultgouge.analysis import damping_matrix, linear_response, stiffness_matrix
-from faultgouge.analysis.transient import NoGainError, transient_gain
+from faultgouge.analysis.motion.transient import NoGainError, transient_gain
 
 
 def matrices(packing):

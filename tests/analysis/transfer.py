@@ -5,7 +5,7 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from faultgouge.analysis import damping_matrix, stiffness_matrix
-from faultgouge.analysis.response import layer_force
+from faultgouge.analysis.motion.response import layer_force
 
 
 def layer_response(packing, omega):

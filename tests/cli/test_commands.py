@@ -10,7 +10,7 @@ import pytest
 
 from faultgouge.analysis import RunFile, read_dump, spectrum
 from faultgouge.pywrap import Record, Scene, settle
-from faultgouge.pywrap.decks import DECKS
+from faultgouge.pywrap.lammps.decks import DECKS
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from faultgouge.analysis import RunFile
-from faultgouge.analysis.transient import transient_gain
+from faultgouge.analysis.motion.transient import transient_gain
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 

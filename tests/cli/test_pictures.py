@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from faultgouge.analysis import RunFile
+from faultgouge.notebook import picture
 from faultgouge.pywrap import Scene
 
 if sys.version_info >= (3, 11):
@@ -125,7 +126,7 @@ def test_a_packing_shows_itself(folder):
     with RunFile(folder / "ramp.h5") as file:
         packing, same, other = file.packing(1), file.packing(1), file.packing(2)
     assert len(repr(packing)) < 200
-    assert packing._repr_png_().startswith(b"\x89PNG")
+    assert picture(packing).startswith(b"\x89PNG")
     assert packing == same
     assert packing != other
     assert packing.contacts == same.contacts

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.units import real_units
+from faultgouge.pywrap.scenes.units import real_units
 
 BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"

@@ -8,7 +8,7 @@ import pytest
 from comparing import same
 
 from faultgouge.analysis import BadInputError, RunFile
-from faultgouge.analysis.wholefile import MAGIC
+from faultgouge.analysis.files.wholefile import MAGIC
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.exchange import read_disks, upper_layer, write_packing
 

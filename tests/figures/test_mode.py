@@ -6,7 +6,7 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.quiver import Quiver
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, closest_to_meeting, normal_modes, spectrum, touching
-from faultgouge.analysis.spectrum import participation_ratio, rotation_share
+from faultgouge.analysis.spectrum.spectrum import participation_ratio, rotation_share
 from faultgouge.figures.mode import Mode, ModeError, draw_modes, unstable_pair
 
 

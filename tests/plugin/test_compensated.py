@@ -8,7 +8,7 @@ import pytest
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, mean_square_displacement
 from faultgouge.pywrap import Engine, Equilibrium, equilibrate
-from faultgouge.pywrap.quasistatic import rounding_floor
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 
 mpmath.mp.dps = 50
 mpf = mpmath.mpf

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, damping_matrix, read_dump, touching
-from faultgouge.pywrap.decks import DECKS
-from faultgouge.pywrap.engine import Engine
+from faultgouge.pywrap.lammps.decks import DECKS
+from faultgouge.pywrap.lammps.engine import Engine
 
 KN, KT = 2e5, 2e5 * 2 / 7
 exponents = pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from faultgouge.pywrap.decks import DECKS
+from faultgouge.pywrap.lammps.decks import DECKS
 
 SHORT = {"settle.in": (), "ramp.in": ("-var", "until", "2e-3"), "perturb.in": ("-var", "time", "0.5")}
 

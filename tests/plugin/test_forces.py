@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing
-from faultgouge.pywrap.engine import Engine
+from faultgouge.pywrap.lammps.engine import Engine
 
 KN, KT = 2e5, 2e5 * 2 / 7
 OVERLAPS = [1e-7, 1e-3, 0.1]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from faultgouge.pywrap.decks import DECKS
+from faultgouge.pywrap.lammps.decks import DECKS
 
 HEAD = """
 newton          {newton}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Contacts, stiffness_matrix
-from faultgouge.pywrap.engine import Engine
+from faultgouge.pywrap.lammps.engine import Engine
 
 STEP = 2.0**-27
 """About 1e-8, and a power of two, so that coordinates move by it exactly."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import read_dump, spectrum
-from faultgouge.pywrap.decks import DECKS
+from faultgouge.pywrap.lammps.decks import DECKS
 
 pytestmark = pytest.mark.skipif("LAMMPS_PROGRAM" not in os.environ, reason="LAMMPS_PROGRAM names no LAMMPS")
 RAMP = ("-var", "decks", str(DECKS), "-var", "until", "2e-3")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import read_dump
-from faultgouge.pywrap.decks import DECKS
+from faultgouge.pywrap.lammps.decks import DECKS
 
 ROOT = Path(__file__).parents[2]
 

@@ -8,7 +8,7 @@ import pytest
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Record, Scene, SceneError, perturb, reach
-from faultgouge.pywrap.undamped import sampling, weakening_of
+from faultgouge.pywrap.runs.undamped import sampling, weakening_of
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 

@@ -5,7 +5,7 @@ import pytest
 
 from faultgouge.analysis import damping_matrix, largest_damping_rate, largest_frequency, stable_timestep
 from faultgouge.pywrap import Engine, Scene, SceneError, perturb, ramp, settle
-from faultgouge.pywrap.undamped import time_step
+from faultgouge.pywrap.runs.undamped import time_step
 
 SCENE = {
     "packing": {"disks": 20, "width": 3.6, "seed": 2},

@@ -10,12 +10,12 @@ from faultgouge.analysis import (
     spectrum,
     transient_gain,
 )
-from faultgouge.analysis.damped import dissipating
-from faultgouge.analysis.damped_modes import DampedModes, Pencil
+from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil
+from faultgouge.analysis.damped_onset.windows import dissipating
 from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, settle
-from faultgouge.pywrap.equilibria import EquilibriumPath
-from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.pywrap.undamped import time_step
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+from faultgouge.pywrap.runs.path import EquilibriumPath
+from faultgouge.pywrap.runs.undamped import time_step
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from copy import deepcopy
 import pytest
 
 from faultgouge.pywrap import Scene, SceneError
-from faultgouge.pywrap.estimate import estimated, foreseen
+from faultgouge.pywrap.scenes.estimate import estimated, foreseen
 
 SCENE = {
     "packing": {"disks": 30, "top": 6, "width": 6.5, "seed": 3},

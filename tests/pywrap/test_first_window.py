@@ -6,9 +6,9 @@ from scipy.linalg import eigvals
 
 from faultgouge.analysis import find_onset
 from faultgouge.analysis.onset import full_operator
-from faultgouge.analysis.spectrum import unit_rounding
+from faultgouge.analysis.spectrum.spectrum import unit_rounding
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.equilibria import EquilibriumPath
+from faultgouge.pywrap.runs.path import EquilibriumPath
 
 
 @pytest.mark.slow

@@ -8,8 +8,8 @@ import pytest
 from faultgouge.analysis import discrete_frequency, fit_growth, mean_square_displacement, spectrum
 from faultgouge.analysis.onset import Modes, full_operator
 from faultgouge.pywrap import Engine, Equilibrium, equilibrate
-from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.pywrap.undamped import time_step
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+from faultgouge.pywrap.runs.undamped import time_step
 
 
 def equilibrium(packing, fx, increment=1e-3):

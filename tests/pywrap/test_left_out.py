@@ -13,13 +13,13 @@ import pytest
 from mpi4py import MPI
 
 from faultgouge.analysis import MindlinLaw, PackingFileError, read_dump, spectrum, stiffness_matrix, touching
-from faultgouge.analysis.dumps import dump_frames
-from faultgouge.analysis.spectrum import dynamical_matrix
+from faultgouge.analysis.files.dumps import dump_frames
+from faultgouge.analysis.spectrum.spectrum import dynamical_matrix
+from faultgouge.assessment.left_out.switches import Loaded
 from faultgouge.pywrap import Engine, EngineError, Equilibrium, Scene, equilibrate, settle
-from faultgouge.pywrap.decks import DECKS, Decks
-from faultgouge.pywrap.dynamics import Weakening
-from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.studies.switches import Loaded
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+from faultgouge.pywrap.lammps.decks import DECKS, Decks
+from faultgouge.pywrap.lammps.dynamics import Weakening
 
 BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from faultgouge.pywrap.loose import Start, layer_size, loose_start
+from faultgouge.pywrap.scenes.loose import Start, layer_size, loose_start
 
 
 def smallest_gap(start: Start) -> float:

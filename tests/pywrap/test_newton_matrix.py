@@ -7,13 +7,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix
-from faultgouge.analysis.stiffness import contact_terms
+from faultgouge.analysis.operators.stiffness import contact_terms
 from faultgouge.pywrap import Engine
-from faultgouge.pywrap.contact_graph import ContactGraph
-from faultgouge.pywrap.contact_rows import ContactRows
-from faultgouge.pywrap.newton_matrix import AFLOAT, factored
-from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.pywrap.trial import Trial
+from faultgouge.pywrap.equilibria.newton_matrix import AFLOAT, factored
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+from faultgouge.pywrap.lammps.contact_graph import ContactGraph
+from faultgouge.pywrap.lammps.contact_rows import ContactRows
+from faultgouge.pywrap.lammps.trial import Trial
 
 
 def trial_of(packing, force=None):

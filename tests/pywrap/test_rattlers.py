@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, nearest_image
-from faultgouge.pywrap.rattlers import middle_of_cage
+from faultgouge.pywrap.equilibria.rattlers import middle_of_cage
 
 
 def packing(position, radius, box_length=None):

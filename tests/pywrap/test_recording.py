@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from faultgouge.analysis import RunFile, sealedfile
+from faultgouge.analysis import RunFile
+from faultgouge.analysis.files import sealedfile
 from faultgouge.pywrap import Equilibrium, Record, Scene
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"

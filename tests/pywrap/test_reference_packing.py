@@ -8,10 +8,10 @@ import pytest
 
 from faultgouge.analysis import Contacts, find_onset, spectrum, stiffness_matrix
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate
-from faultgouge.pywrap.equilibria import EquilibriumPath, next_equilibrium
-from faultgouge.pywrap.newton_matrix import factored
-from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.pywrap.trial import Trial
+from faultgouge.pywrap.equilibria.newton_matrix import factored
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+from faultgouge.pywrap.lammps.trial import Trial
+from faultgouge.pywrap.runs.path import EquilibriumPath, next_equilibrium
 
 FX = 0.01
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from faultgouge.pywrap.packing_section import GeneratedPacking, StoredPacking
-from faultgouge.pywrap.scene import Scene, SceneError
+from faultgouge.pywrap.scenes.packing_section import GeneratedPacking, StoredPacking
+from faultgouge.pywrap.scenes.scene import Scene, SceneError
 
 ROOT = Path(__file__).parents[2]
 REFERENCE = ROOT / "tests" / "reference" / "packing7.json"

@@ -7,7 +7,7 @@ import pytest
 
 from faultgouge.analysis import stiffness_matrix, touching
 from faultgouge.pywrap import NoEquilibriumError, Scene, settle
-from faultgouge.pywrap.rattlers import clear_rattlers
+from faultgouge.pywrap.equilibria.rattlers import clear_rattlers
 
 
 def scene(**packing):

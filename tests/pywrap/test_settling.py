@@ -10,10 +10,11 @@ import pytest
 from scipy.linalg import eigvalsh
 
 from faultgouge.analysis import MindlinLaw, Packing, spectrum, stiffness_matrix, touching
-from faultgouge.pywrap import NoEquilibriumError, Scene, settle, settling
-from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.pywrap.settling import minimized
-from faultgouge.pywrap.undamped import ACCURATE_SHARE, time_step
+from faultgouge.pywrap import NoEquilibriumError, Scene, settle
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+from faultgouge.pywrap.runs.undamped import ACCURATE_SHARE, time_step
+from faultgouge.pywrap.settling import settling
+from faultgouge.pywrap.settling.settling import minimized
 
 BIN = Path(sys.executable).parent
 SCENE = {"packing": {"disks": 400, "width": 24.0, "seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}

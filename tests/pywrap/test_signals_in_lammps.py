@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from faultgouge.analysis.forcing import floor_force, sampled_response
-from faultgouge.analysis.response import layer_force
-from faultgouge.analysis.signals import Signal, SignalError
+from faultgouge.analysis.files.signal_files import of_trace, read_signal
+from faultgouge.analysis.motion.forcing import floor_force, sampled_response
+from faultgouge.analysis.motion.response import layer_force
+from faultgouge.analysis.motion.signals import Signal, SignalError
 from faultgouge.pywrap import Engine, Equilibrium, Scene, SceneError, equilibrate
-from faultgouge.pywrap.decks import DECKS
-from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.pywrap.records import of_trace, read_signal
-from faultgouge.pywrap.undamped import time_step
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+from faultgouge.pywrap.lammps.decks import DECKS
+from faultgouge.pywrap.runs.undamped import time_step
 
 LEAST = {"packing": {"disks": 30, "width": 6.0}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
 

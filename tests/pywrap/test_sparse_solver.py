@@ -7,8 +7,8 @@ from scipy.sparse import coo_array, csc_array, csr_array, triu
 from scipy.sparse.linalg import splu
 
 from faultgouge.analysis import stiffness_matrix
-from faultgouge.pywrap.linear import ACCURATE, SparseSolver, elimination_order
-from faultgouge.studies.stability_cases.packings import crystal
+from faultgouge.analysis.factors.linear import ACCURATE, SparseSolver, elimination_order
+from faultgouge.assessment.stability.cases.packings import crystal
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from faultgouge.pywrap import Scene, SceneError
-from faultgouge.pywrap.units import dashpot, quality_factor, real_units, restitution
+from faultgouge.pywrap.scenes.units import dashpot, quality_factor, real_units, restitution
 
 QUARTZ = {
     "grain_diameter": "0.1 mm",

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from faultgouge.pywrap import Scene, SceneError
-from faultgouge.studies.damped_onset import damped_onset_run, ramped
+from faultgouge.pywrap.onset.damped import damped_onset_run, ramped
 from faultgouge.studies.dissipation import RATIOS, over_distance, over_strength, seeded, weak_cases
 
 TABLES = Path(__file__).parents[2] / "docs" / "dissipation"

@@ -4,9 +4,9 @@ import matplotlib
 import numpy as np
 import pytest
 
-from faultgouge.analysis.normal_form import NormalForm
-from faultgouge.analysis.pair_form import PairForm
-from faultgouge.analysis.power_law import PowerLaw, fit_power_law
+from faultgouge.analysis.motion.power_law import PowerLaw, fit_power_law
+from faultgouge.analysis.onset.pair_form import PairForm
+from faultgouge.analysis.spectrum.normal_form import NormalForm
 from faultgouge.figures import save
 from faultgouge.studies.reproduce.draw import growth_figure
 from faultgouge.studies.triggering.compute import Sensitivity

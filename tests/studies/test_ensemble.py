@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from faultgouge.pywrap import NoEquilibriumError, Scene, SceneError, settle
-from faultgouge.studies import ensemble as study
-from faultgouge.studies.ensemble import Member
-from faultgouge.studies.ensemble_figure import ensemble_figure
-from faultgouge.studies.onsets import onset_run
+from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.studies.reproduce import ensemble as study
+from faultgouge.studies.reproduce.ensemble import Member
+from faultgouge.studies.reproduce.ensemble_figure import ensemble_figure
 from faultgouge.studies.statistics import distribution, median_interval, quartiles, share
 from faultgouge.studies.sweep import triggering
 from faultgouge.studies.sweep.triggering import Eruption, RampEnd

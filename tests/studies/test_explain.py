@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from faultgouge.assessment.left_out.costs import in_turns
+from faultgouge.assessment.left_out.explain import _affordable, _switched, explain
+from faultgouge.assessment.left_out.switches import Feature, Loaded, Push, Run, features
 from faultgouge.pywrap import Scene, settle
-from faultgouge.studies.costs import in_turns
-from faultgouge.studies.explain import _affordable, _switched, explain
-from faultgouge.studies.switches import Feature, Loaded, Push, Run, features
 
 SCENES = files("faultgouge") / "scenes"
 

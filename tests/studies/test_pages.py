@@ -2,7 +2,7 @@
 
 import re
 
-from faultgouge.studies.pages import WIDTH, filled
+from faultgouge.figures.pages import WIDTH, filled
 
 PROSE = "The exponent is 0.5 - 0.001 + 0.002 > 0, as in 1. and in # 2, over all of the many loads that are there. " * 3
 

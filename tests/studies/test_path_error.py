@@ -9,9 +9,9 @@ import pytest
 import faultgouge
 from faultgouge.analysis import find_onset, spectrum
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.equilibria import EquilibriumPath
-from faultgouge.studies.damped_onset import damped_onset_run
-from faultgouge.studies.path_error import meeting, path_error, with_path_error
+from faultgouge.pywrap.onset.damped import damped_onset_run
+from faultgouge.pywrap.onset.path_error import meeting, path_error, with_path_error
+from faultgouge.pywrap.runs.path import EquilibriumPath
 
 SHIPPED = Path(faultgouge.__file__).parent / "scenes" / "paper.toml"
 

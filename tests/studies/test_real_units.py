@@ -10,7 +10,7 @@ import tomllib
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene, SceneError
-from faultgouge.pywrap.units import real_units
+from faultgouge.pywrap.scenes.units import real_units
 from faultgouge.studies.reproduce import reproduce
 
 BIN = Path(sys.executable).parent

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import discrete_frequency, spectrum, stiffness_matrix
+from faultgouge.assessment import error_and_time as page
+from faultgouge.assessment.error_and_time.work_precision import dumps, relaxation, trajectory
+from faultgouge.assessment.error_and_time.work_precision.extended import refined
+from faultgouge.assessment.error_and_time.work_precision.fire import fire
+from faultgouge.assessment.error_and_time.work_precision.forces import central_differences, complex_step, net_force
+from faultgouge.assessment.error_and_time.work_precision.frequency import corrected
+from faultgouge.assessment.error_and_time.work_precision.mode import Mode
+from faultgouge.assessment.error_and_time.work_precision.precision import compensated
+from faultgouge.assessment.error_and_time.work_precision.study import Point, Settings, fit_order
+from faultgouge.assessment.error_and_time.work_precision.timing import timed
+from faultgouge.assessment.error_and_time.work_precision.verlet import Verlet
 from faultgouge.pywrap import Engine, Scene, ramp
-from faultgouge.studies import report as page
-from faultgouge.studies.work_precision import dumps, relaxation, trajectory
-from faultgouge.studies.work_precision.extended import refined
-from faultgouge.studies.work_precision.fire import fire
-from faultgouge.studies.work_precision.forces import central_differences, complex_step, net_force
-from faultgouge.studies.work_precision.frequency import corrected
-from faultgouge.studies.work_precision.mode import Mode
-from faultgouge.studies.work_precision.precision import compensated
-from faultgouge.studies.work_precision.study import Point, Settings, fit_order
-from faultgouge.studies.work_precision.timing import timed
-from faultgouge.studies.work_precision.verlet import Verlet
 
 POINT = {"method", "parameter", "error", "seconds", "evaluations"}
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 import pytest
 
 from faultgouge.analysis import stiffness_matrix
+from faultgouge.assessment.stability import CASES, StabilityError, check, stability
+from faultgouge.assessment.stability.cases import checks
+from faultgouge.assessment.stability.cases.case import Case, Outcome, measured, refusal, refused
+from faultgouge.assessment.stability.cases.packings import crystal, sheared
 from faultgouge.pywrap import Equilibrium
-from faultgouge.pywrap.quasistatic import rounding_floor
-from faultgouge.studies.stability import CASES, StabilityError, check, stability
-from faultgouge.studies.stability_cases import checks
-from faultgouge.studies.stability_cases.case import Case, Outcome, measured, refusal, refused
-from faultgouge.studies.stability_cases.packings import crystal, sheared
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 
 QUICK = [case for case in CASES if case.quick]
 

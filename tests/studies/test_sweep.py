@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from faultgouge.pywrap import Scene, SceneError, settle
-from faultgouge.studies.onsets import onset_run
+from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.studies.sweep.compute import run_sweep, stored
 from faultgouge.studies.sweep.draw import draw_sweep
 from faultgouge.studies.sweep.estimate import estimate

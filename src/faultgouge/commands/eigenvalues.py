@@ -90,7 +90,7 @@ def _print_spectrum(
 
 def _gain_of(packing: Packing) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None of an unstable one, and of one that is too large."""
-    from faultgouge.analysis.transient import MOST_DISKS, NoGainError, transient_gains
+    from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
 
     if len(packing) > MOST_DISKS:
         return None
@@ -131,7 +131,7 @@ def onset(
     With a section [damping]: the windows in which some motion grows in spite of
     the dissipation, or because of it, and beside them the undamped onset.
     """
-    from faultgouge.analysis.wholefile import check_folder, write_text
+    from faultgouge.analysis.files.wholefile import check_folder, write_text
 
     wanted, part = read_scene(scene, "onset"), None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
@@ -158,7 +158,7 @@ def _search_folder(output: Path | None) -> Path | None:
 def _undamped_onset(modes: tuple[int, int] | None, folder: Path | None, scene: Scene, mu: float) -> dict[str, Any]:
     """The onset of a scene, as its JSON; and what a user reads of it."""
     from faultgouge.analysis.digits import with_uncertainty
-    from faultgouge.studies.onsets import onset_run
+    from faultgouge.pywrap.onset.undamped import onset_run
 
     with status(f"mu = {mu:g}") as show:
         watch = partial(_under_way, show, f"mu = {mu:g}", folder=folder)
@@ -174,7 +174,7 @@ def _undamped_onset(modes: tuple[int, int] | None, folder: Path | None, scene: S
 def _damped_onset(scene: Scene, mu: float) -> dict[str, Any]:
     """The onset of a scene with dissipation, as its JSON; and what a user reads of it."""
     from faultgouge.analysis.digits import with_uncertainty
-    from faultgouge.studies.damped_onset import damped_onset_run
+    from faultgouge.pywrap.onset.damped import damped_onset_run
 
     with status(f"mu = {mu:g}") as show:
         run = damped_onset_run(scene, mu, watch=partial(_under_way, show, f"mu = {mu:g}"))
@@ -195,7 +195,7 @@ def _damped_onset(scene: Scene, mu: float) -> dict[str, Any]:
 
 def _in_si(scene: Scene, windows: Sequence[tuple[float, float]]) -> dict[str, list[dict[str, float]]]:
     """Loads at which windows begin, with frequencies, as the key si of a scene that has [units]; else nothing."""
-    from faultgouge.pywrap.units import real_units
+    from faultgouge.pywrap.scenes.units import real_units
 
     real = real_units(scene)
     return {} if real is None else {"si": [real.onset(fx, omega) for fx, omega in windows]}

@@ -73,7 +73,7 @@ def import_(
     comes to rest under law and load: without friction, which then begins with zero
     slips; with friction if the file has slips. What moved is said.
     """
-    from faultgouge.analysis.wholefile import check_folder
+    from faultgouge.analysis.files.wholefile import check_folder
 
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
@@ -172,8 +172,8 @@ def _packing(
     disks: Disks, top: str | None, scene: Path | None, laws: dict[str, Any], loads: dict[str, float | None]
 ) -> Packing:
     """The packing under the law and the load of the scene, of the options, or of the file."""
-    from faultgouge.pywrap.bed import drag_time, law_of
     from faultgouge.pywrap.exchange import packing_of, upper_layer
+    from faultgouge.pywrap.settling.bed import drag_time, law_of
 
     layer = upper_layer(disks, top)
     options = {key: value for key, value in {**laws, **loads}.items() if value is not None}
@@ -195,7 +195,7 @@ def _packing(
 
 def _scene(scene: Path | None, disks: Disks, values: dict[str, Any]) -> Scene:
     """The scene, or one that says what options and file say."""
-    from faultgouge.pywrap.scene import Scene
+    from faultgouge.pywrap.scenes.scene import Scene
 
     if scene is not None:
         return Scene.from_toml(scene, packing={})
@@ -214,8 +214,8 @@ def _scene(scene: Path | None, disks: Disks, values: dict[str, Any]) -> Scene:
 def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
     """The packing if it is in balance, else brought to rest if that is wanted."""
     from faultgouge.analysis import PackingFileError
-    from faultgouge.pywrap.bed import OUT_OF_BALANCE
-    from faultgouge.pywrap.exchange.resting import at_rest
+    from faultgouge.pywrap.settling.bed import OUT_OF_BALANCE
+    from faultgouge.pywrap.settling.resting import at_rest
 
     if len(packing.contacts) and packing.residual <= OUT_OF_BALANCE * packing.fy:
         return packing
@@ -233,7 +233,7 @@ def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
 
 def _store(output: Path, packing: Packing) -> None:
     from faultgouge.analysis import RunFile
-    from faultgouge.pywrap.quasistatic import rounding_floor
+    from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 
     with RunFile.create(output, packing, {"task": "import"}) as file:
         file.append(packing, floor=rounding_floor(packing), evaluations=0)

@@ -13,7 +13,7 @@ from .terminal import AsJson, Out, ScenePath, print_json, progress, read_scene, 
 
 if TYPE_CHECKING:
     from faultgouge.pywrap import Equilibrium, Record, Scene
-    from faultgouge.pywrap.dynamics import Weakening
+    from faultgouge.pywrap.lammps.dynamics import Weakening
 
 app = typer.Typer()
 
@@ -40,8 +40,8 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     """Raise F_x from equilibrium to equilibrium, each stored as it is reached."""
     from faultgouge.pywrap import Record
     from faultgouge.pywrap import ramp as ramp_up
-    from faultgouge.pywrap.equilibria import loads
-    from faultgouge.pywrap.refusals import needed
+    from faultgouge.pywrap.runs.path import loads
+    from faultgouge.pywrap.scenes.refusals import needed
 
     wanted = read_scene(scene, "ramp")
     settings = needed(wanted.ramp, "ramp")
@@ -62,7 +62,7 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
 def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
     """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t)."""
     from faultgouge.pywrap import Record, reach
-    from faultgouge.pywrap.refusals import needed
+    from faultgouge.pywrap.scenes.refusals import needed
 
     wanted = read_scene(scene, "perturb")
     settings = needed(wanted.perturb, "perturb")
@@ -93,7 +93,7 @@ def _series(path: Path) -> dict[str, Any]:
 
 def _lines(scene: Scene, record: Record) -> int:
     """Lines of the series of an undamped run."""
-    from faultgouge.pywrap.undamped import sampling
+    from faultgouge.pywrap.runs.undamped import sampling
 
     assert scene.perturb is not None
     assert record.last is not None
@@ -102,7 +102,7 @@ def _lines(scene: Scene, record: Record) -> int:
 
 def _check_time(scene: Scene, start: Equilibrium) -> None:
     """Refuse a time step or a time that the packing does not allow, before anything is written."""
-    from faultgouge.pywrap.undamped import sampling
+    from faultgouge.pywrap.runs.undamped import sampling
 
     assert scene.perturb is not None
     sampling(scene.perturb, start.packing)
@@ -110,7 +110,7 @@ def _check_time(scene: Scene, start: Equilibrium) -> None:
 
 def _weakening(scene: Scene, record: Record) -> Weakening | None:
     """The friction that falls with velocity, its threshold v_0 calibrated if the scene says so."""
-    from faultgouge.pywrap.undamped import unforced, weakening_of
+    from faultgouge.pywrap.runs.undamped import unforced, weakening_of
 
     if scene.friction is None:
         return None

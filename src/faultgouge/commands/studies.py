@@ -25,7 +25,7 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     with their quartiles, and whether what both compute agrees to the bit. It
     takes some ten seconds.
     """
-    from faultgouge.studies.explain import explain as explain_scene
+    from faultgouge.assessment.left_out.explain import explain as explain_scene
 
     wanted = read_scene(scene, "settle")
     with status("switching features off and on"):
@@ -35,7 +35,7 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     elif is_root():
         from rich.console import Console
 
-        from faultgouge.studies.explanation_table import explanation_table
+        from faultgouge.assessment.left_out.explanation_table import explanation_table
 
         console = Console(highlight=False)
         # a file or a pipe has no width, and a table of 80 columns is hard to read
@@ -70,7 +70,7 @@ def reproduce(
     shipped = Path(str(files("faultgouge") / "scenes"))
     wanted = read_scene(scene or shipped / "paper.toml", "reproduce", max(ensemble, 1))
     if ensemble:
-        from faultgouge.studies.ensemble import ensemble as examine_packings
+        from faultgouge.studies.reproduce.ensemble import ensemble as examine_packings
 
         keeps(f"what {output}/results.jsonl has is kept, and the same command goes on from there")
 
@@ -99,7 +99,7 @@ def report(
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points: a minute instead of ten.")] = False,
 ) -> None:
     """Error against run time: which method to take when, for six tasks, with figures and numbers."""
-    from faultgouge.studies.report import report as run_studies
+    from faultgouge.assessment.error_and_time import report as run_studies
 
     keeps(f"{output} has the studies that were finished; the same command begins anew and replaces them")
     run_studies(output, quick, say, lambda runs, name: progress(runs, name, len(runs)))
@@ -115,8 +115,8 @@ def stability(
     as_json: AsJson = False,
 ) -> None:
     """Stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
-    from faultgouge.studies.stability import check
-    from faultgouge.studies.stability import stability as try_cases
+    from faultgouge.assessment.stability import check
+    from faultgouge.assessment.stability import stability as try_cases
 
     keeps(f"{output} has the cases that were finished; the same command begins anew and replaces them")
     result = try_cases(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))

@@ -21,7 +21,7 @@ from ..ranks import is_root
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
     from faultgouge.pywrap import Scene
-    from faultgouge.pywrap.estimate import Task
+    from faultgouge.pywrap.scenes.estimate import Task
 
 T = TypeVar("T")
 
@@ -35,8 +35,8 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON."
 
 def read_scene(path: Path, task: Task | None = None, packings: int = 1) -> Scene:
     """The scene of a TOML file; if its task is long, what is to be done and how long it takes is said."""
-    from faultgouge.pywrap.estimate import foreseen
-    from faultgouge.pywrap.scene import Scene
+    from faultgouge.pywrap.scenes.estimate import foreseen
+    from faultgouge.pywrap.scenes.scene import Scene
 
     scene = Scene.from_toml(path)
     ahead = foreseen(scene, task, packings) if task is not None else ""

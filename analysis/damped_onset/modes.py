@@ -1,0 +1,248 @@
+r"""Eigenvalues of small motion with dissipation, all of them or one that is followed.
+
+Small motion :math:`\propto e^{st}` is an eigenvector of :math:`T(s) = s^2 + s G + A` with the mass-weighted matrices
+A, G of :mod:`~faultgouge.analysis.motion.state_space`: right vectors :math:`T(s) x = 0`, left ones :math:`y^H T(s) =
+0`. It grows if Re s > 0. Matrices that change by dA and dG move an eigenvalue by
+
+.. math:: \mathrm ds = - \frac{y^H (\mathrm dA + s\, \mathrm dG)\, x}{y^H (2 s + G)\, x} ,
+
+so that weak damping of an undamped motion, :math:`s = i\sqrt\lambda`, gives it
+:math:`\mathrm{Re}\, s = -y^H G x / (2 y^H x)`.
+
+**All of them** (`DampedModes`) are LAPACK's for the first-order matrix Z in coordinates of the energy. A perfectly
+conditioned one is uncertain by the unit roundoff times :math:`|Z|_F`; one with unit vectors l, r of Z by
+:math:`1/|l^H r|` of that. Re s > 0 is believed from `SAFETY` times as much.
+
+**One of them** (`DampedMode.at`) is followed to a neighbouring load by Rayleigh quotient iteration with both vectors,
+which triples the digits in every step: :math:`x \leftarrow T(s)^{-1} T'(s) x`, the same for y, and
+:math:`s \leftarrow s - y^H T(s) x / y^H T'(s) x`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eig, lu_solve
+from scipy.linalg.lapack import zgetrf
+
+from ..motion.state_space import StateSpace
+from ..onset import force_bearing
+from ..onset.edge import load_error
+from ..onset.modes import matched
+from ..packing.packing import Floats, Indices, Packing
+from ..spectrum.spectrum import SAFETY, Complexes, unit_rounding
+
+STEADY = 1e-3
+"""Digits of an eigenvalue smaller than this share of |Z|_F are not asked for."""
+
+STEPS = 12
+"""Steps of Rayleigh quotient iteration: each triples the digits, and three or four are enough."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pencil:
+    """s^2 + s G + A of a packing at one load.
+
+    Attributes
+    ----------
+    fx : float
+        The load, force per top disk.
+    system : StateSpace
+        On the coordinates that feel a force, of the packing without contacts whose force is unknown.
+    stiffness, damping : ndarray, shape (3N, 3N)
+        A, 1 / time^2, and G, 1 / time, on all coordinates.
+    balance : float
+        Error of fx that goes with the packing's residual, see :class:`~faultgouge.analysis.Window`.
+    rounding : float
+        u |Z|_F, 1 / time: uncertainty of a perfectly conditioned s.
+    """
+
+    fx: float
+    system: StateSpace
+    stiffness: Floats
+    damping: Floats
+    balance: float
+    rounding: float
+
+    @classmethod
+    def of(cls, packing: Packing) -> "Pencil":
+        """That of a packing with dashpots or drag."""
+        return cls.of_system(packing.fx, StateSpace.of(force_bearing(packing)), 3 * len(packing), load_error(packing))
+
+    @classmethod
+    def of_system(cls, fx: float, system: StateSpace, size: int, balance: float = 0.0) -> "Pencil":
+        """That of a system with so many coordinates, rattlers' and all."""
+        inner = np.ix_(system.active, system.active)
+        stiffness, damping = np.zeros((2, size, size))
+        stiffness[inner], damping[inner] = system.stiffness, system.damping
+        return cls(fx, system, stiffness, damping, balance, unit_rounding(system.matrix))
+
+
+@dataclass(frozen=True, eq=False)
+class DampedMode:
+    """One eigenvalue with its vectors.
+
+    Attributes
+    ----------
+    pencil : Pencil
+        To which it belongs.
+    rate : complex
+        s, 1 / time.
+    right, left : ndarray of complex, shape (3N,)
+        Unit vectors x and y; zero on coordinates that feel no force.
+    """
+
+    pencil: Pencil
+    rate: complex
+    right: Complexes
+    left: Complexes
+
+    @property
+    def fx(self) -> float:
+        return self.pencil.fx
+
+    @property
+    def overlap(self) -> float:
+        """|y^H (2 s + G) x| / |2 s|: it vanishes where two eigenvalues coalesce."""
+        return abs(self._slant) / abs(2 * self.rate)
+
+    @property
+    def _slant(self) -> complex:
+        return complex(np.vdot(self.left, 2 * self.rate * self.right + self.pencil.damping @ self.right))
+
+    @property
+    def growing(self) -> bool:
+        """Whether Re s > 0 beyond its uncertainty."""
+        return bool(self.rate.real * self.overlap > SAFETY * self.pencil.rounding)
+
+    def change(self, other: Pencil) -> complex:
+        """First-order change of s on the way to another pencil."""
+        force = (other.stiffness - self.pencil.stiffness) @ self.right
+        force = force + self.rate * ((other.damping - self.pencil.damping) @ self.right)
+        return complex(-np.vdot(self.left, force) / self._slant)
+
+    def at(self, pencil: Pencil, guess: complex | None = None) -> "DampedMode | None":
+        """The same mode in a neighbouring pencil, shape and all; None if it is not found there.
+
+        Parameters
+        ----------
+        pencil : Pencil
+            The neighbour.
+        guess : complex, optional
+            Where to begin; the first-order change by default.
+        """
+        active = pencil.system.active
+        a, g = pencil.system.stiffness, pencil.system.damping
+        x, y, s = self.right[active], self.left[active], self.rate + self.change(pencil) if guess is None else guess
+        unit, last = np.eye(len(active)), np.inf
+        for _ in range(STEPS):
+            factors = _factors(a + s * g + s * s * unit)
+            x = _unit(lu_solve(factors, 2 * s * x + g @ x, check_finite=False))
+            y = _unit(lu_solve(factors, 2 * np.conj(s) * y + g @ y, trans=2, check_finite=False))
+            slant = np.vdot(y, 2 * s * x + g @ x)
+            step = np.vdot(y, a @ x + s * (g @ x) + s * s * x) / slant
+            s = complex(s - step)
+            if not np.isfinite(s):
+                return None
+            size = abs(s) + self.pencil.rounding / np.finfo(float).eps * STEADY  # of a steady mode s is zero
+            if abs(step) <= 4 * np.finfo(float).eps * size or (abs(step) < 1e-9 * size and abs(step) >= last):
+                break
+            last = float(abs(step))
+        else:
+            return None
+        right, left = np.zeros((2, len(self.right)), complex)
+        right[active], left[active] = x, y
+        found = DampedMode(pencil, complex(s), right, left)
+        return found if self.resembles(found) else None
+
+    def same(self, other: "DampedMode") -> bool:
+        """Whether two modes of one pencil are one and the same: their eigenvalues agree to half of the digits."""
+        return abs(self.rate - other.rate) * min(self.overlap, other.overlap) < 1e-8 * abs(self.rate)
+
+    def resembles(self, other: "DampedMode") -> bool:
+        """Whether both have the same shape rather than not."""
+        return bool(min(abs(np.vdot(self.right, other.right)), abs(np.vdot(self.left, other.left))) > 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class DampedModes:
+    """All eigenvalues at one load with Im s >= 0; the others are their mirror images.
+
+    Attributes
+    ----------
+    pencil : Pencil
+        To which they belong.
+    rates : ndarray of complex, shape (m,)
+        s by increasing imaginary part, 1 / time.
+    right, left : ndarray of complex, shape (3N, m)
+        Unit vectors in columns.
+    uncertainty : ndarray, shape (m,)
+        Re s counts as positive from here.
+    """
+
+    pencil: Pencil
+    rates: Complexes
+    right: Complexes
+    left: Complexes
+    uncertainty: Floats
+
+    @classmethod
+    def of(cls, pencil: Pencil) -> "DampedModes":
+        """Solve the dense first-order eigenproblem."""
+        system, size = pencil.system, len(pencil.system.active)
+        z = system.matrix
+        values, left, right = eig(z, left=True, check_finite=False)
+        kept = np.flatnonzero(values.imag >= 0)
+        kept = kept[np.lexsort((values[kept].real, values[kept].imag))]
+        overlap = np.abs(np.sum(left[:, kept].conj() * right[:, kept], axis=0))
+        x, y = np.zeros((2, len(pencil.stiffness), len(kept)), complex)
+        x[system.active] = _unit(system.unweight @ right[:size, kept])
+        y[system.active] = _unit(left[size:, kept])
+        with np.errstate(divide="ignore"):
+            uncertainty = SAFETY * pencil.rounding / overlap
+        return cls(pencil, np.asarray(values[kept], complex), x, y, uncertainty)
+
+    def __len__(self) -> int:
+        return len(self.rates)
+
+    @property
+    def fx(self) -> float:
+        return self.pencil.fx
+
+    @property
+    def growing(self) -> Indices:
+        """Which of them have Re s > 0 beyond their uncertainty."""
+        return np.flatnonzero(self.rates.real > self.uncertainty)
+
+    def mode(self, index: int) -> DampedMode:
+        """One of them."""
+        return DampedMode(self.pencil, complex(self.rates[index]), self.right[:, index], self.left[:, index])
+
+    def changes(self, other: Pencil) -> Complexes:
+        """First-order changes of all s on the way to another pencil, shape (m,)."""
+        y, x, s = self.left.conj(), self.right, self.rates
+        force = (other.stiffness - self.pencil.stiffness) @ x + ((other.damping - self.pencil.damping) @ x) * s
+        slant = np.sum(y * (2 * s * x + self.pencil.damping @ x), axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(-np.sum(y * force, axis=0) / slant)
+
+    def assigned(self, other: "DampedModes") -> Indices:
+        """Which mode of a neighbouring load each mode here has become, shape (m,); -1 where there is none.
+
+        Shapes decide, |x^H x'| |y^H y'|, and for shapes that two overdamped motions share, the eigenvalues.
+        """
+        weight = np.abs(self.right.conj().T @ other.right) * np.abs(self.left.conj().T @ other.left)
+        a, b = self.rates[:, None], other.rates[None]
+        return matched(weight * (1 - np.abs(a - b) / (np.abs(a) + np.abs(b) + np.finfo(float).tiny)))
+
+
+def _factors(matrix: Complexes) -> tuple[Complexes, Indices]:
+    """LU factors; where s is an eigenvalue to the last bit, a pivot of rounding stands for one that is zero."""
+    factors, pivots, _ = zgetrf(matrix)
+    zero = np.flatnonzero(np.diag(factors) == 0)
+    factors[zero, zero] = np.finfo(float).eps * np.abs(matrix).max()
+    return factors, pivots
+
+
+def _unit(vectors: NDArray) -> Complexes:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=0))

@@ -1,0 +1,280 @@
+r"""Linear solvers for Newton's method: a band for small packings, sparse factors for large ones, of one interface.
+
+A packing is a few disks wide or high, and K couples neighbours only. With the disks in the order of reverse Cuthill and
+McKee, and the coordinates of a disk together, all entries lie within a band: of 100 disks with 285 coordinates, within
+44 places of the diagonal. LAPACK factors the band in a quarter of the time that it takes for the full matrix, and what
+it touches leaves Python and LAMMPS in the processor's caches.
+
+To factor K of 100,000 disks takes as long as thirty evaluations of the forces, and its symmetric part as long as ten.
+From one Newton iteration to the next K changes a little everywhere, with the load, and much at a few contacts, which
+close or open. Neither needs new factors: with those of a matrix nearby, or of the symmetric part, as preconditioner P,
+:math:`P^{-1} K` is the identity but for something small and for something of low rank, and GMRES reduces the residual a
+hundredfold in some five iterations. Where it does not, K itself is factored.
+
+A fill-reducing order of the matrix itself sees single entries, and those that happen to vanish, as on a crystal, spoil
+it: the coordinates of one disk then no longer count as one. So the order of elimination is found on the graph of disks
+and contacts, by minimum degree, and the coordinates of a disk stay together, which also gives the factorisation dense
+blocks.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgbtrf, dgbtrs
+from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from ..operators.stiffness import SIGNS
+from .sparse_lu import Factors, SingularMatrixError, minimum_degree, symmetric_lu
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+
+ACCURATE = 1e-2
+"""Residual of the iterative solution, as a share of the force. Where contacts open or close a Newton iteration gains a
+factor of five, where none does a thousand: a tenth of it is lost at the end, and half of the work saved before."""
+
+LONGEST = 30
+"""Iterations of GMRES that are worth while: a factorisation takes as long as fifty."""
+
+
+class Solver(Protocol):
+    """A matrix K on some of the 3N coordinates (x.., y.., R theta..), to be solved with many forces."""
+
+    def solve(self, force: Floats) -> Floats | None:
+        """The solution of K dq = F, zero on coordinates that K does not know, shape (3N,); None if K is singular."""
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Where the stiffnesses of contacts are in the band matrix of some coordinates.
+
+    Attributes
+    ----------
+    active : ndarray of bool, shape (3N,)
+        The coordinates (x.., y.., R theta..) that the matrix has, E of them.
+    coordinates : ndarray of int, shape (E,)
+        The same in the order of the matrix.
+    disks : ndarray of int, shape (E,)
+        Whose they are.
+    width : int
+        W, diagonals on either side of the main one.
+    places : ndarray of int, shape (36 C,)
+        For each number of each contact, by partner of the row and of the column, and their coordinates; E (3W + 1) for
+        what is not in the matrix.
+    """
+
+    active: Booleans
+    coordinates: Indices
+    disks: Indices
+    width: int
+    places: Indices
+
+    def matrix(self, terms: Floats) -> Floats:
+        """The matrix as LAPACK wants it, with room for what pivots fill in, shape (3W + 1, E).
+
+        Parameters
+        ----------
+        terms : ndarray, shape (3, 3, C)
+            The numbers of each contact, see :func:`~faultgouge.analysis.operators.stiffness.contact_terms`.
+        """
+        shape = len(self.coordinates), 3 * self.width + 1
+        values = (SIGNS[..., None] * terms).ravel()
+        return np.bincount(self.places, values, shape[0] * shape[1] + 1)[:-1].reshape(shape).T
+
+
+def band(i: Indices, j: Indices, active: Booleans) -> Band:
+    """The band of a packing.
+
+    Parameters
+    ----------
+    i, j : ndarray of int, shape (C,)
+        Partners of the contacts; j = -1 is the floor.
+    active : ndarray of bool, shape (3N,)
+        The coordinates (x.., y.., R theta..) that the matrix has.
+    """
+    disks = len(active) // 3
+    coordinates = (_order(i, j, disks)[:, None] + disks * np.arange(3)).ravel()
+    coordinates = coordinates[active[coordinates]]
+    size = len(coordinates)
+    nowhere = 3 * size * size + size  # larger than any place, for any width
+    number = np.full((3, disks + 1), nowhere)  # of coordinates in the matrix; those of the floor, -1, come last
+    axis, disk = np.divmod(coordinates, disks)
+    number[axis, disk] = np.arange(size)
+    ends = number[:, [i, j]].transpose(1, 0, 2)
+    rows, columns = ends[:, None, :, None], ends[None, :, None, :]
+    inside = (rows < nowhere) & (columns < nowhere)
+    width = int(np.abs(rows - columns).max(where=inside, initial=0))
+    places = np.where(inside, rows + 3 * width * columns + 2 * width, size * (3 * width + 1))
+    return Band(active, coordinates, disk, width, places.ravel())
+
+
+def _order(i: Indices, j: Indices, disks: int) -> Indices:
+    """The disks in an order in which neighbours have close numbers, shape (N,)."""
+    pair = j >= 0
+    ends = np.concatenate([i[pair], j[pair]]), np.concatenate([j[pair], i[pair]])
+    graph = coo_array((np.ones(len(ends[0])), ends), shape=(disks, disks))
+    return reverse_cuthill_mckee(csr_array(graph), symmetric_mode=True).astype(np.int64)
+
+
+class BandSolver:
+    """K in a band, factored by LAPACK.
+
+    Parameters
+    ----------
+    band : Band
+        Where its entries are.
+    matrix : ndarray, shape (3W + 1, E)
+        K, see :meth:`Band.matrix`; it is overwritten.
+    """
+
+    def __init__(self, band: Band, matrix: Floats) -> None:
+        self._coordinates, self._width = band.coordinates, band.width
+        self._factors, self._pivots, self._singular = dgbtrf(matrix, band.width, band.width, overwrite_ab=True)
+
+    def solve(self, force: Floats) -> Floats | None:
+        """The solution of K dq = F, shape (3N,); None if K is singular."""
+        if self._singular:
+            return None
+        solution, _ = dgbtrs(self._factors, self._width, self._width, force.take(self._coordinates), self._pivots)
+        step = np.zeros(len(force))
+        step[self._coordinates] = solution
+        return step if np.isfinite(solution.sum()) else None
+
+
+@dataclass(frozen=True, eq=False)
+class SparseFactors:
+    """Factors of K.
+
+    Attributes
+    ----------
+    coordinates : ndarray of int, shape (E,)
+        Which of the 3N coordinates the matrix has, in the order of elimination.
+    factors : Factors
+        Of the matrix in this order.
+    exact : bool
+        Whether they are of K itself, and not of its symmetric part.
+    """
+
+    coordinates: Indices
+    factors: Factors
+    exact: bool
+
+    def solve(self, force: Floats) -> Floats:
+        """The solution on these coordinates, zero on the others, shape (3N,)."""
+        step = np.zeros_like(force)
+        step[self.coordinates] = self.factors.solve(force[self.coordinates])
+        return step
+
+
+class SparseSolver:
+    """K, solved with the factors of a matrix nearby as long as these serve, and then with its own.
+
+    Parameters
+    ----------
+    matrix : scipy.sparse.csr_array, shape (3N, 3N)
+        K; a coordinate without stiffness of its own is no unknown.
+    i, j : ndarray of int, shape (P,)
+        The pairs of disks that it couples.
+    nearby : SparseSolver, optional
+        That of a matrix nearby.
+
+    Attributes
+    ----------
+    own : bool
+        Whether it has had to make factors of its own.
+    """
+
+    def __init__(self, matrix: csr_array, i: Indices, j: Indices, nearby: "SparseSolver | None" = None) -> None:
+        self._stiffness = matrix.diagonal()
+        self._active = np.flatnonzero(self._stiffness)
+        self._matrix = matrix[self._active][:, self._active]
+        self._pairs = i, j
+        self._factors: SparseFactors | None = None if nearby is None else nearby._factors
+        self._left = [False, True]  # of which matrix factors can still be made: K, its symmetric part
+        self.own = False
+
+    def solve(self, force: Floats) -> Floats | None:
+        """The solution of K dq = F, shape (3N,); None if K is singular."""
+        step = self._solved(force)
+        while step is None and self._left:
+            self._factors = None  # before the memory for others is taken
+            self._factors, self.own = self._factored(symmetric=self._left.pop()), True
+            step = self._solved(force)
+        return step
+
+    def _solved(self, force: Floats) -> Floats | None:
+        """The solution with the factors at hand; None without any, and if they are of no use."""
+        if self._factors is None:
+            return None
+        exact = self.own and self._factors.exact
+        step = self._factors.solve(force) if exact else self._iterated(self._factors, force)
+        return step if step is not None and np.all(np.isfinite(step)) else None
+
+    def _factored(self, symmetric: bool) -> SparseFactors | None:
+        order = elimination_order(*self._pairs, len(self._stiffness) // 3, self._active)
+        matrix = 0.5 * (self._matrix + self._matrix.T) if symmetric else self._matrix
+        inside = csc_array(matrix[order][:, order])
+        try:
+            # nearly symmetric: pivots of K itself on the diagonal where good
+            factors = symmetric_lu(inside, ordered=True, symmetric=symmetric, pivoting=0.0 if symmetric else 0.01)
+        except SingularMatrixError:
+            return None
+        return SparseFactors(self._active[order], factors, exact=not symmetric)
+
+    def _iterated(self, nearby: SparseFactors, force: Floats) -> Floats | None:
+        """The solution by GMRES; None if that takes too long."""
+        active, shape = self._active, self._matrix.shape
+        known = np.zeros(len(force), dtype=bool)
+        known[nearby.coordinates] = True
+        new = active[~known[active]]
+
+        def preconditioned(residual: Floats) -> Floats:
+            spread = np.zeros_like(force)
+            spread[active] = residual
+            step = nearby.solve(spread)
+            step[new] = spread[new] / self._stiffness[new]
+            return step[active]
+
+        # from the right, so that its residual is a force
+        operator = LinearOperator(shape, lambda residual: self._matrix @ preconditioned(residual), dtype=np.float64)
+        found, failed = gmres(operator, force[active], rtol=ACCURATE, restart=LONGEST, maxiter=1)
+        if failed:
+            return None
+        step = np.zeros_like(force)
+        step[active] = preconditioned(found)
+        return step
+
+
+def elimination_order(i: Indices, j: Indices, disks: int, coordinates: Indices) -> Indices:
+    """A fill-reducing order of coordinates.
+
+    Parameters
+    ----------
+    i, j : ndarray of int, shape (P,)
+        The pairs of disks whose coordinates are coupled.
+    disks : int
+        N.
+    coordinates : ndarray of int, shape (E,)
+        Which of the 3N coordinates (x.., y.., R theta..) are unknown.
+
+    Returns
+    -------
+    ndarray of int, shape (E,)
+        A permutation of range(E).
+    """
+    every = np.arange(disks)
+    ones = np.ones(len(i))
+    degree = np.bincount(i, minlength=disks) + np.bincount(j, minlength=disks)
+    # diagonally dominant, so that SuperLU, which orders only what it factors, has nothing to pivot
+    graph = coo_array(
+        (np.concatenate([-ones, -ones, degree + 1.0]), (np.concatenate([i, j, every]), np.concatenate([j, i, every]))),
+        shape=(disks, disks),
+    )
+    place = minimum_degree(csc_array(graph))
+    axis, disk = np.divmod(coordinates, disks)
+    return np.lexsort((axis, place[disk]))

@@ -1,0 +1,176 @@
+"""Sparse factors of large matrices with a symmetric pattern, such as K: the one place where they are made.
+
+**Symmetric matrices** in an order of elimination are factored by :mod:`~faultgouge.analysis.factors.ldlt`, without
+pivoting.
+
+**SuperLU**, which SciPy has, factors all others, and finds orders of elimination of minimum degree on the pattern. Its
+pivots are taken from the diagonal. SuperLU would also join small columns of the elimination tree to supernodes and fill
+them with zeros; without that the factors of 300,000 coordinates have three quarters of the entries, and take half of
+the time.
+
+**MUMPS**, if python-mumps is installed (``pip install faultgouge[mumps]``), from `MUMPS_FROM` coordinates on. Nested
+dissection gives its factors fewer entries, and pivots of two rows keep them accurate. It is not made for several
+threads at a time, so that threads that factor beside each other do not use it.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from threading import RLock
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import SuperLU, splu
+
+from ..errors import FaultgougeError
+from ..packing.packing import Indices
+from .ldlt import SymmetricFactors, library
+
+
+class SingularMatrixError(FaultgougeError):
+    """A matrix has no factors: a pivot is zero."""
+
+    @classmethod
+    def of(cls, matrix: csc_array, why: object) -> "SingularMatrixError":
+        """The sentence about a matrix."""
+        return cls(f"The sparse factors of a matrix of {matrix.shape[0]} rows: {why}.")
+
+
+SYMMETRIC: dict[str, Any] = {"relax": 1, "options": {"SymmetricMode": True}}
+
+MUMPS_FROM = 1_000_000
+"""Coordinates from which on MUMPS is used: it takes as long there, and half of the memory (docs/benchmarks.md)."""
+
+
+class Factors(Protocol):
+    """Factors of a matrix A."""
+
+    def solve(self, right: Any, trans: str = "N") -> Any:
+        """The solution of A x = b, or with `trans` = "T" of A^T x = b, shape (n,) or (n, k)."""
+
+    @property
+    def negative(self) -> int:
+        """Negative pivots of a symmetric A, as many as it has negative eigenvalues: Sylvester's law of inertia."""
+
+
+@dataclass(frozen=True, eq=False)
+class SuperLUFactors:
+    """Those of SuperLU."""
+
+    lu: SuperLU
+
+    def solve(self, right: Any, trans: str = "N") -> Any:
+        """See :class:`Factors`."""
+        return self.lu.solve(right, trans)
+
+    @property
+    def negative(self) -> int:
+        """See :class:`Factors`; of factors without pivoting alone."""
+        return int(np.count_nonzero(self.lu.U.diagonal() < 0))
+
+
+def symmetric_lu(
+    matrix: csc_array, *, ordered: bool = False, pivoting: float = 0.0, symmetric: bool = False, mumps: bool = True
+) -> Factors:
+    """The factors of a matrix with a symmetric pattern.
+
+    Parameters
+    ----------
+    matrix : scipy.sparse.csc_array, shape (n, n)
+        Symmetric, or nearly so.
+    ordered : bool
+        Whether its coordinates are in the order of elimination already; MUMPS orders by itself.
+    pivoting : float
+        Share of the largest entry of a column that its diagonal entry must have to be SuperLU's pivot. With 0 it always
+        is: the factors are then those of a symmetric matrix, L D L^T, and their accuracy is to be looked at.
+    symmetric : bool
+        Whether it is symmetric to the bit; real then.
+    mumps : bool
+        Whether MUMPS may be used: not by several threads at a time, nor where the digits must not depend on it.
+
+    Raises
+    ------
+    SingularMatrixError
+        If a pivot is zero.
+    """
+    if mumps and uses_mumps(matrix.shape[0]):
+        return MumpsFactors(matrix, symmetric)
+    compiled = library() if ordered and symmetric and pivoting == 0 else None
+    # where a pivot is zero SuperLU takes another one
+    factors = SymmetricFactors.of(matrix, compiled) if compiled is not None else None
+    return factors or SuperLUFactors(_superlu(matrix, "NATURAL" if ordered else "MMD_AT_PLUS_A", pivoting))
+
+
+def uses_mumps(size: int) -> bool:
+    """Whether a matrix of so many coordinates is one for MUMPS, and it is there."""
+    return size >= MUMPS_FROM and _mumps() is not None
+
+
+def minimum_degree(matrix: csc_array) -> Indices:
+    """Places of the rows of a symmetric, diagonally dominant matrix in an order of elimination, shape (n,)."""
+    return np.asarray(_superlu(matrix, "MMD_AT_PLUS_A", 0.0).perm_c)
+
+
+def _superlu(matrix: csc_array, order: str, pivoting: float) -> SuperLU:
+    try:
+        return splu(matrix, permc_spec=order, diag_pivot_thresh=pivoting, **SYMMETRIC)
+    except RuntimeError as error:  # SuperLU's only word for it
+        raise SingularMatrixError.of(matrix, error) from error
+
+
+@cache
+def _mumps() -> Any:
+    """The module of python-mumps; None where it is not installed."""
+    try:
+        import mumps
+    except ImportError:
+        return None
+    return mumps
+
+
+_LOCK = RLock()
+"""Held by who makes, uses or frees factors of MUMPS, which has variables that all of them share."""
+
+
+class MumpsFactors:
+    """Those of MUMPS, see :class:`Factors`.
+
+    Parameters
+    ----------
+    matrix : scipy.sparse.csc_array, shape (n, n)
+    symmetric : bool
+        Whether half of the matrix says all of it.
+    """
+
+    THRESHOLD = 0.01
+    """Share of the largest entry of its row that a pivot must have: MUMPS's default."""
+    SINGULAR = (-6, -10)
+    """What MUMPS calls a matrix without factors, by its structure and by its numbers."""
+
+    def __init__(self, matrix: csc_array, symmetric: bool) -> None:
+        mumps = _mumps()
+        with _LOCK:
+            self._context = mumps.Context()
+            self._context.set_matrix(matrix, symmetric=symmetric)
+            try:
+                # nested dissection by PORD, which every MUMPS has: a tenth fewer entries than minimum fill
+                self._context.factor(ordering="pord", pivot_tol=self.THRESHOLD)
+            except mumps.MUMPSError as error:
+                if self._context.mumps_instance.infog[1] not in self.SINGULAR:
+                    raise
+                raise SingularMatrixError.of(matrix, error) from error
+
+    def solve(self, right: Any, trans: str = "N") -> Any:
+        """See :class:`Factors`."""
+        with _LOCK:
+            self._context.mumps_instance.icntl[9] = 1 if trans == "N" else 0
+            return self._context.solve(right)
+
+    @property
+    def negative(self) -> int:
+        """See :class:`Factors`."""
+        return int(self._context.mumps_instance.infog[12])
+
+    def __del__(self) -> None:
+        with _LOCK:
+            self._context.mumps_instance = None

@@ -1,0 +1,367 @@
+"""run.h5: the equilibria of a run, to the bit, written as they come.
+
+The file is H5MD 1.1, which MDAnalysis opens with
+``Universe.empty(N, trajectory=True).load_new("run.h5", format="H5MD", convert_units=False)``::
+
+    /h5md                          version, author, creator
+    /particles/disks/position      (T, N, 3)  centres, z = 0
+    /particles/disks/box           dimension 3, periodic along x or not
+    /particles/disks/box/edges     (T, 3)     period, twice the height, largest diameter; only if periodic
+    /observables/angle             (T, N)     orientations
+    /observables/fx, fy            (T,)       force per top disk
+    /observables/residual          (T,)       the largest net force on a disk that has a contact
+    /observables/contacts          (T, C, 3)  rows (i, j, slip), j = -1 for the floor; unused rows are nan
+    /observables/<name>            (T,)       whatever scalars come with an equilibrium
+    /parameters/<name>             what never changes: radii, masses, top, law, inertia, box
+    /faultgouge/<name>/<column>    time series, such as D(t)
+
+Every element with a T is a group of ``value`` and of links to one common ``step`` (the number of the
+equilibrium) and ``time`` (the same number: equilibria have no time). A frame exists once ``step`` counts it,
+and ``step`` grows last.
+
+The trajectory of an undamped run stands behind the equilibrium from which it began, as further frames of position, with
+the run's own time: readers of H5MD step through both. fx and fy are theirs, all other observables of such a frame are
+nan, or 0 if they are whole numbers. ``/faultgouge/trajectory`` has its times, so that it counts these frames, and low
+parts of its positions.
+
+The stored file is whole at any moment and has a checksum over all its bytes (:mod:`.sealedfile`). The attribute
+``complete`` of the root is false until the run has come to its end; ``/checkpoint`` is then the state from which an
+undamped run goes on. A file is checked whole when it is opened (:mod:`.runfile_check`).
+
+Datasets depend on the scene alone. What belongs to the circumstances (resolved scene, versions, seed, ranks)
+is an attribute of the root. One file holds one set of disks and one law.
+"""
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Literal
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import PackingFileError
+from ..packing.contacts import Contacts
+from ..packing.law import MindlinLaw
+from ..packing.packing import Floats, Packing
+from .runfile_check import equilibria
+from .runfile_header import CHECKED, COMPACT, LAW_DEFAULTS, parameters_of, write_header
+from .sealedfile import SealedFile, new_file, write
+
+
+class RunFile(SealedFile):
+    """A run.h5, open for reading or for appending; a context manager.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    mode : {"r", "a"}
+        Read, or read and append. :meth:`create` makes a new one.
+
+    Raises
+    ------
+    PackingFileError
+        If the file is missing, broken, or not written by this class.
+    """
+
+    def __init__(self, path: str | PathLike[str], mode: Literal["r", "a"] = "r") -> None:
+        super().__init__(path, mode)
+        self._step = self._file["particles/disks/position/step"]
+
+    @classmethod
+    def create(
+        cls,
+        path: str | PathLike[str],
+        packing: Packing,
+        attributes: Mapping[str, str | int | float] | None = None,
+    ) -> "RunFile":
+        """Start a new file for runs of the disks of a packing; an existing file is replaced.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        packing : Packing
+            Its radii, masses, upper layer, law, inertia factor and box are those of every frame. It is not
+            appended.
+        attributes : mapping, optional
+            Attributes of the root: the resolved scene as JSON, versions, seed, ranks.
+
+        Returns
+        -------
+        RunFile
+            Open for appending, without frames, and not `complete`.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        with new_file() as file:
+            write_header(file, packing)
+            file.attrs["complete"] = False
+            for name, value in (attributes or {}).items():
+                file.attrs[name] = value
+            write(Path(path), file)
+        return cls(path, "a")
+
+    def __len__(self) -> int:
+        """Number of complete frames, those of a trajectory left out: of equilibria."""
+        return equilibria(self._file)
+
+    @property
+    def fx(self) -> Floats:
+        """Force along +x on each top disk in every frame, shape (T,)."""
+        return self.observable("fx")
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """Names of everything that is stored with a frame."""
+        return tuple(self._file["observables"])
+
+    def observable(self, name: str) -> NDArray:
+        """An observable in every complete frame, shape (T, ...).
+
+        Raises
+        ------
+        KeyError
+            If it is not stored.
+        """
+        return self._file["observables"][name]["value"][: len(self)]
+
+    def append(self, packing: Packing, **scalars: float) -> None:
+        """Add a frame and see that it reaches the disk.
+
+        Parameters
+        ----------
+        packing : Packing
+            An equilibrium of the disks that the file was created for.
+        **scalars : float or int
+            Further observables, such as the force floor or the number of evaluations: the same names in every
+            frame.
+
+        Raises
+        ------
+        ValueError
+            If disks, law or box are not those of the file, or the names differ from those of earlier frames.
+        """
+        self._check_same(packing)
+        count = len(self)
+        if count < self._step.shape[0]:
+            raise ValueError(f"{self.path} has a trajectory, behind which no equilibrium can follow.")
+        columns = [packing.contacts.i, packing.contacts.j, packing.contacts.slip]
+        if packing.contacts.slip_low is not None:
+            columns.append(packing.contacts.slip_low)
+        contacts = np.column_stack(columns)
+        frame: dict[str, ArrayLike] = {
+            "angle": packing.angle,
+            "fx": packing.fx,
+            "fy": packing.fy,
+            "residual": packing.residual,
+            "contacts": contacts,
+        }
+        if packing.position_low is not None:
+            frame["position_low"] = packing.position_low
+        taken = frame.keys() & scalars.keys()
+        if taken:
+            raise ValueError(f"The name {min(taken)} is taken: the packing itself says it.")
+        frame |= scalars
+        if count and set(frame) != set(self.observables):
+            raise ValueError(f"Frames of {self.path} have the observables {', '.join(self.observables)}, not others.")
+        with self.change():
+            self._put_frame(packing, frame, count)
+
+    def _put_frame(self, packing: Packing, frame: Mapping[str, ArrayLike], count: int) -> None:
+        for name, value in frame.items():
+            self._put(f"observables/{name}", np.asarray(value), count)
+        flat = np.column_stack([packing.position, np.zeros(len(packing))])
+        self._put("particles/disks/position", flat, count)
+        if packing.box_length is not None:
+            edges = [
+                packing.box_length,
+                # twice the height: readers that take every axis as periodic see no neighbours across it
+                2 * (packing.position[:, 1] + packing.radius).max(),
+                2 * packing.radius.max(),
+            ]
+            self._put("particles/disks/box/edges", np.array(edges), count)
+        time = self._file["particles/disks/position/time"]
+        time.resize(count + 1, axis=0)
+        time[count] = count
+        self._step.resize(count + 1, axis=0)
+        self._step[count] = count
+
+    def packing(self, frame: int = -1) -> Packing:
+        """The packing of a frame, bit for bit.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame; negative ones count from the end.
+
+        Returns
+        -------
+        Packing
+
+        Raises
+        ------
+        PackingFileError
+            If there is no such frame.
+        """
+        count = len(self)
+        if not -count <= frame < count:
+            raise PackingFileError(f"{self.path} has {count} frames; there is no frame {frame}.")
+        try:
+            return self._packing(frame % count)
+        except ValueError as error:  # numbers that no packing has
+            raise PackingFileError(f"{self.path} is damaged: {error}") from error
+
+    def _packing(self, frame: int) -> Packing:
+        rows = self._file["observables/contacts/value"][frame]
+        rows = rows[~np.isnan(rows[:, 0])]
+        parameters = self._file["parameters"]
+        low = self._file.get("observables/position_low")
+        return Packing(
+            position=self._file["particles/disks/position/value"][frame, :, :2],
+            radius=parameters["radius"][...],
+            angle=self._file["observables/angle/value"][frame],
+            mass=parameters["mass"][...],
+            inertia_factor=parameters["inertia_factor"][()],
+            box_length=parameters["box_length"][()] if "box_length" in parameters else None,
+            top=parameters["top"][...].astype(np.bool_),
+            contacts=Contacts(
+                rows[:, 0].astype(np.int64),
+                rows[:, 1].astype(np.int64),
+                rows[:, 2],
+                rows[:, 3] if rows.shape[1] > 3 else None,
+            ),
+            law=MindlinLaw(
+                *(parameters[name][()] for name in ("kn", "kt", "mu")),
+                **{name: parameters[name][()] for name in LAW_DEFAULTS if name in parameters},
+            ),
+            drag_time=parameters["drag_time"][()] if "drag_time" in parameters else None,
+            fx=self._file["observables/fx/value"][frame],
+            fy=self._file["observables/fy/value"][frame],
+            position_low=low["value"][frame] if low is not None else None,
+        )
+
+    def append_trajectory(self, time: ArrayLike, position: ArrayLike, position_low: ArrayLike | None = None) -> None:
+        """Add frames of the undamped run that began at the last equilibrium.
+
+        Parameters
+        ----------
+        time : array_like, shape (S,)
+            Since the begin of the run.
+        position : array_like, shape (S, N, 2)
+            Centres, length.
+        position_low : array_like, shape (S, N, 2), optional
+            Their low parts.
+        """
+        low = {} if position_low is None else {"position_low": position_low}
+        place = np.asarray(position, dtype=np.float64)
+        flat = np.concatenate([place, np.zeros((*place.shape[:2], 1))], axis=2)
+        begin, group = self._step.shape[0], self._file["particles/disks/position"]
+        end, last = begin + len(flat), len(self) - 1
+        with self.change():
+            self.append_series("trajectory", time=time, **low)
+            rows = {"position/value": flat, "position/time": time, "position/step": np.arange(begin, end)}
+            for name, values in rows.items():
+                group.parent[name].resize(end, axis=0)
+                group.parent[name][begin:] = values
+            repeated = [self._file[f"observables/{name}/value"] for name in ("fx", "fy")]
+            if "box/edges" in group.parent:
+                repeated.append(group.parent["box/edges/value"])
+            for data in (item["value"] for item in self._file["observables"].values()):
+                data.resize(end, axis=0)
+            for data in repeated:
+                data.resize(end, axis=0)
+                data[begin:] = data[last]
+
+    def append_series(self, name: str, **columns: ArrayLike) -> None:
+        """Add rows to a time series, which begins with the first call.
+
+        Parameters
+        ----------
+        name : str
+            Name of the series.
+        **columns : array_like, shape (R, ...)
+            Columns by name, all of one length: always the same names.
+
+        Raises
+        ------
+        ValueError
+            If the columns differ in length, or in name from earlier calls.
+        """
+        group = self._file.require_group(f"faultgouge/{name}")
+        arrays = {column: np.asarray(value) for column, value in columns.items()}
+        lengths = {array.shape[0] if array.ndim else -1 for array in arrays.values()}
+        if len(lengths) != 1 or -1 in lengths:
+            raise ValueError(f"The columns of the series {name} must be lists of one length.")
+        if len(group) and set(group) != set(arrays):
+            raise ValueError(f"The series {name} has the columns {', '.join(group)}, not others.")
+        start, rows = _rows(group), lengths.pop()
+        with self.change():
+            for column, array in arrays.items():
+                if column not in group:
+                    shape = array.shape[1:]
+                    group.create_dataset(
+                        column, (0, *shape), array.dtype, maxshape=(None, *shape), chunks=True, **CHECKED
+                    )
+                group[column].resize(start + rows, axis=0)
+                group[column][start:] = array
+
+    @property
+    def names_of_series(self) -> tuple[str, ...]:
+        """Names of the time series."""
+        return tuple(self._file.get("faultgouge", ()))
+
+    def series(self, name: str) -> dict[str, NDArray]:
+        """The columns of a time series by name.
+
+        Raises
+        ------
+        PackingFileError
+            If there is no such series.
+        """
+        group = self._file.get(f"faultgouge/{name}")
+        if group is None:
+            raise PackingFileError(f"{self.path} has no series {name}.")
+        columns = {column: group[column][: _rows(group)] for column in group}
+        if name == "trajectory" and "position" not in columns:
+            columns["position"] = self._file["particles/disks/position/value"][len(self) :, :, :2]
+        return columns
+
+    def _put(self, name: str, value: NDArray, frame: int) -> None:
+        """Write one element of one frame; the contacts' second axis grows as it must, others stay."""
+        if name not in self._file:
+            group = self._file.create_group(name)
+            number = np.int64 if np.issubdtype(value.dtype, np.integer) else np.float64
+            group.create_dataset(
+                "value",
+                (0, *value.shape),
+                number,
+                maxshape=(None,) * (value.ndim + 1),
+                chunks=(1, *value.shape) if value.size > 1 else True,
+                fillvalue=np.nan if number is np.float64 else 0,
+                **(COMPACT if value.ndim else CHECKED),
+            )
+            for clock in ("step", "time"):
+                group[clock] = self._file[f"particles/disks/position/{clock}"]
+        data = self._file[name]["value"]
+        size = [max(have, need) for have, need in zip(data.shape[1:], value.shape, strict=True)]
+        data.resize((frame + 1, *size))
+        row = np.full(size, data.fillvalue, data.dtype)
+        row[tuple(slice(extent) for extent in value.shape)] = value
+        data[frame] = row
+
+    def _check_same(self, packing: Packing) -> None:
+        parameters, values = self._file["parameters"], parameters_of(packing)
+        for name in parameters.keys() | values.keys():
+            if not (name in parameters and name in values and np.array_equal(parameters[name][()], values[name])):
+                raise ValueError(f"{self.path} was begun for a packing with another {name}.")
+
+
+def _rows(group: h5py.Group) -> int:
+    """Rows that every column of a series has: a killed run may have left them uneven."""
+    return min((group[column].shape[0] for column in group), default=0)

@@ -1,0 +1,141 @@
+r"""One oscillator, driven and damped: the function of a matrix that small motion without dashpots is.
+
+Small motion about an equilibrium, under a force f on the coordinates q and with the drag time tau, obeys
+:math:`M \ddot q = -K q + f \cos\omega t - M \dot q / \tau`. In mass-weighted coordinates :math:`z = M^{1/2} q` it is
+a function of one matrix A, and one oscillator :math:`\ddot x = -\lambda x - \dot x/\tau + \cos\omega t` gives it. From
+rest, with :math:`\Omega = \sqrt\lambda` and no drag,
+
+.. math::
+
+    x = \frac{\cos\omega t - \cos\Omega t}{\Omega^2 - \omega^2} = 2\,
+    \frac{\sin\tfrac12(\Omega + \omega) t}{\Omega + \omega}\,
+    \frac{\sin\tfrac12(\Omega - \omega) t}{\Omega - \omega} ,
+
+whose last form cancels neither in resonance nor at small times; a start from x = 1 at rest gives
+:math:`\cos\Omega t`. With drag, :math:`\gamma = 1/2\tau` and :math:`S^2 = \lambda - \gamma^2`, the motion
+is the stationary one less :math:`e^{-\gamma t}` times a combination of :math:`\cos St` and
+:math:`\sin(St)/S`; in the first moments the two cancel, to the rounding of the stationary motion. All of these
+are entire functions of :math:`\lambda`, so that f(A) exists whatever A is.
+
+**Time steps.** Velocity Verlet with step dt gives the same formulas with
+:math:`\sin\tfrac12\Omega\,dt = \tfrac12\sqrt\lambda\,dt` and with
+:math:`h \sin(Xt)/\sin(Xh)` for :math:`\sin(Xt)/X`, h = dt for a whole and dt/2 for a half angle: its
+positions at the steps are met exactly, and its velocities :math:`(x_{n+1} - x_{n-1})/2dt` as well.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..packing.packing import Floats
+from ..spectrum.spectrum import Complexes, discrete_frequency
+
+
+class Motion(NamedTuple):
+    """Displacement and velocity of an oscillator; arrays of complex numbers."""
+
+    displacement: Complexes
+    velocity: Complexes
+
+
+@dataclass(frozen=True)
+class Oscillator:
+    """One oscillator x'' = -lambda x - x'/tau + cos(omega t), for any complex lambda.
+
+    Parameters
+    ----------
+    omega : float
+        Angular frequency of the forcing, radian / time.
+    damping_time : float, optional
+        tau, time; no damping by default.
+    dt : float, optional
+        Time step of velocity Verlet, for an undamped motion at multiples of dt; exact dynamics by default.
+
+    Raises
+    ------
+    ValueError
+        If the damping time or the step is not positive, or both are given.
+    """
+
+    omega: float = 0.0
+    damping_time: float | None = None
+    dt: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("damping_time", "dt"):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < np.inf:
+                raise ValueError(f"{name} = {value} must be positive and finite.")
+        if self.damping_time is not None and self.dt is not None:
+            raise ValueError("The dispersion of velocity Verlet is that of undamped runs: give dt or damping_time.")
+
+    def released(self, eigenvalue: ArrayLike, time: ArrayLike) -> Motion:
+        """From x = 1 at rest, without forcing.
+
+        Parameters
+        ----------
+        eigenvalue : array_like of complex
+            lambda, 1 / time^2.
+        time : array_like
+            Times; broadcast against the eigenvalues.
+
+        Returns
+        -------
+        Motion
+        """
+        value, t = np.asarray(eigenvalue, dtype=np.complex128), np.asarray(time, dtype=np.float64)
+        if self.damping_time is not None:
+            cosine, sine = self._decaying(value, t)
+            return Motion(cosine + 0.5 / self.damping_time * sine, -value * sine)
+        frequency = self._frequency(value)
+        # (sin(Omega dt) / dt)^2 of Verlet's velocity is lambda itself at dt = 0
+        squared = value if self.dt is None else value * (1 - 0.25 * value * self.dt**2)
+        return Motion(np.cos(frequency * t), -squared * _sine_over(frequency, t, self.dt))
+
+    def driven(self, eigenvalue: ArrayLike, time: ArrayLike) -> Motion:
+        """From rest at x = 0 under the force cos(omega t); parameters as those of `released`."""
+        value, t = np.asarray(eigenvalue, dtype=np.complex128), np.asarray(time, dtype=np.float64)
+        if self.damping_time is not None:
+            return self._driven_and_damped(value, t)
+        frequency, half = self._frequency(value), None if self.dt is None else 0.5 * self.dt
+        fast, slow = frequency + self.omega, frequency - self.omega
+        of_fast, of_slow = _sine_over(fast, 0.5 * t, half), _sine_over(slow, 0.5 * t, half)
+        cos_fast, cos_slow = np.cos(0.5 * fast * t), np.cos(0.5 * slow * t)
+        if half is not None:  # central differences of the sines in the displacement
+            cos_fast, cos_slow = cos_fast * np.cos(slow * half), cos_slow * np.cos(fast * half)
+        return Motion(2 * of_fast * of_slow, of_fast * cos_slow + cos_fast * of_slow)
+
+    def _driven_and_damped(self, value: Complexes, t: Floats) -> Motion:
+        assert self.damping_time is not None
+        gamma, omega = 0.5 / self.damping_time, self.omega
+        cosine, sine = self._decaying(value, t)
+        detuning, loss = value - omega**2, 2 * gamma * omega
+        weight = 1 / (detuning**2 + loss**2)
+        a, b = detuning * weight, loss * weight
+        c, s = np.cos(omega * t), np.sin(omega * t)
+        return Motion(
+            a * (c - cosine) + b * s - (gamma * a + omega * b) * sine,
+            -omega * a * s + omega * b * (c - cosine) + (value * a + gamma * omega * b) * sine,
+        )
+
+    def _decaying(self, value: Complexes, t: Floats) -> tuple[Complexes, Complexes]:
+        """exp(-gamma t) times cos(St) and sin(St)/S, without an overflow where S is imaginary."""
+        assert self.damping_time is not None
+        gamma = 0.5 / self.damping_time
+        root = np.sqrt(value - gamma**2)
+        root = np.where(root.imag < 0, -root, root)
+        slower: Complexes = np.exp((-gamma - 1j * root) * t)
+        turn: Complexes = np.expm1(2j * root * t)
+        safe = np.where(root == 0, 1, root)
+        return slower * (1 + 0.5 * turn), slower * np.where(root == 0, t, turn / (2j * safe))
+
+    def _frequency(self, value: Complexes) -> Complexes:
+        return np.sqrt(value) if self.dt is None else discrete_frequency(value, self.dt)
+
+
+def _sine_over(frequency: Complexes, t: Floats, step: float | None) -> Complexes:
+    """sin(Xt)/X, or h sin(Xt)/sin(Xh) with a step h; t where X is zero."""
+    below = frequency if step is None else np.sin(frequency * step) / step
+    return np.where(below == 0, t, np.sin(frequency * t) / np.where(below == 0, 1, below))

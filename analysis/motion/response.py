@@ -1,0 +1,219 @@
+r"""Linear response of a packing to a force and to a displacement, exact at all times.
+
+Small motion about an equilibrium, under a force f on the coordinates q and the dissipation C, obeys
+
+.. math:: M \ddot q + C \dot q + K q = f \cos\omega t .
+
+Without dashpots it is a function of one matrix, and of one oscillator (:mod:`~faultgouge.analysis.motion.oscillator`).
+
+**Dashpots** (:mod:`~faultgouge.analysis.operators.damping`) have no modes in common with K. The motion is then that
+of the first-order system of :mod:`~faultgouge.analysis.motion.state_space`, whose eigenvalues s give :math:`e^{st}`
+and, under the force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. What is left of it in the end, if all Re s <
+0, is the transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}` (`transfer` in
+:mod:`~faultgouge.analysis.motion.forcing`).
+
+Functions of the matrix of a packing close to a coalescence of two eigenvalues keep their digits
+(:mod:`~faultgouge.analysis.motion.matrix_functions`).
+
+Coordinates that feel no force, those of rattlers, are held still.
+"""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..packing.packing import Floats, Packing
+from .matrix_functions import Modes, first_order
+from .oscillator import Oscillator
+from .state_space import StateSpace, driven, released
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Motion of a packing about its equilibrium.
+
+    Attributes
+    ----------
+    time : ndarray, shape (T,)
+        Times.
+    displacement : ndarray, shape (T, 3N)
+        q = (x.., y.., R theta..) from the equilibrium, length.
+    velocity : ndarray, shape (T, 3N)
+        Its time derivative, length / time.
+    top : ndarray of bool, shape (N,)
+        The disks of the upper layer.
+    """
+
+    time: Floats
+    displacement: Floats
+    velocity: Floats
+    top: NDArray[np.bool_]
+
+    @property
+    def msd(self) -> Floats:
+        """D, mean over disks of dx^2 + dy^2, length^2, shape (T,)."""
+        return np.sum(self.displacement[:, : 2 * len(self.top)] ** 2, axis=1) / len(self.top)
+
+    @property
+    def layer_velocity(self) -> Floats:
+        """Mean velocity of the upper layer along x, length / time, shape (T,)."""
+        return self.velocity[:, : len(self.top)][:, self.top].mean(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearMotion:
+    """The linearised motion of a packing, decomposed once for any number of forces, starts and times.
+
+    Attributes
+    ----------
+    packing : Packing
+        The equilibrium.
+    system : StateSpace
+        Its matrices.
+    damping_time : float or None
+        tau of the drag, time.
+    modes : Modes
+        Of A without dashpots, of the first-order system with them.
+    """
+
+    packing: Packing
+    system: StateSpace
+    damping_time: float | None
+    modes: Modes
+
+    @classmethod
+    def of(cls, packing: Packing, damping_time: float | None = None) -> "LinearMotion":
+        """Decompose a packing; parameters and errors as of `linear_response`."""
+        if damping_time is not None:
+            packing = replace(packing, drag_time=damping_time)
+        system = StateSpace.of(packing)
+        modes = Modes.of(system.matrix if packing.law.damped else system.stiffness)
+        return cls(packing, system, packing.drag_time, modes)
+
+    def response(
+        self,
+        times: ArrayLike,
+        *,
+        force: ArrayLike | None = None,
+        omega: float = 0.0,
+        initial: ArrayLike | None = None,
+        dt: float | None = None,
+    ) -> Response:
+        """Motion from rest; parameters and errors as of `linear_response`."""
+        oscillator, time = self._oscillator(omega, dt), _times(times, dt)
+        active, root, count = self.system.active, self.system.root_mass, 3 * len(self.packing)
+        displacement, velocity = np.zeros((2, len(time), count))
+        for given, name, scale in ((force, "force", 1 / root), (initial, "initial", root)):
+            if given is None:
+                continue
+            vector = np.asarray(given, dtype=np.float64)
+            if vector.shape != (count,):
+                raise ValueError(f"{name} has shape {vector.shape}; {(count,)} is needed.")
+            x, v = self._motion(oscillator, name == "force", vector[active] * scale, time, np.diag(1 / root))
+            displacement[:, active] += x
+            velocity[:, active] += v
+        return Response(time, displacement, velocity, self.packing.top)
+
+    def _oscillator(self, omega: float, dt: float | None) -> Oscillator:
+        if dt is not None and self.packing.law.damped:
+            raise ValueError("The dispersion of velocity Verlet is that of undamped runs: leave dt out with dashpots.")
+        return Oscillator(float(omega), self.damping_time, dt)
+
+    def _motion(
+        self, oscillator: Oscillator, forced: bool, vector: Floats, time: Floats, observed: Floats
+    ) -> tuple[Floats, Floats]:
+        """Displacement and velocity of rows of the mass-weighted coordinates, under a force or from a displacement."""
+        if not self.packing.law.damped:
+            second = oscillator.driven if forced else oscillator.released
+            motion = self.modes.apply(second, time, vector, observed)
+            return motion.displacement.real, motion.velocity.real
+        system, rest, size = self.system, np.zeros_like(vector), len(observed)
+        start = system.state(rest, vector) if forced else system.state(vector, rest)
+        rows = np.block([[observed @ system.unweight, 0 * observed], [0 * observed, observed]])
+        first = partial(driven, oscillator.omega) if forced else released
+        (value,) = self.modes.apply(first, time, start, rows, first_order)
+        return value[:, :size].real, value[:, size:].real
+
+
+def linear_response(
+    packing: Packing,
+    times: ArrayLike,
+    *,
+    force: ArrayLike | None = None,
+    omega: float = 0.0,
+    initial: ArrayLike | None = None,
+    damping_time: float | None = None,
+    dt: float | None = None,
+) -> Response:
+    """Motion of the linearised packing from rest, with its dashpots and drag.
+
+    To ask for many motions of one packing, decompose it once: :class:`LinearMotion`.
+
+    Parameters
+    ----------
+    packing : Packing
+        The equilibrium.
+    times : array_like, shape (T,)
+        Times, in any order, not negative.
+    force : array_like, shape (3N,), optional
+        f of the force f cos(omega t) on (x.., y.., R theta..), force, as of `layer_force`; none by default.
+    omega : float
+        Angular frequency of the force, radian / time.
+    initial : array_like, shape (3N,), optional
+        Displacement at t = 0, length; none by default.
+    damping_time : float, optional
+        tau of the drag -M q'/tau, time; that of the packing by default.
+    dt : float, optional
+        Time step of the undamped velocity Verlet run to be met; exact dynamics by default.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit, a time is negative, a damping time or step is not positive, both are given, or the
+        times are not multiples of the step.
+    numpy.linalg.LinAlgError
+        If more than two eigenvalues coalesce.
+    """
+    motion = LinearMotion.of(packing, damping_time)
+    return motion.response(times, force=force, omega=omega, initial=initial, dt=dt)
+
+
+def layer_force(packing: Packing, amplitude: float, disks: ArrayLike | None = None) -> Floats:
+    """A force along x on some disks.
+
+    Parameters
+    ----------
+    packing : Packing
+        The configuration.
+    amplitude : float
+        a, force on each of them.
+    disks : array_like of bool, shape (N,), optional
+        Which; the upper layer by default.
+
+    Returns
+    -------
+    ndarray, shape (3N,)
+        On (x.., y.., R theta..).
+    """
+    force = np.zeros(3 * len(packing))
+    force[: len(packing)] = amplitude * np.asarray(packing.top if disks is None else disks, dtype=bool)
+    return force
+
+
+def _times(times: ArrayLike, dt: float | None) -> Floats:
+    time = np.array(times, dtype=np.float64)
+    if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(time < 0):
+        raise ValueError("The times of a response must be a list of finite numbers, none of them negative.")
+    if dt is None:
+        return time
+    steps = np.round(time / dt)
+    # Times of a run are multiples of dt, printed or summed: a part in a million of a step is far above rounding.
+    if np.any(np.abs(time / dt - steps) > 1e-6 * np.maximum(1.0, steps * 1e-6)):
+        raise ValueError(f"The times of a run with the step {dt:g} are multiples of it.")
+    return steps * dt

@@ -1,0 +1,130 @@
+r"""Signals of time: what forces the upper layer, or moves the floor.
+
+A signal is a table of (time, value), joined by straight lines, and zero before and after. A pulse is Ricker's wavelet,
+the second derivative of a Gaussian (N. Ricker, Geophysics 18, 10, 1953), whose spectrum peaks at omega,
+
+.. math:: s(t) = (1 - 2 x^2) e^{-x^2}, \qquad x = \tfrac12 \omega (t - t_0) ,
+
+and a sweep :math:`s(t) = \sin\phi(t)` has a frequency :math:`\dot\phi` that goes evenly from one value to another.
+
+**Motion of the floor.** A rigid floor with the acceleration a(t) is, seen from the floor itself, a floor at rest and a
+force :math:`-m a(t)` on every disk, exactly. Seismometers record velocities; `differentiated` makes accelerations of
+them, by central differences at the samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import BadInputError
+from ..packing.arrays import Floats, settle
+
+ONSET_OF_PULSE = 10.0
+"""omega t_0 of a pulse: x = 5 at t = 0, where the pulse is 1e-9 of its peak."""
+
+SAMPLES = 256
+"""Rows a period of pulses and sweeps: straight lines between them are off by (2 pi/256)^2/8 = 8e-5 of the amplitude."""
+
+
+class SignalError(BadInputError):
+    """A signal that cannot be used: one sentence that says what is wrong, where, and what to do."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A table of values over time.
+
+    Parameters
+    ----------
+    time : array_like, shape (T,)
+        Increasing times; at least two.
+    value : array_like, shape (T,)
+        Values: a force, or a displacement, velocity or acceleration of the floor.
+
+    Raises
+    ------
+    SignalError
+        If there are fewer than two rows, a number is not finite, or the times do not increase.
+    """
+
+    time: Floats
+    value: Floats
+
+    def __post_init__(self) -> None:
+        settle(self, time=np.array(self.time, dtype=np.float64), value=np.array(self.value, dtype=np.float64))
+        if self.time.ndim != 1 or self.time.shape != self.value.shape or len(self.time) < 2:
+            raise SignalError(
+                f"a signal has two columns of one length with two rows or more, and not the shapes {self.time.shape} "
+                f"and {self.value.shape}: give it a beginning and an end"
+            )
+        for name in ("time", "value"):
+            wrong = np.flatnonzero(~np.isfinite(getattr(self, name)))
+            if len(wrong):
+                raise SignalError(
+                    f"row {wrong[0] + 1} of the signal has the {name} {getattr(self, name)[wrong[0]]}: give finite "
+                    "numbers, and fill gaps or cut them off"
+                )
+        late = np.flatnonzero(np.diff(self.time) <= 0)
+        if len(late):
+            row = int(late[0]) + 2
+            raise SignalError(
+                f"the time {self.time[row - 1]:g} in row {row} of the signal is not later than the "
+                f"{self.time[row - 2]:g} before it: sort the rows by time, and leave out double ones"
+            )
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        return (
+            f"Signal({len(self)} rows from t = {self.time[0]:g} to {self.time[-1]:g}, "
+            f"|value| <= {np.abs(self.value).max():g})"
+        )
+
+    @property
+    def shortest(self) -> float:
+        """The least time between two rows."""
+        return float(np.diff(self.time).min())
+
+    def at(self, time: ArrayLike) -> Floats:
+        """Values at any times, of the shape of `time`."""
+        return np.interp(np.asarray(time, dtype=np.float64), self.time, self.value, left=0.0, right=0.0)
+
+    def scaled(self, scale: float = 1.0, stretch: float = 1.0) -> Signal:
+        """The signal with its values times `scale` and its times times `stretch`."""
+        return Signal(stretch * self.time, scale * self.value)
+
+    def differentiated(self) -> Signal:
+        """Its time derivative, by central differences at the rows."""
+        return Signal(self.time, np.gradient(self.value, self.time))
+
+
+def pulse(omega: float) -> Signal:
+    """Ricker's wavelet of height 1 whose spectrum peaks at omega; it begins at t = 0.
+
+    Parameters
+    ----------
+    omega : float
+        Angular frequency, 1 / time.
+    """
+    time = np.linspace(0.0, 2 * ONSET_OF_PULSE / omega, int(2 * ONSET_OF_PULSE / (2 * np.pi) * SAMPLES))
+    squared = (0.5 * (omega * time - ONSET_OF_PULSE)) ** 2
+    return Signal(time, (1 - 2 * squared) * np.exp(-squared))
+
+
+def sweep(first: float, last: float, duration: float) -> Signal:
+    """A wave of amplitude 1 whose frequency goes evenly from `first` to `last`; zero at t = 0.
+
+    Parameters
+    ----------
+    first, last : float
+        Angular frequencies, 1 / time.
+    duration : float
+        Length, time.
+    """
+    rows = int(np.ceil(max(first, last) * duration / (2 * np.pi) * SAMPLES)) + 1
+    time = np.linspace(0.0, duration, max(rows, SAMPLES))
+    return Signal(time, np.sin(first * time + 0.5 * (last - first) * time**2 / duration))

@@ -1,0 +1,204 @@
+r"""Transient gain: how far a packing that is linearly stable moves away before it comes back.
+
+Below the onset all eigenvalues are real and positive, and every motion of the linearised packing is a sum of
+oscillations. K is not symmetric, though, its modes are oblique, and a start that is a small difference of two nearly
+parallel modes becomes their sum once their phases differ by :math:`\pi`. The gain is the largest growth over all starts
+and over the time t,
+
+.. math:: \mathcal G(t) = \max_{q_0} \frac{|q(t)|^2}{|q_0|^2} = \|P(t)\|_2^2 .
+
+**Displacement.** q is (x.., y.., R theta..), the start is a displacement at rest, and P(t) is the propagator of
+:math:`M \ddot q + C \dot q + K q = 0`; without dissipation :math:`P = M^{-1/2} \cos(A^{1/2} t) M^{1/2}`.
+
+**Energy.** The start is any displacement and any velocity, and the norm is the energy
+:math:`\tfrac12 \dot q^T M \dot q + \tfrac12 q^T K_s q` with the symmetric part :math:`K_s` of K; P(t) is
+:math:`e^{Zt}` of :mod:`~faultgouge.analysis.motion.state_space`. Were K symmetric, both gains would be 1: the
+antisymmetric part of K alone makes them larger. (See Trefethen and Embree, *Spectra and Pseudospectra*, 2005, for what
+eigenvalues do not tell of such matrices.)
+
+**The maximum.** With the modes x, the rows l of the inverse of their matrix and the functions f of the eigenvalues,
+:math:`P(t) = \sum_k f_k(t)\, x_k l_k^H`. Close to an onset two terms have most of it, those of the pair that is about
+to coalesce, :math:`|x_k| |l_k| = \kappa`: the gain is close to :math:`4\kappa^2` where their phases have come apart by
+:math:`\pi`, at the beat time :math:`\pi/(\omega_1 - \omega_2)`. It grows as the inverse of the distance from the onset,
+the amplitude and the time as its inverse root. Farther away several pairs share in it. So P is sampled on the few modes
+with large :math:`|x_k| |l_k|`, `propagator.SAMPLES` times a period, over a window of time that is stated with the
+result. At the best of these times Lanczos iteration finds the largest singular value of the whole propagator.
+Times are refined on the space of these vectors, where P(t) is a small matrix: its norm is nowhere larger than that of
+P(t), and meets it at each time whose vectors are in the space, with its slope; so the vectors at its maximum join it,
+until the maximum stays (the subspace method of Kangal, Meerbergen, Mengi and Michiels, SIAM J. Matrix Anal. Appl. 39,
+48, 2018). What is returned has been attained by the start that is returned.
+
+Whether a later time has a larger gain no window tells, as the frequencies are incommensurate. But P is never larger
+than :math:`\|X S\|_2 \|S^{-1} X^{-1}\|_2` with any scaling S of the modes, since no :math:`|f_k|` exceeds 1; with the
+scaling that makes :math:`|x_k| = |l_k|` the square of this, `bound`, is close to the gain wherever one pair dominates
+(the displacement, without dissipation; the energy, always).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..packing.packing import Floats, Packing
+from .propagator import ACCURACY, Motions, NoGainError, Norm, Propagator
+
+SYMMETRIC = 1e-6
+"""An excess of the bound below this is no gain: K is symmetric, but for rounding."""
+
+LOOSE = 1e-4
+"""Relative error of the norms at the best samples: what reaches them makes the first space."""
+
+FINE = 1e-4
+"""Error of a refined time, in units of the time between the samples."""
+
+GRID = 9
+"""Times between two samples at which the norm on that space is looked at."""
+
+NEAR = 0.98
+"""Maxima on that space which come so close to the largest norm that was found are refined, too."""
+
+LOOKS = 12
+"""Vectors that join the space, at the most."""
+
+MOST_DISKS = 300
+"""Disks up to which commands compute the gain unasked."""
+
+
+@dataclass(frozen=True, eq=False)
+class TransientGain:
+    """The largest transient growth of a stable packing.
+
+    Attributes
+    ----------
+    gain : float
+        |q(time)|^2 / |q(0)|^2, or the ratio of the energies.
+    time : float
+        When it is reached.
+    start : ndarray, shape (3N,)
+        The displacement (x.., y.., R theta..) that reaches it. Of norm 1, or with the velocity of energy 1/2.
+    velocity : ndarray, shape (3N,)
+        Its velocity at the start; zero for the displacement.
+    norm : {"displacement", "energy"}
+        What has grown.
+    window : float
+        The times from 0 to this were searched.
+    bound : float
+        No later time has a larger gain; inf where no bound is known.
+    """
+
+    gain: float
+    time: float
+    start: Floats
+    velocity: Floats
+    norm: Norm
+    window: float
+    bound: float
+
+    @property
+    def disk(self) -> int:
+        """The worst disk to push: that which the start displaces farthest."""
+        return int(np.argmax(np.linalg.norm(self.start.reshape(3, -1)[:2], axis=0)))
+
+    @property
+    def direction(self) -> Floats:
+        """In which direction, a unit vector (x, y)."""
+        push = self.start.reshape(3, -1)[:2, self.disk]
+        return np.asarray(push / np.linalg.norm(push))
+
+
+def transient_gain(packing: Packing, norm: Norm = "displacement") -> TransientGain:
+    """The largest transient gain of a stable packing, with its dashpots and drag.
+
+    Parameters
+    ----------
+    packing : Packing
+        The equilibrium.
+    norm : {"displacement", "energy"}
+        Displacements from rest in the norm of (x, y, R theta), or all states in the norm of the energy.
+
+    Returns
+    -------
+    TransientGain
+
+    Raises
+    ------
+    NoGainError
+        If some motion grows for ever, or the norm is the energy and K has none that is positive.
+    numpy.linalg.LinAlgError
+        If more than two eigenvalues coalesce.
+    """
+    return _gain(Motions.of(packing), norm)
+
+
+def transient_gains(packing: Packing) -> tuple[TransientGain, TransientGain]:
+    """The gains in displacement and in energy, with the modes computed once; as of :func:`transient_gain`."""
+    motions = Motions.of(packing)
+    return _gain(motions, "displacement"), _gain(motions, "energy")
+
+
+def _gain(motions: Motions, norm: Norm) -> TransientGain:
+    system, disks = motions.system, motions.disks
+    if norm == "energy" and not system.positive:
+        raise NoGainError("the symmetric part of K is not positive: displacements have no energy to compare with")
+    propagator = Propagator.of(motions, norm)
+    bound, columns = propagator.bound(), propagator.kept()
+    if bound < 1 + SYMMETRIC:
+        return _nothing(disks, norm, 0.0, bound)
+    length = min(propagator.window(columns), propagator.end(bound))
+    time, size, start = _refined(propagator, propagator.candidates(columns, length))
+    if size <= 1:
+        return _nothing(disks, norm, length, bound)
+    displacement, velocity = np.zeros((2, 3 * disks))
+    root, count = system.root_mass, len(system.active)
+    if norm == "displacement":
+        displacement[system.active] = start
+    else:
+        displacement[system.active] = system.unweight @ start[:count] / root
+        velocity[system.active] = start[count:] / root
+    return TransientGain(size**2, time, displacement, velocity, norm, length, bound)
+
+
+def _nothing(disks: int, norm: Norm, window: float, bound: float) -> TransientGain:
+    """No start grows: K is symmetric, or what it feeds is less than the dissipation takes."""
+    rest, start = np.zeros((2, 3 * disks))
+    start[0] = 1.0
+    return TransientGain(1.0, 0.0, start, rest, norm, window, bound)
+
+
+def _refined(propagator: Propagator, brackets: list[tuple[float, float]]) -> tuple[float, float, Floats]:
+    """Time, norm and start of the largest norm of the whole propagator about some maxima."""
+    grid = np.array([np.linspace(a, b, GRID) for a, b in brackets])
+    _, left, right = (
+        np.array(part).T for part in zip(*(propagator.largest(t[GRID // 2], LOOSE) for t in grid), strict=True)
+    )
+    seen = np.zeros(len(grid))
+    best = 0.0, 0.0, right[:, 0]
+    for _ in range(LOOKS):
+        left, right = np.linalg.qr(left)[0], np.linalg.qr(right)[0]
+        small = propagator.on(left, right)
+        sizes = np.linalg.norm(small.at(grid.ravel()), 2, (1, 2)).reshape(grid.shape)
+        tops = np.where(sizes.max(axis=1) > seen * (1 + ACCURACY), sizes.max(axis=1), 0.0)
+        place = int(np.argmax(tops))
+        if tops[place] <= NEAR * best[1]:
+            break
+        top = int(np.argmax(sizes[place]))
+        time = _top(small, grid[place, max(top - 1, 0)], grid[place, min(top + 1, GRID - 1)])
+        size, out, start = propagator.largest(time)
+        seen[place] = size
+        best = max(best, (time, size, start), key=lambda each: each[1])
+        left, right = np.column_stack([left, out]), np.column_stack([right, start])
+    return best
+
+
+def _top(propagator: Propagator, a: float, b: float) -> float:
+    """The time between two others at which the norm of P(t) is largest."""
+    from scipy.optimize import minimize_scalar
+
+    if a == b:
+        return a
+    top = minimize_scalar(
+        lambda t: -np.linalg.norm(propagator.at(np.array([t]))[0], 2),
+        bounds=(a, b),
+        method="bounded",
+        options={"xatol": FINE * (b - a)},
+    )
+    return float(top.x)

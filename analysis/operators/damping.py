@@ -1,0 +1,78 @@
+r"""The damping matrix :math:`C = -\partial F / \partial \dot q` of a packing.
+
+Coordinates and the vectors N and T of a contact are those of :mod:`~faultgouge.analysis.operators.stiffness`. A
+contact has a dashpot along its normal and one along its slip (:mod:`~faultgouge.analysis.packing.law`), and a disk
+may feel a drag
+:math:`-(m/\tau)\,\mathbf v` and :math:`-(I/\tau)\,\omega`:
+
+.. math::
+
+    C = \sum_c \left( C_N \delta^{p-1}\, N N^T + C_T \delta^{p-1}\, T T^T \right) + \frac1\tau M, \qquad
+    M = \mathrm{diag}(m, m, I_0 m).
+
+C is symmetric and positive semidefinite: the energy falls by :math:`\dot q^T C\, \dot q` per unit of time. Small motion
+about an equilibrium obeys :math:`M \ddot q + C \dot q + K q = 0`.
+
+A contact at Coulomb's bound has no term in T. There the tangential force is no differentiable function of the
+velocity: it stays at the bound if the contact slides on, and the dashpot acts if the contact slides back. C takes the
+first of the two, as the stability operator does where the slip of such a contact is concerned.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import eigsh
+
+from ..packing.law import Derivatives
+from ..packing.packing import Floats, Packing
+from .stiffness import assembled, contact_terms
+
+
+def damping_matrix(packing: Packing) -> csr_array:
+    """Assemble C = -dF/d(dq/dt).
+
+    Parameters
+    ----------
+    packing : Packing
+        The configuration, with dashpots ``law.cn`` and ``law.ct`` and with ``drag_time``; any of them may be absent.
+
+    Returns
+    -------
+    scipy.sparse.csr_array, shape (3N, 3N)
+        Force time / length, symmetric and positive semidefinite, in the order (x.., y.., R theta..). Empty without
+        dashpots and drag.
+    """
+    contacts = packing.contacts
+    pairs = len(contacts) - np.count_nonzero(contacts.floor)
+    normal, _, distance, overlap = packing.geometry
+    along, across = packing.law.dashpots(overlap, contacts.slip)
+    zero = np.zeros_like(along)
+    # N N^T and T T^T are what the normal and the tangential stiffness multiply in K
+    terms = contact_terms(Derivatives(zero, zero, along, -across, zero), normal.T, distance, pairs)
+    matrix = assembled(terms, contacts.i, contacts.j[:pairs], len(packing))
+    if packing.drag_time is None:
+        return matrix
+    return csr_array(matrix + diags_array(_mass(packing) / packing.drag_time))
+
+
+def largest_damping_rate(packing: Packing) -> float:
+    """Largest eigenvalue of M^-1 C of the dashpots, 1 / time: what limits the time step; drag does not.
+
+    Parameters
+    ----------
+    packing : Packing
+        The configuration.
+    """
+    matrix = damping_matrix(replace(packing, drag_time=None))
+    if matrix.nnz == 0:
+        return 0.0
+    scale = diags_array(1 / np.sqrt(_mass(packing)))
+    # a fixed start makes the result the same on every rank
+    found = eigsh(scale @ matrix @ scale, 1, which="LA", v0=np.ones(matrix.shape[0]), return_eigenvectors=False)
+    return float(found[0])
+
+
+def _mass(packing: Packing) -> Floats:
+    """Of the coordinates (x.., y.., R theta..)."""
+    return np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])

@@ -1,0 +1,284 @@
+r"""A packing of frictional disks, the one data type that everything passes on.
+
+Two disks touch when :math:`\delta = R_i + R_j - r > 0`, with :math:`r` the length of the branch vector
+:math:`\mathbf r_i - \mathbf r_j` (nearest image along x in a periodic box).
+:math:`\mathbf n = (\mathbf r_i - \mathbf r_j)/r` points to i and
+:math:`\boldsymbol\tau = \hat z \times \mathbf n = (-n_y, n_x)`. The history of a contact is one number, the
+slip s along :math:`\boldsymbol\tau`, and it is even under exchange of i and j: the normal, the relative
+motion and the tangent all change sign. The flat floor at y = 0 is a partner with :math:`\mathbf n = (0, 1)`,
+:math:`\boldsymbol\tau = (-1, 0)`, :math:`\delta = R - y` and a normal that never turns.
+
+With the coordinates :math:`q = (x_1..x_N, y_1..y_N, u_1..u_N)`, :math:`u_i = R_i \theta_i`, the forces are
+:math:`(F_x, F_y, T/R)`; a contact puts :math:`f_n \mathbf n + f_t \boldsymbol\tau` on i, the opposite on j,
+and :math:`-f_t` as T/R on both, because the lever arm is the full radius. Each disk of the upper layer
+carries :math:`(f_x, -f_y)` besides.
+
+Coordinates and slips are doubles, or doubles with low parts (:mod:`~faultgouge.analysis.packing.compensated`), if
+compensated arithmetic has found them.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arrays import Floats, Indices, booleans, derived, floats, frozen, number, positive_each, same_bits, settle
+from .compensated import Pair
+from .contacts import Contacts
+from .geometry import ContactGeometry, check_box, measured
+from .law import MindlinLaw
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class Packing:
+    """A configuration of disks with its contacts, law and load. Arrays are copied and made read-only.
+
+    Parameters
+    ----------
+    position : array_like, shape (N, 2)
+        Centres, length; x may lie in any image of a periodic box.
+    radius : array_like, shape (N,)
+        Radii, length, positive.
+    contacts : Contacts
+        Pairs and floor contacts with their slips.
+    law : MindlinLaw
+        The law of all contacts, floor included.
+    angle : array_like, shape (N,), optional
+        Orientations theta, radian; zero by default.
+    mass : array_like, shape (N,), optional
+        Masses, positive; one by default.
+    inertia_factor : float
+        I_0 in I = I_0 m R^2, positive.
+    box_length : float, optional
+        Period along x, length; not periodic by default.
+    top : array_like of bool, shape (N,), optional
+        The disks of the upper layer, which carry the load; none by default.
+    fx, fy : float
+        Force on each disk of the upper layer: fx along +x, fy downwards.
+    position_low : array_like, shape (N, 2), optional
+        Low parts of the coordinates, length: the packing is then a compensated one. None by default.
+    drag_time : float, optional
+        tau of the drag -(m/tau) v and -(I/tau) omega on every disk, time, positive; no drag by default.
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit, a number is not finite or has the wrong sign, a contact names a disk that
+        does not exist, or the box is so narrow that a disk could touch two images of another.
+    """
+
+    position: Floats
+    radius: Floats
+    contacts: Contacts
+    law: MindlinLaw
+    angle: Floats
+    mass: Floats
+    inertia_factor: float
+    box_length: float | None
+    top: NDArray[np.bool_]
+    fx: float
+    fy: float
+    position_low: Floats | None
+    drag_time: float | None
+
+    def __init__(
+        self,
+        *,
+        position: ArrayLike,
+        radius: ArrayLike,
+        contacts: Contacts,
+        law: MindlinLaw,
+        angle: ArrayLike | None = None,
+        mass: ArrayLike | None = None,
+        inertia_factor: float = 1.0,
+        box_length: float | None = None,
+        top: ArrayLike | None = None,
+        fx: float = 0.0,
+        fy: float = 0.0,
+        position_low: ArrayLike | None = None,
+        drag_time: float | None = None,
+    ) -> None:
+        n = len(np.atleast_1d(np.asarray(radius)))
+        if n == 0:
+            raise ValueError("A packing needs at least one disk.")
+        settle(
+            self,
+            position=floats("position", position, (n, 2)),
+            radius=positive_each("radius", floats("radius", radius, (n,))),
+            contacts=contacts,
+            law=law,
+            angle=floats("angle", np.zeros(n) if angle is None else angle, (n,)),
+            mass=positive_each("mass", floats("mass", np.ones(n) if mass is None else mass, (n,))),
+            inertia_factor=number("inertia_factor", inertia_factor, positive=True),
+            box_length=None if box_length is None else number("box_length", box_length, positive=True),
+            top=booleans("top", np.zeros(n, bool) if top is None else top, n),
+            fx=number("fx", fx),
+            fy=number("fy", fy),
+            position_low=None if position_low is None else floats("position_low", position_low, (n, 2)),
+            drag_time=None if drag_time is None else number("drag_time", drag_time, positive=True),
+        )
+        check_box(self.radius, self.box_length)
+        _check_partners(contacts, n)
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether every array and number is the same to the bit, low parts included."""
+        return same_bits(self, other) if isinstance(other, Packing) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((len(self), self.fx, self.position.tobytes()))
+
+    def __repr__(self) -> str:
+        box = "open sides" if self.box_length is None else f"period {self.box_length:g}"
+        load = f"fx = {self.fx:g}, fy = {self.fy:g}"
+        digits = ", compensated" if self.compensated else ""
+        return (
+            f"<Packing: {len(self)} disks, {len(self.contacts)} contacts, {int(self.top.sum())} in the upper "
+            f"layer, {box}, mu = {self.law.mu:g}, {load}{digits}>"
+        )
+
+    @property
+    def scaled_angle(self) -> Floats:
+        """u = R theta, length, shape (N,)."""
+        return self.radius * self.angle
+
+    @property
+    def compensated(self) -> bool:
+        """Whether coordinates have low parts."""
+        return self.position_low is not None
+
+    @property
+    def coordinate_rounding(self) -> float:
+        """What a coordinate is known to, length: its last place, or that of its low part (see compensated.h)."""
+        if not self.compensated:
+            return float(np.finfo(float).eps * np.abs(self.position).max())
+        exponent = int(np.frexp(2 * self.radius.max())[1])
+        return float(np.ldexp(1.0, exponent - 26 - 52))
+
+    @cached_property
+    def geometry(self) -> ContactGeometry:
+        """Normals, tangents, distances and overlaps of the contacts."""
+        return self._measured[0]
+
+    @cached_property
+    def _measured(self) -> tuple[ContactGeometry, Pair, Pair]:
+        """The geometry, and the branch vectors and overlaps with their low parts."""
+        return measured(self.position, self.position_low, self.radius, self.contacts, self.box_length)
+
+    @property
+    def normal_force(self) -> Floats:
+        """f_n of each contact, force, shape (C,)."""
+        return self.law.normal_force(self.geometry.overlap)
+
+    @property
+    def tangential_force(self) -> Floats:
+        """f_t of each contact along tau, force, shape (C,)."""
+        return self.law.tangential_force(self.geometry.overlap, self.contacts.slip)
+
+    @cached_property
+    def rattlers(self) -> Indices:
+        """Indices of the disks that touch nothing; their rows of the stability operator are zero."""
+        closed = self.geometry.overlap > 0
+        alone = np.ones(len(self), dtype=np.bool_)
+        alone[self.contacts.i[closed]] = False
+        alone[self.contacts.j[closed & ~self.contacts.floor]] = False
+        return frozen(np.flatnonzero(alone))
+
+    @cached_property
+    def net_force(self) -> Floats:
+        """Force on every coordinate, load included: (Fx_1.., Fy_1.., T_1/R_1..), shape (3N,).
+
+        Of a compensated packing it is summed in numpy's long doubles, which have 64 bits on x86.
+        """
+        i, j, pair = self.contacts.i, self.contacts.j, ~self.contacts.floor
+        fn, ft, normal = self._contact_forces
+        on_i = np.column_stack([fn * normal[:, 0] - ft * normal[:, 1], fn * normal[:, 1] + ft * normal[:, 0]])
+        total = np.zeros((3, len(self)), fn.dtype)
+        total[0, self.top] = self.fx
+        total[1, self.top] = -self.fy
+        for axis in (0, 1):
+            np.add.at(total[axis], i, on_i[:, axis])
+            np.subtract.at(total[axis], j[pair], on_i[pair, axis])
+        np.subtract.at(total[2], i, ft)
+        np.subtract.at(total[2], j[pair], ft[pair])
+        return frozen(total.ravel().astype(np.float64))
+
+    @property
+    def _contact_forces(self) -> tuple[NDArray, NDArray, NDArray]:
+        """f_n, f_t and n of the contacts; of a compensated packing in long doubles, which keep what low parts add."""
+        if not self.compensated:
+            return self.normal_force, self.tangential_force, self.geometry.normal
+        _, branch, overlap = self._measured
+        delta = np.add(*overlap, dtype=np.longdouble)
+        low = self.contacts.slip_low
+        slip = np.add(self.contacts.slip, 0.0 if low is None else low, dtype=np.longdouble)
+        between = np.add(*branch, dtype=np.longdouble)
+        distance = np.sqrt(np.sum(between * between, axis=1))
+        distance[self.contacts.floor] = between[self.contacts.floor, 1]
+        normal = between / distance[:, None]
+        return self.law.normal_force(delta), self.law.tangential_force(delta, slip), normal
+
+    def moved(
+        self,
+        position: ArrayLike,
+        angle: ArrayLike,
+        contacts: Contacts,
+        position_low: ArrayLike | None = None,
+        fx: float | None = None,
+    ) -> "Packing":
+        """The same disks elsewhere; only what is new is checked.
+
+        Parameters
+        ----------
+        position, angle, contacts, position_low
+            As of the class.
+        fx : float, optional
+            Force along x on each disk of the upper layer; as it was by default.
+        """
+        n = len(self)
+        _check_partners(contacts, n)
+        return derived(
+            self,
+            position=floats("position", position, (n, 2)),
+            angle=floats("angle", angle, (n,)),
+            contacts=contacts,
+            position_low=None if position_low is None else floats("position_low", position_low, (n, 2)),
+            fx=self.fx if fx is None else number("fx", fx),
+        )
+
+    def loaded(self, least: float) -> "Packing":
+        """The packing without the contacts that carry no more than a given force.
+
+        A disk that nothing holds comes to rest just about touching another, with an overlap, and so a stiffness, that
+        is rounding noise: of order (force / k_n)^(1/3), which is not small.
+
+        Parameters
+        ----------
+        least : float
+            Normal force that a contact has to exceed.
+        """
+        kept = self.normal_force > least
+        if np.all(kept):
+            return self
+        low = self.contacts.slip_low
+        contacts = Contacts(
+            self.contacts.i[kept], self.contacts.j[kept], self.contacts.slip[kept], None if low is None else low[kept]
+        )
+        return replace(self, contacts=contacts)
+
+    @property
+    def residual(self) -> float:
+        """Largest |(Fx, Fy, T/R)| on a disk that has a contact, force; zero if none has.
+
+        A rattler of the upper layer would fall under the load: it has no balance to miss and is not counted.
+        """
+        per_disk = np.linalg.norm(self.net_force.reshape(3, -1), axis=0)
+        return float(np.delete(per_disk, self.rattlers).max(initial=0.0))
+
+
+def _check_partners(contacts: Contacts, disks: int) -> None:
+    if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= disks:
+        raise ValueError(f"A contact names a disk beyond the last one, {disks - 1}.")

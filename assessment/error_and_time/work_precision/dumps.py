@@ -1,0 +1,166 @@
+r"""What the eigenvalues lose on the way through a file.
+
+An overlap is a small difference of coordinates: an error :math:`\Delta x` of these changes the stiffness
+:math:`\tfrac32 k_n \delta^{1/2}` of a contact by the share :math:`\Delta x/(2\delta)`, and the overlaps of a packing
+under load are 1e-5 to 1e-3 of a radius. So text with the six digits of ``%g``, and the float32 of a trajectory, lose
+most of the stiffness of the weakest contacts, and contacts open that were closed. A trajectory has no slips besides.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ....analysis import Packing, RunFile, read_dump, stiffness_matrix, touching
+from ....analysis.packing.contacts import Contacts
+from ....analysis.packing.packing import Floats
+from ....analysis.spectrum.spectrum import Complexes
+from ....pywrap import Engine
+from .study import Point, Settings, Study, Theory
+from .timing import timed
+
+METHODS = ("text", "HDF5 (run.h5)", "float32 trajectory, slips kept", "positions in doubles, slips lost")
+TEXT, HDF5, SINGLE, NO_SLIPS = METHODS
+G = 6
+"""Digits of %g."""
+
+
+def eigenvalues(packing: Packing) -> Complexes:
+    """All 3N eigenvalues of M^(-1) K, zeros of rattlers included, 1 / time^2."""
+    mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
+    return np.linalg.eigvals(stiffness_matrix(packing).toarray() / mass[:, None])
+
+
+def loss(found: Packing, exact: Complexes) -> float:
+    """Largest change of an eigenvalue, in units of the largest; eigenvalues are matched to their nearest."""
+    from scipy.optimize import linear_sum_assignment  # slow to import
+
+    apart = np.abs(eigenvalues(found)[:, None] - exact)
+    return float(apart[linear_sum_assignment(apart)].max() / np.abs(exact).max())
+
+
+def through_text(packing: Packing, stem: Path, digits: int, folder: Path) -> tuple[Packing, int]:
+    """The deck's dumps with another number of digits, read back, and their bytes.
+
+    A format of LAMMPS's and one of Python's write the same digits.
+    """
+    size = 0
+    for suffix in (".disks", ".contacts", ".params"):
+        text = stem.with_suffix(suffix).read_text()
+        if suffix != ".params":
+            text = _rounded(text, digits)
+        (folder / f"copy{suffix}").write_text(text)
+        size += len(text)
+    return read_dump(folder / "copy.disks"), size
+
+
+def through_hdf5(packing: Packing, folder: Path) -> tuple[Packing, int]:
+    """run.h5 and back, and its bytes."""
+    path = folder / "run.h5"
+    with RunFile.create(path, packing) as file:
+        file.append(packing)
+    with RunFile(path) as file:
+        return file.packing(), path.stat().st_size
+
+
+def through_trajectory(packing: Packing) -> tuple[Packing, int]:
+    """Positions in float32, as MDAnalysis hands them out; angles and contacts from elsewhere."""
+    positions = np.column_stack([packing.position, np.zeros(len(packing))]).astype(np.float32)
+    return _moved(packing, positions[:, :2].astype(np.float64)), positions.nbytes
+
+
+def without_slips(packing: Packing) -> tuple[Packing, int]:
+    """Positions to the bit; contacts from these alone."""
+    contacts = touching(packing.position, packing.radius, packing.box_length)
+    return replace(packing, contacts=contacts), packing.position.nbytes
+
+
+def dumps(settings: Settings) -> Study:
+    """The study, on a packing under shear."""
+    packing = settings.at(0.02).packing
+    with tempfile.TemporaryDirectory(prefix="faultgouge-") as name, Engine(packing) as engine:
+        engine.dump(Path(name) / "packing")
+        return _study(settings, packing, Path(name))
+
+
+Run = tuple[str, float | None, Callable[[], tuple[Packing, int]]]
+
+
+def _study(settings: Settings, packing: Packing, folder: Path) -> Study:
+    exact = eigenvalues(packing)
+    digits = (G, 9, 12, 15, 16, 17) if settings.quick else (G, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17)
+    runs = _runs(packing, folder, digits)
+    results = timed([run for *_, run in runs], settings.repeats, settings.progress)
+    points = tuple(
+        Point(method, parameter, loss(found, exact), seconds, size)
+        for (method, parameter, _), ((found, size), seconds) in zip(runs, results, strict=True)
+    )
+    overlap, furthest = packing.geometry.overlap, np.abs(packing.position).max()
+    stiffest = float(packing.law.normal_stiffness(overlap).max())
+    weakest = float(packing.law.normal_curvature(overlap.min())) / stiffest
+    unit = [0.5 * 10.0 ** (np.ceil(np.log10(furthest)) - n) for n in digits]  # of the last digit of the largest
+    expected = [each * weakest for each in unit]
+    sizes = [float(point.evaluations or 0) for point in points if point.method == TEXT]
+    return Study(
+        name="files",
+        question=f"The eigenvalues of {len(packing)} disks at F_x = {packing.fx:g} after the packing went through a "
+        "file.",
+        error="largest change of an eigenvalue, in units of the largest",
+        parameter="digits of the text",
+        evaluations="bytes",
+        abscissa="evaluations",
+        reference="the packing in memory; eigenvalues have the rounding of their solver",
+        reference_error=float(np.finfo(float).eps),
+        points=points,
+        advice=_advice(points),
+        theory=(Theory("rounding of the coordinates", tuple(expected), tuple(sizes)),),
+        remarks=(
+            f"The smallest overlap is {overlap.min():.1e}, coordinates go up to {furthest:.3g}. Where text has too "
+            "few digits for an overlap, contacts open or close.",
+            "An error of zero, the same eigenvalues to the bit, stands at the lower edge of the figure.",
+        ),
+    )
+
+
+def _runs(packing: Packing, folder: Path, digits: Sequence[int]) -> list[Run]:
+    """The ways through a file: method, digits, and what takes the packing through it."""
+    runs: list[Run] = [(TEXT, n, partial(through_text, packing, folder / "packing", n, folder)) for n in digits]
+    runs.append((HDF5, None, partial(through_hdf5, packing, folder)))
+    runs.append((SINGLE, None, partial(through_trajectory, packing)))
+    runs.append((NO_SLIPS, None, partial(without_slips, packing)))
+    return runs
+
+
+def _advice(points: Sequence[Point]) -> tuple[str, str]:
+    by = {(point.method, point.parameter): point.error for point in points}
+    return (
+        "Take run.h5 or the decks' %.17g: both give the packing back to the bit.",
+        f"Never take eigenvalues from text at %g, which changes them by {by[TEXT, G]:.0e} of the largest, from "
+        f"the float32 of a trajectory ({by[SINGLE, None]:.0e}), or from positions without slips "
+        f"({by[NO_SLIPS, None]:.0e}).",
+    )
+
+
+def _rounded(text: str, digits: int) -> str:
+    """A dump of one snapshot with the numbers of its rows at so many digits; its head stays."""
+    lines = text.splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith(("ITEM: ATOMS", "ITEM: ENTRIES"))) + 1
+    rows = [" ".join(f"{float(word):.{digits}g}" for word in line.split()) for line in lines[first:]]
+    return "\n".join([*lines[:first], *rows]) + "\n"
+
+
+def _moved(packing: Packing, position: Floats) -> Packing:
+    """Other positions, with the slips of contacts that are closed still; new ones have none."""
+    known = dict(zip(_pairs(packing.contacts), packing.contacts.slip, strict=True))
+    found = touching(position, packing.radius, packing.box_length)
+    slip = np.array([known.get(pair, 0.0) for pair in _pairs(found)])
+    return replace(packing, position=position, contacts=replace(found, slip=slip))
+
+
+def _pairs(contacts: Contacts) -> list[tuple[int, int]]:
+    return list(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True))

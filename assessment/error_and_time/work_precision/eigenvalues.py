@@ -1,0 +1,196 @@
+r"""Error of eigenvalues over the time that they take, far from an exceptional point and near one.
+
+The dense solver is backward stable: it returns the eigenvalues of :math:`A + E`, :math:`|E| \sim u |A|_F`, and so errs
+by about :math:`u |A|_F \kappa`, with the condition :math:`\kappa = 1/|y^H x|`, which grows without bound towards an
+exceptional point. Shift-invert Arnoldi finds the few eigenvalues nearest to a shift, to a tolerance, and with less
+rounding the nearer they are. More digits than the coordinates have are of no use: how far their rounding alone moves
+the eigenvalues is measured. The mean of the two eigenvalues of a pair and their discriminant have no such condition;
+that is what the onset is solved with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from scipy.linalg import eig, eigvals
+
+from ....analysis import Packing, dynamical_matrix, eigenpairs
+from ....analysis.spectrum.spectrum import Complexes
+from ....pywrap import Engine, equilibrate
+from .extended import refined_near
+from .onset import Ways
+from .study import Point, Settings, Study, Theory
+from .timing import timed
+
+COUNT = 6
+"""Eigenvalues that shift-invert is asked for: the pair and its neighbours."""
+
+APART = 1e-9
+"""Distance below the onset, force, at which the pair is near its exceptional point."""
+
+FAR = 0.011
+"""F_x far from it."""
+
+METHODS = ("dense (LAPACK)", "shift-invert (ARPACK)", "dense, refined")
+DENSE, ARPACK, REFINED = METHODS
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """The eigenvalues of a packing next to a shift.
+
+    Attributes
+    ----------
+    packing : Packing
+        The configuration.
+    shift : float
+        Near the pair, but not on it, 1 / time^2.
+    exact : ndarray of complex, shape (COUNT,)
+        The eigenvalues nearest to it, in extended precision, 1 / time^2.
+    error : float
+        Largest relative error of these.
+    condition : float
+        Largest kappa of these.
+    rounding : float
+        u |A|_F, 1 / time^2.
+    """
+
+    packing: Packing
+    shift: float
+    exact: Complexes
+    error: float
+    condition: float
+    rounding: float
+
+    @classmethod
+    def of(cls, packing: Packing, shift: float) -> Target:
+        """Solve the eigenproblem and refine what is nearest to the shift."""
+        found, condition, rounding = refined_near(packing, shift, COUNT)
+        exact = np.array([complex(each.value) for each in found])
+        error = max(each.error / abs(each.value) for each in found)
+        return cls(packing, shift, exact, float(error), condition, rounding)
+
+    @property
+    def attainable(self) -> float:
+        """u |A|_F kappa, relative."""
+        return float(self.rounding * self.condition / np.abs(self.exact).min())
+
+    @property
+    def coordinates(self) -> tuple[float, float]:
+        """What one unit in the last place of each coordinate, up or down, changes: the eigenvalues, and the mean of the
+        pair, relative."""
+        sign = np.random.default_rng(0).choice([-1.0, 1.0], self.packing.position.shape)
+        position = np.nextafter(self.packing.position, sign * np.inf)
+        moved = Target.of(replace(self.packing, position=position), self.shift)
+        return self.off(moved.exact), float(abs(moved.mean / self.mean - 1))
+
+    @property
+    def mean(self) -> complex:
+        """Mean of the two of these eigenvalues that are closest to one another: the pair, 1 / time^2."""
+        apart = np.abs(self.exact[:, None] - self.exact) + np.diag(np.full(COUNT, np.inf))
+        return complex(self.exact[list(np.unravel_index(np.argmin(apart), apart.shape))].mean())
+
+    def off(self, values: Complexes) -> float:
+        """Largest relative error of the eigenvalues, each against the nearest; no less than the rounding of a
+        number."""
+        error = np.abs(values[:, None] - self.exact).min(axis=0) / np.abs(self.exact)
+        return max(float(error.max()), 0.5 * float(np.finfo(float).eps))
+
+    def dense(self) -> tuple[Complexes, int | None]:
+        """All eigenvalues by LAPACK."""
+        return eigvals(dynamical_matrix(self.packing)[0].toarray()), None
+
+    def shift_invert(self, tolerance: float) -> tuple[Complexes, int | None]:
+        """The nearest few by ARPACK, and the number of solves."""
+        found = eigenpairs(self.packing, self.shift, COUNT, tolerance=tolerance)
+        return found.values, found.solves
+
+    def refined(self) -> tuple[Complexes, int | None]:
+        """The same from LAPACK and Newton's method in extended precision, and the number of steps."""
+        found, *_ = refined_near(self.packing, self.shift, COUNT)
+        return np.array([complex(each.value) for each in found]), sum(each.steps for each in found)
+
+
+def far(settings: Settings) -> Study:
+    """The eigenvalues about the pair that will coalesce, at half the load."""
+    packing = settings.at(FAR).packing
+    _, pair = _near(settings)
+    target = Target.of(packing, 1.001 * pair)
+    return _study(
+        settings,
+        target,
+        "eigenvalues, far from an exceptional point",
+        f"at F_x = {packing.fx:g}, far from it",
+        "Take shift-invert where a few eigenvalues will do ({sparse.seconds:.2g} s, {sparse.error:.0e}), to "
+        "the smallest tolerance, which costs next to nothing, and refine nothing.",
+    )
+
+
+def near(settings: Settings) -> Study:
+    """The same just below the onset."""
+    packing, pair = _near(settings)
+    target = Target.of(packing, 1.001 * pair)
+    return _study(
+        settings,
+        target,
+        "eigenvalues, near an exceptional point",
+        f"at a distance of {APART:g} below it",
+        "Take shift-invert for the pair itself ({sparse.error:.0e}), but trust no single eigenvalue of it: rounding "
+        "of the coordinates moves it by {coordinates:.0e}, and the mean of the pair by {mean:.0e}.",
+    )
+
+
+def _near(settings: Settings) -> tuple[Packing, float]:
+    """The packing just below the onset, and the pair there, 1 / time^2."""
+    start = settings.ramp[0]
+    with Engine(start.packing) as engine:
+        onset, _ = Ways(engine, start, settings.scene).bisect(1e-3, 30)
+        below = max((each for each in settings.ramp if each.fx < onset - APART), key=lambda each: each.fx)
+        packing = equilibrate(engine, below, onset - APART).packing
+    values, left, right = eig(dynamical_matrix(packing)[0].toarray(), left=True, right=True)
+    return packing, float(values[np.argmin(np.abs(np.sum(left.conj() * right, axis=0)))].real)
+
+
+def _study(settings: Settings, target: Target, name: str, place: str, otherwise: str) -> Study:
+    runs: list[tuple[str, float | None, Callable[[], tuple[Complexes, int | None]]]] = [(DENSE, None, target.dense)]
+    for tolerance in np.logspace(-1, -15, 5 if settings.quick else 15).tolist():
+        runs.append((ARPACK, tolerance, partial(target.shift_invert, tolerance)))
+    runs.append((REFINED, None, target.refined))
+    results = timed([run for *_, run in runs], settings.repeats, settings.progress)
+    points = tuple(
+        Point(method, parameter, target.off(found), seconds, evaluations)
+        for (method, parameter, _), ((found, evaluations), seconds) in zip(runs, results, strict=True)
+    )
+    last = {point.method: point for point in points}  # shift-invert's with the smallest tolerance
+    dense, sparse = last[DENSE], last[ARPACK]
+    coordinates, mean = target.coordinates
+    return Study(
+        name=name,
+        question=f"The {COUNT} eigenvalues about the pair that coalesces at the onset, {place}; kappa = "
+        f"{target.condition:.3g}.",
+        error="largest relative error of the eigenvalues",
+        parameter="tolerance of the iteration",
+        evaluations="solves; refined: Newton steps",
+        abscissa="parameter",
+        reference="Newton's method on each eigenpair with residuals in extended precision, K as rounded to doubles "
+        "taken as exact; its error is the last step and the rounding in that precision times kappa, an upper bound",
+        reference_error=target.error,
+        points=points,
+        advice=(
+            f"Take the dense solver for {len(target.packing)} disks: all eigenvalues in {dense.seconds:.2g} s, "
+            f"these to {dense.error:.0e}.",
+            otherwise.format(sparse=sparse, coordinates=coordinates, mean=mean),
+        ),
+        theory=(
+            Theory("u |A| kappa", (target.attainable,)),
+            Theory("one unit in the last place of the coordinates", (coordinates,)),
+        ),
+        remarks=(
+            f"One unit in the last place of the coordinates moves these eigenvalues by {coordinates:.0e}: that much "
+            "they mean. What is more exact gives digits of the rounded K, not of the packing.",
+            f"Shift-invert computes {COUNT} eigenvalues with right and left vectors, the dense solver all without.",
+        ),
+    )

@@ -1,0 +1,196 @@
+r"""Error of the onset F_x^c over the time that it takes to find it.
+
+Three ways: a *scan*, the spectrum at each increment of a ramp, the onset in the middle between the last real and the
+first complex one; a *bisection* of the increment in which it lies; and the *root of the discriminant* of the two
+eigenvalues (:mod:`~faultgouge.analysis.onset`). The paper's scan waits for overdamped dynamics at each increment, the
+others take Newton's method.
+
+A scan errs by half an increment at the most. A bisection ends where a complex pair is no longer told from rounding,
+see `believable`: the imaginary part and the overlap :math:`|y^H x|` both vanish as :math:`(F_x - F_x^c)^{1/2}`, their
+product linearly, and the pair is believed from :math:`50\, u |A|_F` on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+
+from ....analysis import Onset, Packing, find_onset, spectrum
+from ....analysis.spectrum.spectrum import SAFETY
+from ....pywrap import Engine, Equilibrium, Scene
+from ....pywrap.onset.path_error import with_path_error
+from ....pywrap.runs.path import EquilibriumPath
+from .coverage import INCREMENTS, coverage
+from .precision import compensated
+from .study import Point, Settings, Study, Theory
+from .timing import timed
+
+METHODS = ("scan, overdamped", "scan, Newton", "bisection", "root of the discriminant")
+OVERDAMPED, SCAN, BISECTION, ROOT = METHODS
+
+BEYOND = 1e-5
+"""Distance beyond the onset, force, at which the pair's imaginary part and overlap are measured for the floor."""
+
+
+class Ways:
+    """The ways from one settled packing to its onset.
+
+    Parameters
+    ----------
+    engine : Engine
+        LAMMPS with the packing.
+    start : Equilibrium
+        The packing at F_x = 0.
+    scene : Scene
+        Of the ramp.
+    """
+
+    def __init__(self, engine: Engine, start: Equilibrium, scene: Scene) -> None:
+        self._engine, self._start, self._scene = engine, start, scene
+
+    def scan(self, increment: float, method: str = "newton") -> tuple[float, int]:
+        """The onset in the middle of an increment, and the number of equilibria."""
+        path, last = self._up(increment, method)
+        return (last - 0.5) * increment, len(path.kept) - 1
+
+    def bisect(self, increment: float, halvings: int) -> tuple[float, int]:
+        """The onset after a bisection of the scan's increment, and the number of equilibria."""
+        path, last = self._up(increment, "newton")
+        low, high = (last - 1) * increment, last * increment
+        for _ in range(halvings):
+            middle = 0.5 * (low + high)
+            if spectrum(path(middle)).pairs:
+                high = middle
+            else:
+                low = middle
+        return 0.5 * (low + high), len(path.kept) - 1 + halvings
+
+    def root(self, increment: float, beyond: float) -> tuple[float, int]:
+        """The onset by the root of the discriminant on a ramp to the first increment beyond a force, and the number of
+        equilibria."""
+        found, computed = self.solved(increment, beyond)
+        return found.fx_c, computed
+
+    def solved(self, increment: float, beyond: float) -> tuple[Onset, int]:
+        """The same, with the error that it states."""
+        path, computed = self._path("newton"), 0
+
+        def equilibrium(fx: float) -> Packing:
+            nonlocal computed
+            computed += 1
+            return path(fx)
+
+        found = find_onset(equilibrium, increment * np.arange(np.ceil(beyond / increment) + 1))
+        return found, computed
+
+    def whole(self, increment: float, beyond: float) -> Onset:
+        """The same with the error of the path in it."""
+        path = self._path("newton")
+        found = find_onset(path, increment * np.arange(np.ceil(beyond / increment) + 1))
+        return with_path_error(found, self._engine, path, self._scene)
+
+    def beyond(self, onset: float) -> tuple[float, float]:
+        """The error that a bisection ends at, and |y^H x| at `BEYOND` beyond the onset."""
+        path, _ = self._up(1e-3, "newton")
+        found = spectrum(path(onset + BEYOND))
+        pair = max(found.pairs, key=lambda each: each.overlap * each.eigenvalue.imag)
+        return SAFETY * found.rounding * BEYOND / (pair.overlap * pair.eigenvalue.imag), pair.overlap
+
+    def _up(self, increment: float, method: str) -> tuple[EquilibriumPath, int]:
+        """The ramp up to the first equilibrium with a complex pair, and its number."""
+        path, k = self._path(method), 1
+        while not spectrum(path(k * increment)).pairs:
+            k += 1
+        return path, k
+
+    def _path(self, method: str) -> EquilibriumPath:
+        assert self._scene.ramp is not None  # it is the scene of a ramp
+        scene = self._scene.model_copy(update={"ramp": self._scene.ramp.model_copy(update={"method": method})})
+        return EquilibriumPath(self._engine, self._start, scene)
+
+
+def onset(settings: Settings) -> Study:
+    """The study: four ways to the onset of the ramp."""
+    start = settings.ramp[0]
+    exact_start = compensated(start)
+    with Engine(start.packing) as engine, Engine(exact_start.packing) as exact_engine:
+        exact = Ways(exact_engine, exact_start, settings.scene)
+        return _study(settings, Ways(engine, start, settings.scene), exact)
+
+
+Run = tuple[str, float, Callable[[], tuple[float, int]]]
+
+
+def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
+    quick = settings.quick
+    check, finest = (2e-3, 1e-3) if quick else (5e-4, 2.5e-4)
+    guess = ways.scan(1e-3)[0] + 0.5e-3
+    found, _ = reference.solved(finest, guess)
+    exact = found.fx_c
+    reference_error = found.error + abs(reference.root(check, guess)[0] - exact)
+    whole = {"doubles": partial(ways.whole, beyond=guess), "compensated": partial(reference.whole, beyond=guess)}
+    runs = _runs(ways, quick, exact)
+    results = timed([run for _, _, run in runs], settings.repeats, settings.progress)
+    resolution = float(np.spacing(exact))
+    points = tuple(
+        Point(method, parameter, max(abs(found - exact), resolution), seconds, equilibria)
+        for (method, parameter, _), ((found, equilibria), seconds) in zip(runs, results, strict=True)
+    )
+    lost, overlap = ways.beyond(exact)
+    residual = max(each.residual for each in settings.ramp)
+    best = {method: min((p for p in points if p.method == method), key=lambda p: p.error) for method in METHODS}
+    return Study(
+        name="onset",
+        question=f"The force F_x^c = {exact:.10g} at which the first pair of eigenvalues of "
+        f"{len(settings.ramp[0].packing)} disks becomes complex, from the settled packing on.",
+        error="error of F_x^c, force",
+        parameter="increment of F_x; bisection: width that is left",
+        evaluations="equilibria, each with its eigenvalues",
+        abscissa="evaluations",
+        reference=f"the root of the discriminant in compensated arithmetic on a ramp with increments of {finest:g}; "
+        f"its error is the one that it states and its difference from increments of {check:g}",
+        reference_error=reference_error,
+        points=points,
+        covered=coverage(whole, INCREMENTS[:2] if quick else INCREMENTS),
+        advice=_advice(best),
+        theory=(_half_an_increment(exact), Theory("pair lost in rounding", (lost,))),
+        remarks=(
+            f"At {BEYOND:g} beyond the onset |y^H x| is {overlap:.1e}; an error of the equilibria, of the order of "
+            f"their residual {residual:.0e}, is in all ways alike.",
+            f"The best scan by overdamped dynamics took {best[OVERDAMPED].seconds:.3g} s for an error of "
+            f"{best[OVERDAMPED].error:.0e}. An error below the spacing of doubles, {resolution:.0e}, is shown as that.",
+        ),
+    )
+
+
+def _runs(ways: Ways, quick: bool, exact: float) -> list[Run]:
+    """Method, increment, and what finds the onset."""
+    runs: list[Run] = []
+    for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
+        runs.append((OVERDAMPED, increment, partial(ways.scan, increment, "overdamped")))
+    for increment in (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4):
+        runs.append((SCAN, increment, partial(ways.scan, increment)))
+    for halvings in (5, 25) if quick else (2, 5, 10, 20, 30):
+        runs.append((BISECTION, 1e-3 * 2.0**-halvings, partial(ways.bisect, 1e-3, halvings)))
+    for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
+        runs.append((ROOT, increment, partial(ways.root, increment, exact)))
+    return runs
+
+
+def _half_an_increment(exact: float) -> Theory:
+    """The error of a scan over the number of its equilibria."""
+    counts = np.array([3.0, 300.0])
+    return Theory("half an increment", tuple((0.5 * exact / counts).tolist()), tuple(counts.tolist()))
+
+
+def _advice(best: Mapping[str, Point]) -> tuple[str, str]:
+    return (
+        f"Take the root of the discriminant: {best[ROOT].error:.0e} in {best[ROOT].seconds:.2g} s, with an "
+        "error that it states, and windows of complex eigenvalues that are narrower than an increment are "
+        "found.",
+        f"Take a bisection where one window is known to be there, {best[BISECTION].error:.0e} in "
+        f"{best[BISECTION].seconds:.2g} s and nothing else computed; a scan, which errs by up to half its "
+        "increment, only for a picture of the eigenvalues, and never with overdamped dynamics.",
+    )

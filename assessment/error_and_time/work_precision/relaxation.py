@@ -1,0 +1,216 @@
+r"""Distance to an equilibrium over the time that it takes to get there.
+
+The load of a packing in equilibrium is raised by one increment. Four ways lead to the next equilibrium: overdamped
+dynamics :math:`\mathbf v = \mathbf F/\gamma`, the paper's; velocity Verlet with viscous drag; FIRE; and Newton's
+method.
+
+Friction remembers the path, and a minimizer's path is no motion. FIRE (Bitzek et al., Phys. Rev. Lett. 97, 170201,
+2006) is made right here in the way that Newton's method is: its unknown is the displacement q from the last
+equilibrium, slips advance along the straight path from there, and never from an iterate, so that F(q) is a function
+and its root the same for both. F has no energy, but K is nearly symmetric, and FIRE needs no more than the sign of the
+power :math:`F \cdot v`. LAMMPS's own minimizers advance no slips and are refused by the pair style.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ....analysis import Packing, dynamical_matrix
+from ....analysis.packing.packing import Floats
+from ....pywrap import Engine, Equilibrium, equilibrate
+from ....pywrap.equilibria.quasistatic import rounding_floor
+from .fire import fire
+from .precision import compensated
+from .study import Point, Settings, Study, Theory
+from .timing import timed
+
+FROM, TO = 0.010, 0.011
+"""F_x before and after: an increment far from the onset."""
+
+METHODS = ("overdamped, step of the decks", "overdamped", "FIRE", "Verlet with drag", "Newton")
+DECKS, OVERDAMPED, FIRE, VERLET, NEWTON = METHODS
+COMPENSATED = ", compensated"
+"""Ends the name of a method in compensated arithmetic."""
+
+CHUNK = 200
+"""Steps between two looks at the forces, so that the cost is known to so many steps."""
+
+STABLE = 0.95
+"""Share of the longest stable time step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Increment:
+    """One increment of the load, and where it leads.
+
+    Attributes
+    ----------
+    engine : Engine
+        LAMMPS with the packing.
+    start : Equilibrium
+        At `FROM`.
+    end : Packing
+        At `TO`, by Newton's method in compensated arithmetic.
+    """
+
+    engine: Engine
+    start: Equilibrium
+    end: Packing
+
+    def distance(self, packing: Packing) -> float:
+        """Largest difference of a coordinate (x, y, R theta) of a disk that is held, length."""
+        apart = packing.position - self.end.position + (_low(packing) - _low(self.end))
+        turned = packing.scaled_angle - self.end.scaled_angle
+        return float(np.abs(np.delete(np.column_stack([apart, turned]), self.end.rattlers, axis=0)).max())
+
+    def overdamped(self, time_step: float | None, tolerance: float) -> tuple[Packing, int]:
+        """The paper's dynamics until no disk feels more than a force."""
+        self.engine.restore(self.start.packing)
+        self.engine.set_fx(TO)
+        steps = self.engine.relax(tolerance, time_step=time_step, chunk=CHUNK).steps
+        return self.engine.packing, steps
+
+    def verlet(self, time_step: float, rate: float, steps: int) -> tuple[Packing, int]:
+        """Newton's dynamics with viscous drag."""
+        self.engine.restore(self.start.packing)
+        self.engine.set_fx(TO)
+        with self.engine.undamped(time_step, drag_time=1 / rate) as dynamics:
+            dynamics.advance(steps)
+            return self.engine.packing, steps
+
+    def fire(self, time_step: float, tolerance: float) -> tuple[Packing, int]:
+        """FIRE on the displacement from the last equilibrium."""
+        self.engine.set_fx(TO)
+        free = np.ones((3, len(self.end)), dtype=bool)
+        free[:, self.start.packing.rattlers] = False
+
+        def force(displacement: Floats) -> Floats:
+            self.engine.displace(self.start.packing, displacement)
+            return np.where(free.ravel(), self.engine.net_force, 0.0)
+
+        displacement, evaluations = fire(force, np.zeros(free.size), time_step, tolerance)
+        return self.engine.displace(self.start.packing, displacement), evaluations
+
+    def newton(self, tolerance: float | None) -> tuple[Packing, int]:
+        """Newton's method; to the rounding floor without a tolerance."""
+        found = equilibrate(self.engine, self.start, TO, tolerance)
+        return found.packing, found.evaluations
+
+
+def _low(packing: Packing) -> Floats:
+    return np.zeros_like(packing.position) if packing.position_low is None else packing.position_low
+
+
+def relaxation(settings: Settings) -> Study:
+    """The four ways, each to several accuracies, three of them in both arithmetics."""
+    plain = settings.at(FROM)
+    careful = compensated(plain)
+    with Engine(plain.packing) as engine, Engine(careful.packing) as careful_engine:
+        end = equilibrate(careful_engine, careful, TO)
+        return _study(
+            settings,
+            Increment(engine, plain, end.packing),
+            Increment(careful_engine, careful, end.packing),
+            end,
+        )
+
+
+Run = tuple[str, float, Increment, Callable[[], tuple[Packing, int]]]
+
+
+def _study(settings: Settings, plain: Increment, careful: Increment, end: Equilibrium) -> Study:
+    matrix, _ = dynamical_matrix(end.packing)
+    values = np.linalg.eigvals(matrix.toarray()).real
+    slowest, fastest = float(values.min()), float(values.max())
+    # errors of the forces as independent ones on all coordinates, through K^-1
+    softness = float(np.sqrt(np.mean(values**-2.0)))
+    rounding = rounding_floor(plain.start.packing) * softness
+    relax_step, verlet_step, drag = STABLE * 2 / fastest, STABLE * 2 / np.sqrt(fastest), 2 * np.sqrt(slowest)
+    runs = _runs(plain, careful, (relax_step, verlet_step, drag), settings.quick)
+    results = timed([run for *_, run in runs], settings.repeats, settings.progress)
+    reference_error = end.floor * softness
+    points = tuple(
+        Point(method, parameter, increment.distance(packing) or reference_error, seconds, evaluations)
+        for (method, parameter, increment, _), ((packing, evaluations), seconds) in zip(runs, results, strict=True)
+    )
+    first = plain.distance(plain.start.packing)
+    many = np.geomspace(10, 3e4, 100)
+    decay = {OVERDAMPED: slowest * relax_step, VERLET: 0.5 * drag * verlet_step}
+    theory = [_decay(f"slowest mode, {name}", first, rate, many) for name, rate in decay.items()]
+    best = {name: min((p for p in points if p.method == name), key=lambda p: p.error) for name, *_ in runs}
+    return Study(
+        name="relaxation",
+        question=f"The equilibrium of {len(end.packing)} disks at F_x = {TO:g}, from that at {FROM:g}: how far from "
+        "it the packing still is.",
+        error="largest error of x, y, R theta; length",
+        parameter="largest force on a disk at which it ends; Verlet: number of steps",
+        evaluations="force evaluations",
+        abscissa="evaluations",
+        reference="Newton's equilibrium in compensated arithmetic; its error is estimated from what the rounding "
+        "of the forces makes through K^-1, and it is shown in the figure as that. What the others differ in "
+        "because of their path is in their errors",
+        reference_error=reference_error,
+        points=points,
+        advice=_advice(best),
+        theory=(*theory, Theory("rounding of doubles", (rounding,))),
+        remarks=_remarks(slowest, fastest),
+    )
+
+
+def _runs(plain: Increment, careful: Increment, dynamics: tuple[float, float, float], quick: bool) -> list[Run]:
+    """Method, parameter, increment, and what finds the equilibrium; steps of dynamics, of Verlet, and its drag."""
+    relax_step, verlet_step, drag = dynamics
+    runs: list[Run] = []
+    for force in np.logspace(-3, -9, 4 if quick else 7).tolist():
+        runs.append((DECKS, force, plain, partial(plain.overdamped, None, force)))
+        runs.append((OVERDAMPED, force, plain, partial(plain.overdamped, relax_step, force)))
+        if force > 1e-6:  # its evaluations are slow, and its convergence steady
+            runs.append((FIRE, force, plain, partial(plain.fire, verlet_step, force)))
+    for force in (1e-5, 1e-9, 1e-13):
+        runs.append((OVERDAMPED + COMPENSATED, force, careful, partial(careful.overdamped, relax_step, force)))
+    for steps in (50, 100, 200, 400, 800):
+        runs.append((VERLET, steps, plain, partial(plain.verlet, verlet_step, drag, steps)))
+        runs.append((VERLET + COMPENSATED, steps, careful, partial(careful.verlet, verlet_step, drag, steps)))
+    for force in (1e-1, 1e-4, 1e-7, 0.0):
+        runs.append((NEWTON, force, plain, partial(plain.newton, force or None)))
+    for force in (1e-1, 1e-4, 1e-7, 1e-12, 0.0):
+        runs.append((NEWTON + COMPENSATED, force, careful, partial(careful.newton, force or None)))
+    return sorted(runs, key=lambda run: run[0])
+
+
+def _advice(best: Mapping[str, Point]) -> tuple[str, str]:
+    newton, careful_newton, verlet = best[NEWTON], best[NEWTON + COMPENSATED], best[VERLET]
+    return (
+        f"Take Newton's method: {newton.error:.0e} after {newton.evaluations} evaluations ({newton.seconds:.2g} "
+        f"s) in doubles, {careful_newton.error:.0e} after {careful_newton.evaluations} in compensated "
+        f"arithmetic ({careful_newton.seconds:.2g} s), and no parameter to choose.",
+        "Take Verlet with drag where the path has to be a motion: with a drag of 2 omega_min, spins included, "
+        f"it errs by {verlet.error:.0e} after {verlet.evaluations} steps ({verlet.seconds:.2g} s), where the "
+        f"paper's overdamped dynamics errs by {best[DECKS].error:.0e} after {best[DECKS].evaluations} "
+        f"({best[DECKS].seconds:.2g} s).",
+    )
+
+
+def _remarks(slowest: float, fastest: float) -> tuple[str, ...]:
+    return (
+        f"The eigenvalues of K/m go from {slowest:.3g} to {fastest:.3g}: overdamped dynamics needs a number of "
+        "steps proportional to their ratio, Verlet with critical drag to its root. Overdamped means with the "
+        "longest stable step, from K, where the step of the decks is not named.",
+        "FIRE is on the displacement from the last equilibrium, with slips advanced along the straight path "
+        "from there in every evaluation, as in Newton's method; run as a motion, its stops and restarts would "
+        "be in the slips. An evaluation of FIRE or Newton goes through Python, one of the dynamics does not.",
+        "The dynamics in compensated arithmetic ends beside Newton's equilibrium, not on it: it has taken another "
+        "path, and slips depend on it.",
+        "Nothing slides in this increment. Where contacts slide, ways that differ may end further apart.",
+    )
+
+
+def _decay(label: str, first: float, rate: float, steps: Floats) -> Theory:
+    """first exp(-rate n), as far as it is above 1e-14."""
+    error = first * np.exp(-rate * steps)
+    seen = error > 1e-14
+    return Theory(label, tuple(error[seen].tolist()), tuple(steps[seen].tolist()))

@@ -1,0 +1,218 @@
+r"""What a work-precision study consists of: points of error and cost, orders of convergence, and advice.
+
+An order p of a method is the slope of :math:`\log(\text{error}) = p \log(\text{parameter}) + \text{const}`, by least
+squares, with the standard error of the slope from the scatter about the line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+
+from ....pywrap import Equilibrium, Scene
+from .coverage import Covered
+
+T = TypeVar("T")
+Progress = Callable[[Sequence[T]], Iterable[T]]
+
+
+def no_progress(items: Sequence[T]) -> Iterable[T]:
+    """Show nothing."""
+    return items
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a study is given.
+
+    Attributes
+    ----------
+    scene : Scene
+        Of the ramp, with its section [ramp].
+    ramp : tuple of Equilibrium
+        Its equilibria by increasing F_x, from 0 to beyond the onset.
+    quick : bool
+        Whether fewer points and shorter runs have to do.
+    repeats : int
+        Runs of which the median of the times is taken.
+    progress : callable
+        Wraps what a study goes through, to show how far it is.
+    """
+
+    scene: Scene
+    ramp: tuple[Equilibrium, ...]
+    quick: bool = False
+    repeats: int = 3
+    progress: Progress = no_progress
+
+    def at(self, fx: float) -> Equilibrium:
+        """The equilibrium of the ramp nearest to a load."""
+        return min(self.ramp, key=lambda each: abs(each.fx - fx))
+
+
+@dataclass(frozen=True)
+class Point:
+    """One run of one method.
+
+    Attributes
+    ----------
+    method : str
+        Which.
+    parameter : float or None
+        What the method's accuracy is set by; None if nothing sets it.
+    error : float
+        Against the study's reference.
+    seconds : float
+        Wall time, the median of several.
+    evaluations : int or None
+        Work that does not depend on the machine; None where there is nothing to count.
+    """
+
+    method: str
+    parameter: float | None
+    error: float
+    seconds: float
+    evaluations: int | None
+
+
+@dataclass(frozen=True)
+class Order:
+    """The order of convergence of a method.
+
+    Attributes
+    ----------
+    method : str
+        Which.
+    order : float
+        Slope of log error over log parameter.
+    error : float
+        Standard error of the slope.
+    expected : float
+        What theory says.
+    points : int
+        How many points were fitted.
+    """
+
+    method: str
+    order: float
+    error: float
+    expected: float
+    points: int
+
+
+@dataclass(frozen=True)
+class Theory:
+    """What theory says of the error, a line in the figure.
+
+    Attributes
+    ----------
+    label : str
+        What it is.
+    error : tuple of float
+        One value, a floor for all; or values at `parameter`.
+    parameter : tuple of float
+        Where a curve goes through `error`; empty for a floor.
+    """
+
+    label: str
+    error: tuple[float, ...]
+    parameter: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Study:
+    """Error against cost for several ways to one result.
+
+    Attributes
+    ----------
+    name : str
+        Of the study.
+    question : str
+        What is computed, a sentence or two.
+    error, parameter, evaluations : str
+        What the numbers of the points are, with their units.
+    abscissa : {"evaluations", "parameter"}
+        What the second panel of the figure has on its x axis.
+    reference : str
+        What the errors are taken against.
+    reference_error : float
+        The reference's own error, in the unit of `error`.
+    points : tuple of Point
+        By method.
+    advice : tuple of str
+        Two sentences: what to take when.
+    orders : tuple of Order
+        Those that theory predicts.
+    theory : tuple of Theory
+        Floors and curves to compare with.
+    remarks : tuple of str
+        What else the reader has to know, one sentence each.
+    covered : tuple of Covered
+        Stated against true errors, where the result states one.
+    """
+
+    name: str
+    question: str
+    error: str
+    parameter: str
+    evaluations: str
+    abscissa: Literal["evaluations", "parameter"]
+    reference: str
+    reference_error: float
+    points: tuple[Point, ...]
+    advice: tuple[str, str]
+    orders: tuple[Order, ...] = ()
+    theory: tuple[Theory, ...] = ()
+    remarks: tuple[str, ...] = ()
+    covered: tuple[Covered, ...] = ()
+
+    def of(self, method: str) -> list[Point]:
+        """The points of one method."""
+        return [point for point in self.points if point.method == method]
+
+    @property
+    def methods(self) -> list[str]:
+        """Names of the methods, in the order of the points."""
+        return list(dict.fromkeys(point.method for point in self.points))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers, strings, lists and dicts, for JSON."""
+        return asdict(self)
+
+
+def fit_order(points: Iterable[Point], method: str, expected: float, least: float = 0.0, most: float = np.inf) -> Order:
+    """The order of a method from its points with errors between two bounds.
+
+    Parameters
+    ----------
+    points : iterable of Point
+        Of any methods.
+    method : str
+        Which.
+    expected : float
+        What theory says.
+    least, most : float
+        Errors below `least` are those of the floor or of the reference, errors above `most` are not yet asymptotic.
+
+    Returns
+    -------
+    Order
+
+    Raises
+    ------
+    ValueError
+        If fewer than three points are left.
+    """
+    chosen = [p for p in points if p.method == method and p.parameter and least < p.error < most]
+    if len(chosen) < 3:
+        raise ValueError(f"{len(chosen)} points of {method} are between {least:.1e} and {most:.1e}: an order needs 3")
+    x = np.log([point.parameter or np.nan for point in chosen])
+    y = np.log([point.error for point in chosen])
+    x, y = x - x.mean(), y - y.mean()
+    slope = float(x @ y / (x @ x))
+    scatter = y - slope * x
+    error = float(np.sqrt(scatter @ scatter / (len(chosen) - 2) / (x @ x)))
+    return Order(method, slope, error, expected, len(chosen))

@@ -1,0 +1,141 @@
+r"""Error of a trajectory over the time step.
+
+Three disks: one is pressed down between two others that lie on the floor. They roll and slide apart. All four
+contacts stay closed and slide at some time, two stick again, two turn by 16 and 19 degrees, and the overlaps swing by
+their own size. The packing is soft, so that all this shows in the slips.
+
+Velocity Verlet is of second order as long as the slip increment is. The force is continuously differentiable at
+Coulomb's bound and the clamp is applied at the end of the step, so that passing the bound costs no order. A contact
+that *forms* during the run would: its slip begins with zero at the end of a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from ....analysis import MindlinLaw, Packing, touching
+from ....analysis.packing.packing import Floats
+from ....pywrap import Engine
+from .study import Order, Point, Settings, Study, Theory, fit_order
+from .timing import timed
+from .verlet import Tangent, Verlet
+
+TIME = 2.0
+"""Length of the run: two swings of the overlaps."""
+
+COARSEST = 200
+"""Steps of the coarsest run: 60 to a period of the fastest mode."""
+
+LAMMPS, MIDPOINT, END = "LAMMPS, tangent at the middle", "NumPy, tangent at the middle", "NumPy, tangent at the end"
+
+
+def three_disks() -> Packing:
+    """A disk between two on the floor, under a load that is not straight down; forces are out of balance."""
+    overlap, gap = 0.03, 0.02
+    radius = np.array([0.5, 0.5, 0.4])
+    x, y = 0.5 * (1 + gap), 0.5 - overlap
+    height = y + np.sqrt((0.9 - overlap) ** 2 - x**2)
+    position = np.array([[-x, y], [x, y], [0.0, height]])
+    law = MindlinLaw(kn=100.0, kt=100.0 * 2 / 7, mu=0.5)
+    contacts = touching(position, radius)
+    return Packing(
+        position=position, radius=radius, contacts=contacts, law=law, top=np.array([False, False, True]), fx=0.3, fy=3.0
+    )
+
+
+def in_lammps(engine: Engine, packing: Packing, steps: int) -> Floats:
+    """(x, y, u) after `TIME`, by the pair style; shape (3, N), length."""
+    engine.restore(packing)
+    with engine.undamped(TIME / steps) as dynamics:
+        dynamics.advance(steps)
+        end = engine.packing
+    return np.array([*end.position.T, end.scaled_angle])
+
+
+def in_numpy(packing: Packing, tangent: Tangent, steps: int) -> Floats:
+    """The same by the reference integrator."""
+    return Verlet(packing, tangent).run(TIME / steps, steps)
+
+
+def reference(engine: Engine, packing: Packing, finest: int) -> tuple[Floats, float]:
+    """Richardson's extrapolation of LAMMPS's runs with `finest` and half as many steps, and the error of it."""
+    runs = [in_lammps(engine, packing, steps) for steps in (finest // 4, finest // 2, finest)]
+    coarse, fine = ((4 * runs[k + 1] - runs[k]) / 3 for k in (0, 1))
+    return fine, float(np.abs(fine - coarse).max())
+
+
+def trajectory(settings: Settings) -> Study:
+    """The study: LAMMPS and NumPy with the tangent at the middle of the step, NumPy with the tangent at its end."""
+    packing = three_disks()
+    with Engine(packing) as engine:
+        return _study(settings, engine, packing)
+
+
+def _study(settings: Settings, engine: Engine, packing: Packing) -> Study:
+    exact, reference_error = reference(engine, packing, 204_800 if settings.quick else 819_200)
+    fine, coarse = (8, 5) if settings.quick else (10, 7)
+    runs: list[tuple[str, int, Callable[[], Floats]]] = []
+    runs += [(LAMMPS, n, partial(in_lammps, engine, packing, n)) for n in _steps(fine)]
+    runs += [(MIDPOINT, n, partial(in_numpy, packing, "midpoint", n)) for n in _steps(coarse)]
+    runs += [(END, n, partial(in_numpy, packing, "end", n)) for n in _steps(coarse)]
+    results = timed([run for _, _, run in runs], settings.repeats, settings.progress)
+    points = tuple(
+        Point(method, TIME / steps, float(np.abs(end - exact).max()), seconds, steps)
+        for (method, steps, _), (end, seconds) in zip(runs, results, strict=True)
+    )
+    ends = {(method, steps): end for (method, steps, _), (end, _) in zip(runs, results, strict=True)}
+    apart = max(float(np.abs(ends[MIDPOINT, n] - ends[LAMMPS, n]).max()) for n in _steps(coarse))
+    orders = tuple(
+        fit_order(points, method, expected, least=100 * reference_error)
+        for method, expected in ((LAMMPS, 2), (MIDPOINT, 2), (END, 1))
+    )
+    return Study(
+        name="time step: trajectory",
+        question="Where three disks are that roll and slide apart under a load, after a time of 2; undamped.",
+        error="largest error of x, y, R theta; length",
+        parameter="time step",
+        evaluations="steps",
+        abscissa="parameter",
+        reference="Richardson's extrapolation of runs in LAMMPS with a time step far below those shown; its error "
+        "is the difference from the extrapolation with twice that step",
+        reference_error=reference_error,
+        points=points,
+        advice=_advice(points, orders),
+        orders=orders,
+        theory=_slopes(fine),
+        remarks=(
+            f"LAMMPS and the NumPy integrator with the same tangent differ by {apart:.1e} at the most: they "
+            "integrate the same equations. NumPy is slow because it interprets; compare methods within one of the "
+            "two.",
+            "No contact forms in this run. One that does begins with zero slip at the end of a step, which is of first "
+            "order in the step.",
+        ),
+    )
+
+
+def _advice(points: Sequence[Point], orders: Sequence[Order]) -> tuple[str, str]:
+    same = min(point.error for point in points if point.method == END)
+    needed = next(p for p in points if p.method == MIDPOINT and p.error < same)
+    finest = max(point.evaluations or 0 for point in points if point.method == END)
+    return (
+        f"Take the tangent at the middle of the step, as the pair style does: order {orders[0].order:.3f} +- "
+        f"{orders[0].error:.1g}, so that halving the step gains a factor of four.",
+        f"The tangent at the end of the step has no use: order {orders[2].order:.3f} +- {orders[2].error:.1g}, and "
+        f"{finest} steps with it err as much as fewer than {needed.evaluations} with the other.",
+    )
+
+
+def _slopes(count: int) -> tuple[Theory, ...]:
+    """Lines of the first and of the second order over the time steps of so many runs."""
+    first, last = TIME / COARSEST, TIME / COARSEST / 2 ** (count - 1)
+    return tuple(
+        Theory(f"order {order}", (start, start * (last / first) ** order), (first, last))
+        for order, start in ((1, 4e-4), (2, 2e-4))
+    )
+
+
+def _steps(count: int) -> list[int]:
+    return [COARSEST * 2**k for k in range(count)]

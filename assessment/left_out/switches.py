@@ -1,0 +1,318 @@
+"""Undamped runs that differ in one feature, and what each of them holds in LAMMPS."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
+
+from ...analysis import Contacts, MindlinLaw, Packing, touching
+from ...analysis.motion.signals import Signal
+from ...pywrap import Engine
+from ...pywrap.lammps.dynamics import Dynamics, Weakening
+
+QUIET_SHARE = 1e-4
+"""Time step of the runs, in units of the decks': a packing that has lost its floor or its sides stays what it is while
+it is timed. The time that a step takes does not depend on it."""
+
+OWN_COMPUTES = {"thermo_temp", "thermo_press", "thermo_pe"}
+"""Computes that LAMMPS makes in every instance. No deck asks for their values, except relaxations for the energy."""
+
+UNREACHED = 1e6
+"""A threshold v_0 that no layer reaches: friction that could weaken, and does not."""
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """What a LAMMPS instance holds.
+
+    Attributes
+    ----------
+    parts : tuple of str
+        Deck parts that it has read, by its log.
+    fixes, computes, dumps, variables : tuple of str
+        By their IDs.
+    arrays : tuple of str
+        Per-atom arrays of fixes and of property/atom, with their columns.
+    settings : tuple of str
+        Periodic sides, and whether ghost disks have velocities.
+    """
+
+    parts: tuple[str, ...]
+    fixes: tuple[str, ...]
+    computes: tuple[str, ...]
+    dumps: tuple[str, ...]
+    variables: tuple[str, ...]
+    arrays: tuple[str, ...]
+    settings: tuple[str, ...]
+
+    @classmethod
+    def of(cls, engine: Engine, log: Path) -> Loaded:
+        """Read it from LAMMPS, and from its log, which ends here."""
+        instance = engine.lammps
+        instance.command("log none")
+        fixes = tuple(instance.available_ids("fix"))
+        periodic = instance.extract_box()[5]
+        settings = [f"periodic {axis}" for axis, flag in zip("xy", periodic, strict=False) if flag]
+        if instance.extract_setting("ghost_velocity"):
+            settings.append("velocities of ghosts")
+        return cls(
+            parts=tuple(dict.fromkeys(re.findall(r"^include\s.*?(\w+\.in)", log.read_text(), re.MULTILINE))),
+            fixes=fixes,
+            computes=tuple(each for each in instance.available_ids("compute") if each not in OWN_COMPUTES),
+            dumps=tuple(instance.available_ids("dump")),
+            variables=tuple(instance.available_ids("variable")),
+            arrays=tuple(_arrays(instance, fixes)),
+            settings=tuple(settings),
+        )
+
+    @property
+    def everything(self) -> tuple[str, ...]:
+        """All in one, as "fix slips" and so on; variables belong to the deck parts and are left out."""
+        kinds = {
+            "part": self.parts,
+            "fix": self.fixes,
+            "compute": self.computes,
+            "dump": self.dumps,
+            "array": self.arrays,
+        }
+        return *(f"{kind} {name}" for kind, names in kinds.items() for name in names), *self.settings
+
+    def beyond(self, other: Loaded) -> tuple[str, ...]:
+        """What is here and not there."""
+        return tuple(each for each in self.everything if each not in other.everything)
+
+
+@dataclass(frozen=True)
+class Push:
+    """The perturbation a cos(omega t) on some disks, the upper layer if None."""
+
+    amplitude: float
+    omega: float
+    target: tuple[int, ...] | None
+
+
+@dataclass(frozen=True)
+class Sent:
+    """A signal, as force along x on some disks, the upper layer if None, or as acceleration of the floor."""
+
+    signal: Signal
+    on: Literal["layer", "floor"]
+    target: tuple[int, ...] | None
+
+
+@dataclass(frozen=True)
+class Run:
+    """An undamped run: the scene's, or one that differs from it in one feature.
+
+    Attributes
+    ----------
+    packing : Packing
+        Where it starts.
+    push : Push or None
+    sent : Sent or None
+        The signal.
+    weakening : Weakening or None
+    floor : bool
+        Whether the floor is there.
+    contacts : Path or None
+        A file for the forces of each contact, every 100 steps.
+    """
+
+    packing: Packing
+    push: Push | None = None
+    sent: Sent | None = None
+    weakening: Weakening | None = None
+    floor: bool = True
+    contacts: Path | None = None
+
+    @contextmanager
+    def started(self, communicator: MPI.Comm, log: Path | None = None) -> Iterator[tuple[Engine, Dynamics]]:
+        """LAMMPS, and its dynamics ready for `advance`."""
+        # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
+        stiffness = self.packing.law.stiffness_scale(10 * self.packing.fy)
+        step = QUIET_SHARE * 0.2 / np.sqrt(12 * stiffness)
+        push, sent = self.push or Push(0.0, 0.0, None), self.sent
+        target = sent.target if sent else push.target
+        on: Literal["layer", "floor"] = sent.on if sent else "layer"
+        signal = sent.signal if sent else None
+        with (
+            Engine(self.packing, communicator, log) as engine,
+            engine.undamped(step, push.amplitude, push.omega, target, self.weakening, signal=signal, on=on) as dynamics,
+        ):
+            if not self.floor:
+                engine.lammps.command("unfix floor")
+            if self.contacts:
+                engine.lammps.command("compute contact all pair/local p1 p2 p3 cutoff radius")
+                engine.lammps.command(f'dump contact all local 100 "{self.contacts}" index c_contact[*]')
+            if self.contacts or not self.floor:
+                engine.lammps.command("run 0 post no")
+            yield engine, dynamics
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One feature of a run, and the two runs that differ in it.
+
+    Attributes
+    ----------
+    name, reason : str
+        Its name, and why the scene has it or not.
+    without, with_it : Run
+        The two.
+    touched : ndarray of bool, shape (N,)
+        The disks on which it acts from the first moment.
+    moves : bool
+        Whether it changes the motion.
+    """
+
+    name: str
+    reason: str
+    without: Run
+    with_it: Run
+    touched: NDArray[np.bool_]
+    moves: bool
+
+
+def features(run: Run) -> Iterator[Feature]:
+    """The features of an undamped run, each with two runs that differ in it and have no push, signal or weakening else.
+
+    Parameters
+    ----------
+    run : Run
+        The scene's.
+
+    Yields
+    ------
+    Feature
+    """
+    law = run.packing.law
+    rough_law = law if law.frictional else replace(law, kt=2 / 7 * law.kn, mu=1.0)
+    bare = replace(run, push=None, sent=None, weakening=None)
+    yield _floor(bare)
+    yield _history(bare, rough_law)
+    yield _periodicity(bare)
+    yield _weakening(run, replace(bare, packing=replace(run.packing, law=rough_law)))
+    yield from _damping(bare, law)
+    yield _perturbation(run, bare)
+    yield _signal(run, bare)
+
+
+def _floor(bare: Run) -> Feature:
+    packing = bare.packing
+    on_floor = where(packing, packing.contacts.i[packing.contacts.floor])
+    reason = f"{on_floor.sum()} of {len(packing)} disks rest on it, and nothing else bears the load"
+    return Feature("floor", reason, replace(bare, floor=False), bare, on_floor, moves=True)
+
+
+def _history(bare: Run, rough_law: MindlinLaw) -> Feature:
+    """Zero slips in both, so that friction alone differs."""
+    packing, law = bare.packing, bare.packing.law
+    packing = replace(packing, contacts=touching(packing.position, packing.radius, packing.box_length))
+    return Feature(
+        "tangential history",
+        f"mu = {law.mu:g}, kt = {law.kt:g}" + ("" if law.frictional else ": no tangential force"),
+        replace(bare, packing=replace(packing, law=replace(law, mu=0.0))),
+        replace(bare, packing=replace(packing, law=rough_law)),
+        where(packing, []),
+        moves=True,
+    )
+
+
+def _periodicity(bare: Run) -> Feature:
+    opened, closed, across = _opened_and_closed(bare.packing)
+    box = bare.packing.box_length
+    reason = "the sides are open" if box is None else f"x has the period {box:g}"
+    open_run, closed_run = (replace(bare, packing=packing) for packing in (opened, closed))
+    return Feature("periodicity", reason, open_run, closed_run, across, moves=True)
+
+
+def _weakening(run: Run, rough: Run) -> Feature:
+    weakening = run.weakening or Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=UNREACHED, v_ss=1.0)
+    reason = "section [friction]; measured below its threshold" if run.weakening else "no section [friction]"
+    nobody = where(run.packing, [])
+    return Feature("dynamic friction", reason, rough, replace(rough, weakening=weakening), nobody, moves=False)
+
+
+def _perturbation(run: Run, bare: Run) -> Feature:
+    push = run.push or Push(1e-9, 0.01, None)
+    reason = f"amplitude {push.amplitude:g}" if run.push else "no amplitude in [perturb]"
+    pushed = run.packing.top if push.target is None else where(run.packing, push.target)
+    return Feature("perturbation", reason, bare, replace(bare, push=push), pushed, moves=True)
+
+
+def _signal(run: Run, bare: Run) -> Feature:
+    sent = run.sent or Sent(Signal(np.array([0.0, 1e6]), np.array([1e-9, 1e-9])), "layer", None)
+    reason = f"{len(sent.signal)} rows, on the {sent.on}" if run.sent else "no signal in [perturb]"
+    moved = run.packing.top if sent.target is None else where(run.packing, sent.target)
+    if sent.on == "floor":
+        moved = np.ones(len(run.packing), dtype=bool)
+    return Feature("signal", reason, bare, replace(bare, sent=sent), moved, moves=True)
+
+
+def _damping(bare: Run, law: MindlinLaw) -> Iterator[Feature]:
+    """Dashpots and drag, each with what the scene has or else a hundredth of what is critical for one contact."""
+    packing = bare.packing
+    rate = np.sqrt(law.stiffness_scale(packing.fy) / packing.mass.mean())
+    dashpot = float(0.01 * packing.mass.mean() * rate / law.growth(np.array(law.overlap_of_force(packing.fy))))
+    damped = law if law.damped else replace(law, cn=dashpot, ct=dashpot)
+    for name, reason, without, with_it in (
+        (
+            "dashpots",
+            f"cn = {law.cn:g}, ct = {law.ct:g}" if law.damped else "no cn or ct in [damping]",
+            replace(packing, law=replace(law, cn=0.0, ct=0.0)),
+            replace(packing, law=damped),
+        ),
+        (
+            "drag",
+            "no tau in [damping]" if packing.drag_time is None else f"tau = {packing.drag_time:g}",
+            replace(packing, drag_time=None),
+            replace(packing, drag_time=packing.drag_time or 100 / rate),
+        ),
+    ):
+        without_run, with_run = (replace(bare, packing=each) for each in (without, with_it))
+        yield Feature(name, reason, without_run, with_run, where(packing, []), moves=True)
+
+
+def _arrays(instance: Any, fixes: tuple[str, ...]) -> Iterator[str]:
+    """Per-atom arrays of fixes, and the angles if disks have them."""
+    from lammps import LMP_SIZE_COLS, LMP_STYLE_ATOM
+
+    for name in fixes:
+        with suppress(Exception):  # the LAMMPS module raises plain Exception for a fix without
+            yield f"f_{name} ({instance.extract_fix(name, LMP_STYLE_ATOM, LMP_SIZE_COLS)} columns)"
+    if instance.extract_atom_datatype("d_theta") > 0:
+        yield "d_theta"
+
+
+def where(packing: Packing, disks: ArrayLike) -> NDArray[np.bool_]:
+    """Which disks are among those listed, shape (N,)."""
+    return np.isin(np.arange(len(packing)), disks)
+
+
+def _opened_and_closed(packing: Packing) -> tuple[Packing, Packing, NDArray[np.bool_]]:
+    """The packing with open sides and with a period, and the disks with a contact across it."""
+    i, j, floor = packing.contacts.i, packing.contacts.j, packing.contacts.floor
+    position = packing.position.copy()
+    if packing.box_length is None:
+        room = 2 * packing.radius.max()
+        position[:, 0] += room - position[:, 0].min()
+        length = position[:, 0].max() + room
+    else:
+        length = packing.box_length
+        position[:, 0] %= length
+    beyond = ~floor & (np.abs(position[i, 0] - position[j, 0]) > 0.5 * length)
+    slip, low = packing.contacts.slip, packing.contacts.slip_low
+    contacts = Contacts(i[~beyond], j[~beyond], slip[~beyond], None if low is None else low[~beyond])
+    return (
+        replace(packing, position=position, box_length=None, contacts=contacts),
+        replace(packing, position=position, box_length=length),
+        where(packing, np.concatenate([i[beyond], j[beyond]])),
+    )

@@ -1,0 +1,211 @@
+"""Few disks, and contacts at the edge of being one: closing, opening, grazing, at the bound, with one centre."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ....analysis import Contacts, MindlinLaw, Packing, spectrum, stiffness_matrix, touching
+from ....pywrap import Engine, Scene, SceneError
+from .alone import refused_by_lammps
+from .case import Case, Outcome, measured, refused
+from .checks import balance
+from .packings import KN, at_rest, bed, crystal, law, sheared
+
+GROUP = "geometry"
+
+NONE = Contacts(np.zeros(0, int), np.zeros(0, int), np.zeros(0))
+
+
+def _contact(slip: float) -> Contacts:
+    """The contact of the first two disks."""
+    return Contacts(np.array([0]), np.array([1]), np.array([slip]), np.zeros(1))
+
+
+def _disks(position: list[tuple[float, float]], contacts: Contacts | None = None, **changes: object) -> Packing:
+    """Disks of radius 1/2 with compensated coordinates."""
+    radius = np.full(len(position), 0.5)
+    values = {
+        "position": np.array(position),
+        "position_low": np.zeros((len(position), 2)),
+        "radius": radius,
+        "contacts": touching(np.array(position), radius, None) if contacts is None else contacts,
+        "law": law(),
+    }
+    # mypy cannot know which key has which type; Packing checks them
+    return Packing(**(values | changes))  # type: ignore[arg-type]
+
+
+def _one_disk() -> Outcome:
+    """On the floor under the load: k_n delta^(3/2) = F_y."""
+    packing = at_rest(_disks([(3.0, 0.4995)], top=np.array([True]), fy=3.0)).packing
+    exact = packing.law.overlap_of_force(3.0)
+    return measured(
+        abs(packing.geometry.overlap[0] / exact - 1),
+        4e-16 * 3,
+        "relative error of the overlap against (F_y/k_n)^(2/3): a few roundings",
+    )
+
+
+def _two_disks() -> Outcome:
+    """One on top of the other, upright: both contacts carry F_y."""
+    top = np.array([False, True])
+    packing = at_rest(_disks([(3.0, 0.4994), (3.0, 1.4988)], top=top, fy=3.0)).packing
+    return measured(
+        np.abs(packing.normal_force / 3.0 - 1).max(),
+        1e-14,
+        "relative error of the normal forces against F_y; a column is unstable, and stands because nothing pushes it",
+    )
+
+
+def _three_disks() -> Outcome:
+    """Two that touch, and one on top."""
+    height = 0.499 + np.sqrt(0.998**2 - 0.499**2)
+    position = [(3.0, 0.499), (3.998, 0.499), (3.499, height)]
+    return balance(sheared(_disks(position, top=np.array([False, False, True]), fy=3.0)))
+
+
+def _no_contact() -> Outcome:
+    """A rattler stays where it is, and has no eigenvalues."""
+    settled = bed()
+    hovering = np.array([[2.0, settled.position[:, 1].max() + 3.0]])
+    c = settled.contacts
+    packing = replace(
+        settled,
+        position=np.vstack([settled.position, hovering]),
+        radius=np.append(settled.radius, 0.5),
+        angle=np.append(settled.angle, 0.0),
+        mass=np.append(settled.mass, 1.0),
+        top=np.append(settled.top, True),
+        contacts=Contacts(c.i, c.j, c.slip),
+    )
+    last = len(packing) - 1
+    with Engine(packing) as engine, engine.undamped(1e-4) as dynamics:
+        moved = dynamics.advance(10_000).position[last] - hovering[0]
+    counted = len(spectrum(packing).eigenvalues) - len(spectrum(settled).eigenvalues)
+    return measured(
+        np.abs(moved).max() + counted,
+        0.0,
+        "how far a loaded disk without contact went in 10,000 undamped steps, plus eigenvalues that it added: none",
+    )
+
+
+def _zero_overlap() -> Outcome:
+    """Exactly touching is no contact, for the pair style as for the analysis."""
+    packing = _disks([(3.0, 3.0), (4.0, 3.0)], _contact(0.0))
+    with Engine(packing) as engine:
+        found = engine.displace(packing, np.zeros(6))
+        force = np.abs(engine.net_force).max()
+    return measured(
+        force + len(found.contacts) + stiffness_matrix(packing).nnz + np.abs(packing.net_force).max(),
+        0.0,
+        "forces, contacts and entries of K of two disks that touch exactly: none, and nothing is divided by zero",
+    )
+
+
+def _at_the_bound() -> Outcome:
+    """|f_t| = mu f_n to the bit, and no tangential stiffness."""
+    packing = _disks([(3.0, 3.999), (3.0, 3.0)], _contact(1.0))
+    with Engine(packing) as engine:
+        engine.displace(packing, np.zeros(6))
+        force = engine.net_force.reshape(3, 2)[:, 0]
+    excess = abs(abs(force[0]) - packing.law.mu * abs(force[1]))
+    limit = packing.law.slip_limit(packing.geometry.overlap)
+    stiffness = np.abs(packing.law.tangential_slip_derivative(packing.geometry.overlap, limit))[0]
+    return measured(excess + stiffness, 0.0, "|f_t| - mu f_n in LAMMPS, and df_t/ds of the analysis, at the bound")
+
+
+def _opens_and_closes() -> Outcome:
+    """A disk leaves one neighbour and reaches the next within one step."""
+    packing = _disks([(3.0, 3.0), (3.999, 3.0), (5.0, 3.0)], _contact(1e-4))
+    there = np.array([0.0, 2e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    with Engine(packing) as engine:
+        over = engine.displace(packing, there)
+        back = engine.displace(over, -there)
+    wrong = over.contacts.i.tolist() != [1] or over.contacts.j.tolist() != [2]
+    wrong |= back.contacts.i.tolist() != [0] or back.contacts.j.tolist() != [1]
+    slips = np.abs(np.concatenate([over.contacts.slip, back.contacts.slip])).max(initial=0.0)
+    return measured(wrong + slips, 0.0, "wrong contacts, and slips that should have been forgotten")
+
+
+def _grazing() -> Outcome:
+    """A disk passes another at an overlap of 1e-12 for one step."""
+    aside = Packing(
+        position=np.array([[2.999, 4.0], [3.0, 3.0]]),
+        position_low=np.array([[0.0, -1e-12], [0.0, 0.0]]),
+        radius=np.array([0.5, 0.5]),
+        contacts=NONE,
+        law=law(),
+    )
+    step = np.array([3.0 - aside.position[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0])
+    with Engine(aside) as engine:
+        closest = engine.displace(aside, step)
+        force = engine.net_force.reshape(3, 2)
+        beyond = engine.displace(closest, step)
+    overlap = closest.geometry.overlap
+    if len(aside.contacts) or len(beyond.contacts) or len(overlap) != 1:
+        return Outcome("fails", None, None, f"contacts on the way: {len(overlap)} and {len(beyond.contacts)}")
+    expected = float(aside.law.normal_force(1e-12))
+    return measured(
+        np.abs(force[1] / expected - [1, -1]).max() + np.abs(closest.contacts.slip[0]),
+        1e-10,
+        "relative error of the force at an overlap of 1e-12; low parts are known to 7e-24, 1e-11 of it",
+    )
+
+
+def _wide(columns: int) -> Outcome:
+    return balance(sheared(crystal(columns)))
+
+
+def _narrow() -> Outcome:
+    return refused(lambda: crystal(2), ValueError, "under two largest diameters")
+
+
+def _narrow_scene() -> Outcome:
+    section = {"disks": 10, "top": 1, "width": 2.7}
+    scene = {"packing": section, "law": {"kn": KN}, "load": {"fy": 3.0}}
+    return refused(lambda: Scene.from_mapping(scene), SceneError, "widen the box")
+
+
+def _one_centre() -> Outcome:
+    packing = _disks([(3.0, 3.0), (3.0, 3.0)], _contact(0.0))
+    return refused(lambda: stiffness_matrix(packing), ValueError, "same centre")
+
+
+def _not_a_number() -> Outcome:
+    return refused(lambda: _disks([(3.0, float("nan"))], NONE), ValueError, "not finite")
+
+
+def _infinite() -> Outcome:
+    return refused(lambda: MindlinLaw(float("inf"), 1.0, 1.0), ValueError, "must be finite")
+
+
+CASES = [
+    Case(GROUP, "one disk", _one_disk, True),
+    Case(GROUP, "two disks", _two_disks, True),
+    Case(GROUP, "three disks", _three_disks, True),
+    Case(GROUP, "a disk without contact", _no_contact, True),
+    Case(GROUP, "zero overlap", _zero_overlap, True),
+    Case(GROUP, "at Coulomb's bound", _at_the_bound, True),
+    Case(GROUP, "opens and closes in one step", _opens_and_closes, True),
+    Case(GROUP, "grazing", _grazing, True),
+    *(Case(GROUP, f"box {10**e if e else 3} wide", partial(_wide, 10**e if e else 3), e < 2) for e in (0, 1, 2, 3, 4)),
+    Case(GROUP, "box 2 wide", _narrow, True),
+    Case(GROUP, "box under two diameters, a scene", _narrow_scene, True),
+    Case(GROUP, "one centre", _one_centre, True),
+    Case(
+        GROUP,
+        "one centre, LAMMPS",
+        partial(refused_by_lammps, [(3.0, 3.0), (3.0, 3.0)], "run 0\n", "have the same centre"),
+        True,
+    ),
+    Case(
+        GROUP,
+        "a centre inside of the other disk, LAMMPS",
+        partial(refused_by_lammps, [(3.0, 3.0), (3.4, 3.0)], "run 0\n", "contact law does not hold"),
+    ),
+    Case(GROUP, "a coordinate that is no number", _not_a_number, True),
+    Case(GROUP, "k_n infinite", _infinite, True),
+]

@@ -1,0 +1,101 @@
+"""Stiff and extreme cases: each holds within a stated bound, or is refused in one sentence.
+
+Never a NaN, a hang, a crash or a quiet wrong number. The cases are in `stability_cases`, a module for each kind of
+trouble; here they are run. stability.json and stability.md are written anew after
+every case, so that a case which takes the program down is the one that is missing. Runs with LAMMPS use all ranks,
+whose number changes no figure; rank 0 writes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from ...analysis import FaultgougeError
+from ...analysis.files.wholefile import make_folder, write_text
+from ...figures.style import save
+from .cases import dynamics, eigenvalues, geometry, loads, restarts
+from .cases.case import Case, Outcome
+from .draw import stability_figure
+from .page import stability_page
+
+Say = Callable[[str], None]
+
+CASES: tuple[Case, ...] = tuple(
+    case for module in (loads, geometry, dynamics, eigenvalues, restarts) for case in module.CASES
+)
+
+
+class StabilityError(FaultgougeError):
+    """Cases that failed, in one sentence."""
+
+
+def no_progress(cases: Sequence[Case]) -> Iterable[Case]:
+    """Show nothing."""
+    return cases
+
+
+def stability(
+    output: Path,
+    quick: bool = False,
+    say: Say = print,
+    progress: Callable[[Sequence[Case]], Iterable[Case]] = no_progress,
+    cases: Sequence[Case] = CASES,
+) -> dict[str, Any]:
+    """Try the cases and leave stability.json, stability.md and stability.png in a folder.
+
+    Parameters
+    ----------
+    output : Path
+        The folder, made if need be.
+    quick : bool
+        Only the small part of the cases.
+    say : callable
+        Takes a line of progress.
+    progress : callable
+        Wraps the cases to show how far it is.
+    cases : sequence of Case
+        What to try.
+
+    Returns
+    -------
+    dict
+        What stability.json holds: each case's name, group, status, figure, bound and what it says.
+    """
+    root = MPI.COMM_WORLD.rank == 0
+    if root:
+        make_folder(output)
+    chosen = [case for case in cases if case.quick or not quick]
+    done: list[tuple[Case, Outcome]] = []
+    for case in progress(chosen):
+        outcome = case.outcome()
+        done.append((case, outcome))
+        if outcome.status == "fails":
+            say(f"{case.group}, {case.name}: {outcome.says}")
+        if root:
+            _write(done, output)
+    if root:
+        save(stability_figure(done), output / "stability")
+    return _as_dict(done)
+
+
+def check(result: dict[str, Any]) -> None:
+    """Raise StabilityError if a case of a result has failed."""
+    failed = [case["name"] for case in result["cases"] if case["status"] == "fails"]
+    if failed:
+        raise StabilityError(f"{len(failed)} of {len(result['cases'])} cases failed: {'; '.join(failed)}")
+
+
+def _write(done: Sequence[tuple[Case, Outcome]], output: Path) -> None:
+    """stability.json and stability.md with what there is."""
+    write_text(output / "stability.json", json.dumps(_as_dict(done), indent=1, allow_nan=False) + "\n")
+    write_text(output / "stability.md", stability_page(done))
+
+
+def _as_dict(done: Sequence[tuple[Case, Outcome]]) -> dict[str, Any]:
+    return {"cases": [{"name": case.name, "group": case.group} | asdict(outcome) for case, outcome in done]}

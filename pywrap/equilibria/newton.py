@@ -1,0 +1,242 @@
+r"""Newton's method from one equilibrium, at one load.
+
+The unknown is the displacement q from the last equilibrium, :math:`q = (\Delta x.., \Delta y.., R \Delta\theta..)`.
+LAMMPS moves the disks by q along a straight path, advances the slips from their values at that equilibrium
+(never from an iterate), clamps them, and gives the forces F(q). With the consistent stiffness matrix K of
+the trial configuration,
+
+.. math:: K\, \Delta q = F(q), \qquad q \leftarrow q + \Delta q.
+
+K is the Jacobian of F up to the finite length of the path, a relative error of order :math:`|q|`, so the
+convergence is quadratic until it is linear with a factor of about 1e-4 or less. A contact that opens, closes,
+sticks or slides on the way changes K, and the iteration goes on with the new contacts.
+
+Doubles bound what can be reached: a coordinate x is known to :math:`\epsilon |x|`, which changes the force of a
+contact of stiffness k by :math:`k \epsilon |x|`. The rounding floor sums this over the contacts of each disk. An
+equilibrium whose residual no longer falls and is of this order is at the floor. No further iteration is made where the
+last two residuals show that it would gain nothing. In compensated arithmetic a coordinate is known to 1e-23, and the
+next bound is the displacement itself, a double: :math:`k \epsilon |q|`. From there on displacements count from the
+iterate. What is left, :math:`q'`, is of order :math:`\epsilon |q|`, and that its slips start at an iterate changes them
+by :math:`|q| |q'|`, which is less than they can resolve.
+
+A rattler that a neighbour runs into on the way is moved to the middle of its cage: it carries nothing, and where it
+lies is no matter (:mod:`~faultgouge.pywrap.equilibria.rattlers`).
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis import Packing
+from ..lammps.trial import EPSILON, Trial
+from .newton_matrix import Factors, factored
+from .rattlers import middle_of_cage
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+ITERATIONS = 40
+"""Newton iterations before an increment is halved. Three or four do, but where a disk is pushed out between two others:
+their contacts open as delta^p -> 0, on which Newton's method gains a factor of 5 an iteration for p = 3/2, and 12 reach
+the floor."""
+
+FRUITLESS = 8
+"""Iterations that gain nothing before an increment is halved."""
+
+FREEING = 3
+"""Iterations in which a disk that is pushed out, and yet was not moved out of the way, gets p times Newton's step:
+its force goes as delta^p, a root of that order, and the factor makes the convergence quadratic again. Later ones take
+Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
+
+MOVES = 3
+"""Times that a rattler is moved in an increment: what it lies against may be another one that is moved later."""
+
+NOISE = 10
+"""Rounding floors up to which a residual that no longer falls is one."""
+
+SPARED = 3
+"""Iterations that are made with the factors of K at hand if these suffice to reach the floor. New ones cost as much as
+two iterations at 100 disks, and one or two more follow."""
+
+SPARING = 300
+"""Disks beyond which factors of K are used on whatever is left to go: new ones cost ten force evaluations and more."""
+
+KEPT = 0.1
+"""Factor of the residual in one iteration up to which the factors of K are good for another one."""
+
+GAIN = 1e-2
+"""Factor by which the first iteration reduces the residual, where nothing is known yet: 1e-2 is that of an increment of
+1e-3 from no displacement, and smaller ones have smaller factors."""
+
+
+class Guess(NamedTuple):
+    """Where an iteration starts.
+
+    Attributes
+    ----------
+    displacement : ndarray, shape (3N,)
+        (dx.., dy.., R dtheta..), length.
+    factors : Factors, optional
+        Those of K that it was found with.
+    answers : float
+        The largest force that it answers.
+    """
+
+    displacement: Floats
+    factors: Factors | None = None
+    answers: float = np.inf
+
+
+def iterated(
+    displaced: Callable[[Packing, Floats], Trial],
+    start: Trial,
+    force_tolerance: float | None = None,
+    guess: Guess | None = None,
+) -> tuple[Trial | None, int]:
+    """Newton's method from one equilibrium.
+
+    Parameters
+    ----------
+    displaced : callable
+        The trial at the end of a displacement from a packing, under the load that is wanted.
+    start : Trial
+        The equilibrium.
+    force_tolerance : float, optional
+        Residual to stop at. By default the iteration ends at the floor.
+    guess : Guess, optional
+        By default it starts without a displacement.
+
+    Returns
+    -------
+    Trial, or None
+        In balance; None where the iteration does not converge.
+    int
+        Force evaluations.
+    """
+    base, since, rattlers = start.packing, start.graph, _Rattlers(start)
+    displacement, factors, answers = guess or Guess(np.zeros(3 * len(base)))
+    course = _Course(start.floor, answers, force_tolerance)
+    evaluations = 0
+    for iteration in range(ITERATIONS):
+        trial, evaluations = displaced(base, displacement), evaluations + 1
+        # What a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved.
+        if course.ends_at(trial, result=guess is None or iteration > 0):
+            return course.best, evaluations
+        if factors is None or not course.spares_factors(trial.residual, len(base)):
+            course.floor = trial.floor
+            hit = rattlers.hit(trial)
+            if len(hit):
+                displacement = _out_of_the_way(trial.packing, hit, displacement)
+                trial, evaluations = displaced(base, displacement), evaluations + 1
+            factors = factored(trial, course.floor, since, factors)
+        course.goes_on(trial.residual)
+        step = None if factors is None else factors.solve(trial.force)
+        if factors is None or step is None or too_long(step, base):
+            return None, evaluations
+        if iteration < FREEING and factors.expelled.any():
+            step.reshape(3, -1)[:, factors.expelled] *= base.law.exponent
+        if base.compensated and trial.residual < NOISE * _floor_of(displacement, trial):
+            base, since, displacement = trial.packing, trial.graph, np.zeros_like(displacement)
+        displacement = displacement + step
+    return None, evaluations
+
+
+class _Course:
+    """How the residual falls from iteration to iteration, and when it falls no more.
+
+    Parameters
+    ----------
+    floor : float
+        What rounding leaves of it.
+    answers : float
+        The force that the first displacement answers.
+    force_tolerance : float or None
+        Residual to stop at.
+    """
+
+    def __init__(self, floor: float, answers: float, force_tolerance: float | None) -> None:
+        self.floor, self._tolerance = floor, force_tolerance
+        self.best: Trial | None = None
+        self._worse = 0  # iterations that gained nothing; changes of contacts cost some
+        self._earlier, self._last = np.inf, answers  # residuals of the two iterations before
+
+    def ends_at(self, trial: Trial, result: bool) -> bool:
+        """Whether nothing is left to gain, or to hope for; the best trial is the result then, None if it is none.
+
+        Parameters
+        ----------
+        trial : Trial
+            The next one.
+        result : bool
+            Whether it may be the result.
+        """
+        residual = trial.residual
+        if self.best is not None and residual > 0.5 * self.best.residual:
+            if self.best.residual < NOISE * self.floor:
+                if residual < self.best.residual and self.floor < self.best.residual:
+                    self.best = trial  # below the floor the one that moved less is as good
+                return True
+            self._worse += 1
+            if self._worse > FRUITLESS:
+                self.best = None
+                return True
+        if result and (self.best is None or residual < self.best.residual):
+            self.best = trial
+        if self.best is None:
+            return False
+        if residual <= (0.1 * self.floor if self._tolerance is None else self._tolerance):
+            return True
+        # The next residual falls by at least the factor of this one, rounding apart: it may be far below the floor.
+        factor = self._last / self._earlier if self._earlier < np.inf else GAIN
+        return residual < self.floor and factor * self._last < 0.1 * self.floor
+
+    def spares_factors(self, residual: float, disks: int) -> bool:
+        """Whether the factors of K at hand do for the next iteration."""
+        if residual * (residual / self._last) ** SPARED < 0.1 * self.floor:
+            return True
+        return disks > SPARING and residual <= KEPT * self._last
+
+    def goes_on(self, residual: float) -> None:
+        """Another iteration is made from here."""
+        self._earlier, self._last = self._last, residual
+
+
+class _Rattlers:
+    """Which disks carry nothing, and how often each has been moved."""
+
+    def __init__(self, start: Trial) -> None:
+        # no more than an equilibrium may leave
+        self._loose = (_carrying(start, NOISE * start.floor) == 0) & ~start.still.top
+        self._moved = np.zeros(len(self._loose), dtype=np.int64)
+
+    def hit(self, trial: Trial) -> Indices:
+        """Those that a neighbour ran into, and disks with one contact left, which become rattlers; to be moved."""
+        count = _carrying(trial, trial.floor)
+        hit = ((count == 1) & ~trial.still.top) | (self._loose & (count > 0))
+        disks = np.flatnonzero(hit & (self._moved < MOVES))
+        self._moved[disks] += 1
+        return disks
+
+
+def _carrying(trial: Trial, least: float) -> Floats:
+    """Number of contacts of each disk that carry more than a given force, shape (N,)."""
+    return trial.graph.count(trial.derivatives.normal_force > least)
+
+
+def _floor_of(displacement: Floats, trial: Trial) -> float:
+    """The rounding floor where the displacement is known to its last place only."""
+    return trial.rounded(trial.coordinate_rounding + EPSILON * float(np.abs(displacement).max()))
+
+
+def too_long(step: Floats, packing: Packing) -> bool:
+    """Whether a step of Newton's method is no small displacement: a part floats."""
+    return bool(np.abs(step).max() > 0.1 * packing.radius.min())
+
+
+def _out_of_the_way(trial: Packing, disks: NDArray[np.int64], displacement: Floats) -> Floats:
+    """The displacement with which these disks end up in the middle of their cages."""
+    changed = displacement.copy()
+    changed.reshape(3, -1)[:2, disks] += (middle_of_cage(trial, disks) - trial.position[disks]).T
+    return changed

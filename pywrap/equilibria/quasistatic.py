@@ -1,0 +1,146 @@
+r"""From equilibrium to equilibrium, by Newton's method (:mod:`~faultgouge.pywrap.equilibria.newton`).
+
+The first step needs no forces: at an equilibrium they are those of the increment on the upper layer, and the iteration
+starts from the linear response to these. Its factors of K serve the next iterations, too, as long as these converge
+fast: a small increment takes no others. Between equilibria q is nearly proportional to the increment: where a third one
+is known, its displacement in proportion is a better start. The ramp of an onset takes the equilibrium before the last;
+a ramp that is stored does not, so that it goes on to the bit where it was cut off.
+
+Where Newton fails the increment is halved, since the path matters: friction remembers.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...analysis import NoEquilibriumError, Packing, nearest_image
+from ..lammps.contact_graph import ContactGraph
+from ..lammps.engine import Engine
+from ..lammps.trial import rounding
+from .newton import Guess, iterated, too_long
+from .newton_matrix import factored
+
+SMOOTH = "; without friction (mu = 0) nothing holds a layer back on a smooth floor, so give law.mu a value above 0"
+
+SMALLEST_SHARE = 2.0**-10
+"""The share of an increment below which halving ends and the packing is said to flow."""
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """An equilibrium and how well it is balanced.
+
+    Attributes
+    ----------
+    packing : Packing
+        The configuration.
+    residual : float
+        Largest force, with torque over radius, on a disk that has a contact; of the forces in LAMMPS.
+    floor : float
+        Estimate of the residual that the rounding of coordinates leaves.
+    evaluations : int
+        Force evaluations that it took from the equilibrium before.
+    """
+
+    packing: Packing
+    residual: float
+    floor: float
+    evaluations: int
+
+    @property
+    def fx(self) -> float:
+        """F_x on each disk of the upper layer."""
+        return self.packing.fx
+
+
+def rounding_floor(packing: Packing) -> float:
+    """Residual that one unit in the last place of each coordinate leaves, force.
+
+    The forces of a disk's contacts are summed as independent errors, and the largest over disks is taken.
+    """
+    graph = ContactGraph(packing.contacts, packing.radius)
+    return rounding(packing.law.normal_stiffness(packing.geometry.overlap), graph, packing.coordinate_rounding)
+
+
+def equilibrate(
+    engine: Engine,
+    last: Equilibrium,
+    fx: float,
+    force_tolerance: float | None = None,
+    beside: Equilibrium | None = None,
+) -> Equilibrium:
+    """The equilibrium at fx that follows from the last one.
+
+    Parameters
+    ----------
+    engine : Engine
+        LAMMPS with this packing.
+    last : Equilibrium
+        Where to start; its fx may be lower or higher.
+    fx : float
+        Force along x on each disk of the upper layer.
+    force_tolerance : float, optional
+        Residual to stop at. By default the iteration ends at the floor.
+    beside : Equilibrium, optional
+        Another one near the last, at another fx: its displacement is a better guess than none. It does not change what
+        is found, except for the rounding.
+
+    Returns
+    -------
+    Equilibrium
+
+    Raises
+    ------
+    NoEquilibriumError
+        If halving the increment leads nowhere.
+    """
+    here, target, evaluations = last, fx, 0
+    guess = _response(engine, last, fx) if beside is None else _in_proportion(last, beside, fx)
+    while True:
+        engine.set_fx(target)
+        found, spent = _newton(engine, here.packing, force_tolerance, guess)
+        evaluations += spent
+        if found is None and guess is not None:
+            guess = None
+        elif found is None:
+            if fx == here.fx or abs(target - here.fx) < SMALLEST_SHARE * abs(fx - last.fx):
+                raise NoEquilibriumError(
+                    f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there"
+                    f"{'' if here.packing.law.frictional else SMOOTH}"
+                )
+            target = 0.5 * (here.fx + target)
+        elif target == fx:
+            return replace(found, evaluations=evaluations)
+        else:
+            here, target = found, fx
+
+
+def _response(engine: Engine, last: Equilibrium, fx: float) -> Guess | None:
+    """The linear response to the increment, which is Newton's first step; None where there is none."""
+    packing = last.packing
+    if fx == packing.fx:
+        return None
+    push = np.zeros(3 * len(packing))
+    push[: len(packing)][packing.top] = fx - packing.fx
+    trial = engine.kept(packing)
+    factors = factored(trial, trial.floor)
+    step = None if factors is None else factors.solve(push)
+    return None if step is None or too_long(step, packing) else Guess(step, factors, abs(fx - packing.fx))
+
+
+def _in_proportion(last: Equilibrium, beside: Equilibrium, fx: float) -> Guess:
+    """The displacement from one equilibrium to another, (dx.., dy.., R dtheta..), in proportion to the increment."""
+    a, b = last.packing, beside.packing
+    moved = nearest_image(b.position - a.position, a.box_length)
+    displacement = np.concatenate([moved[:, 0], moved[:, 1], b.scaled_angle - a.scaled_angle])
+    return Guess(displacement * ((fx - last.fx) / (beside.fx - last.fx)))
+
+
+def _newton(
+    engine: Engine, base: Packing, force_tolerance: float | None, guess: Guess | None
+) -> tuple[Equilibrium | None, int]:
+    """Newton's method from one base at the engine's fx; None where it does not converge."""
+    best, evaluations = iterated(engine.displaced, engine.kept(base), force_tolerance, guess)
+    if best is None:
+        return None, evaluations
+    return Equilibrium(engine.keep(best), best.residual, best.floor, evaluations), evaluations

@@ -1,0 +1,109 @@
+r"""Rattlers out of the way: disks that carry nothing, moved to the middle of their cages.
+
+A settled packing leaves a disk that nothing holds just about touching one of its neighbours. Where it lies is of no
+consequence to anything but Newton's method: as the packing is sheared the neighbour runs into it, and a contact opens
+as delta^(3/2) -> 0, to which Newton's method converges slowly, one such disk at a time. In a packing of 10,000 disks,
+with its hundreds of rattlers, ten of them are hit in an increment of 1e-4 of the load. Such a disk may as well lie
+where it touches nothing: its position is no property of the equilibrium.
+
+The middle of a cage is where the narrowest gap is widest. A gap :math:`g_j = |x - x_j| - R - R_j` is a convex function
+of the disk's position, so that its linearisation is a lower bound. The linear program
+
+.. math:: \max_{d, t} t \quad\text{with}\quad t \le g_j + n_j \cdot d
+
+over a move d of the disk therefore leaves the narrowest gap t no smaller than it finds it, and a few of them in turn
+reach the maximum, however narrow the cage.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ...analysis import Packing, nearest_image, touching
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+TRAVEL = 0.3
+"""How far a disk may move along x and along y, in radii: cages are a few tenths wide."""
+
+ROUNDS = 20
+"""Linear programs for a disk at the most; two or three do."""
+
+GAIN = 0.05
+"""Share by which a linear program has to widen the narrowest gap for another one to follow."""
+
+
+def clear_rattlers(packing: Packing, least: float) -> Packing:
+    """Move every disk whose contacts carry no more than a given force to the middle of its cage.
+
+    Parameters
+    ----------
+    packing : Packing
+        At rest, without friction: its contacts have no history that could be lost.
+    least : float
+        Normal force up to which a contact counts as carrying nothing.
+
+    Returns
+    -------
+    Packing
+        The same but for the positions of these disks, and their contacts, which are gone.
+    """
+    idle = packing.loaded(least).rattlers
+    position = packing.position.copy()
+    position[idle] = middle_of_cage(packing, idle)
+    return replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
+
+
+def middle_of_cage(packing: Packing, disks: Indices) -> Floats:
+    """Where the narrowest gap between a disk and its neighbours is widest, one disk after the other.
+
+    Parameters
+    ----------
+    packing : Packing
+        Whose other disks are the cages.
+    disks : ndarray of int, shape (D,)
+        The disks to move.
+
+    Returns
+    -------
+    ndarray, shape (D, 2)
+        Their places, length.
+    """
+    radius, box = packing.radius, packing.box_length
+    position = packing.position.copy()
+    wrapped = position.copy()
+    if box is not None:
+        wrapped[:, 0] %= box
+    tree = cKDTree(wrapped, boxsize=None if box is None else [box, 0.0])
+    # both may move, by sqrt(2) TRAVEL
+    reach = radius[disks] + (1 + 4 * TRAVEL) * radius.max()
+    for disk, near in zip(disks, tree.query_ball_point(wrapped[disks], reach), strict=True):
+        cage = np.setdiff1d(near, [disk])
+        branch = nearest_image(position[disk] - position[cage], box)
+        position[disk] += _to_the_middle(branch, radius[cage] + radius[disk], position[disk, 1], radius[disk])
+    return position[disks]
+
+
+def _to_the_middle(branch: Floats, contact: Floats, height: float, radius: float) -> Floats:
+    """The move of a disk with these branch vectors to its neighbours, of these lengths at contact, shape (2,)."""
+    from scipy.optimize import linprog
+
+    move, room = np.zeros(2), TRAVEL * radius
+    for _ in range(ROUNDS):
+        distance = np.hypot(branch[:, 0] + move[0], branch[:, 1] + move[1])
+        normal = np.vstack([(branch + move) / distance[:, None], [0.0, 1.0]])  # the floor is the last one
+        gap = np.append(distance - contact, height + move[1] - radius)
+        narrowest = min(float(gap.min()), radius)  # no gap needs to be wider
+        step = linprog(
+            [0.0, 0.0, -1.0],
+            np.column_stack([-normal, np.ones(len(gap))]),
+            gap,
+            bounds=[*zip(-room - move, room - move, strict=True), (narrowest, radius)],
+        ).x
+        move += step[:2]
+        if step[2] - narrowest <= GAIN * abs(narrowest):
+            break
+    return move

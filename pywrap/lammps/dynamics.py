@@ -1,0 +1,182 @@
+"""The dynamics of the disks in LAMMPS from rest, undamped but for what damping the packing has.
+
+`Engine.undamped` starts it: deck part undamped.in with a force on some disks (push.in), a signal (signal.in), and
+friction that falls with velocity (weaken.in).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ...analysis import Packing
+from ...analysis.files.signal_files import write_table
+from ...analysis.motion.signals import Signal
+from .decks import Decks
+from .shared_folder import shared_folder
+from .wire import Wire
+
+Floats = NDArray[np.float64]
+
+
+class Motion(NamedTuple):
+    """Positions and velocities in the course of an undamped run.
+
+    Attributes
+    ----------
+    position : ndarray, shape (N, 2)
+        Centres, length.
+    position_low : ndarray, shape (N, 2), or None
+        Their low parts, in compensated arithmetic.
+    velocity : ndarray, shape (N, 2)
+        Length / time.
+    spin : ndarray, shape (N,)
+        Angular velocity, 1 / time.
+    friction : float
+        Friction coefficient at that moment.
+    """
+
+    position: Floats
+    position_low: Floats | None
+    velocity: Floats
+    spin: Floats
+    friction: float
+
+
+@dataclass(frozen=True)
+class Weakening:
+    """Friction mu (B exp(-w (v - v0)/v_ss) + mu_ss) for velocities v = |mean v_x| of the upper layer above v0.
+
+    Attributes
+    ----------
+    B, w, mu_ss : float
+        Numbers of the law.
+    v0, v_ss : float
+        Threshold and scale, length / time.
+    """
+
+    B: float
+    w: float
+    mu_ss: float
+    v0: float
+    v_ss: float
+
+
+class Dynamics:
+    """A run under way.
+
+    Parameters
+    ----------
+    decks : Decks
+        LAMMPS.
+    wire : Wire
+        The state of its disks.
+    packing : Packing
+        From which the run starts. Rattlers are held still: nothing would stop them.
+    weakening : Weakening, optional
+        Friction that falls with the velocity of the upper layer; constant by default.
+    """
+
+    def __init__(self, decks: Decks, wire: Wire, packing: Packing, weakening: Weakening | None) -> None:
+        self._decks, self._wire, self._packing, self._weakening = decks, wire, packing, weakening
+
+    @contextmanager
+    def moving(self, time_step: float, drag_time: float | None) -> Iterator[None]:
+        """Velocity Verlet, and what damping there is (deck part undamped.in)."""
+        still = self._packing.rattlers
+        with ExitStack() as groups:
+            mobile = groups.enter_context(self._decks.all_but(still)) if len(still) else "all"
+            drag = {} if drag_time is None else {"tau": drag_time}
+            self._decks.include("undamped.in", dt=time_step, mobile=mobile, **drag)
+            yield
+            self._decks.command("unfix move")
+            self._decks.command("variable tau delete")
+            if self._packing.law.damped:
+                self._decks.command("pair_style mindlin/smooth ${kn} ${kt} ${mu} exponent ${exponent} ${compensated}")
+                self._decks.command("fix_modify floor damping no")
+
+    @contextmanager
+    def pushed(self, amplitude: float, omega: float, target: str) -> Iterator[None]:
+        """The force a cos(omega t) along x on each disk of a group (deck part push.in)."""
+        self._decks.include("push.in", amplitude=amplitude, omega=omega, target=target)
+        yield
+        self._decks.command("unfix push")
+
+    @contextmanager
+    def forced(self, signal: Signal, on: str, target: str, communicator: MPI.Comm) -> Iterator[None]:
+        """A signal (deck part signal.in), as a table that all ranks can read."""
+        with shared_folder(communicator) as folder:
+            table = folder / "signal.txt"
+            if communicator.rank == 0:
+                write_table(signal, table)
+            communicator.barrier()
+            self._decks.include("signal.in", signal=table, scale=1.0, stretch=1.0, on=on, target=target)
+        yield
+        self._decks.command("unfix force")
+
+    def begin(self) -> None:
+        """Compute the forces at the start, for `advance`."""
+        if self._weakening is not None:
+            self._decks.include("weaken.in", **asdict(self._weakening))
+        self._decks.command("thermo 0")
+        self._decks.command("run 0 post no")
+
+    @property
+    def steps(self) -> int:
+        """Time steps so far."""
+        return self._decks.steps
+
+    def advance(self, steps: int) -> Motion:
+        """Go on by so many steps."""
+        self._decks.command(f"run {steps} pre no post no")
+        law = self._packing.law
+        friction = law.mu if self._weakening is None else self._decks.number("friction")
+        position, low, velocity = self._wire.motion()
+        spin = velocity[:, 2] if law.frictional else np.zeros(len(velocity))
+        return Motion(position, low, velocity[:, :2], spin, float(friction))
+
+    def work(self, steps: int) -> tuple[Motion, float]:
+        """Go on by so many steps, and the work of all forces meanwhile by the trapezoidal rule (deck part work.in)."""
+        # windows of fix ave/time end at multiples of their length
+        self._decks.command(f"reset_timestep {(self.steps + steps - 1) // steps * steps}")
+        self._decks.include("work.in", work_steps=steps)
+        self._decks.command("run 0 post no")
+        first = self._decks.number("power_now")
+        motion = self.advance(steps)
+        last = self._decks.number("power_now")
+        lammps = self._decks.lammps
+        mean = float(lammps.extract_fix("power", 0, 0))
+        for command in ("unfix power", "uncompute power", "variable power delete"):
+            self._decks.command(command)
+        if self._packing.law.frictional:
+            self._decks.command("uncompute work_spin")
+        return motion, (mean * steps + 0.5 * (first - last)) * float(lammps.extract_global("dt"))
+
+    @contextmanager
+    def halted(self, velocity: float) -> Iterator[None]:
+        """End the run once the upper layer is faster than this, length / time (deck part halt.in)."""
+        self._decks.include("halt.in", halt_velocity=float(velocity))
+        self._decks.command("run 0 post no")
+        yield
+        self._decks.command("unfix halt")
+        self._decks.command("uncompute halt_velocity")
+
+    def state(self) -> dict[str, Floats]:
+        """All that the run has at this moment, by LAMMPS's names, for `resume`."""
+        return self._wire.checkpoint()
+
+    def resume(self, step: int, state: Mapping[str, Floats]) -> None:
+        """Go on from the state that a run had at a step, this one or that of another engine.
+
+        Forces are computed anew. A run that is continued elsewhere is the same to the bit as one that resumes its own
+        state at the same steps.
+        """
+        self._wire.write_checkpoint(state)
+        self._decks.command(f"reset_timestep {step}")
+        self._decks.command("run 0 post no")

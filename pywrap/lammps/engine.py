@@ -1,0 +1,302 @@
+"""A LAMMPS instance that holds one packing.
+
+The instance is set up by the deck part ``system.in``, the same file that ``lmp -in`` runs, and driven by its
+companions (:mod:`~faultgouge.pywrap.lammps.decks`). A `Packing` goes in and a `Packing` comes out, bit for bit
+(:mod:`~faultgouge.pywrap.lammps.wire`). All methods are collective over the ranks of the communicator, and every rank
+sees the whole packing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
+
+from ...analysis import Packing
+from ...analysis.motion.signals import Signal
+from .data_file import data_file
+from .decks import DECKS, Decks
+from .displacing import Displacing
+from .dynamics import Dynamics, Weakening
+from .instance import lammps_instance
+from .shared_folder import shared_folder
+from .trial import Trial
+from .wire import Wire
+
+Floats = NDArray[np.float64]
+
+LOOK = 1000
+"""Time steps between two looks at the forces."""
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """How a relaxation ended.
+
+    Attributes
+    ----------
+    residual : float
+        Largest force, with torque over radius, on a disk.
+    status : {"yes", "floor", "no"}
+        Whether the tolerance was reached, or the rounding of the coordinates, or neither.
+    steps : int
+        Time steps, that is force evaluations.
+    """
+
+    residual: float
+    status: str
+    steps: int
+
+
+class Engine:
+    """LAMMPS with one packing in it.
+
+    Parameters
+    ----------
+    packing : Packing
+        Positions, angles, slips, law and load to begin with. The arithmetic is compensated if it is.
+    communicator : mpi4py.MPI.Comm, optional
+        The ranks that share the packing; all of them by default.
+    log : Path, optional
+        File for LAMMPS's log; none by default.
+
+    Raises
+    ------
+    EngineError
+        If the plugin is not there, or LAMMPS refuses the packing.
+    """
+
+    def __init__(self, packing: Packing, communicator: MPI.Comm | None = None, log: Path | None = None) -> None:
+        self.communicator = communicator or MPI.COMM_WORLD
+        self._decks = Decks(lammps_instance(self.communicator, log))
+        self._displacing = Displacing(self._decks, packing)
+        self._wire = Wire(self._decks, self._displacing, packing)
+        self._kept: Trial | None = None
+        self._load(packing)
+
+    def __enter__(self) -> Engine:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._decks.lammps.close()
+
+    @property
+    def lammps(self) -> Any:
+        """The LAMMPS instance, for what it holds and for commands that the driver does not cover."""
+        self._displacing.end()
+        return self._decks.lammps
+
+    @property
+    def packing(self) -> Packing:
+        """The configuration as it stands, with its slips and its load."""
+        return self._wire.read().packing
+
+    @property
+    def net_force(self) -> Floats:
+        """Forces as LAMMPS has them, (Fx.., Fy.., T/R..), shape (3N,), load included."""
+        return self._wire.force(self._wire.state())
+
+    def set_fx(self, fx: float) -> None:
+        """Set the force along x on each disk of the upper layer."""
+        self._displacing.load(fx)
+
+    def restore(self, packing: Packing) -> None:
+        """Put the disks, slips and load of a packing back, to the bit."""
+        self._displacing.end()
+        self._wire.write(packing)
+        self.set_fx(packing.fx)
+
+    def settle(
+        self, force_tolerance: float, gather: float = 1.0, viscosity: float | None = None, steps: int = 10_000_000
+    ) -> None:
+        """Let a loose start settle under the load (deck parts gather.in, bed.in).
+
+        Parameters
+        ----------
+        force_tolerance : float
+            Largest force on a disk.
+        gather : float
+            Share of its height to which the start is brought down evenly at first; 1 for not at all.
+        viscosity : float, optional
+            Of the damping, mass / time; by default that of the decks.
+        steps : int
+            Time steps of each stage, at the most.
+        """
+        self._displacing.end()
+        self._decks.variables(force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
+        if viscosity is not None:
+            self._decks.variables(viscosity=viscosity)
+        if gather < 1:
+            self._decks.include("gather.in", gather=gather)
+        self._decks.include("bed.in")
+
+    def damp(self, packing: Packing, force_tolerance: float, steps: int, viscosity: float | None = None) -> None:
+        """Viscously damped dynamics from a packing at rest (deck part damp.in), for so many steps at the most.
+
+        The viscosity is that of the call before, or of `settle`, unless it is given.
+        """
+        self.restore(packing)
+        if viscosity is not None:
+            self._decks.variables(viscosity=viscosity)
+        self._decks.include("damp.in", force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
+
+    def relax(
+        self, force_tolerance: float, damping: float = 1.0, time_step: float | None = None, chunk: int = 1000
+    ) -> Relaxation:
+        """Overdamped relaxation (deck part relax.in).
+
+        Parameters
+        ----------
+        force_tolerance : float
+            Largest force, with torque over radius, on a disk.
+        damping : float
+            Mass / time.
+        time_step : float, optional
+            By default from the stiffness of a heavily loaded contact.
+        chunk : int
+            Steps between two looks at the forces.
+        """
+        self._displacing.end()
+        self._decks.command("variable relax_step delete")  # that of an earlier call
+        if time_step is not None:
+            self._decks.variables(relax_step=time_step)
+        start = self._decks.steps
+        self._decks.include("relax.in", force_tolerance=force_tolerance, damping=damping, chunk=chunk)
+        return Relaxation(
+            residual=self._decks.number("residual"),
+            status=str(self._decks.lammps.extract_variable("relaxed")),
+            steps=self._decks.steps - start,
+        )
+
+    def displace(self, base: Packing, displacement: Floats) -> Packing:
+        """Move the disks from a configuration along a straight path and advance the slips along it.
+
+        LAMMPS sees the displacement as the motion of one time step of length one. The configuration before
+        the call is forgotten, so that any number of trials may start from one base, each to the bit as if
+        there had been no other.
+
+        Parameters
+        ----------
+        base : Packing
+            Where the path begins.
+        displacement : ndarray, shape (3N,)
+            (dx.., dy.., R dtheta..), length.
+
+        Returns
+        -------
+        Packing
+            The configuration at the end of the path; `net_force` has its forces.
+        """
+        return self.displaced(base, displacement).packing
+
+    def displaced(self, base: Packing, displacement: Floats) -> Trial:
+        """The same as a `Trial`, for many displacements in turn."""
+        self._displacing.begin()
+        self._wire.write(base, (displacement.reshape(3, -1) / self._wire.levers).T)
+        self._displacing.run()
+        return self._wire.read()
+
+    def keep(self, trial: Trial) -> Packing:
+        """The packing of a trial, for displacements from there: LAMMPS is then given what it gave."""
+        self._kept = trial
+        self._wire.keep(trial)
+        return trial.packing
+
+    def kept(self, packing: Packing) -> Trial:
+        """The trial that `keep` was given with this packing; otherwise a trial of the packing without forces."""
+        if self._kept is None or self._kept.packing is not packing:
+            self._kept = Trial.of(packing)
+        return self._kept
+
+    def dump(self, stem: Path) -> None:
+        """Write the configuration as LAMMPS dumps in full precision (deck part write.in): STEM.disks and others."""
+        self._displacing.end()
+        self._decks.include("write.in", name=stem, fx=self._displacing.fx)
+
+    @contextmanager
+    def undamped(
+        self,
+        time_step: float,
+        amplitude: float = 0.0,
+        omega: float = 0.0,
+        target: ArrayLike | None = None,
+        weakening: Weakening | None = None,
+        signal: Signal | None = None,
+        on: Literal["layer", "floor"] = "layer",
+        drag_time: float | None = None,
+    ) -> Iterator[Dynamics]:
+        """Dynamics from rest, undamped but for what damping the packing has.
+
+        Parameters
+        ----------
+        time_step : float
+            Of velocity Verlet, time.
+        amplitude : float
+            Of the force a cos(omega t) along x on each disk of the target; 0 for none.
+        omega : float
+            Its angular frequency, 1 / time.
+        target : array_like of int, optional
+            The disks that feel it; the upper layer by default.
+        weakening : Weakening, optional
+            Friction that falls with the velocity of the upper layer; constant by default.
+        signal : Signal, optional
+            A further force along x (deck part signal.in); none by default.
+        on : {"layer", "floor"}
+            What the signal is: the force on each disk of the target, or the acceleration of the floor.
+        drag_time : float, optional
+            tau of the drag -(m/tau) v and -(I/tau) omega on every disk, time; that of the packing by default.
+
+        Yields
+        ------
+        Dynamics
+            To go on with. Rattlers are held still: nothing would stop them.
+        """
+        packing = self.packing
+        self._displacing.end()
+        dynamics = Dynamics(self._decks, self._wire, packing, weakening)
+        with dynamics.moving(time_step, packing.drag_time if drag_time is None else drag_time), ExitStack() as forces:
+            pushed = "top" if target is None else forces.enter_context(self._decks.group("pushed", target))
+            if amplitude != 0:
+                forces.enter_context(dynamics.pushed(amplitude, omega, pushed))
+            if signal is not None:
+                forces.enter_context(dynamics.forced(signal, on, pushed, self.communicator))
+            dynamics.begin()
+            yield dynamics
+
+    def _load(self, packing: Packing) -> None:
+        law = packing.law
+        with shared_folder(self.communicator) as folder:
+            data = folder / "packing.data"
+            if self.communicator.rank == 0:
+                data.write_text(data_file(packing))
+            self.communicator.barrier()
+            self._decks.variables(
+                decks=DECKS,
+                data=data,
+                sides="f" if packing.box_length is None else "p",
+                kn=law.kn,
+                kt=law.kt,
+                mu=law.mu,
+                exponent=law.exponent,
+                fx=packing.fx,
+                fy=packing.fy,
+                inertia=packing.inertia_factor,
+                precision="compensated" if packing.compensated else "double",
+            )
+            if law.damped:
+                self._decks.variables(cn=law.cn, ct=law.ct)
+            self._decks.include("system.in")
+        self._wire.write_masses()
+        if law.frictional or packing.compensated:
+            self._displacing.begin()
+            self._decks.command("run 0 post no")  # makes the fixes slips and low
+            self.restore(packing)

@@ -1,0 +1,53 @@
+"""A LAMMPS instance with the plugin in it, of whichever LAMMPS is installed."""
+
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from ...analysis import FaultgougeError
+from ...plugin import directory
+
+
+class EngineError(FaultgougeError):
+    """LAMMPS could not do what was asked: one sentence with its reason."""
+
+
+def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:
+    """Start LAMMPS on the ranks of a communicator.
+
+    Parameters
+    ----------
+    communicator : mpi4py.MPI.Comm
+        The ranks.
+    log : Path, optional
+        File for LAMMPS's log; none by default.
+
+    Raises
+    ------
+    EngineError
+        If LAMMPS does not see these ranks, or has not loaded the plugin.
+    """
+    from lammps import lammps
+
+    arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none"]
+    instance = lammps(cmdargs=arguments, comm=communicator)
+    if instance.extract_setting("world_size") != communicator.size:
+        raise EngineError(
+            f"LAMMPS runs on {instance.extract_setting('world_size')} ranks and this program on {communicator.size}: "
+            "their MPI libraries differ, so use one rank, or a LAMMPS built with the MPI of mpi4py"
+        )
+    plugin = Path(directory()) / "mindlinsmoothplugin.so"
+    if not instance.has_style("pair", "mindlin/smooth") and plugin.is_file():
+        instance.command(f'plugin load "{plugin}"')  # older wheels and LAMMPSes of one's own do not look for plugins
+    if not instance.has_style("pair", "mindlin/smooth"):
+        trouble = (
+            f"does not take the plugin {plugin}, which was built for another release, MPI or size of atom IDs"
+            if plugin.is_file()
+            else f"has no plugin, since {plugin} is not there"
+        )
+        raise EngineError(
+            f"LAMMPS {instance.version()} {trouble}: build the plugin for this LAMMPS (pip install "
+            "--no-build-isolation faultgouge, or cmake), or name the folder of one that was by FAULTGOUGE_PLUGIN"
+        )
+    return instance

@@ -1,0 +1,144 @@
+"""The onset F_x^c of a scene, for each of its friction coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
+from ...analysis.digits import with_uncertainty
+from ...analysis.onset import full_operator, seeks_all
+from ...analysis.onset.search import windows_rows
+from ...analysis.spectrum.spectrum import active_coordinates
+from ...analysis.tabled import Tabled
+from ..equilibria.quasistatic import Equilibrium
+from ..lammps.engine import Engine
+from ..runs.path import EquilibriumPath, loads
+from ..scenes.refusals import SceneError, needed
+from ..scenes.scene import Scene
+from ..settling.bed import settle
+from ..settling.settling import Watch
+from .path_error import with_path_error
+from .sharing import searching
+
+
+@dataclass(frozen=True, eq=False)
+class OnsetRun(Tabled):
+    """A ramp and what it shows.
+
+    Attributes
+    ----------
+    mu : float
+        Friction coefficient.
+    equilibria : tuple of Equilibrium
+        Those of the ramp's increments, by increasing F_x.
+    onset : Onset
+        Windows of complex eigenvalues, their errors those of rounding and of the path together.
+    flows_beyond : float or None
+        The last F_x that had an equilibrium, where the packing was found to flow before the ramp's `until`.
+    between : dict
+        Further equilibria that were asked for, packing by F_x.
+    """
+
+    mu: float
+    equilibria: tuple[Equilibrium, ...]
+    onset: Onset
+    flows_beyond: float | None
+    between: dict[float, Packing]
+
+    def __repr__(self) -> str:
+        found = with_uncertainty(self.onset.fx_c, self.onset.error)
+        return (
+            f"<OnsetRun: mu = {self.mu:g}, F_x^c = {found}, {len(self.onset.windows)} windows, "
+            f"{len(self.equilibria)} equilibria up to F_x = {self.equilibria[-1].fx:g}>"
+        )
+
+    def _rows(self) -> dict[str, str]:
+        return windows_rows(self.onset.windows)
+
+
+def onset_run(
+    scene: Scene,
+    mu: float,
+    reached: Callable[[Equilibrium], None] | None = None,
+    near_onset: NDArray[np.float64] | None = None,
+    modes: tuple[int, int] | None = None,
+    watch: Watch = lambda says: None,
+    folder: Path | None = None,
+) -> OnsetRun:
+    """Ramp a scene for one friction coefficient and find the onset.
+
+    The error of each onset is the whole one: that of rounding, and that of the path's increments
+    (:mod:`~faultgouge.pywrap.onset.path_error`). The ramp goes to its end, or to where the packing flows. Where the
+    first onset alone is sought, and nobody else wants the equilibria, it ends there.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a section [ramp].
+    mu : float
+        Friction coefficient.
+    reached : callable, optional
+        Called with each equilibrium of the ramp.
+    near_onset : ndarray, optional
+        Distances from F_x^c at which equilibria are wanted besides, force.
+    modes : tuple of (int, int), optional
+        Search these modes alone, see :func:`~faultgouge.analysis.find_onset`.
+    watch : callable, optional
+        Told in words what is under way in a large packing.
+    folder : Path, optional
+        Where the search of a large packing leaves what it finds, and goes on from, see
+        :func:`~faultgouge.analysis.find_onset`.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no section [ramp], or the packing has none of the modes.
+    OnsetError
+        If no pair becomes complex up to the ramp's end.
+    NoEquilibriumError
+        If the packing flows from the first increment on, or before an onset.
+    """
+    wanted = loads(needed(scene.ramp, "ramp"))
+    start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"))
+    _check_modes(start.packing, modes)
+    whole = reached is not None or seeks_all(start.packing, modes)
+    reached = reached or (lambda _: None)
+    reached(start)
+    with Engine(start.packing) as engine:
+        path = EquilibriumPath(engine, start, scene)
+        forces = wanted
+        if whole:
+            watch(f"ramp up to F_x = {wanted[-1]:g}")
+            for equilibrium in path.climb(wanted[1:]):
+                reached(equilibrium)
+            forces = np.array([each.fx for each in path.kept])
+        flows = len(forces) < len(wanted)
+        try:
+            onset = find_onset(path, forces, modes=modes, watch=watch, ranks=searching(), folder=folder)
+        except (OnsetError, NoEquilibriumError) as error:
+            if not flows and isinstance(error, OnsetError):
+                raise
+            raise NoEquilibriumError(
+                f"no pair of eigenvalues becomes complex up to F_x = {path.kept[-1].fx:.10g}, and no equilibrium was "
+                "found beyond: the packing flows before an onset"
+            ) from error
+        last = path.kept[-1].fx
+        extra = [] if near_onset is None else [fx for fx in onset.fx_c + near_onset if 0 <= fx <= last]
+        between = {float(fx): path(float(fx)) for fx in extra}
+        watch("the path once more, with other increments")
+        onset = with_path_error(onset, engine, path, scene)
+    return OnsetRun(mu, tuple(path.kept), onset, last if flows else None, between)
+
+
+def _check_modes(packing: Packing, modes: tuple[int, int] | None) -> None:
+    """Refuse modes that a packing does not have."""
+    if modes is None:
+        return
+    count = len(active_coordinates(full_operator(packing)))
+    if modes[0] >= count:
+        raise SceneError(f"modes {modes[0]}:{modes[1]} are no part of the {count} modes of the packing, 0:{count}")

@@ -1,0 +1,267 @@
+"""run.h5 of a scene: begun, or opened where a run was cut off."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from mpi4py import MPI
+
+from ...analysis import Packing, RunFile
+from ...analysis.files.wholefile import check_folder
+from ..equilibria.quasistatic import Equilibrium
+from ..lammps.dynamics import Motion, Weakening
+from ..scenes.refusals import SceneError
+from ..scenes.scene import SECTIONS, Scene
+from .undamped import Checkpoint, Sample, perturb, sampling
+
+T = TypeVar("T")
+Task = Literal["ramp", "perturb"]
+
+
+class Record:
+    """run.h5 of a scene: opened where it was cut off, or begun.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    scene : Scene
+        The scene; a file of another scene is refused.
+    communicator : mpi4py.MPI.Comm, optional
+        Rank 0 writes; all by default.
+    task : {"ramp", "perturb"}
+        What the file is for: a settled packing and its ramp, or an undamped run. A file for the other is refused.
+    saved : callable, optional
+        Told in words what the file holds, whenever it has been saved.
+
+    Attributes
+    ----------
+    last : Equilibrium or None
+        The last one in the file.
+
+    Raises
+    ------
+    SceneError
+        If the file holds another scene, or is for another task.
+    OutputError
+        If the file cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        scene: Scene,
+        communicator: MPI.Comm | None = None,
+        task: Task = "ramp",
+        saved: Callable[[str], None] = lambda words: None,
+    ) -> None:
+        self.path, self.scene, self.task = path, scene, task
+        self.communicator = communicator or MPI.COMM_WORLD
+        self._file: RunFile | None = None
+        self._said = saved
+        self.last: Equilibrium | None = from_root(self.communicator, self._resume)
+
+    def _resume(self) -> Equilibrium | None:
+        if not self.path.exists():
+            check_folder(self.path)
+            return None
+        file = RunFile(self.path, "a")
+        stored = json.loads(file.attributes.get("scene", "{}"))
+        difference = _difference(stored, self.scene.resolved())
+        if difference:
+            raise SceneError(
+                f"{self.path} holds a run of another scene ({difference}): give another name with -o, or delete it"
+            )
+        task = file.attributes.get("task", "ramp")
+        if task != self.task:
+            raise SceneError(f"{self.path} is a file of the command {task}: give another name with -o, or delete it")
+        if len(file) == 0:
+            return None
+        self._file = file
+        self._say_saved()
+        row = {name: file.observable(name)[-1] for name in ("residual", "floor", "evaluations")}
+        return Equilibrium(file.packing(), float(row["residual"]), float(row["floor"]), int(row["evaluations"]))
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run has come to its end; the same on all ranks."""
+        return bool(from_root(self.communicator, lambda: self._file is not None and self._file.complete))
+
+    def finish(self) -> None:
+        """The run has come to its end."""
+        if self._file is not None:
+            with self._file.change():
+                self._file.put_checkpoint()
+                self._file.complete = True
+            self._file.save()
+            self._say_saved()
+
+    def append(self, equilibrium: Equilibrium) -> None:
+        """Write one equilibrium."""
+        if self.communicator.rank == 0:
+            file = self._opened(equilibrium.packing)
+            with file.change():
+                file.complete = False
+                file.append(
+                    equilibrium.packing,
+                    floor=equilibrium.floor,
+                    evaluations=equilibrium.evaluations,
+                )
+            self._say_saved()
+        self.last = equilibrium
+
+    def undamped(
+        self, scene: Scene, start: Equilibrium, name: str = "undamped", weakening: Weakening | None = None
+    ) -> Iterator[Sample]:
+        """An undamped run whose lines go into a time series; it goes on where it was cut off.
+
+        Parameters
+        ----------
+        scene : Scene
+            With a section [perturb].
+        start : Equilibrium
+            Where the run begins.
+        name : str
+            Of the series.
+        weakening : Weakening, optional
+            As of `perturb`.
+
+        Yields
+        ------
+        Sample
+            Those that were in the file first.
+        """
+        assert scene.perturb is not None
+        _, steps = sampling(scene.perturb, start.packing)
+        known, checkpoint = from_root(self.communicator, lambda: self._known(name))
+        yield from known
+        if len(known) == len(steps):
+            return
+        trajectory = scene.output is not None and scene.output.trajectory and name == "undamped"
+        samples: list[Sample] = []
+        motions: list[tuple[float, Motion]] = []
+
+        def watch(time: float, motion: Motion) -> None:
+            motions.append((time, motion))
+
+        run = perturb(
+            scene,
+            start,
+            communicator=self.communicator,
+            weakening=weakening,
+            watch=watch if trajectory else None,
+            keep=lambda reached: self._keep(name, samples, motions, reached),
+            resume=checkpoint,
+        )
+        for sample in run:
+            samples.append(sample)
+            yield sample
+        self._keep(name, samples, motions, None)
+
+    def append_motion(self, time: float, motion: Motion) -> None:
+        """Write positions of an undamped run, series trajectory."""
+        self._append_motions([(time, motion)])
+
+    def _known(self, name: str) -> tuple[list[Sample], Checkpoint | None]:
+        """Lines of a series so far, and the state after them."""
+        if self._file is None or name not in self._file.names_of_series:
+            return [], None
+        columns = self._file.series(name)
+        rows = zip(*(columns[key].tolist() for key in columns), strict=True)
+        samples = [Sample(**dict(zip(columns, row, strict=True))) for row in rows]
+        state = self._file.checkpoint
+        return samples, Checkpoint(int(state.pop("step")), state) if state else None
+
+    def _keep(
+        self, name: str, samples: list[Sample], motions: list[tuple[float, Motion]], reached: Checkpoint | None
+    ) -> None:
+        """Write what has come since the last checkpoint, together with this one."""
+        if self._file is not None and (samples or reached):
+            with self._file.change():
+                self._file.complete = False
+                if samples:
+                    columns = {key: [getattr(sample, key) for sample in samples] for key in vars(samples[0])}
+                    self._file.append_series(name, **columns)
+                self._append_motions(motions)
+                state: dict[str, Any] = {} if reached is None else {"step": reached.step, **reached.state}
+                self._file.put_checkpoint(**state)
+            self._say_saved(f", and the series {name}" + (f" up to t = {samples[-1].time:g}" if samples else ""))
+        samples.clear()
+        motions.clear()
+
+    def _append_motions(self, motions: list[tuple[float, Motion]]) -> None:
+        if self._file is None or not motions:
+            return
+        low = [motion.position_low for _, motion in motions if motion.position_low is not None]
+        times, positions = [time for time, _ in motions], [motion.position for _, motion in motions]
+        self._file.append_trajectory(times, positions, low or None)
+
+    def _say_saved(self, more: str = "") -> None:
+        """Say what the stored file holds, if it holds all."""
+        file = self._file
+        if file is None or not file.saved or len(file) == 0:
+            return
+        goes_on = "is complete" if file.complete else "the same command goes on from there"
+        count = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}{more}"
+        self._said(f"{self.path} holds {count}; {goes_on}")
+
+    def _opened(self, packing: Packing) -> RunFile:
+        if self._file is None:
+            self._file = RunFile.create(self.path, packing, self._attributes())
+        return self._file
+
+    def _attributes(self) -> dict[str, str | int]:
+        return {
+            "task": self.task,
+            "scene": json.dumps(self.scene.resolved()),
+            "seed": getattr(self.scene.packing, "seed", -1),
+            "ranks": self.communicator.size,
+            **{f"version_{name}": version(name) for name in ("faultgouge", "lammps", "numpy", "scipy", "h5py")},
+        }
+
+    def __enter__(self) -> Record:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            self._file.save()
+            self._say_saved()
+            self._file.close()
+
+
+def from_root(communicator: MPI.Comm, work: Callable[[], T]) -> T:
+    """What rank 0 finds, on all ranks; an error that it meets is met by all."""
+    result: tuple[T | None, Exception | None] = (None, None)
+    if communicator.rank == 0:
+        try:
+            result = work(), None
+        except Exception as error:  # of whatever kind: the other ranks wait for it
+            result = None, error
+    value, failure = communicator.bcast(result)
+    if failure is not None:
+        raise failure
+    return value
+
+
+def _difference(stored: dict[str, Any], wanted: dict[str, Any]) -> str:
+    """The first key in which two resolved scenes differ, ramp.until left aside: a ramp may be prolonged."""
+    for section in sorted(stored.keys() | wanted.keys()):
+        here, there = stored.get(section), wanted.get(section)
+        if isinstance(here, dict) and isinstance(there, dict):
+            for key in sorted(here.keys() | there.keys()):
+                old, new = (each.get(key, _default(section, key)) for each in (here, there))
+                if (section, key) != ("ramp", "until") and old != new:
+                    return f"{section}.{key} is {old} there and {new} here"
+        elif here != there:
+            return f"{section} is {'there' if here is not None else 'missing there'}"
+    return ""
+
+
+def _default(section: str, key: str) -> Any:
+    """What a key is that a file does not have, because it was written before there was such a key."""
+    fields = (model.model_fields[key] for model in SECTIONS.get(section, ()) if key in model.model_fields)
+    return next((field.default for field in fields if not field.is_required()), None)

@@ -1,0 +1,238 @@
+"""Undamped runs from an equilibrium: their time step, their perturbation and their time series.
+
+A run yields each sample as soon as it has it. It resumes its own state after every part, so that one that is continued
+from a checkpoint is the same to the bit. All functions are collective over the ranks of the communicator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ...analysis import Packing, largest_damping_rate, largest_frequency, mean_square_displacement, stable_timestep
+from ..equilibria.quasistatic import Equilibrium
+from ..lammps.dynamics import Dynamics, Motion, Weakening
+from ..lammps.engine import Engine
+from ..scenes.refusals import SceneError, needed
+from ..scenes.scene import Scene
+from ..scenes.sections import Friction, Perturb
+
+ACCURATE_SHARE = 0.05
+"""Time step of undamped runs in units of the stability limit 2/omega_max: the fastest mode is then resolved
+by 60 steps a period, and the dispersion of all others is smaller."""
+
+
+SHORTEST_PART, MOST_PARTS = 10_000, 100
+"""Steps after which an undamped run resumes its own state, and may be continued from there: at least so many, and at
+most so many parts a run. The setup of a part takes about as long as a hundred steps."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One line of the time series of an undamped run.
+
+    Attributes
+    ----------
+    time : float
+        Since the start of the run.
+    msd : float
+        D, mean square displacement from the equilibrium, length^2.
+    kinetic_energy : float
+        Of translation and rotation.
+    layer_velocity : float
+        Mean velocity of the upper layer along x.
+    friction : float
+        Friction coefficient at that moment.
+    """
+
+    time: float
+    msd: float
+    kinetic_energy: float
+    layer_velocity: float
+    friction: float
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """An undamped run that is under way.
+
+    Attributes
+    ----------
+    step : int
+        Time steps so far.
+    state : dict of ndarray
+        The disks, see :meth:`~faultgouge.pywrap.Engine.state`.
+    """
+
+    step: int
+    state: dict[str, NDArray[np.float64]]
+
+
+def time_step(packing: Packing, wanted: float | None = None) -> float:
+    """Time step of an undamped run from an equilibrium.
+
+    Parameters
+    ----------
+    packing : Packing
+        The equilibrium.
+    wanted : float, optional
+        A step of the user's; by default `ACCURATE_SHARE` of the limit. That is 2/omega_max without dashpots; where
+        these damp at a rate of up to gamma, it is the largest dt with gamma dt + (omega_max dt/2)^2 <= 1.
+
+    Raises
+    ------
+    SceneError
+        If the step wanted is not below the limit: velocity Verlet would blow up.
+    """
+    limit = stable_timestep(largest_frequency(packing))
+    damped = largest_damping_rate(packing) * limit
+    limit *= 0.5 * (np.sqrt(damped**2 + 4) - damped)
+    if wanted is None:
+        return ACCURATE_SHARE * limit
+    if wanted >= limit:
+        raise SceneError(
+            f"perturb.time_step = {wanted:g} is over the limit 2/omega_max = {limit:.4g} of this packing, above which "
+            f"every run blows up: lower it, to {ACCURATE_SHARE * limit:.2g} for an accurate run"
+        )
+    return wanted
+
+
+def perturb(
+    scene: Scene,
+    start: Equilibrium,
+    samples: int = 2000,
+    early: int = 200,
+    communicator: MPI.Comm | None = None,
+    weakening: Weakening | None = None,
+    watch: Callable[[float, Motion], None] | None = None,
+    keep: Callable[[Checkpoint], None] | None = None,
+    resume: Checkpoint | None = None,
+) -> Iterator[Sample]:
+    """An undamped run from rest at an equilibrium, with the scene's perturbation if it has one.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a section [perturb].
+    start : Equilibrium
+        The equilibrium at the scene's perturb.fx.
+    samples : int
+        Lines of the time series, equally spaced; fewer if there are fewer steps.
+    early : int
+        Further lines, at times that grow geometrically from the first step on; 0 for none.
+    communicator : mpi4py.MPI.Comm, optional
+        The ranks that share the packing; all by default.
+    weakening : Weakening, optional
+        Friction that falls with the layer's velocity, see `weakening_of`; constant by default.
+    watch : callable, optional
+        Called with the time, and the positions and velocities, of each sample.
+    keep : callable, optional
+        Called with a checkpoint after every part of the run, see `SHORTEST_PART`, once the samples before it have been
+        consumed.
+    resume : Checkpoint, optional
+        Go on from there, and yield the samples that follow: the same to the bit.
+
+    Returns
+    -------
+    iterator of Sample
+        The run proceeds as it is consumed.
+
+    Raises
+    ------
+    SceneError
+        At once, if the scene has no section [perturb], its time step is over the limit, or its time shorter than one
+        step.
+    """
+    settings = needed(scene.perturb, "perturb")
+    dt, steps = sampling(settings, start.packing, samples, early)
+    return _undamped(settings, start.packing, dt, steps, communicator, weakening, watch, keep, resume)
+
+
+def sampling(
+    settings: Perturb, packing: Packing, samples: int = 2000, early: int = 200
+) -> tuple[float, NDArray[np.int64]]:
+    """Time step of an undamped run, and the steps at which it is sampled; parameters and errors as of `perturb`."""
+    dt = time_step(packing, settings.time_step)
+    settings.check_samples(dt)
+    if settings.time < dt:
+        raise SceneError(f"perturb.time = {settings.time:g} is shorter than one step, {dt:.4g}: run longer")
+    every = max(1, int(settings.time / dt / samples))
+    steps = every * np.arange(1, int(settings.time / dt / every) + 1)
+    if early:
+        steps = np.union1d(steps, np.geomspace(1, steps[-1], early).astype(np.int64))
+    return dt, steps
+
+
+def unforced(scene: Scene) -> Scene:
+    """The scene without its perturbation: the run that calibrates v_0."""
+    settings = needed(scene.perturb, "perturb")
+    return scene.model_copy(update={"perturb": settings.model_copy(update={"amplitude": 0.0, "signal": None})})
+
+
+def weakening_of(friction: Friction, v0: float) -> Weakening:
+    """The scene's mu(v) for a threshold v_0, length / time."""
+    return Weakening(B=friction.B, w=friction.w, mu_ss=friction.mu_ss, v0=v0, v_ss=friction.velocity_scale(v0))
+
+
+def _undamped(
+    settings: Perturb,
+    packing: Packing,
+    dt: float,
+    steps: NDArray[np.int64],
+    communicator: MPI.Comm | None,
+    weakening: Weakening | None,
+    watch: Callable[[float, Motion], None] | None,
+    keep: Callable[[Checkpoint], None] | None,
+    resume: Checkpoint | None,
+) -> Iterator[Sample]:
+    everyone = range(len(packing)) if settings.target == "all" else settings.target
+    target = None if everyone == "top" else [int(disk) for disk in everyone]
+    forces = *settings.cosine, target, weakening, settings.forcing(), settings.on or "layer"
+    with Engine(packing, communicator) as engine, engine.undamped(dt, *forces) as dynamics:
+        last = 0
+        if resume is not None:
+            last = resume.step
+            dynamics.resume(last, resume.state)
+        ends = _ends_of_parts(int(settings.time / dt))
+        for step in steps[steps > last].tolist():
+            for end in ends[(ends > last) & (ends < step)].tolist():
+                dynamics.advance(end - last)
+                last = end
+                _end_part(dynamics, end, keep)
+            motion, last = dynamics.advance(step - last), step
+            if watch is not None:
+                watch(step * dt, motion)
+            yield _sampled(step * dt, motion, packing)
+            if step in ends and step < steps[-1]:
+                _end_part(dynamics, step, keep)
+
+
+def _sampled(time: float, motion: Motion, packing: Packing) -> Sample:
+    displaced = mean_square_displacement(
+        motion.position, packing.position, packing.box_length, motion.position_low, packing.position_low
+    )
+    inertia = packing.inertia_factor * packing.mass * packing.radius**2
+    return Sample(
+        time=time,
+        msd=float(displaced),
+        kinetic_energy=float(0.5 * (packing.mass @ np.sum(motion.velocity**2, axis=1) + inertia @ motion.spin**2)),
+        layer_velocity=float(motion.velocity[packing.top, 0].mean()),
+        friction=motion.friction,
+    )
+
+
+def _ends_of_parts(total: int) -> NDArray[np.int64]:
+    """The steps at which the parts of a run end; they depend on its length alone, and not on when it is sampled."""
+    part = max(SHORTEST_PART, -(-total // MOST_PARTS))
+    return np.arange(part, total, part)
+
+
+def _end_part(dynamics: Dynamics, step: int, keep: Callable[[Checkpoint], None] | None) -> None:
+    state = dynamics.state()
+    dynamics.resume(step, state)  # as a run does that is continued from here
+    if keep is not None:
+        keep(Checkpoint(step, state))

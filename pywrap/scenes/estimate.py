@@ -1,0 +1,303 @@
+r"""What a scene asks for, before any of it is done: steps, increments, memory, size of files, time.
+
+Two questions. *Can it be at all?* `impossible` finds in the numbers of a scene what no packing bears: overlaps beyond
+the contact law, forces that drown in the rounding of the coordinates, a settling that never ends. *How long does it
+take?* `estimated` counts the work of a command, and `foreseen` refuses what nobody can want. Times are those of one
+core of 2020, within a factor of three or so, and say whether to wait or to come back tomorrow.
+
+A contact that carries the force f has :math:`\delta = (f/k_n)^{1/p}` and the stiffness
+:math:`k = p\, k_n \delta^{p-1}`, with p = 3/2 for Hertz. A time step is a share of :math:`(m/k)^{1/2}`, a disk falls
+under :math:`F_y` through the medium at the speed :math:`F_y^{1/2}`: their ratio, :math:`(k_n/F_y)^{1/3}` for Hertz,
+is what the steps of a settling grow with.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+from .keys import Keys
+from .packing_section import GeneratedPacking
+from .refusals import SceneError
+
+Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "reproduce"]
+
+EPSILON = 2.3e-16
+
+FORCE_CHAINS = 10.0
+"""The largest contact force, in units of F_y, for which LAMMPS's time steps are made."""
+
+LONGEST = 3.2e7
+"""A year, in seconds."""
+LARGEST_FILE = 1e13
+"""10 TB."""
+
+# Work, measured on packings of 30 to 10,000 disks.
+SETTLING = 100.0
+"""Steps to rest, in units of the time step that F_y's own time has: 26,000 at k_n = 2e5, F_y = 3, as many for 30 disks
+as for 100, and growing with (k_n/F_y)^(1/3) from 26,000 to 665,000."""
+SETTLING_WITH_FRICTION = 25.0
+"""The same with packing.settle_friction, in units of the overdamped time step: between 11 and 33 for 30 disks, Hertz
+with k_n = 2e5 and 2e6 and harmonic with 2e4."""
+OVERDAMPED = 16_000
+"""Steps of the default length in one increment of overdamped dynamics."""
+SECONDS_A_STEP = 2e-6, 1.7e-7
+"""Of LAMMPS: of a step, and of a step for each disk."""
+SECONDS_AN_INCREMENT = 1e-3, 1e-4
+"""Of Newton's method: of an increment, and for each disk."""
+SECONDS_A_SEARCH = 2.5e-7, 3e-3
+"""Of the search for complex pairs in an increment: for each disk cubed up to `DENSE` disks, for each disk beyond."""
+DENSE = 300
+"""Disks up to which the search takes all eigenvalues."""
+GROWTH = 300_000
+"""Steps of the undamped run in which reproduce measures a growth rate; a tenth or three times as many."""
+TRIGGERING_RUNS = 4
+"""Runs of [perturb] in the triggering part of reproduce: with and without a perturbation, an eruption, its control."""
+BYTES_KEPT = 600
+"""Memory of one equilibrium that is kept, for each disk: positions, contacts, and what is computed of them once."""
+BYTES_SEARCHED = 50_000
+"""Of the search in slices of the spectrum, for each disk, in two threads: 5.0 to 5.4 GB for 100,000 disks."""
+BYTES_OF_BASES = 150, 3.6e9
+"""Of eigenvectors that are kept, for each disk squared; and the most of them, beyond which they are not kept."""
+BYTES_WRITTEN = 150
+"""Of one equilibrium in run.h5, for each disk."""
+BYTES_AT_ALL = 4000
+"""Of LAMMPS, the matrices and their factors, for each disk."""
+
+# Refusals, each where nothing else could be meant.
+STEPS_TO_REST = 10_000_000
+"""Steps after which the decks give up on a packing of up to 300 disks: 10,000 looks of 1000 steps."""
+SINKING = 400_000
+"""Steps after which they give up on a stage of a larger one."""
+LEAST_SHARE = 0.4
+"""Of `SETTLING`, what a larger packing takes at the least in its first stage; and of `SETTLING_WITH_FRICTION`."""
+LOST = 5e-5
+"""Rounding of a force, in units of F_y, beyond which a bed never comes to the 1e-3 F_y that the first stage asks."""
+WORTH_SAYING = 10.0
+"""Seconds from which on somebody wonders whether anything is happening."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The work of a command.
+
+    Attributes
+    ----------
+    disks : int
+        Number of disks.
+    steps : float
+        Time steps of LAMMPS.
+    increments : float
+        Equilibria after the settled one.
+    memory, written : float
+        Bytes in memory at the most, and bytes of the files.
+    seconds : float
+        On one core.
+    """
+
+    disks: int
+    steps: float
+    increments: float
+    memory: float
+    written: float
+    seconds: float
+
+    def __str__(self) -> str:
+        parts = [f"{self.disks} disks"]
+        if self.steps >= 1:
+            parts.append(f"{_count(self.steps)} time steps")
+        if self.increments >= 1:
+            parts.append(f"{_count(self.increments)} increments of F_x")
+        if self.memory > 1e9:
+            parts.append(f"{_bytes(self.memory)} of memory")
+        if self.written > 1e9:
+            parts.append(f"{_bytes(self.written)} of files")
+        return f"about {_duration(self.seconds)}: {', '.join(parts)}"
+
+
+def estimated(scene: Keys, task: Task) -> Estimate:
+    """What a command does for a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is wanted.
+    task : {"settle", "ramp", "perturb", "onset", "reproduce"}
+        Each includes the settling; perturb the ramp up to its equilibrium, onset that up to its end, reproduce the
+        onset, a run whose growth is measured and, where the scene has [friction], the runs of [perturb].
+    """
+    disks = _disks(scene)
+    steps = _settling_steps(scene) if isinstance(scene.packing, GeneratedPacking) else 0.0
+    increments, kept = 0.0, 1.0
+    ramp, perturb = scene.ramp, scene.perturb
+    seconds = 0.0
+    if task in ("ramp", "onset", "reproduce") and ramp is not None:
+        # the layer slides on whatever bears it once F_x exceeds mu F_y
+        increments = min(ramp.until, max(scene.law.mus) * scene.load.fy + ramp.step) / ramp.step
+    if task == "perturb" and perturb is not None:
+        increments = perturb.fx / (ramp.step if ramp is not None else 1e-3)
+    if ramp is not None and ramp.method == "overdamped":
+        steps += increments * _overdamped_steps(scene)
+    else:
+        seconds += increments * (SECONDS_AN_INCREMENT[0] + SECONDS_AN_INCREMENT[1] * disks)
+    if task == "perturb" and perturb is not None:
+        runs = 2 if scene.friction is not None and scene.friction.v0 == "calibrated" else 1
+        steps += runs * perturb.time / (perturb.time_step or _undamped_step(scene))
+    if task == "reproduce":
+        steps += GROWTH
+        if perturb is not None and scene.friction is not None:
+            steps += TRIGGERING_RUNS * perturb.time / (perturb.time_step or _undamped_step(scene))
+    if task in ("onset", "reproduce"):
+        search = SECONDS_A_SEARCH[0] * disks**3 if disks <= DENSE else SECONDS_A_SEARCH[1] * disks
+        seconds = len(scene.law.mus) * (seconds + increments * search)
+        kept = increments + 1
+    seconds += steps * (SECONDS_A_STEP[0] + SECONDS_A_STEP[1] * disks)
+    memory = disks * (BYTES_AT_ALL + kept * BYTES_KEPT)
+    if task in ("onset", "reproduce") and disks > DENSE:
+        # the ramp ends at the first onset, and few equilibria are kept
+        memory = max(memory, disks * BYTES_AT_ALL + _searched_bytes(disks))
+    written = 0.0 if task == "onset" else disks * BYTES_WRITTEN * (increments + 1)
+    return Estimate(disks, steps, increments, memory, written, seconds)
+
+
+def foreseen(scene: Keys, task: Task, packings: int = 1) -> str:
+    """What a command will do and how long that takes, in a line; empty where it takes no time.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is wanted.
+    task : {"settle", "ramp", "perturb", "onset", "reproduce"}
+        As in `estimated`.
+    packings : int
+        How many packings of the scene, one after the other.
+
+    Raises
+    ------
+    SceneError
+        If it takes a year, more memory than there is, or a file of more than `LARGEST_FILE`.
+    """
+    one = estimated(scene, task)
+    work = replace(one, steps=packings * one.steps, seconds=packings * one.seconds, written=packings * one.written)
+    if not work.seconds < LONGEST:
+        what = "a year and more"
+    elif work.memory > _installed_memory():
+        what = f"more memory than the {_bytes(_installed_memory())} of this machine"
+    elif work.written > LARGEST_FILE:
+        what = f"more than the {_bytes(LARGEST_FILE)} that a file may take"
+    else:
+        what = task if packings == 1 else f"{task}, {packings} packings"
+        return f"{what}: {work}" if work.seconds > WORTH_SAYING else ""
+    raise SceneError(f"the scene asks {task} for {what} ({work}): {_remedy(scene, task)}")
+
+
+def impossible(scene: Keys) -> tuple[str, str] | None:
+    """What in the numbers of a scene no packing can bear: the key, and the rest of the sentence; None if nothing is."""
+    packing, law, fy = scene.packing, scene.law, scene.load.fy
+    if not isinstance(packing, GeneratedPacking):
+        return None
+    overlap = _overlap(scene, fy)
+    smallest = min(packing.radii)
+    if not overlap < smallest:
+        return "load.fy", (
+            f"= {fy:g} presses two disks {overlap:.2g} into each other, deeper than the smallest radius {smallest:g}, "
+            f"where the contact law does not hold: lower it, or raise law.kn = {law.kn:g}"
+        )
+    rounding = EPSILON * packing.width * _stiffness(scene, fy) / fy
+    if not rounding < LOST:
+        return "law.kn", (
+            f"= {law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of F_y, "
+            "and no packing comes to rest: lower it, or raise load.fy"
+        )
+    steps = _settling_steps(scene)
+    if packing.settle_friction:
+        ends = LEAST_SHARE * steps < STEPS_TO_REST
+    else:
+        ends = steps < STEPS_TO_REST if packing.disks <= DENSE else LEAST_SHARE * steps < SINKING
+    if not ends:
+        return "law.kn", (
+            f"= {law.kn:g} is too stiff for load.fy = {fy:g}: settling takes about {_count(steps)} time steps, more "
+            "than are made: lower it, or raise load.fy"
+        )
+    if scene.ramp is not None and scene.ramp.method == "overdamped":
+        steps = _overdamped_steps(scene)
+        if not steps < STEPS_TO_REST:
+            return "relax.time_step", (
+                f"= {scene.relax.time_step:g} needs about {_count(steps)} steps to an equilibrium, more than are made: "
+                f"raise it, or leave it out for {_overdamped_step(scene):.2g}"
+            )
+    return None
+
+
+def _disks(scene: Keys) -> int:
+    return scene.packing.disks
+
+
+def _searched_bytes(disks: int) -> float:
+    """Memory of the search in slices of the spectrum."""
+    bases = BYTES_OF_BASES[0] * disks**2
+    return disks * BYTES_SEARCHED + (bases if bases < BYTES_OF_BASES[1] else 0.0)
+
+
+def _exponent(scene: Keys) -> float:
+    return float(scene.law.exponent)
+
+
+def _overlap(scene: Keys, force: float) -> float:
+    return float((force / scene.law.kn) ** (1 / _exponent(scene)))
+
+
+def _stiffness(scene: Keys, force: float) -> float:
+    p = _exponent(scene)
+    return float(p * scene.law.kn * _overlap(scene, force) ** (p - 1))
+
+
+def _settling_steps(scene: Keys) -> float:
+    stiff = _stiffness(scene, FORCE_CHAINS * scene.load.fy)
+    if scene.packing.settle_friction if isinstance(scene.packing, GeneratedPacking) else False:
+        return SETTLING_WITH_FRICTION * 4 * stiff / scene.load.fy  # overdamped, with damping 1
+    return SETTLING * math.sqrt(8 * stiff / scene.load.fy) / 0.8
+
+
+def _overdamped_step(scene: Keys) -> float:
+    return scene.relax.damping / (4 * _stiffness(scene, FORCE_CHAINS * scene.load.fy))
+
+
+def _overdamped_steps(scene: Keys) -> float:
+    step = scene.relax.time_step
+    return OVERDAMPED if step is None else OVERDAMPED * _overdamped_step(scene) / step
+
+
+def _undamped_step(scene: Keys) -> float:
+    lightest = min(1.0, scene.inertia_factor)
+    return 0.1 * math.sqrt(lightest / (6 * _stiffness(scene, scene.load.fy)))
+
+
+def _remedy(scene: Keys, task: Task) -> str:
+    if task == "perturb":
+        return "lower perturb.time, or raise perturb.time_step"
+    return "take a larger ramp.step, or fewer disks" if task in ("ramp", "onset", "reproduce") else "take fewer disks"
+
+
+def _installed_memory() -> float:
+    return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+
+
+def _count(number: float) -> str:
+    return f"{number:.2g}" if number >= 1e5 else f"{number:.0f}"
+
+
+def _bytes(number: float) -> str:
+    for unit, size in (("TB", 1e12), ("GB", 1e9)):
+        if number >= size:
+            return f"{number / size:.2g} {unit}"
+    return f"{number / 1e6:.2g} MB"
+
+
+def _duration(seconds: float) -> str:
+    for unit, size in (("years", 3.16e7), ("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{max(seconds, 1.0):.0f} s"

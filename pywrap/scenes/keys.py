@@ -1,0 +1,48 @@
+"""All keys of a scene, section by section, each section checked by itself."""
+
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Tag
+
+from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
+from .refusals import Section
+from .sections import Damping, Friction, Law, Load, Output, Perturb, Ramp, Relax
+from .study_sections import Eruptions, Trigger
+from .units_section import Units
+
+
+class Keys(Section):
+    """What a scene says.
+
+    Attributes
+    ----------
+    precision : {"double", "compensated"}
+        Arithmetic of coordinates, slips and forces: doubles, or doubles with low parts, for forces that balance to
+        1e-17 instead of 1e-11.
+    packing, law, load, relax
+        Sections that every scene has; relax may be left out in TOML.
+    ramp, perturb, friction, damping, trigger, eruptions, units, output
+        Sections or None, which means that the feature is not in the run.
+    """
+
+    precision: Literal["double", "compensated"] = "double"
+    packing: Annotated[
+        Annotated[GeneratedPacking, Tag("generated")] | Annotated[StoredPacking, Tag("stored")],
+        Discriminator(kind_of_packing),
+    ]
+    law: Law
+    load: Load
+    relax: Relax = Relax()
+    ramp: Ramp | None = None
+    perturb: Perturb | None = None
+    friction: Friction | None = None
+    trigger: Trigger | None = None
+    eruptions: Eruptions | None = None
+    units: Units | None = None
+    damping: Damping | None = None
+    output: Output | None = None
+
+    @property
+    def inertia_factor(self) -> float:
+        """I_0 in I = I_0 m R^2 of dynamics, spectrum and onset alike: that of [perturb], or the paper's 1."""
+        return self.perturb.inertia_factor if self.perturb else 1.0

@@ -1,0 +1,161 @@
+"""The section [packing] of a scene: disks from a seed, or from a file."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from ...analysis import BadInputError, PackingFileError, RunFile
+from ..exchange import Disks, format_of, is_hdf5, read_disks, upper_layer
+from .loose import Start, layer_size, loose_start
+from .refusals import Positive, Section, refusal
+
+SPARSEST = 10.0
+"""Width of the box, in lengths of all disks in one row, beyond which nothing would ever touch."""
+
+
+class GeneratedPacking(Section):
+    """[packing] from a seed: a loose start of disks of several sizes in equal shares, settled under the load.
+
+    Attributes
+    ----------
+    disks : int
+        Number of disks N, the upper layer included; at most ten millions, a slip of the pen beyond.
+    radii : tuple of float
+        Radii, length, each for an equal share of the disks, upper layer included.
+    width : float
+        Width of the box, length. The paper gives none; this one makes 100 disks about square.
+    top : int
+        Number of disks in the upper layer: free disks, above all others at the start, the load on each. By default a
+        tenth of the disks, and at least as many as fit side by side (`loose.layer_size`). The paper gives no number.
+    seed : int
+        Seed of the loose start.
+    periodic : bool
+        Whether x is periodic, which the paper does not say. With false the sides are open, and nothing holds the disks
+        there: that is refused, unless the packing is one row of disks, all of the upper layer.
+    settle_friction : bool
+        False: settled without friction, which then starts with zero slips, so that K is symmetric at F_x = 0.
+        True: settled with friction, so that the packing carries tangential load from the start. The paper
+        does not say which.
+    """
+
+    disks: int = Field(100, gt=0, le=10_000_000)
+    radii: Annotated[tuple[Positive, ...], Field(min_length=1, strict=False)] = (0.5, 0.7)
+    width: Positive = 11.9
+    # the default becomes a number in the validator, which knows disks, radii and width
+    top: int = Field(None, gt=0)  # type: ignore[assignment]
+    seed: int = Field(7, ge=0, lt=2**63)
+    periodic: bool = True
+    settle_friction: bool = False
+
+    @field_validator("top", mode="before")
+    @classmethod
+    def _layer(cls, top: object, info: ValidationInfo) -> object:
+        if top is not None:
+            return top
+        known = {"disks", "radii", "width"} <= info.data.keys()  # else one of them is refused, and that gets reported
+        return layer_size(info.data["disks"], info.data["radii"], info.data["width"]) if known else 1
+
+    @model_validator(mode="after")
+    def _fits(self) -> "GeneratedPacking":
+        if self.top > self.disks:
+            raise refusal("top", f"= {self.top} is more than the {self.disks} disks of the packing: lower it")
+        cutoff = 2 * max(self.radii)
+        if self.periodic and self.width < 2 * cutoff:
+            says = f"= {self.width} is under two cutoffs of one largest diameter, {2 * cutoff}: widen the box"
+            raise refusal("width", says)
+        row = 2 * self.disks * max(self.radii)
+        if self.width > SPARSEST * row:
+            says = f"= {self.width:g} is {self.width / row:.2g} times the length of all disks in a row: narrow the box"
+            raise refusal("width", says)
+        if not self.periodic and (self.top < self.disks or row > self.width):
+            raise refusal(
+                "periodic",
+                "= false leaves the sides open, where the upper layer spreads the disks below until they are lost: "
+                "leave it out, or give a pile that stands by itself as packing.file",
+            )
+        try:
+            self.start()
+        except ValueError as error:
+            raise refusal("", f"is refused because {error}: widen the box, or take fewer disks") from None
+        return self
+
+    def start(self) -> Start:
+        """The loose start that this section describes."""
+        return loose_start(self.disks, self.radii, self.top, self.width, self.seed, periodic=self.periodic)
+
+
+class StoredPacking(Section):
+    """[packing] from a file.
+
+    Attributes
+    ----------
+    file : Path
+        A run.h5, a packing.json, or a file of another code as `faultgouge import` takes it. In a scene, a relative path
+        counts from the folder of the scene's file; here it is absolute.
+    top : int or str or None
+        The upper layer, where the file does not say it, or other than it says: a count of the highest, "type:2",
+        "ids:1,4,7-9", or a region such as "y>10". Not of a run.h5.
+    frame : int or None
+        Which of several frames; by default the last. Not of a run.h5, whose first is taken.
+    """
+
+    file: Annotated[Path, Field(strict=False)]
+    top: int | str | None = None
+    frame: int | None = None
+
+    @field_validator("file")
+    @classmethod
+    def _known(cls, file: Path, info: ValidationInfo) -> Path:
+        folder: Path = (info.context or {}).get("folder", Path())
+        path = Path(os.path.realpath(folder / file))  # Path.resolve fails on a loop of links
+        try:
+            if not is_hdf5(path):
+                format_of(path)
+        except OSError as error:
+            says = f"cannot be read at {path} ({error.strerror}): correct the name"
+            raise refusal("", f'= "{file}" {says}') from None
+        except PackingFileError as error:
+            raise refusal("", f'= "{file}" is refused: {str(error).rstrip(".")}') from None
+        return path
+
+    @model_validator(mode="after")
+    def _readable(self) -> "StoredPacking":
+        if is_hdf5(self.file):
+            for key in ("top", "frame"):
+                if getattr(self, key) is not None:
+                    raise refusal(
+                        key, "cannot stand beside a run.h5, whose first frame is taken as it is: leave it out"
+                    )
+            return self
+        try:
+            self.read()
+        except BadInputError as error:
+            raise refusal("file", f'= "{self.file.name}" is refused: {str(error).rstrip(".")}') from None
+        return self
+
+    def read(self) -> tuple[Disks, NDArray[np.bool_]] | None:
+        """What the file has, and the upper layer; None for a run.h5."""
+        if is_hdf5(self.file):
+            return None
+        disks = read_disks(self.file, self.frame)
+        return disks, upper_layer(disks, self.top)
+
+    @property
+    def disks(self) -> int:
+        """Number of disks."""
+        read = self.read()
+        if read is not None:
+            return len(read[0])
+        with RunFile(self.file) as run:
+            return len(run.packing(0)) if len(run) else 0
+
+
+def kind_of_packing(section: Any) -> str:
+    """Which of the two a section [packing] is, by name of its tag."""
+    stored = "file" in section if isinstance(section, Mapping) else isinstance(section, StoredPacking)
+    return "stored" if stored else "generated"

@@ -1,0 +1,157 @@
+"""A scene: what is wanted, in TOML, checked in full before any work is done.
+
+    precision = "double"          # of the coordinates
+    [packing]   the disks and the box: generated from a seed, or read from a file
+    [law]       k_n, k_t and the friction coefficient mu
+    [damping]   dashpots at the contacts, drag on the disks
+    [load]      the force F_y that presses each disk of the upper layer down
+    [relax]     damped dynamics: friction against the medium and time step
+    [ramp]      F_x raised from equilibrium to equilibrium
+    [perturb]   an undamped run at one F_x, with or without a forcing a cos(omega t)
+    [friction]  mu(v) that falls with the velocity v of the upper layer
+    [trigger]   the map of waves that trigger
+    [eruptions] the loads from which undamped runs start that go on until they are over
+    [units]     what the numbers are in SI
+    [output]    what is written beside the result
+
+packing, law and load are needed; of the others, one that is absent is a feature that is not in the run. The
+units are the user's own: k_n and k_t are force / length^law.exponent, 3/2 by default, and the paper's numbers take
+the mass of a disk and the diameter of a small disk as units. Defaults are the paper's values where it gives one; the
+docstrings say where it does not.
+"""
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError, model_validator
+
+from .estimate import impossible
+from .keys import Keys
+from .packing_section import GeneratedPacking, StoredPacking
+from .refusals import SceneError, refusal, sentence
+from .sections import Damping, Friction, Law, Load, Output, Perturb, Ramp, Relax
+from .study_sections import Eruptions, Trigger
+from .units import real_units
+from .units_section import Units
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+
+class Scene(Keys):
+    """What is wanted, complete and consistent: `Keys` whose sections agree with each other."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Scene":
+        perturb, ramp = self.perturb, self.ramp
+        if perturb and ramp and perturb.fx > ramp.until:
+            says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.until}: ramp further"
+            raise refusal("perturb.fx", says)
+        if perturb and isinstance(perturb.target, tuple) and isinstance(self.packing, GeneratedPacking):
+            beyond = [disk for disk in perturb.target if disk >= self.packing.disks]
+            if beyond:
+                says = f"names disk {beyond[0]}: name disks from 0 to {self.packing.disks - 1}"
+                raise refusal("perturb.target", says)
+        cannot = impossible(self)
+        if cannot is not None:
+            raise refusal(*cannot)
+        if self.friction and self.law.mus[0] == 0:
+            raise refusal("friction", "has no mu to weaken: leave it out or give law.mu a value above 0")
+        if self.damping and ramp and ramp.method == "overdamped":
+            says = (
+                "acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no use "
+            )
+            raise refusal("damping", says + 'for it: set ramp.method = "newton", or leave [damping] out')
+        if self.damping and self.damping.ct > 0 and self.law.mus[0] == 0:
+            says = f"= {self.damping.ct:g} has no friction to damp: leave it out or give law.mu a value above 0"
+            raise refusal("damping.ct", says)
+        real_units(self)
+        return self
+
+    @classmethod
+    def from_toml(cls, path: str | Path, packing: Mapping[str, Any] | None = None) -> "Scene":
+        """Read a scene.
+
+        Parameters
+        ----------
+        path : str or Path
+            A TOML file. A relative packing.file in it counts from its folder.
+        packing : mapping, optional
+            A section [packing] in place of the file's, whose own may name a file that is not there yet.
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        SceneError
+            If the file cannot be read, is no TOML, or does not describe a scene that can be run.
+        """
+        path = Path(path)
+        try:
+            mapping = tomllib.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise SceneError(f"{path}: the scene cannot be read ({error.strerror}): correct its path.") from None
+        except ValueError as error:  # bytes that are not UTF-8, or text that is not TOML
+            raise SceneError(f"{path}: the scene is not valid TOML: {error}.") from None
+        return cls._checked(mapping if packing is None else mapping | {"packing": packing}, path.parent, str(path))
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any], folder: str | Path = ".") -> "Scene":
+        """Make a scene from what a TOML file would hold.
+
+        Parameters
+        ----------
+        mapping : mapping
+            Sections by name, keys and values in them as in TOML; `resolved` gives such a mapping.
+        folder : str or Path
+            The folder from which a relative packing.file counts.
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        SceneError
+            If the mapping does not describe a scene that can be run.
+        """
+        return cls._checked(mapping, Path(folder), "scene")
+
+    @classmethod
+    def _checked(cls, mapping: Mapping[str, Any], folder: Path, name: str) -> "Scene":
+        try:
+            return cls.model_validate(mapping, context={"folder": folder})
+        except ValidationError as error:
+            # A misspelled name makes the right one missing, too: the misspelling is the cause.
+            errors = sorted(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
+            raise SceneError(f"{name}: {sentence(errors[0], SECTIONS)}.") from None
+
+    def resolved(self) -> dict[str, Any]:
+        """Every key with its value, defaults included, as plain numbers, strings, lists and dicts.
+
+        k_t is a number and packing.file an absolute path. What is None is left out, so that
+        `Scene.from_mapping(scene.resolved())` equals the scene.
+        """
+        return self.model_dump(mode="json", exclude_none=True)
+
+
+SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
+    "packing": (GeneratedPacking, StoredPacking),
+    "law": (Law,),
+    "load": (Load,),
+    "relax": (Relax,),
+    "ramp": (Ramp,),
+    "perturb": (Perturb,),
+    "friction": (Friction,),
+    "trigger": (Trigger,),
+    "eruptions": (Eruptions,),
+    "units": (Units,),
+    "damping": (Damping,),
+    "output": (Output,),
+}

@@ -1,0 +1,277 @@
+"""The sections of a scene beside [packing]: their keys, units and defaults.
+
+Defaults are the paper's values where it gives one; the docstrings say where it does not.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from ...analysis.packing.law import EXPONENTS
+from .refusals import NotNegative, Positive, Section, is_number, refusal
+from .signal_keys import SignalKeys
+
+EQUILIBRIA = 10_000_000
+"""Of a ramp: half a day and 150 GB for 100 disks."""
+
+
+class Law(Section):
+    """[law] of all contacts, floor included.
+
+    Attributes
+    ----------
+    kn : float
+        Normal stiffness, force / length^exponent.
+    kt : float
+        Tangential stiffness, force / length^exponent. A scene may also say "A/B kn", "A kn" or "kn". The
+        default, "2/7 kn", is the paper's.
+    mu : float or tuple of float
+        Static friction coefficient; 0 means no tangential force at all. Of a list, `onset` and
+        `reproduce` take every one and all else the first.
+    exponent : float
+        p of the repulsion kn overlap^p: 1.5 (Hertz, the paper's) or 1 (harmonic disks).
+    """
+
+    kn: Positive
+    # the default is of the form that a scene gives, and becomes a number in the validator
+    kt: NotNegative = Field("2/7 kn")  # type: ignore[assignment]
+    mu: float | tuple[float, ...] = 1.0
+    exponent: float = 1.5
+
+    @model_validator(mode="before")
+    @classmethod
+    def _kt_has_kn(cls, section: Any) -> Any:
+        if isinstance(section, Mapping) and "kt" in section and "kn" not in section:
+            raise refusal("kt", "stands without kn: give kn, in force / length^exponent, as well")
+        return section
+
+    @field_validator("kt", mode="before")
+    @classmethod
+    def _share_of_kn(cls, kt: object, info: ValidationInfo) -> object:
+        if not isinstance(kt, str):
+            return kt
+        if "kn" not in info.data:
+            return 0.0  # kn is missing or refused, and that is what gets reported
+        match = re.fullmatch(r"(?:(\d+(?:\.\d+)?)(?:/(\d+(?:\.\d+)?))? )?kn", kt.strip())
+        numerator, denominator = (float(number or 1) for number in match.groups()) if match else (0.0, 0.0)
+        if denominator == 0:
+            raise refusal("", f'= "{kt}" is no share of kn: give a number, or a share such as "2/7 kn"')
+        return numerator * info.data["kn"] / denominator
+
+    @field_validator("mu", mode="before")
+    @classmethod
+    def _one_or_several(cls, mu: object) -> object:
+        several = tuple(mu) if isinstance(mu, (list, tuple)) else (mu,)
+        if not several or not all(is_number(value) and value >= 0 for value in several):
+            raise refusal("", f"= {mu!r} is refused: give a number of at least 0, or a list of such numbers")
+        if len(set(several)) < len(several):
+            raise refusal("", f"= {mu!r} names one value twice: give each once")
+        return several if isinstance(mu, (list, tuple)) else mu
+
+    @field_validator("exponent")
+    @classmethod
+    def _known_exponent(cls, exponent: float) -> float:
+        if exponent not in EXPONENTS:
+            raise refusal("", f"= {exponent:g} is refused: give 1.5 (Hertz) or 1 (harmonic disks)")
+        return exponent
+
+    @property
+    def mus(self) -> tuple[float, ...]:
+        """Every friction coefficient that the scene asks for, in its order."""
+        return self.mu if isinstance(self.mu, tuple) else (self.mu,)
+
+
+class Damping(Section):
+    """[damping] of dynamics; none in a scene without this section. Equilibria do not depend on it.
+
+    Attributes
+    ----------
+    cn, ct : float
+        Dashpots at the contacts, normal and tangential, force time / length^exponent.
+    tau : float or None
+        Time of the drag -(m/tau) v and -(I/tau) omega on every disk, the paper's damping. None: no drag.
+    """
+
+    cn: NotNegative = 0.0
+    ct: NotNegative = 0.0
+    tau: Positive | None = None
+
+    @model_validator(mode="after")
+    def _not_empty(self) -> "Damping":
+        if not self.model_fields_set:
+            raise refusal("", "has nothing in it: give cn, ct or tau, or leave the section out")
+        return self
+
+
+class Load(Section):
+    """[load] on the upper layer.
+
+    Attributes
+    ----------
+    fy : float
+        Force F_y on each disk of the upper layer, downwards.
+    """
+
+    fy: Positive
+
+
+class Relax(Section):
+    """[relax] damped dynamics, v = F / damping, of the ramp's method "overdamped".
+
+    Attributes
+    ----------
+    damping : float
+        Friction against the medium, mass / time. It sets the unit of the relaxation's time and leaves the
+        equilibria as they are; the paper gives none.
+    time_step : float or None
+        Step, time. None: a third of the stable step of a disk whose contacts carry ten times F_y.
+    """
+
+    damping: Positive = 1.0
+    time_step: Positive | None = None
+
+
+class Ramp(Section):
+    """[ramp] of the force F_x on each disk of the upper layer, from 0.
+
+    Attributes
+    ----------
+    step : float
+        Increment of F_x.
+    until : float
+        Last F_x.
+    method : {"newton", "overdamped"}
+        How each equilibrium is found. The paper's is overdamped dynamics.
+    force_tolerance : float or None
+        Largest net force, and torque over radius, on a disk of an equilibrium, the paper's f_min; a force in
+        the scene's units. None: what the rounding of the coordinates allows.
+    """
+
+    step: Positive = 1e-4
+    until: Positive
+    method: Literal["newton", "overdamped"] = "newton"
+    force_tolerance: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_step_at_least(self) -> "Ramp":
+        if self.step > self.until:
+            raise refusal("step", f"= {self.step} is larger than until = {self.until}: take a smaller step")
+        if not self.until / self.step < EQUILIBRIA:
+            says = f"= {self.step:g} makes {self.until / self.step:.2g} equilibria up to until = {self.until:g}"
+            raise refusal("step", f"{says}, and {EQUILIBRIA:.0e} are the most: take a larger step")
+        return self
+
+
+class Perturb(SignalKeys):
+    """[perturb] an undamped run from an equilibrium, and the forcing in it: keys of `SignalKeys`, and these.
+
+    Attributes
+    ----------
+    fx : float
+        F_x of the equilibrium.
+    target : {"top", "all"} or tuple of int
+        The forced disks: the upper layer, all, or those of the list, counted from 0. The paper does not say
+        which.
+    time_step : float or None
+        Step of velocity Verlet, time. None: from the largest eigenvalue of K.
+    inertia_factor : float
+        I_0 in I = I_0 m R^2: 1 in the paper, 1/2 for a uniform disk. `Scene.inertia_factor` hands it to
+        spectra and onsets as well.
+    """
+
+    fx: NotNegative
+    target: Literal["top", "all"] | tuple[int, ...] = "top"
+    time_step: Positive | None = None
+    inertia_factor: Positive = 1.0
+
+    @field_validator("target", mode="before")
+    @classmethod
+    def _group_or_disks(cls, target: object) -> object:
+        if target in ("top", "all"):
+            return target
+        disks = tuple(target) if isinstance(target, (list, tuple)) else ()
+        if not disks or not all(type(disk) is int and disk >= 0 for disk in disks):
+            rule = 'give "top", "all" or a list of disks, counted from 0'
+            raise refusal("", f"= {target!r} is refused: {rule}")
+        return disks
+
+    @model_validator(mode="after")
+    def _complete(self) -> "Perturb":
+        if self.time_step is not None and self.time < self.time_step:
+            raise refusal("time", f"= {self.time} is shorter than one step, {self.time_step}: run longer")
+        return self
+
+
+class Friction(Section):
+    """[friction] mu(v) = mu (B exp(-w (v - v_0)/v_ss) + mu_ss) for v > v_0, and mu below.
+
+    Attributes
+    ----------
+    B, w, mu_ss : float
+        Numbers of the law; mu(v) is continuous at v_0 if B + mu_ss = 1.
+    v0 : float or "calibrated"
+        Threshold of the mean velocity v of the upper layer. "calibrated": from an undamped run of the stable
+        packing without forcing, as in the paper.
+    v_ss : float or str
+        Velocity over which mu falls, or a multiple of v_0 such as "10 v0". It has no default: the paper gives
+        no value.
+    """
+
+    B: NotNegative = 0.2
+    w: Positive = 0.4
+    mu_ss: NotNegative = 0.8
+    v0: NotNegative | Literal["calibrated"] = "calibrated"
+    v_ss: Positive | str
+
+    @model_validator(mode="before")
+    @classmethod
+    def _has_scale(cls, section: Any) -> Any:
+        if isinstance(section, Mapping) and "v_ss" not in section:
+            rule = 'give a velocity, or a multiple such as "10 v0"'
+            raise refusal("v_ss", f"is missing, and the paper gives no value: {rule}")
+        return section
+
+    @field_validator("v0", mode="before")
+    @classmethod
+    def _threshold(cls, v0: object) -> object:
+        if v0 != "calibrated" and not (is_number(v0) and v0 >= 0):
+            raise refusal("", f'= {v0!r} is refused: give a velocity of at least 0, or "calibrated"')
+        return v0
+
+    @field_validator("v_ss", mode="before")
+    @classmethod
+    def _scale(cls, v_ss: object, info: ValidationInfo) -> object:
+        if not (_multiple_of_v0(v_ss) if isinstance(v_ss, str) else is_number(v_ss) and v_ss > 0):
+            rule = 'give a velocity above 0, or a multiple of v0 such as "10 v0"'
+            raise refusal("", f"= {v_ss!r} is refused: {rule}")
+        if isinstance(v_ss, str) and info.data.get("v0") == 0:
+            raise refusal("", f'= "{v_ss}" is no velocity because v0 = 0: give a velocity above 0')
+        return v_ss
+
+    def velocity_scale(self, v0: float) -> float:
+        """v_ss for a threshold v0, velocity."""
+        return _multiple_of_v0(self.v_ss) * v0 if isinstance(self.v_ss, str) else self.v_ss
+
+
+class Output(Section):
+    """[output] beside run.h5.
+
+    Attributes
+    ----------
+    trajectory : bool
+        Whether undamped runs store configurations along the way.
+    dumps : bool
+        Whether LAMMPS writes its own per-disk and per-contact dumps.
+    """
+
+    trajectory: bool = False
+    dumps: bool = False
+
+
+def _multiple_of_v0(text: str) -> float:
+    """10 for "10 v0"; 0 for what is no multiple."""
+    match = re.fullmatch(r"(?:(\d+(?:\.\d+)?(?:e\d+)?) )?v0", text.strip())
+    factor = float(match[1] or 1) if match else 0.0
+    return factor if is_number(factor) else 0.0

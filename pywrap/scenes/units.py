@@ -1,0 +1,246 @@
+r"""Real units: what the numbers of a scene are for grains of a certain size and material.
+
+A scene has three units that nothing in it fixes. The grains do: the length is the diameter :math:`2 R_1` of the
+smallest disks, the mass that of a smallest grain, a sphere or (with a thickness h) a cylinder,
+
+.. math:: M = \tfrac43 \pi R_1^3 \rho \quad\text{or}\quad M = \pi R_1^2 h \rho ,
+
+and the time follows from Hertz's contact of two such spheres (K. L. Johnson, *Contact Mechanics*, 1985, section 4.2),
+
+.. math:: F = \tfrac43 E^* \sqrt{R_1/2}\, \delta^{3/2}, \qquad E^* = \frac{E}{2 (1 - \nu^2)},
+    \qquad\text{so}\qquad k = \frac{E \sqrt{2 R_1}}{3 (1 - \nu^2)} ,
+
+which is the scene's k_n: :math:`T^2 = k_n M / (k \sqrt{2 R_1})`. A cylinder has no contact law with the exponent 3/2;
+its thickness changes the mass and the area alone.
+
+**Stress.** The upper layer has n disks above the area W h, W the width of the box and h the thickness, or
+:math:`2 R_1`. The force F_y on each of them is the overburden :math:`n F_y / (W h)`, F_x the shear stress, and
+F_x/F_y their ratio. The ratio k_n/F_y of a scene therefore *is* a depth, and the overburden that is given must be that
+of the scene.
+
+**Waves.** A force a on each disk of the upper layer is a stress :math:`\sigma = n a/(W h)`. A plane shear wave in the
+rock, with the modulus :math:`G = E/2(1 + \nu)`, has it at the strain :math:`\sigma/G` and the ground velocity
+:math:`\sigma/\sqrt{G\rho}`. An acceleration A of the floor at the angular frequency omega is a ground velocity A/omega.
+
+**Dissipation.** The restitution e of two smallest grains that meet head on at a velocity follows from
+:math:`\tfrac12 M \ddot\delta = -k \delta^{3/2} - C_N \delta^{1/2} \dot\delta`; it falls as the velocity grows
+(N. V. Brilliantov et al., Phys. Rev. E 53, 5382, 1996), so that a restitution needs a velocity. The ratio
+:math:`Q = \omega/2|\mathrm{Re}\,s|` is the quality factor of a motion :math:`e^{st}`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...analysis import MindlinLaw, RunFile, read_packing
+from .keys import Keys
+from .packing_section import GeneratedPacking
+from .refusals import refusal
+
+HERTZ = 1.5
+"""Exponent of Hertz's contact."""
+
+MISMATCH = 0.01
+"""Relative difference of the overburden from that of the scene up to which the two count as one."""
+
+
+@dataclass(frozen=True)
+class RealUnits:
+    """What one unit of a scene is in SI, and what follows from it.
+
+    Attributes
+    ----------
+    length, mass, time : float
+        Metres, kilograms and seconds in one unit of the scene.
+    area : float
+        Area of the layer per disk of the upper layer, m^2.
+    shear_modulus, density : float
+        Of the rock, Pa and kg/m^3.
+    fy : float
+        Force on each disk of the upper layer, in units of the scene.
+    """
+
+    length: float
+    mass: float
+    time: float
+    area: float
+    shear_modulus: float
+    density: float
+    fy: float
+
+    @property
+    def force(self) -> float:
+        """Newtons in one unit of the scene."""
+        return self.mass * self.length / self.time**2
+
+    @property
+    def overburden(self) -> float:
+        """Normal stress, Pa."""
+        return self.stress(self.fy)
+
+    @property
+    def shear_wave(self) -> float:
+        """Velocity of shear waves in the rock, m/s; a plane wave's strain is its ground velocity over this."""
+        return float(np.sqrt(self.shear_modulus / self.density))
+
+    def stress(self, force: float) -> float:
+        """Stress of a force on each disk of the upper layer, Pa."""
+        return force * self.force / self.area
+
+    def frequency(self, omega: float) -> float:
+        """Hertz of an angular frequency."""
+        return omega / (2 * np.pi * self.time)
+
+    def velocity(self, velocity: float) -> float:
+        """m/s of a velocity."""
+        return velocity * self.length / self.time
+
+    def displacement(self, msd: float) -> float:
+        """Root of a mean square displacement, m."""
+        return float(np.sqrt(msd)) * self.length
+
+    def ground_velocity(self, amplitude: float, omega: float, on: str) -> float:
+        """m/s of the ground in a wave: a force on each disk of the upper layer, or an acceleration of the floor."""
+        if on == "floor":
+            return amplitude * self.length / self.time**2 / (omega / self.time)
+        return self.stress(amplitude) / (self.density * self.shear_wave)
+
+    def onset(self, fx: float, omega: float) -> dict[str, float]:
+        """For JSON: the shear stress of F_x, its share of the overburden, and the frequency of what grows."""
+        return {
+            "shear_stress_Pa": self.stress(fx),
+            "stress_ratio": fx / self.fy,
+            "frequency_Hz": self.frequency(omega),
+        }
+
+    def as_dict(self) -> dict[str, float]:
+        """For JSON: one unit of the scene in SI, and the overburden."""
+        return {
+            "length_m": self.length,
+            "mass_kg": self.mass,
+            "time_s": self.time,
+            "force_N": self.force,
+            "overburden_Pa": self.overburden,
+        }
+
+
+def real_units(scene: Keys) -> RealUnits | None:
+    """The units of a scene; None if it does not say them.
+
+    Raises
+    ------
+    PydanticCustomError
+        While the scene is checked: if its layer has no width or its law is not Hertz's, or the overburden that
+        is given is not that of the scene's F_y.
+    """
+    units = scene.units
+    if units is None:
+        return None
+    if scene.law.exponent != HERTZ:
+        raise refusal(
+            "units", f"takes k_n from Hertz's contact, and law.exponent = {scene.law.exponent:g}: leave one out"
+        )
+    layer = _layer(scene)
+    if layer.width is None:
+        raise refusal("units", "has no stress without the width of the layer: take a periodic packing")
+    diameter, density, modulus = (units.si(key) for key in ("grain_diameter", "density", "youngs_modulus"))
+    length = diameter / layer.diameter
+    volume = np.pi * diameter**3 / 6 if units.thickness is None else np.pi * diameter**2 / 4 * units.si("thickness")
+    mass = density * volume / layer.mass
+    stiffness = modulus * np.sqrt(diameter) / (3 * (1 - units.poisson_ratio**2))
+    time = float(np.sqrt(scene.law.kn * mass / (stiffness * np.sqrt(length))))
+    depth = diameter if units.thickness is None else units.si("thickness")
+    area = layer.width * length * depth / layer.top
+    shear_modulus = modulus / (2 * (1 + units.poisson_ratio))
+    real = RealUnits(length, mass, time, area, shear_modulus, density, scene.load.fy)
+    if units.overburden is not None:
+        wanted = units.si("overburden")
+        if abs(real.overburden / wanted - 1) > MISMATCH:
+            raise refusal(
+                "units.overburden",
+                f"= {units.overburden} is not the load of the scene, which presses with "
+                f"{real.overburden:.4g} Pa: set load.fy = {scene.load.fy * wanted / real.overburden:.6g}, or leave "
+                "units.overburden out",
+            )
+    return real
+
+
+class _Layer(NamedTuple):
+    """What a scene says of its layer, in its own units: smallest diameter and its mass, width, disks on top."""
+
+    diameter: float
+    mass: float
+    width: float | None
+    top: int
+
+
+def _layer(scene: Keys) -> _Layer:
+    section = scene.packing
+    if isinstance(section, GeneratedPacking):
+        return _Layer(2 * min(section.radii), 1.0, section.width if section.periodic else None, section.top)
+    if section.file.suffix == ".json":
+        packing = read_packing(section.file, MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
+    else:
+        with RunFile(section.file) as file:
+            packing = file.packing(0)
+    smallest = packing.radius.argmin()
+    return _Layer(
+        2 * float(packing.radius[smallest]), float(packing.mass[smallest]), packing.box_length, int(packing.top.sum())
+    )
+
+
+def restitution(kn: float, cn: float, mass: float, velocity: float) -> float:
+    """Restitution of two grains that meet head on.
+
+    Parameters
+    ----------
+    kn : float
+        Normal stiffness, force / length^(3/2).
+    cn : float
+        Dashpot C_N, force / (velocity length^(1/2)).
+    mass : float
+        Of each grain.
+    velocity : float
+        At which they meet, velocity.
+
+    Returns
+    -------
+    float
+        Velocity at which they part over that at which they met.
+    """
+    from scipy.integrate import solve_ivp
+
+    # in units of the largest overlap and of the time to it without a dashpot, up to factors of one
+    length = (mass * velocity**2 / kn) ** 0.4
+    damping = cn * np.sqrt(length) * length / (mass * velocity)
+
+    def course(_: float, state: np.ndarray) -> list[float]:
+        overlap = max(state[0], 0.0)
+        return [state[1], -2 * (overlap**1.5 + damping * np.sqrt(overlap) * state[1])]
+
+    def parted(_: float, state: np.ndarray) -> float:
+        # they part where the force would pull, which is before the overlap is gone
+        return state[0] + damping * state[1] if state[1] < 0 else 1.0
+
+    parted.terminal = True  # type: ignore[attr-defined]  # what solve_ivp looks for
+    path = solve_ivp(course, (0.0, 100.0), [0.0, 1.0], events=parted, rtol=1e-10, atol=1e-12, max_step=0.05)
+    return float(max(0.0, -path.y[1, -1]))
+
+
+def dashpot(kn: float, wanted: float, mass: float, velocity: float) -> float:
+    """C_N of grains with a restitution at a velocity; other parameters as of `restitution`."""
+    from scipy.optimize import brentq
+
+    if wanted == 1:
+        return 0.0
+    length = (mass * velocity**2 / kn) ** 0.4
+    unit = mass * velocity / length**1.5
+    return float(brentq(lambda c: restitution(kn, c * unit, mass, velocity) - wanted, 0.0, 50.0, xtol=1e-10)) * unit
+
+
+def quality_factor(rate: complex) -> float:
+    """Q = |Im s| / 2 |Re s| of a motion exp(s t); infinite without dissipation."""
+    return float(abs(rate.imag) / (2 * abs(rate.real))) if rate.real != 0 else float("inf")

@@ -1,0 +1,166 @@
+"""The packing of a scene in equilibrium at F_x = 0: generated and settled, or read from a file.
+
+All functions are collective over the ranks of the communicator.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+
+from ...analysis import MindlinLaw, NoEquilibriumError, Packing, PackingFileError, RunFile, touching
+from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
+from ..equilibria.rattlers import clear_rattlers
+from ..exchange import packing_of
+from ..lammps.engine import Engine
+from ..scenes.packing_section import GeneratedPacking
+from ..scenes.refusals import SceneError
+from ..scenes.scene import Scene
+from .settling import Watch, settled
+
+OUT_OF_BALANCE = 1e-3
+"""Residual of a stored packing, in units of F_y, above which it counts as not settled: the packing would
+rearrange rather than relax."""
+
+
+def settle(
+    scene: Scene,
+    mu: float | None = None,
+    communicator: MPI.Comm | None = None,
+    watch: Watch = lambda says: None,
+    bed: Packing | None = None,
+) -> Equilibrium:
+    """The packing of a scene in equilibrium at F_x = 0.
+
+    A generated packing settles without friction, and friction begins with zero slips (or settles with
+    friction, if the scene says so); a stored one is taken as it is. Both are brought to the rounding floor.
+
+    Settling is chaotic: two arithmetics would end in two packings. It takes doubles in either arithmetic, so that a
+    seed is one packing, and compensated arithmetic begins where the settled packing is brought to its own floor.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is wanted.
+    mu : float, optional
+        Friction coefficient; by default the scene's first.
+    communicator : mpi4py.MPI.Comm, optional
+        The ranks that share the packing; all by default.
+    watch : callable, optional
+        Told in words what begins, for a packing of more than 300 disks, which takes a while.
+    bed : Packing, optional
+        What `settled_bed` gives for a scene that settles as this one does: it is then not settled again, and the
+        equilibrium is the same to the bit.
+
+    Returns
+    -------
+    Equilibrium
+
+    Raises
+    ------
+    SceneError
+        If a stored packing is not in balance.
+    NoEquilibriumError
+        If the packing does not come to rest.
+    """
+    packing = (
+        settled_bed(scene, mu, communicator, watch)
+        if bed is None
+        else replace(bed, law=law_of(scene, scene.law.mus[0] if mu is None else mu))
+    )
+    packing = _in_arithmetic(packing, scene.precision)
+    with Engine(packing, communicator) as engine:
+        try:
+            return equilibrate(engine, _unpolished(packing), packing.fx)
+        except NoEquilibriumError as error:
+            raise NoEquilibriumError(
+                f"the packing does not come to rest (a disk feels {packing.residual:.2g}): put more disks into the "
+                "upper layer (leave packing.top out for as many as it takes), or try another seed"
+            ) from error
+
+
+def settled_bed(
+    scene: Scene,
+    mu: float | None = None,
+    communicator: MPI.Comm | None = None,
+    watch: Watch = lambda says: None,
+) -> Packing:
+    """The packing of a scene as it has settled, not yet balanced to the rounding floor; arguments as of `settle`.
+
+    Scenes that settle without friction, and differ only in friction and in what follows, share it.
+    """
+    law = law_of(scene, scene.law.mus[0] if mu is None else mu)
+    generated = isinstance(scene.packing, GeneratedPacking)
+    return _settled(scene, law, communicator, watch) if generated else _stored(scene, law)
+
+
+def law_of(scene: Scene, mu: float) -> MindlinLaw:
+    cn, ct = (scene.damping.cn, scene.damping.ct) if scene.damping else (0.0, 0.0)
+    return MindlinLaw(scene.law.kn, scene.law.kt, mu, scene.law.exponent, cn, ct)
+
+
+def drag_time(scene: Scene) -> float | None:
+    return scene.damping.tau if scene.damping else None
+
+
+def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None, watch: Watch) -> Packing:
+    assert isinstance(scene.packing, GeneratedPacking)
+    start = scene.packing.start()
+    settling = law if scene.packing.settle_friction else replace(law, mu=0.0)
+    loose = Packing(
+        position=start.position,
+        radius=start.radius,
+        top=start.top,
+        box_length=start.box_length,
+        inertia_factor=scene.inertia_factor,
+        law=settling,
+        contacts=touching(start.position, start.radius, start.box_length),
+        fy=scene.load.fy,
+        drag_time=drag_time(scene),
+    )
+    with Engine(loose, communicator) as engine:
+        packing = settled(engine, loose, watch)
+    idle = len(packing.loaded(rounding_floor(packing)).rattlers)
+    if idle > 0.5 * len(packing):
+        raise NoEquilibriumError(
+            f"the upper layer sank through the bed, and {idle} of {len(packing)} disks carry nothing: without friction "
+            "only a layer that closes the box stays on top, so put more disks into it (leave packing.top out for as "
+            "many as it takes), or try another seed"
+        )
+    if scene.packing.settle_friction:
+        return packing
+    packing = clear_rattlers(packing, rounding_floor(packing))
+    return replace(packing, law=law, angle=np.zeros(len(packing)))
+
+
+def _in_arithmetic(packing: Packing, precision: str) -> Packing:
+    """The packing with low parts of its coordinates, or without."""
+    if precision == "double":
+        return replace(packing, position_low=None)
+    return packing if packing.compensated else replace(packing, position_low=np.zeros_like(packing.position))
+
+
+def _unpolished(packing: Packing) -> Equilibrium:
+    return Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
+
+
+def _stored(scene: Scene, law: MindlinLaw) -> Packing:
+    assert not isinstance(scene.packing, GeneratedPacking)
+    path, read = scene.packing.file, scene.packing.read()
+    if read is not None:
+        packing = packing_of(read[0], law, read[1], inertia_factor=scene.inertia_factor, fy=scene.load.fy)
+    else:
+        with RunFile(path) as file:
+            if len(file) == 0:
+                raise PackingFileError(f"{path} has no equilibrium in it")
+            packing = file.packing(0)
+        packing = replace(packing, law=law, inertia_factor=scene.inertia_factor, fy=scene.load.fy)
+    packing = _in_arithmetic(replace(packing, drag_time=drag_time(scene)), scene.precision)
+    if packing.residual > OUT_OF_BALANCE * scene.load.fy:
+        raise SceneError(
+            f"{path}: the packing is not in balance, a disk feels {packing.residual:.3g} under fy = {scene.load.fy:g}: "
+            "check law and load against those it was settled with, or bring it to rest by `faultgouge import --relax`"
+        )
+    return packing

@@ -1,0 +1,108 @@
+"""Disks of another code brought to rest under this law and load.
+
+Without slips they rest without friction first, and friction begins with zero slips: so K is symmetric at F_x = 0, as
+in a packing of our own. Disks that come with slips keep friction and rest by overdamped dynamics. Dynamics begins where
+the disks are. It makes what rearrangements there are; Newton's method does the last digits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...analysis import BadInputError, NoEquilibriumError, Packing, nearest_image
+from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
+from ..equilibria.rattlers import clear_rattlers
+from ..lammps.engine import Engine
+from .settling import ABOVE_ROUNDING, TOLERANCES, Watch, contact_rounding, settled
+
+SEEN = 0.01
+"""Displacement, in radii of the disk, from which a disk counts as moved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """A packing brought to rest, and what that did.
+
+    Attributes
+    ----------
+    equilibrium : Equilibrium
+        At rest.
+    before : Packing
+        As it was.
+    """
+
+    equilibrium: Equilibrium
+    before: Packing
+
+    @property
+    def words(self) -> str:
+        """What moved, and by how much."""
+        after, before = self.equilibrium.packing, self.before
+        moved = np.hypot(*nearest_image(after.position - before.position, after.box_length).T)
+        far = int(np.sum(moved > SEEN * after.radius))
+        old, new = (set(zip(p.contacts.i.tolist(), p.contacts.j.tolist(), strict=True)) for p in (before, after))
+        return (
+            f"brought to rest: the largest force on a disk was {largest_force(before):.3g} and is "
+            f"{self.equilibrium.residual:.2g}; {far} of {len(after)} disks moved by more than {SEEN:.0%} of their "
+            f"radius, the farthest by {moved.max():.3g}, all by {np.sqrt(np.mean(moved**2)):.3g} (rms); "
+            f"{len(new - old)} contacts closed and {len(old - new)} opened"
+        )
+
+
+def largest_force(packing: Packing) -> float:
+    """Largest force on a disk, with torque over radius; disks that touch nothing included, which may fall."""
+    return float(np.linalg.norm(packing.net_force.reshape(3, -1), axis=0).max())
+
+
+def at_rest(packing: Packing, watch: Watch = lambda says: None) -> Rest:
+    """Bring a packing to rest under its law and load.
+
+    Parameters
+    ----------
+    packing : Packing
+        Disks as another code left them.
+    watch : callable, optional
+        Told in words what begins.
+
+    Raises
+    ------
+    BadInputError
+        If a packing without slips is under a shear force, which nothing holds without friction.
+    NoEquilibriumError
+        If it does not come to rest.
+    """
+    slipped = packing.law.frictional and bool(np.any(packing.contacts.slip))
+    if not slipped and packing.fx != 0:
+        raise BadInputError(
+            f"without slips the disks rest without friction first, and F_x = {packing.fx:g} would push them along for "
+            "ever: leave --fx out, and raise F_x by `faultgouge ramp`."
+        )
+    resting = _with_friction(packing) if slipped else _without(packing, watch)
+    idle = len(resting.loaded(rounding_floor(resting)).rattlers)
+    if idle > 0.5 * len(resting):
+        raise NoEquilibriumError(
+            f"the upper layer sank through the bed, and {idle} of {len(resting)} disks carry nothing: choose a layer "
+            "that closes the box (--top), or a lower load (--fy)"
+        )
+    with Engine(resting) as engine:
+        start = Equilibrium(resting, resting.residual, rounding_floor(resting), 0)
+        return Rest(equilibrate(engine, start, resting.fx), packing)
+
+
+def _without(packing: Packing, watch: Watch) -> Packing:
+    # where disks rest does not depend on their masses, and the time step of dynamics is that of masses of one
+    law, ones = replace(packing.law, mu=0.0, ct=0.0), np.ones(len(packing))
+    smooth = replace(packing, law=law, mass=ones)
+    with Engine(smooth) as engine:
+        found = settled(engine, smooth, watch, bed=False)
+    return replace(
+        clear_rattlers(found, rounding_floor(found)), law=packing.law, angle=packing.angle, mass=packing.mass
+    )
+
+
+def _with_friction(packing: Packing) -> Packing:
+    with Engine(packing) as engine:
+        engine.relax(max(TOLERANCES[-1] * packing.fy, ABOVE_ROUNDING * contact_rounding(packing)))
+        return engine.packing

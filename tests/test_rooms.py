@@ -1,0 +1,104 @@
+"""Imports run one way: no circle of files, and no arrow up between rooms. Imports inside functions count, too."""
+
+import ast
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+import faultgouge
+
+ROOT = Path(faultgouge.__file__).parent
+
+FLOORS = {
+    "faultgouge": (
+        ("lammps_inputs", "plugin", "ranks"),
+        ("analysis",),
+        ("figures", "pywrap"),
+        ("assessment", "studies"),
+        ("guard", "notebook"),
+        ("commands", "ending"),
+        ("cli",),
+        ("__main__",),
+    ),
+    "faultgouge.analysis": (
+        ("digits", "errors", "tabled"),
+        ("packing",),
+        ("operators",),
+        ("factors", "spectrum"),
+        ("motion",),
+        ("files",),
+        ("onset",),
+        ("damped_onset",),
+    ),
+    "faultgouge.pywrap": (
+        ("lammps",),
+        ("equilibria", "exchange"),
+        ("scenes",),
+        ("settling",),
+        ("runs",),
+        ("onset",),
+    ),
+    "faultgouge.assessment": (("error_and_time", "left_out", "stability"),),
+}
+"""Rooms from the ground up. A room knows those below its floor, and none beside it."""
+
+
+def modules() -> dict[str, Path]:
+    """Every module with its file; the folders of the package are links."""
+    found = {}
+    for entry in ROOT.iterdir():
+        for path in [entry] if entry.suffix == ".py" else entry.resolve().rglob("*.py"):
+            inside = [entry.name, *path.relative_to(entry.resolve()).parts] if entry.is_dir() else [entry.name]
+            names = ["faultgouge", *inside[:-1], Path(inside[-1]).stem]
+            found[".".join(names[:-1] if names[-1] == "__init__" else names)] = path
+    return found
+
+
+def imports(name: str, path: Path, known: dict[str, Path]) -> set[str]:
+    """Modules of the package that a module imports, anywhere in its text."""
+    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            found |= {inner if (inner := f"{base}.{alias.name}") in known else base for alias in node.names}
+    return {each for each in found if each in known and each != name}
+
+
+@pytest.fixture(scope="module")
+def arrows() -> dict[str, set[str]]:
+    known = modules()
+    return {name: imports(name, path, known) for name, path in known.items()}
+
+
+def floor_of(package: str, module: str) -> int | None:
+    """On which floor of a package a module lies; None for the package itself and what lies outside."""
+    if not module.startswith(package + "."):
+        return None
+    room = module[len(package) + 1 :].split(".")[0]
+    floors = [number for number, floor in enumerate(FLOORS[package]) if room in floor]
+    assert floors, f"{module}: {room} is in none of the rooms of {package}"
+    return floors[0]
+
+
+def test_no_circle_of_files(arrows):
+    assert len(arrows) > 240
+    assert "faultgouge.analysis" in arrows["faultgouge.figures.film"]
+    list(TopologicalSorter(arrows).static_order())  # raises CycleError, which names the circle
+
+
+@pytest.mark.parametrize("package", FLOORS)
+def test_no_arrow_up_or_sideways(arrows, package):
+    wrong = []
+    for module, imported in arrows.items():
+        here = floor_of(package, module)
+        for each in imported:
+            there = floor_of(package, each)
+            same = module.split(".")[: package.count(".") + 2] == each.split(".")[: package.count(".") + 2]
+            if here is not None and there is not None and there >= here and not same:
+                wrong.append(f"{module} -> {each}")
+    assert wrong == []
