@@ -12,7 +12,7 @@ ROOT = Path(faultgouge.__file__).parent
 
 FLOORS = {
     "faultgouge": (
-        ("lammps_inputs", "plugin", "ranks"),
+        ("lammps_inputs", "parent", "plugin", "ranks"),
         ("analysis",),
         ("figures", "pywrap"),
         ("assessment", "studies"),

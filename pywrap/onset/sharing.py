@@ -6,10 +6,10 @@ their part of the same search (:func:`searching`).
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from os import sched_getaffinity
 from typing import Any
 
 from mpi4py import MPI
@@ -42,6 +42,7 @@ def searching() -> Ranks:
     world = MPI.COMM_WORLD
     if world.size == 1:
         return Ranks()
-    mine = MPI.Get_processor_name(), sorted(sched_getaffinity(0))
+    own = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
+    mine = MPI.Get_processor_name(), own
     beside = world.allgather(mine).count(mine)  # a launcher that binds ranks to cores leaves each its own
     return Ranks(world.rank, world.size, world.allgather, max(1, len(mine[1]) // beside))

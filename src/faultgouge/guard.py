@@ -15,7 +15,6 @@ gone, so the guards end `TOGETHER`, and the work after them. Rank 0 alone speaks
 
 from __future__ import annotations
 
-import ctypes
 import mmap
 import os
 import signal
@@ -26,6 +25,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import NoReturn
 
+from . import parent
 from .ranks import is_root, size
 
 GRACE = 0.8
@@ -36,8 +36,6 @@ TOGETHER, LAST = 1.2, 1.7
 work is there: mpiexec kills all ranks as soon as the work of one is gone, and then reports the kill."""
 
 SIGNALS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
-DEATH_SIGNAL = 1
-"""PR_SET_PDEATHSIG of Linux's prctl."""
 
 NOTHING = "nothing was written, and the same command begins anew"
 _shared = mmap.mmap(-1, 4096)
@@ -76,9 +74,7 @@ def guarded(work: Callable[[], None]) -> NoReturn:
     guard = os.getpid()
     child = os.fork()
     if child == 0:
-        ctypes.CDLL(None).prctl(DEATH_SIGNAL, signal.SIGKILL)
-        if os.getppid() != guard:
-            os._exit(1)
+        parent.end_with(guard)
         for number in SIGNALS:  # also where they were ignored, as in the background of a script
             signal.signal(number, _raise)
         sys.unraisablehook = _raised_where_nothing_passes
@@ -98,7 +94,7 @@ def _work(work: Callable[[], None], guard: bool) -> NoReturn:
         _shared[CLOSED] = 1
         os.kill(os.getppid(), signalled.args[0])  # where the work alone was signalled
         if size() > 1:
-            ctypes.CDLL(None).prctl(DEATH_SIGNAL, 0)
+            parent.outlive()
         time.sleep(max(0.0, signalled.args[1] + LAST - time.monotonic()))
         os._exit(128 + signalled.args[0])
     sys.exit(0)

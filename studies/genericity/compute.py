@@ -15,14 +15,20 @@ from ..sweep.compute import LINES, Progress, Say, run_sweep, stored
 from .sets import SHARES, sets
 
 
-def compute(output: Path, say: Say = print, progress: Progress = lambda rows, _: rows, share: float = 1.0) -> None:
+def compute(
+    output: Path,
+    say: Say = print,
+    progress: Progress = lambda rows, _: rows,
+    share: float = 1.0,
+    workers: int | None = 1,
+) -> None:
     """Compute what is missing of all sweeps.
 
     Parameters
     ----------
     output : Path
         The folder.
-    say, progress
+    say, progress, workers
         As of `run_sweep`.
     share : float
         Of the packings of each set.
@@ -31,7 +37,7 @@ def compute(output: Path, say: Say = print, progress: Progress = lambda rows, _:
     for part in [*(each for each in SHARES if each < share), share]:
         for name, sweep in sets(part, harmonic).items():
             say(f"{name}: {100 * part:.3g} % of the packings")
-            run_sweep(sweep, output / name.replace(" ", "_"), say=say, progress=progress)
+            run_sweep(sweep, output / name.replace(" ", "_"), say=say, progress=progress, workers=workers)
         if MPI.COMM_WORLD.rank == 0:
             record(output)
 

@@ -70,6 +70,7 @@ def ensemble(
     output: Path,
     say: Say = print,
     progress: Progress = lambda rows, _: rows,
+    workers: int | None = 1,
 ) -> dict[str, Any]:
     """Examine the packings of the seeds seed, ..., seed + members - 1 of a scene.
 
@@ -82,7 +83,7 @@ def ensemble(
         With a generated packing and [ramp]; with [friction] and [perturb] for eruptions. perturb.fx is not used.
     members : int
         Number of packings M.
-    output, say, progress
+    output, say, progress, workers
         As of `run_sweep`.
 
     Returns
@@ -101,7 +102,9 @@ def ensemble(
     first, scene = scene.packing.seed, economical(scene)
     mapping = {"task": "triggering", "sweep": {"packing.seed": f"{first}:{first + members - 1}"}}
     sweep = Sweep.from_mapping(mapping | {"scene": scene.resolved()}, TASKS)
-    rows = run_sweep(sweep, output, say=say, progress=lambda ended, count: progress(_told(ended, say), count))
+    rows = run_sweep(
+        sweep, output, say=say, progress=lambda ended, count: progress(_told(ended, say), count), workers=workers
+    )
     if not rows:
         return {}
     found = [Member.from_row(row) for row in rows]

@@ -1,9 +1,7 @@
 """Run a sweep: every point is a line of results.jsonl as soon as it has ended, and results.csv the table of all.
 
-Points are handed out to the ranks of `mpiexec` by mpi4py.futures; without it they are run one after the other. Each
-has one thread. Points that settle alike share the settled packing: the first of them is handed out alone, and the
-others with the packing that it brought back. As the packing is the same to the bit wherever it was settled, the table
-does not depend on the number of workers, on shards, or on where a run was cut off.
+Points are handed out to workers (:mod:`.workers`), each with one thread. The table does not depend on the number of
+workers, on shards, or on where a run was cut off.
 
 A folder holds sweep.json (what was asked for), results.jsonl and results.csv. Lines of results.jsonl that are of a
 point of this sweep are not computed again. A last line that a kill has cut is computed again.
@@ -13,34 +11,23 @@ from __future__ import annotations
 
 import fcntl
 import json
-import time
-from collections import defaultdict, deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
-from importlib.metadata import version
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from mpi4py import MPI
-from mpi4py.futures import MPICommExecutor
-from scipy.sparse.linalg import ArpackError
-from threadpoolctl import threadpool_limits
 
-from ...analysis import FaultgougeError, Packing
 from ...analysis.files.wholefile import make_folder, write_text
-from ...pywrap import Equilibrium, Scene, SceneError, settle
-from ...pywrap.settling.bed import settled_bed
-from .points import Point, Sweep, shard
+from ...pywrap import SceneError
+from .examine import Row
+from .points import Sweep, shard
 from .table import write_tables
-from .tasks import TASKS
+from .workers import computed, hands
 
 Say = Callable[[str], None]
-Row = dict[str, Any]
 Progress = Callable[[Iterator[Row], int], Iterable[Row]]
-
-FAILURES = (FaultgougeError, ValueError, ArithmeticError, ArpackError, MemoryError)
-"""What may go wrong with one scene: of the package, of LAPACK, of ARPACK, and of a packing that is too large."""
 
 LINES, ASKED, LOCK = "results.jsonl", "sweep.json", "sweep.lock"
 
@@ -51,6 +38,8 @@ def run_sweep(
     part: tuple[int, int] = (1, 1),
     say: Say = print,
     progress: Progress = lambda rows, _: rows,
+    workers: int | None = 1,
+    executor: Executor | None = None,
 ) -> list[Row]:
     """Compute what is missing of a sweep, and write its table.
 
@@ -66,6 +55,11 @@ def run_sweep(
         Takes a line of words.
     progress : callable
         Takes the rows that end and their number, and hands the rows on.
+    workers : int or None
+        Processes that compute; None: as many as this process may use cores. Ranks of mpiexec take their place.
+    executor : concurrent.futures.Executor, optional
+        Computes in place of these, on other machines perhaps. Its workers have faultgouge and one thread each: LAMMPS
+        does not stand several threads in a process.
 
     Returns
     -------
@@ -76,12 +70,11 @@ def run_sweep(
     ------
     SceneError
         If another process writes to the folder.
+    WorkerError
+        If workers are killed again and again.
     """
     points = shard(sweep.points, part)
-    workers: AbstractContextManager[Any] = (
-        nullcontext() if MPI.COMM_WORLD.size == 1 else MPICommExecutor(MPI.COMM_WORLD)
-    )
-    with workers as pool:
+    with hands(workers, executor) as pool:
         if MPI.COMM_WORLD.rank != 0:
             return []
         make_folder(output)
@@ -105,75 +98,6 @@ def _kept(rows: Iterable[Row], file: IO[str]) -> Iterator[Row]:
         file.write(json.dumps(row) + "\n")
         file.flush()
         yield row
-
-
-def computed(pool: Executor | None, task: str, points: Sequence[Point]) -> Generator[Row, None, None]:
-    """The rows of points as they end; closing the generator takes back those that no worker has begun."""
-    groups: dict[str, deque[Point]] = defaultdict(deque)
-    for point in points:
-        groups[point.key if point.scene is None else point.settling].append(point)
-    if pool is None:
-        for group in groups.values():
-            bed = None
-            for number, point in enumerate(group):
-                row, bed = examined(task, point, bed, number + 1 < len(group))
-                yield row
-        return
-    running: dict[Future[tuple[Row, Packing | None]], deque[Point]] = {}
-    for group in groups.values():
-        point = group.popleft()
-        running[pool.submit(examined, task, point, None, bool(group))] = group
-    try:
-        while running:
-            ended, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in ended:
-                group = running.pop(future)
-                row, bed = future.result()
-                while group:
-                    running[pool.submit(examined, task, group.popleft(), bed, False)] = deque()
-                yield row
-    finally:
-        for future in running:
-            future.cancel()
-
-
-def examined(task: str, point: Point, bed: Packing | None, keep: bool) -> tuple[Row, Packing | None]:
-    """One point: its row, and if it is to be kept the packing as it settled.
-
-    What goes wrong with a point is in its row under "says".
-    """
-    begin = time.perf_counter(), time.process_time()
-    beds = [] if bed is None else [bed]
-    row: Row = {
-        "key": point.key,
-        "version": version("faultgouge"),
-        "values": point.values,
-        "result": {},
-        "says": point.says,
-    }
-    if point.scene is not None:
-        with threadpool_limits(1):
-            try:
-                row["result"] = TASKS[task].run(point.scene, _starter(point.scene, beds))
-                row["says"] = row["result"].pop("says", None)
-            except FAILURES as error:
-                row["says"] = str(error) or type(error).__name__
-    row["seconds"] = round(time.perf_counter() - begin[0], 3)
-    row["cpu_seconds"] = round(time.process_time() - begin[1], 3)
-    return row, (beds[0] if keep and beds else bed if keep else None)
-
-
-def _starter(scene: Scene, beds: list[Packing]) -> Callable[[float], Equilibrium]:
-    """The settled packing for a friction coefficient; what settles goes to `beds`, and is taken from there."""
-
-    def start(mu: float) -> Equilibrium:
-        if scene.packing.model_dump().get("settle_friction", False) and mu != scene.law.mus[0]:
-            return settle(scene, mu, MPI.COMM_SELF)
-        if not beds:
-            beds.append(settled_bed(scene, mu, MPI.COMM_SELF))
-        return settle(scene, mu, MPI.COMM_SELF, bed=beds[0])
-
-    return start
 
 
 def stored(path: Path) -> dict[str, Row]:

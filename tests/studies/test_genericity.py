@@ -10,9 +10,9 @@ from faultgouge.studies.genericity.fits import size_law
 from faultgouge.studies.genericity.levels import Pencil, entry_factor
 from faultgouge.studies.genericity.sets import sets
 from faultgouge.studies.genericity.surrogates import randomized
-from faultgouge.studies.sweep.compute import computed
 from faultgouge.studies.sweep.points import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
+from faultgouge.studies.sweep.workers import computed
 
 ROOT = Path(__file__).parents[2]
 

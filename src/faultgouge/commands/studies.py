@@ -10,7 +10,7 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import AsJson, ScenePath, print_json, progress, read_scene, say, status
+from .terminal import AsJson, ScenePath, Workers, print_json, progress, read_scene, say, status
 
 T = TypeVar("T")
 
@@ -53,6 +53,7 @@ def reproduce(
     ensemble: Annotated[
         int, typer.Option(min=0, metavar="M", help="Instead, onsets and eruptions of M packings of the scene.")
     ] = 0,
+    workers: Workers = None,
 ) -> None:
     """The paper's protocol on one packing: its figures, numbers and a report.
 
@@ -61,9 +62,7 @@ def reproduce(
 
     With --ensemble M: how generic that is, from M packings that differ in their
     seeds. An interrupted ensemble goes on, and grows with a larger M. A packing
-    takes a minute at the most on one core; of several ranks one hands out the
-    work, so that mpiexec -n 5 faultgouge reproduce --ensemble 100 keeps 4 cores
-    busy.
+    takes a minute at the most on one core; all cores work, or --workers N.
     """
     from importlib.resources import files
 
@@ -79,7 +78,7 @@ def reproduce(
                 yield member
                 keeps(f"{output}/results.jsonl has {number} more packings; the same command goes on from there")
 
-        examine_packings(wanted, ensemble, output, say, bar)
+        examine_packings(wanted, ensemble, output, say, bar, workers)
         say(f"written: {output}/ensemble.json")
         return
 

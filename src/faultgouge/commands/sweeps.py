@@ -9,20 +9,21 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import progress, say
+from .terminal import Workers, progress, say
 
 app = typer.Typer()
 
 Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted one is continued.")]
 
 
-@app.command(epilog="Example: mpiexec -n 5 faultgouge sweep genericity.toml -o sweep")
+@app.command(epilog="Example: faultgouge sweep genericity.toml -o sweep")
 def sweep(
     file: Annotated[Path, typer.Argument(metavar="SWEEP", help="The sweep, a TOML file.", show_default=False)],
     output: Folder = Path("sweep"),
     shard: Annotated[
         str, typer.Option(metavar="K/N", help="Part K of N alone, for job arrays; each with a folder of its own.")
     ] = "1/1",
+    workers: Workers = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what there is to do and what it will cost.")] = False,
 ) -> None:
     """One task for every scene of a product of keys: results.jsonl, the table results.csv, and a picture.
@@ -31,8 +32,8 @@ def sweep(
     or ranges for any keys of a scene, as in "packing.seed" = "1:200"; and below
     \\[scene.SECTION] what all scenes share. Every result is written as it ends,
     and the same command goes on where it was cut off. A scene that fails
-    is a result, too, with its sentence. Of several ranks one hands out the work:
-    mpiexec -n 5 keeps 4 cores busy.
+    is a result, too, with its sentence. Of several ranks, on several machines
+    perhaps, one hands out the work: mpiexec -n 5 keeps 4 cores busy.
     """
     from faultgouge.studies.sweep.compute import LINES, run_sweep, stored
     from faultgouge.studies.sweep.draw import draw_sweep
@@ -50,7 +51,7 @@ def sweep(
                 say(line)
         return
     keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there")
-    rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count))
+    rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count), workers)
     if is_root():
         failed = sum(row["says"] is not None for row in rows)
         say(f"{len(rows)} scenes, {failed} of them failed; written: {output}/results.csv{draw_sweep(rows, output)}")
@@ -84,12 +85,13 @@ def _shard(text: str) -> tuple[int, int]:
     return int(part), int(of)
 
 
-@app.command(epilog="Example: mpiexec -n 5 faultgouge genericity -o genericity")
+@app.command(epilog="Example: faultgouge genericity -o genericity")
 def genericity(
     output: Folder = Path("genericity"),
     share: Annotated[
         float, typer.Option(min=0.005, max=1.0, help="Share of the packings of each set; a larger one goes on.")
     ] = 1.0,
+    workers: Workers = None,
     page: Annotated[
         bool, typer.Option("--page", help="Compute nothing: the page from the tables that are there.")
     ] = False,
@@ -106,6 +108,6 @@ def genericity(
 
     if not page:
         keeps(f"{output} has the scenes that have ended; the same command goes on from there")
-        compute(output, say, lambda ended, count: progress(ended, "scenes", count), share)
+        compute(output, say, lambda ended, count: progress(ended, "scenes", count), share, workers)
     if is_root():
         say(f"written: {write_page(output)}")

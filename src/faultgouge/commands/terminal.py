@@ -30,6 +30,10 @@ EVERY = 60.0
 
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)]
 Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted one is continued.")]
+Workers = Annotated[
+    int | None,
+    typer.Option(min=1, metavar="N", show_default=False, help="Processes that compute; all cores unless given."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 

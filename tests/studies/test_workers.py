@@ -1,0 +1,82 @@
+"""Whoever computes the points of a sweep, the rows are the same; a worker that is killed takes nothing with it."""
+
+import multiprocessing
+import signal
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from faultgouge.studies.sweep.compute import run_sweep
+from faultgouge.studies.sweep.points import Sweep
+from faultgouge.studies.sweep.tasks import TASKS
+from faultgouge.studies.sweep.workers import Processes, WorkerError, computed, hands
+
+pytestmark = pytest.mark.slow
+
+SWEEP = {
+    "task": "onset",
+    "sweep": {"packing.seed": "1:3", "law.mu": [1.0, 0.5, -1.0]},
+    "scene": {
+        "packing": {"disks": 30, "top": 5, "width": 6.0},
+        "law": {"kn": 2e5},
+        "load": {"fy": 3.0},
+        "ramp": {"step": 5e-3, "until": 0.025},
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def sweep():
+    return Sweep.from_mapping(SWEEP, TASKS)
+
+
+@pytest.fixture(scope="module")
+def rows(sweep):
+    return sorted(stripped(row) for row in computed(None, sweep.task, sweep.points))
+
+
+def stripped(row):
+    """A row without its times, as text."""
+    return str({name: value for name, value in row.items() if "seconds" not in name})
+
+
+def test_processes_give_the_rows_of_one(sweep, rows, tmp_path):
+    found = run_sweep(sweep, tmp_path / "out", say=lambda _: None, workers=2)
+    assert [row["key"] for row in found] == [point.key for point in sweep.points]
+    assert sorted(stripped(row) for row in found) == rows
+
+
+def test_an_executor_of_somebody_else(sweep, rows, tmp_path):
+    with ThreadPoolExecutor(1) as executor:
+        found = run_sweep(sweep, tmp_path / "out", say=lambda _: None, executor=executor)
+    assert sorted(stripped(row) for row in found) == rows
+
+
+def kill_a_worker():
+    workers = [process for process in multiprocessing.active_children() if process.is_alive()]
+    assert len(workers) == 2
+    workers[0].kill()
+
+
+def test_a_killed_worker_takes_nothing_with_it(sweep, rows):
+    found = []
+    with hands(2, None) as pool:
+        for row in computed(pool, sweep.task, sweep.points):
+            if not found:
+                kill_a_worker()
+            found.append(stripped(row))
+    assert sorted(found) == rows
+
+
+class Deadly(Processes):
+    """Processes of which each dies of the first point that it takes."""
+
+    def submit(self, fn, /, *args, **kwargs):
+        return super().submit(signal.raise_signal, signal.SIGKILL)
+
+
+def test_a_point_that_kills_every_worker_is_not_tried_for_ever(sweep):
+    pool = Deadly(2)
+    with pytest.raises(WorkerError, match="fewer --workers"):
+        list(computed(pool, sweep.task, sweep.points))
+    pool.shutdown()
