@@ -62,6 +62,11 @@ constexpr const char *MPI_FAMILY = "STUBS";
 constexpr const char *MPI_FAMILY = "";
 #endif
 
+// What builds the plugin for the LAMMPS of the environment, or of the headers that are named.
+constexpr const char *REMEDY =
+    "pip install --no-build-isolation --force-reinstall --no-deps faultgouge (for a LAMMPS of "
+    "your own: cmake -S . -B build -DLAMMPS_HEADERS=DIR && cmake --build build)";
+
 // The reason why this LAMMPS cannot use the plugin; empty if it can.
 std::string mismatch(void *lmp)
 {
@@ -140,8 +145,8 @@ extern "C" __attribute__((visibility("default"))) void lammpsplugin_init(void *l
 {
   const std::string reason = mismatch(lmp);
   if (!reason.empty()) {
-    fprintf(stderr, "ERROR: the faultgouge plugin %s: its styles are not available; build the plugin for this LAMMPS\n",
-            reason.c_str());
+    fprintf(stderr, "ERROR: the faultgouge plugin %s: its styles are not available; build it for this LAMMPS: %s\n",
+            reason.c_str(), REMEDY);
     return;
   }
   add_styles(lmp, handle, reinterpret_cast<lammpsplugin_regfunc>(regfunc));

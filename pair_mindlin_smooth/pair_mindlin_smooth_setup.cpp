@@ -3,6 +3,7 @@
 #include "pair_mindlin_smooth.h"
 
 #include "atom.h"
+#include "citeme.h"
 #include "comm.h"
 #include "domain.h"
 #include "error.h"
@@ -20,8 +21,19 @@
 using namespace LAMMPS_NS;
 using faultgouge::MindlinLaw;
 
+// what LAMMPS lists at the end of a run among the papers to cite
+static const char CITATION[] = "pair mindlin/smooth: arXiv:2106.11616\n\n"
+                               "@misc{charan2021,\n"
+                               " author = {Harish Charan and Anna Pomyalov and Itamar Procaccia},\n"
+                               " title = {Generic Mechanism for Remote Triggering of Earthquakes},\n"
+                               " year = {2021},\n"
+                               " eprint = {2106.11616},\n"
+                               " archivePrefix = {arXiv}\n"
+                               "}\n\n";
+
 PairMindlinSmooth::PairMindlinSmooth(LAMMPS *lmp) : Pair(lmp)
 {
+  if (lmp->citeme) lmp->citeme->add(CITATION);
   single_enable = 1;
   single_extra = 8;
   svector = new double[single_extra];

@@ -47,7 +47,8 @@ def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:
             else f"has no plugin, since {plugin} is not there"
         )
         raise EngineError(
-            f"LAMMPS {instance.version()} {trouble}: build the plugin for this LAMMPS (pip install "
-            "--no-build-isolation faultgouge, or cmake), or name the folder of one that was by FAULTGOUGE_PLUGIN"
+            f"LAMMPS {instance.version()} {trouble}: build the plugin for this LAMMPS by pip install "
+            "--no-build-isolation --force-reinstall --no-deps faultgouge, or name the folder of one that was by "
+            "FAULTGOUGE_PLUGIN"
         )
     return instance

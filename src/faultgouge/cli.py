@@ -11,6 +11,8 @@ def main() -> NoReturn:
     # one thread for BLAS: its threads cost more than they bring at these sizes, and change the last digits of a solve
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    if os.name == "nt":
+        raise SystemExit("Error: faultgouge does not run on Windows itself: install it in WSL, where Linux's wheel fits.")
     guarded(_command)
 
 
