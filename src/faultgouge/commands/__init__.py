@@ -19,7 +19,7 @@ FAMILIES = ("beginning", "runs", "eigenvalues", "pictures", "exchange", "studies
 def program() -> typer.Typer:
     """The command ``faultgouge`` with all its commands."""
     app = typer.Typer(
-        no_args_is_help=True,
+        invoke_without_command=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # Rich would double the time of --help
         help="Remote triggering in a stressed layer of frictional disks: simulate with LAMMPS, analyse, reproduce.",
@@ -31,12 +31,25 @@ def program() -> typer.Typer:
     return app
 
 
+TO_TRY = """\
+faultgouge: how a stressed, linearly stable layer of frictional disks erupts. Three things to try:
+
+  faultgouge init -o scene.toml          a scene of 100 disks, every key commented
+  faultgouge onset scene.toml            the shear forces at which the layer becomes unstable: seconds
+  faultgouge reproduce -o results        the paper's protocol, with figures and a report: minutes
+
+All commands: faultgouge --help. Each has an example: faultgouge onset --help.
+"""
+
+
 def _options(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=lambda asked: _version(asked), is_eager=True, help="Show versions.")
     ] = False,
 ) -> None:
-    pass
+    if context.invoked_subcommand is None:
+        print(TO_TRY, end="")
 
 
 def _version(asked: bool) -> None:
