@@ -71,6 +71,8 @@ class DampedWindow:
     kind : {"hopf", "steady", "contact change", "start"}
         What begins the window: Re s that goes through zero with Im s or without, a jump of the equilibrium, or nothing:
         the motion grows at the smallest load.
+    path_error : float or None
+        As of :class:`~faultgouge.analysis.Window`.
     """
 
     fx_onset: float
@@ -78,11 +80,12 @@ class DampedWindow:
     frequency: float
     error: float
     kind: Kind
+    path_error: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The keys of the JSON contract."""
         names = ("fx_onset", "fx_end", "frequency", "error", "kind")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in names} | {"error_of_path": self.path_error}
 
 
 def damped_windows(

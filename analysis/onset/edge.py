@@ -73,7 +73,7 @@ class Window:
         time^2.
     error : float
         Uncertainty of fx_onset: twice the scatter of the discriminant over its slope for a coalescence, the bracket
-        otherwise; and the `load_error` of the equilibria. How their path depends on the increments is not in it.
+        otherwise; and the `load_error` of the equilibria; and `path_error`, if that is known.
     end_error : float or None
         The same for fx_end.
     overlap : float
@@ -81,6 +81,9 @@ class Window:
     kind : {"coalescence", "contact change", "start"}
         What begins the window: two real eigenvalues that meet; a jump of the equilibrium; or nothing, as the pair is
         complex at the smallest load.
+    path_error : float or None
+        What of the error comes from the increments in which the path of equilibria was taken, force. One path cannot
+        tell: None of a search, a number where another path was taken as well.
     """
 
     fx_onset: float
@@ -90,6 +93,7 @@ class Window:
     end_error: float | None
     overlap: float
     kind: Kind
+    path_error: float | None = None
 
     @classmethod
     def between(cls, onset: Edge, end: Edge | None) -> "Window":
@@ -105,12 +109,13 @@ class Window:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """The keys of the JSON contract: fx_onset, fx_end, lambda, error, kind."""
+        """The keys of the JSON contract: fx_onset, fx_end, lambda, error, error_of_path, kind."""
         return {
             "fx_onset": self.fx_onset,
             "fx_end": self.fx_end,
             "lambda": self.eigenvalue,
             "error": self.error,
+            "error_of_path": self.path_error,
             "kind": self.kind,
         }
 

@@ -90,6 +90,7 @@ class Onset(Tabled):
         return {
             "fx_c": self.fx_c,
             "error": self.error,
+            "error_of_path": self.windows[0].path_error,
             "windows": [window.as_dict() for window in self.windows],
             "doubtful": [list(increment) for increment in self.doubtful],
             "modes": None if self.modes is None else list(self.modes),

@@ -65,6 +65,7 @@ class DampedOnset:
         return {
             "fx_c": self.fx_c,
             "error": self.error,
+            "error_of_path": self.windows[0].path_error,
             "windows": [window.as_dict() for window in self.windows],
             "undamped": None if undamped is None else {"fx_c": undamped.fx_c, "error": undamped.error},
             "flows_beyond": self.flows_beyond,

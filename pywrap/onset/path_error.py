@@ -15,7 +15,9 @@ contacts on the way, the error that is left out is
 Richardson's extrapolation, for increments that need not be equal. The onset is given at F, and twice the largest
 difference that rounding of both onsets allows is its uncertainty. Where contacts change, nothing is extrapolated. The
 loads that are left out are then those after an increment with a change: a contact that closes there loses its slip
-over twice the increment, so that :math:`|F_{2h} - F_h|` is no smaller than the error of :math:`F_h`.
+over twice the increment. What is lost depends on where in the increment the contact closes, and one other path may
+lose by chance about as much as the ramp. A third path therefore goes through the middles of all increments, and with an
+error of order h the larger of :math:`|F_{2h} - F_h|` and :math:`2 |F_h - F_{h/2}|` is what is stated.
 
 Of a ramp that has fewer than `FEWEST` increments up to the onset the other path goes through the middles of the
 increments, too; its S is then the smaller one, and the same formula holds.
@@ -82,6 +84,8 @@ class PathError:
     ----------
     shift : float
         F_2h - F_h, force; nan where the pair is not found on the other path.
+    finer : float
+        F_h/2 - F_h, force, where contacts change; nan where they do not, or the pair is not found on that path.
     weight : float
         S_2h / S_h - 1.
     changes : bool
@@ -93,6 +97,7 @@ class PathError:
     """
 
     shift: float
+    finer: float
     weight: float
     changes: bool
     rounding: float
@@ -108,9 +113,10 @@ class PathError:
     @property
     def error(self) -> float:
         """Uncertainty of the onset from its path, force; rounding may hide two roundings of the shift."""
-        if np.isnan(self.shift):
+        shifts = [part for part in (abs(self.shift), 2 * abs(self.finer)) if not np.isnan(part)]
+        if not shifts:
             return self.increment
-        largest = abs(self.shift) + 2 * self.rounding
+        largest = max(shifts) + 2 * self.rounding
         part = 1.0 if self.weight > 0 else 2.0  # the ramp is the coarser path of the two
         return part * largest if self.changes else UNKNOWN * largest / abs(self.weight)
 
@@ -132,13 +138,11 @@ def with_path_error(onset: Onset, engine: Engine, path: EquilibriumPath, scene: 
     Returns
     -------
     Onset
-        Windows with the onset of the exact path and the whole error.
+        Windows with the onset of the exact path and the whole error. A window keeps its own, and a `path_error` of
+        None, where the ramp has no equilibrium at the onset that the search has found there.
     """
-    windows = tuple(
-        _whole(window, meeting(window.eigenvalue), engine, path, scene) if window.fx_onset > path.kept[0].fx else window
-        for window in onset.windows
-    )
-    return replace(onset, windows=windows)
+    others = OtherPaths(engine, path, scene)
+    return replace(onset, windows=tuple(_whole(window, meeting(window.eigenvalue), others) for window in onset.windows))
 
 
 def with_damped_path_error(
@@ -159,58 +163,98 @@ def with_damped_path_error(
     engine, path, scene
         As in `with_path_error`.
     """
-    return tuple(
-        _whole(window, crossing(window.frequency, dissipation), engine, path, scene)
-        if window.fx_onset > path.kept[0].fx
-        else window
-        for window in windows
-    )
+    others = OtherPaths(engine, path, scene)
+    return tuple(_whole(window, crossing(window.frequency, dissipation), others) for window in windows)
 
 
 W = TypeVar("W", Window, DampedWindow)
 
 
-def _whole(window: W, vanishes: Vanishes, engine: Engine, path: EquilibriumPath, scene: Scene) -> W:
-    part = path_error(window.fx_onset, vanishes, window.error, engine, path, scene)
-    return replace(window, fx_onset=window.fx_onset + part.correction, error=window.error + part.error)
+def _whole(window: W, vanishes: Vanishes, others: OtherPaths) -> W:
+    """The window as the exact path has it; as it is where the ramp itself has no equilibrium at its onset."""
+    if not window.fx_onset > others.path.kept[0].fx:
+        return window
+    try:
+        part = others.error(window.fx_onset, vanishes, window.error)
+    except NoEquilibriumError:
+        return window
+    return replace(
+        window,
+        fx_onset=window.fx_onset + part.correction,
+        error=window.error + part.error,
+        path_error=part.error,
+    )
 
 
-def path_error(
-    fx: float, vanishes: Vanishes, rounding: float, engine: Engine, path: EquilibriumPath, scene: Scene
-) -> PathError:
-    """What the increments do to the onset at fx, whose rounding error is known.
+class OtherPaths:
+    """Paths of one ramp through other loads, which the onsets of the ramp have in common for the most part.
 
     Parameters
     ----------
-    fx : float
-        The onset as found on the path, force.
-    vanishes : callable
-        Packing -> what goes through zero at the onset: `meeting` or `crossing`.
-    rounding : float
-        Uncertainty of fx from rounding, force.
-    engine, path, scene
-        As in `with_path_error`.
+    engine : Engine
+        LAMMPS with the packing of the path.
+    path : EquilibriumPath
+        The ramp, at least up to the last onset.
+    scene : Scene
+        Of the ramp.
     """
-    before = [each for each in path.kept if each.fx < fx]
-    states = [_state(each.packing, scene.load.fy) for each in (*before, _on(path, fx))]
-    changed = np.array([a != b for a, b in pairwise(states)])
-    ramp = np.array([*(each.fx for each in before), fx])
-    other = _thinned(ramp, changed) if len(changed) >= FEWEST else _halved(ramp)
-    weight = _cubes(other) / _cubes(ramp) - 1
-    increment = float(np.diff(ramp).max())
-    elsewhere = EquilibriumPath(engine, path.kept[0], scene)
-    try:
-        for load in other[1:-1]:
-            elsewhere(float(load))
-        shift = _root(lambda there: vanishes(elsewhere(there)), fx, rounding, 0.5 * increment) - fx
-    except (NoEquilibriumError, ArpackError):
-        shift = np.nan
-    return PathError(shift, float(weight), bool(changed.any()), rounding, increment)
 
+    def __init__(self, engine: Engine, path: EquilibriumPath, scene: Scene) -> None:
+        self.path = path
+        self._engine, self._scene = engine, scene
+        self._states = [_state(each.packing, scene.load.fy) for each in path.kept]
+        self._coarser, self._finer = [path.kept[0]], [path.kept[0]]
 
-def _on(path: EquilibriumPath, fx: float) -> Equilibrium:
-    packing = path(fx)
-    return Equilibrium(packing, packing.residual, 0.0, 0)
+    def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
+        """What the increments do to the onset at fx, whose rounding error is known.
+
+        Parameters
+        ----------
+        fx : float
+            The onset as found on the path, force.
+        vanishes : callable
+            Packing -> what goes through zero at the onset: `meeting` or `crossing`.
+        rounding : float
+            Uncertainty of fx from rounding, force.
+
+        Raises
+        ------
+        NoEquilibriumError
+            If the ramp has no equilibrium at fx.
+        """
+        before = [each for each in self.path.kept if each.fx < fx]
+        states = [*self._states[: len(before)], _state(self.path(fx), self._scene.load.fy)]
+        changed = np.array([a != b for a, b in pairwise(states)])
+        ramp = np.array([*(each.fx for each in before), fx])
+        few = len(changed) < FEWEST
+        other = _halved(ramp) if few else _thinned(ramp, changed)
+        third = _halved(other if few else ramp)
+        increment = float(np.diff(ramp).max())
+
+        def shifted(through: Floats, known: list[Equilibrium]) -> float:
+            try:
+                there = self._along(through, known)
+                return _root(lambda load: vanishes(there(load)), fx, rounding, 0.5 * increment) - fx
+            except (NoEquilibriumError, ArpackError):
+                return np.nan
+
+        shift = shifted(other, self._coarser)
+        finer = shifted(third, self._finer) if changed.any() else np.nan
+        return PathError(shift, finer, _cubes(other) / _cubes(ramp) - 1, bool(changed.any()), rounding, increment)
+
+    def _along(self, through: Floats, known: list[Equilibrium]) -> EquilibriumPath:
+        """The path through the inner ones of some loads, beginning with what is known of it; what is new is kept."""
+        inner = through[1:-1]
+        common = 0
+        while common < min(len(inner), len(known) - 1) and known[common + 1].fx == inner[common]:
+            common += 1
+        path = EquilibriumPath(self._engine, known[0], self._scene, known[1 : common + 1])
+        try:
+            for load in inner[common:]:
+                path(float(load))
+        finally:
+            known[:] = path.kept
+        return path
 
 
 def _state(packing: Packing, fy: float) -> bytes:

@@ -5,7 +5,7 @@ All functions are collective over the ranks of the communicator.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -127,12 +127,15 @@ class EquilibriumPath:
         Where the ramp begins.
     scene : Scene
         With a section [ramp], for its method and force tolerance.
+    further : sequence of Equilibrium
+        Those of the path that are known already, by increasing F_x.
     """
 
-    def __init__(self, engine: Engine, start: Equilibrium, scene: Scene) -> None:
+    def __init__(self, engine: Engine, start: Equilibrium, scene: Scene, further: Sequence[Equilibrium] = ()) -> None:
         self._engine, self._scene = engine, scene
-        self.kept = [start]
-        self._beside: tuple[Equilibrium, Equilibrium] | None = None  # an equilibrium, and another one near it
+        self.kept = [start, *further]
+        # an equilibrium, and another one near it
+        self._beside = (self.kept[-1], self.kept[-2]) if further else None
 
     def __call__(self, fx: float) -> Packing:
         """The packing in equilibrium at fx."""

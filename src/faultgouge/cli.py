@@ -12,7 +12,7 @@ def main() -> NoReturn:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     if os.name == "nt":
-        raise SystemExit("Error: faultgouge does not run on Windows itself: install it in WSL, where Linux's wheel fits.")
+        raise SystemExit("Error: faultgouge does not run on Windows itself: install Linux's wheel in WSL.")
     guarded(_command)
 
 

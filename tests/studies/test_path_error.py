@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import faultgouge
-from faultgouge.analysis import find_onset, spectrum
+from faultgouge.analysis import NoEquilibriumError, find_onset, spectrum
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.onset.damped import damped_onset_run
-from faultgouge.pywrap.onset.path_error import meeting, path_error, with_path_error
+from faultgouge.pywrap.onset.path_error import OtherPaths, meeting, with_path_error
 from faultgouge.pywrap.runs.path import EquilibriumPath
 
 SHIPPED = Path(faultgouge.__file__).parent / "scenes" / "paper.toml"
@@ -71,7 +71,7 @@ def test_a_contact_that_slides_before_the_onset_is_covered():
         with Engine(start.packing) as engine:
             path = EquilibriumPath(engine, start, scene)
             window, *_ = find_onset(path, increment * np.arange(round(3e-3 / increment) + 1)).windows
-            part = path_error(window.fx_onset, meeting(window.eigenvalue), window.error, engine, path, scene)
+            part = OtherPaths(engine, path, scene).error(window.fx_onset, meeting(window.eigenvalue), window.error)
         assert part.changes
         assert part.correction == 0
         found[precision, increment] = window.fx_onset, window.error + part.error
@@ -118,7 +118,31 @@ def test_an_onset_that_is_not_found_again_is_uncertain_by_the_increment():
     with Engine(start.packing) as engine:
         path = EquilibriumPath(engine, start, scene)
         path(1e-3)
-        part = path_error(0.0005, meeting(30.0), 1e-11, engine, path, scene)  # no pair coalesces there
+        part = OtherPaths(engine, path, scene).error(0.0005, meeting(30.0), 1e-11)  # no pair coalesces there
     assert np.isnan(part.shift)
     assert part.correction == 0
     assert part.error == pytest.approx(5e-4)
+
+
+class OnceOnly(EquilibriumPath):
+    """A path that finds what it knows, and nothing in between."""
+
+    def __call__(self, fx):
+        if all(each.fx != fx for each in self.kept):
+            raise NoEquilibriumError(f"no equilibrium was found beyond F_x = {fx}")
+        return super().__call__(fx)
+
+
+def test_an_onset_is_kept_where_no_equilibrium_is_found_again():
+    scene = Scene.from_mapping(
+        {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 5e-3, "until": 0.02}}
+    )
+    start = settle(scene)
+    with Engine(start.packing) as engine:
+        path = EquilibriumPath(engine, start, scene)
+        found = find_onset(path, np.array([0.0, 5e-3, 1e-2, 1.5e-2, 2e-2]))
+        whole = with_path_error(found, engine, path, scene)
+        alone = with_path_error(found, engine, OnceOnly(engine, start, scene, path.kept[1:]), scene)
+    assert alone.windows == found.windows
+    assert alone.as_dict()["error_of_path"] is None
+    assert 0 < whole.as_dict()["error_of_path"] <= whole.error

@@ -16,7 +16,7 @@ from ..ranks import is_root
 from .terminal import AsJson, ScenePath, print_json, read_scene, say, status, stored_packing
 
 if TYPE_CHECKING:
-    from ..analysis import Packing, Spectrum, Window
+    from ..analysis import DampedWindow, Packing, Spectrum, Window
     from ..pywrap import Scene
 
 app = typer.Typer()
@@ -168,6 +168,7 @@ def _undamped_onset(modes: tuple[int, int] | None, folder: Path | None, scene: S
     say(f"mu = {mu:g}: F_x^c = {with_uncertainty(run.onset.fx_c, run.onset.error)}{among}")
     _show_windows(run.onset.windows, real.get("si", []))
     _say_doubtful(run.onset.doubtful)
+    _say_of_one_path(run.onset.windows)
     return {"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond} | real
 
 
@@ -190,6 +191,7 @@ def _damped_onset(scene: Scene, mu: float) -> dict[str, Any]:
     for each in real.get("si", [])[:1]:
         stress, ratio, frequency = _columns(each)
         say(f"mu = {mu:g}: in SI a shear stress of {stress} Pa, {ratio} of the overburden, at {frequency} Hz")
+    _say_of_one_path(run.windows)
     return {"mu": mu} | run.as_dict() | real
 
 
@@ -211,6 +213,17 @@ def _say_doubtful(increments: Iterable[tuple[float, float]]) -> None:
         say(
             f"a pair was expected to become complex between F_x = {below:.6g} and {above:.6g}, and was not found: "
             "an earlier onset may hide there; take smaller increments to be sure"
+        )
+
+
+def _say_of_one_path(windows: Sequence[Window] | Sequence[DampedWindow]) -> None:
+    """What is said of onsets at which no equilibrium was found again, to tell the error of the path."""
+    alone = [each for each in windows if each.path_error is None and each.kind != "start"]
+    if alone:
+        say(
+            f"the error of {len(alone)} of {len(windows)} onsets, the first at F_x = {alone[0].fx_onset:.6g}, is that "
+            "of rounding alone: no equilibrium was found there a second time, so that the error of the path is not "
+            "known; other increments may find one"
         )
 
 
