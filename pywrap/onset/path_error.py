@@ -36,7 +36,7 @@ from scipy.linalg import eigvals
 from scipy.sparse.linalg import ArpackError
 
 from ...analysis import NoEquilibriumError, Onset, Packing, Window, dynamical_matrix, eigenpairs
-from ...analysis.damped_onset.modes import DampedModes, Pencil
+from ...analysis.damped_onset.modes import DampedMode, DampedModes, Pencil
 from ...analysis.damped_onset.windows import DampedWindow
 from ...analysis.onset import force_bearing
 from ..equilibria.quasistatic import Equilibrium
@@ -301,9 +301,16 @@ def meeting(eigenvalue: float) -> Vanishes:
 def crossing(frequency: float, dissipation: Callable[[Packing], Packing]) -> Vanishes:
     """Re s of the motion nearest to a frequency, 1 / time, as a function of the packing without its dissipation."""
 
+    known: list[DampedMode] = []
+
     def growth(packing: Packing) -> float:
-        rates = DampedModes.of(Pencil.of(dissipation(packing))).rates
-        return float(rates[np.argmin(np.abs(rates - 1j * frequency))].real)
+        pencil = Pencil.of(dissipation(packing))
+        followed = known[0].at(pencil) if known else None
+        if followed is None:
+            modes = DampedModes.of(pencil)
+            followed = modes.mode(int(np.argmin(np.abs(modes.rates - 1j * frequency))))
+        known[:] = [followed]
+        return float(followed.rate.real)
 
     return growth
 
