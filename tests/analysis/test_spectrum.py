@@ -12,6 +12,7 @@ from faultgouge.analysis import (
     discrete_frequency,
     dynamical_matrix,
     eigenpairs,
+    eigenvalues,
     growth_rate,
     spectrum,
     stable_timestep,
@@ -49,6 +50,16 @@ def test_rattlers_and_force_free_coordinates_are_left_out(bed):
     nothing = Packing(position=[[0, 9]], radius=[1], contacts=Contacts([], [], []), law=packing.law)
     assert len(spectrum(nothing).eigenvalues) == 0
     assert spectrum(nothing).omega_max == 0
+
+
+def test_eigenvalues_alone_are_those_of_the_spectrum(bed):
+    packing = bed(0.2)
+    whole, alone = spectrum(packing), eigenvalues(packing)
+    # the same operator in two orders of its coordinates: a simple eigenvalue moves by kappa u |A|
+    kappa = 1 / eigenpairs(packing, 0.0, 1).overlap.min()
+    np.testing.assert_allclose(alone, whole.eigenvalues, rtol=0, atol=1e3 * kappa * whole.rounding)
+    pairs = whole.eigenvalues[whole.eigenvalues.imag > 0]
+    assert whole.least_q == min((abs(w.real) / abs(2 * w.imag) for w in np.sqrt(pairs)), default=np.inf)
 
 
 def test_masses_and_inertia_enter(cluster):

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from faultgouge.analysis import RunFile, read_dump, spectrum
+from faultgouge.analysis import RunFile, eigenvalues, read_dump, spectrum
 from faultgouge.pywrap import Record, Scene, settle
 from faultgouge.pywrap.lammps.decks import DECKS
 
@@ -126,6 +126,16 @@ def test_spectrum_from_run_file_and_from_memory(faultgouge, tmp_path):
         here = spectrum(file.packing())
     assert printed["eigenvalues"] == [[value.real, value.imag] for value in here.eigenvalues.tolist()]
     assert printed["rattlers"] == here.rattlers.tolist()
+
+
+@pytest.mark.slow
+def test_eigenvalues_alone(faultgouge, tmp_path):
+    assert faultgouge("ramp", "scene.toml").returncode == 0
+    printed = json.loads(faultgouge("spectrum", "run.h5", "--values", "--json").stdout)
+    with RunFile(tmp_path / "run.h5") as file:
+        assert printed["eigenvalues"] == [[v.real, v.imag] for v in eigenvalues(file.packing()).tolist()]
+    first = faultgouge("spectrum", "run.h5", "--values").stdout.splitlines()[0]
+    assert [float(word) for word in first.split()] == printed["eigenvalues"][0]
 
 
 @pytest.mark.ranks

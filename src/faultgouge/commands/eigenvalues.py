@@ -26,12 +26,18 @@ app = typer.Typer()
 def spectrum(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.")],
     frame: Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")] = -1,
+    values: Annotated[
+        bool, typer.Option("--values", help="Eigenvalues alone: of a thousand disks in a third of the time.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Eigenvalues of a stored packing, its complex pairs and its rattlers."""
     from faultgouge.analysis import spectrum as eigenvalues_of
 
     packing = stored_packing(file, frame)
+    if values:
+        _values(packing, as_json)
+        return
     result = eigenvalues_of(packing)
     gain = _gain_of(packing)
     pairs: list[dict[str, Any]] = [
@@ -41,6 +47,7 @@ def spectrum(
             "overlap": pair.overlap,
             "growth_rate": pair.growth_rate,
             "frequency": pair.frequency,
+            "quality": pair.quality,
             "participation": pair.participation,
             "rotation": pair.rotation,
         }
@@ -51,6 +58,9 @@ def spectrum(
             {
                 "eigenvalues": [[value.real, value.imag] for value in result.eigenvalues.tolist()],
                 "pairs": pairs,
+                "pair_count": len(pairs),
+                "least_q": result.least_q if pairs else None,
+                "largest_growth_rate": result.growth_rate(),
                 "rattlers": result.rattlers.tolist(),
                 "fx": packing.fx,
                 "residual": packing.residual,
@@ -60,6 +70,18 @@ def spectrum(
         )
         return
     _print_spectrum(packing, result, pairs, gain)
+
+
+def _values(packing: Packing, as_json: bool) -> None:
+    """Eigenvalues without vectors: as JSON, or a line each."""
+    from faultgouge.analysis import eigenvalues
+
+    found = [[value.real, value.imag] for value in eigenvalues(packing).tolist()]
+    if as_json:
+        print_json({"eigenvalues": found, "rattlers": packing.rattlers.tolist(), "fx": packing.fx})
+        return
+    for real, imaginary in found:
+        print(f"{real:.17g} {imaginary:.17g}")
 
 
 def _print_spectrum(
@@ -75,7 +97,9 @@ def _print_spectrum(
             f"complex pair {pair['eigenvalue'][0]:.10g} +- {pair['eigenvalue'][1]:.10g} i: "
             f"D grows as exp({pair['growth_rate']:.6g} t), |y^H x| = {pair['overlap']:.2g}"
         )
-    if not pairs:
+    if pairs:
+        print(f"{len(pairs)} complex pairs; least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}")
+    else:
         print("no complex pair: linearly stable")
     if gain is not None:
         print(
