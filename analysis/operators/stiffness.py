@@ -44,6 +44,7 @@ are empty.
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from ..packing.law import Derivatives
@@ -56,7 +57,9 @@ SIGNS = np.einsum("pa,qb->pqab", SIDES, SIDES)
 """Signs of the nine numbers in the blocks of a contact, by partner of the row, of the column, and coordinates."""
 
 
-def stiffness_matrix(packing: Packing, form: Form = "consistent") -> csr_array:
+def stiffness_matrix(
+    packing: Packing, form: Form = "consistent", coupled: NDArray[np.bool_] | None = None
+) -> csr_array:
     """Assemble K = -dF/dq.
 
     Parameters
@@ -65,6 +68,9 @@ def stiffness_matrix(packing: Packing, form: Form = "consistent") -> csr_array:
         The configuration; it need not be in balance.
     form : {"consistent", "paper"}
         The exact derivative, or the one without the turning of the tangent.
+    coupled : ndarray of bool, shape (C,), optional
+        Contacts whose tangential force depends on their overlap; all by default. Of the others b = d f_t / d overlap
+        counts as zero. That is no derivative of this law: it tells what comes of b.
 
     Returns
     -------
@@ -82,6 +88,8 @@ def stiffness_matrix(packing: Packing, form: Form = "consistent") -> csr_array:
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry
     law = packing.law.derivatives(overlap, contacts.slip)
+    if coupled is not None:
+        law = law._replace(overlap_derivative=np.where(coupled, law.overlap_derivative, 0.0))
     return assembled(contact_terms(law, normal.T, distance, pairs, form), contacts.i, contacts.j[:pairs], len(packing))
 
 

@@ -148,7 +148,7 @@ class Spectrum(Tabled):
 
     @property
     def least_q(self) -> float:
-        """Smallest |Re omega| / (2 |Im omega|) of the complex pairs, or inf: a lower quality factor stops all growth."""
+        """Smallest |Re omega| / (2 |Im omega|) of the pairs, or inf: a lower quality factor stops all growth."""
         return min((pair.quality for pair in self.pairs), default=np.inf)
 
     @property

@@ -71,6 +71,10 @@ GAIN = 1e-2
 1e-3 from no displacement, and smaller ones have smaller factors."""
 
 
+REACH = 0.99
+"""Displacement of a disk from an equilibrium, in units of its radius, up to which a trial is made."""
+
+
 class Guess(NamedTuple):
     """Where an iteration starts.
 
@@ -120,6 +124,8 @@ def iterated(
     course = _Course(start.floor, answers, force_tolerance)
     evaluations = 0
     for iteration in range(ITERATIONS):
+        if _beyond_reach(displacement, base):
+            return None, evaluations
         trial, evaluations = displaced(base, displacement), evaluations + 1
         # What a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved.
         if course.ends_at(trial, result=guess is None or iteration > 0):
@@ -239,4 +245,12 @@ def _out_of_the_way(trial: Packing, disks: NDArray[np.int64], displacement: Floa
     """The displacement with which these disks end up in the middle of their cages."""
     changed = displacement.copy()
     changed.reshape(3, -1)[:2, disks] += (middle_of_cage(trial, disks) - trial.position[disks]).T
+    moved = np.hypot(*changed.reshape(3, -1)[:2])
+    far = disks[moved[disks] > REACH * trial.radius[disks]]
+    changed.reshape(3, -1)[:2, far] *= REACH * trial.radius[far] / moved[far]  # a part of the way
     return changed
+
+
+def _beyond_reach(displacement: Floats, packing: Packing) -> bool:
+    """Whether a disk is to move by about its radius, which LAMMPS refuses: no iteration that converges goes there."""
+    return bool(np.any(np.hypot(*displacement.reshape(3, -1)[:2]) > REACH * packing.radius))

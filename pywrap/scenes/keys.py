@@ -7,7 +7,7 @@ from pydantic import Discriminator, Tag
 from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
 from .refusals import Section
 from .sections import Damping, Friction, Law, Load, Output, Perturb, Ramp, Relax
-from .study_sections import Eruptions, Trigger
+from .study_sections import Eruptions, Modes, Trigger
 from .units_section import Units
 
 
@@ -21,7 +21,7 @@ class Keys(Section):
         1e-17 instead of 1e-11.
     packing, law, load, relax
         Sections that every scene has; relax may be left out in TOML.
-    ramp, perturb, friction, damping, trigger, eruptions, units, output
+    ramp, perturb, friction, damping, trigger, eruptions, modes, units, output
         Sections or None, which means that the feature is not in the run.
     """
 
@@ -38,6 +38,7 @@ class Keys(Section):
     friction: Friction | None = None
     trigger: Trigger | None = None
     eruptions: Eruptions | None = None
+    modes: Modes | None = None
     units: Units | None = None
     damping: Damping | None = None
     output: Output | None = None

@@ -11,6 +11,7 @@
     [friction]  mu(v) that falls with the velocity v of the upper layer
     [trigger]   the map of waves that trigger
     [eruptions] the loads from which undamped runs start that go on until they are over
+    [modes]     the loads at which the complex pairs are counted
     [units]     what the numbers are in SI
     [output]    what is written beside the result
 
@@ -32,7 +33,7 @@ from .keys import Keys
 from .packing_section import GeneratedPacking, StoredPacking
 from .refusals import SceneError, refusal, sentence
 from .sections import Damping, Friction, Law, Load, Output, Perturb, Ramp, Relax
-from .study_sections import Eruptions, Trigger
+from .study_sections import Eruptions, Modes, Trigger
 from .units import real_units
 from .units_section import Units
 
@@ -151,6 +152,7 @@ SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
     "friction": (Friction,),
     "trigger": (Trigger,),
     "eruptions": (Eruptions,),
+    "modes": (Modes,),
     "units": (Units,),
     "damping": (Damping,),
     "output": (Output,),

@@ -1,4 +1,4 @@
-"""The sections of a scene that belong to one study each: [trigger] and [eruptions]."""
+"""The sections of a scene that belong to one study each: [trigger], [eruptions] and [modes]."""
 
 from typing import Annotated, Literal
 
@@ -48,3 +48,28 @@ class Eruptions(Section):
 
     load: Annotated[tuple[Positive, ...], Field(min_length=1, strict=False)]
     time: Positive = 3000.0
+
+
+class Modes(Section):
+    """[modes] the complex pairs along the ramp.
+
+    Attributes
+    ----------
+    fx_over_fy : tuple of float
+        Loads at which all eigenvalues are taken, in units of F_y. Those beyond the last equilibrium are left out.
+    """
+
+    fx_over_fy: Annotated[tuple[Positive, ...], Field(min_length=1, strict=False)] = (
+        0.003,
+        0.01,
+        0.02,
+        0.03,
+        0.05,
+        0.1,
+        0.14,
+        0.2,
+        0.25,
+        0.3,
+        0.35,
+        0.4,
+    )

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...pywrap import Scene
+from ...pywrap.scenes.study_sections import Modes
 from ..genericity.levels import growth, levels
 from ..genericity.surrogates import surrogates
+from ..modes.compute import modes
 from .events import eruptions, trigger
 from .onset import Start, onset
 from .triggering import triggering
@@ -82,6 +84,12 @@ def settling_seconds(scene: Scene) -> float:
     return 0.3 * (disks_of(scene) / 100) ** 1.3
 
 
+def modes_seconds(scene: Scene) -> float:
+    """CPU seconds of the complex pairs along a ramp: 2 s for 100 disks and 12 loads, 100 s for 1,000."""
+    loads = len((scene.modes or Modes()).fx_over_fy)
+    return 0.02 * loads * (disks_of(scene) / 100) ** 2.7 + 3e-3 * increments(scene) * disks_of(scene) / 100
+
+
 def disks_of(scene: Scene) -> int:
     """Number of disks, of a stored packing as many as in the paper's."""
     return int(getattr(scene.packing, "disks", 100))
@@ -92,6 +100,7 @@ TASKS: Mapping[str, Task] = {
     "triggering": Task(triggering, triggering_seconds),
     "trigger": Task(trigger, trigger_seconds),
     "eruptions": Task(eruptions, eruptions_seconds),
+    "modes": Task(modes, modes_seconds),
     "levels": Task(levels, dense_seconds),
     "growth": Task(growth, lambda scene: increments(scene) * dense_seconds(scene)),
     "surrogates": Task(surrogates, lambda scene: 3 * onset_seconds(scene)),

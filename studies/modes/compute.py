@@ -1,0 +1,186 @@
+r"""Complex pairs along a ramp: how many, how fast, and what stops them.
+
+Beyond the first window the operator :math:`K = S + A` of a packing, S symmetric and A antisymmetric, has ever more
+complex pairs. With :math:`\omega = \sqrt\lambda`, the mean square displacement of a pair grows at the rate
+:math:`2 |\mathrm{Im}\,\omega|`, and
+
+.. math:: Q = \frac{|\mathrm{Re}\,\omega|}{2\,|\mathrm{Im}\,\omega|}
+
+is the quality factor below which a dissipation that gives each mode the loss :math:`\omega/Q` stops the growth. The
+least Q over the pairs of a load is the Q that stops them all. The *share* of complex modes is twice the number of pairs
+over the number of eigenvalues; rattlers have none.
+
+**Which pairs count.** Rounding makes pairs of eigenvalues that nearly meet, with imaginary parts of up to
+:math:`(u |A|_F\, c)^{1/2}` for couplings c (:mod:`~faultgouge.analysis.spectrum.spectrum`). No coupling is larger than
+the largest eigenvalue, so that a pair beyond that bound is real without a look at its vectors. Of the others the
+vectors are computed, and decide.
+
+**Where b matters.** A tangential force that depends on the overlap, :math:`b = \partial f_t/\partial\delta`, makes K
+non-symmetric. Of packings of up to `SMALL` disks pairs are also counted with b of sticking contacts alone, of sliding
+contacts alone, and of none, at the same equilibria. (The turning of the tangent, which is non-symmetric too, stays.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.linalg import eigvals
+
+from ...analysis import NoEquilibriumError, Packing, dynamical_matrix, eigenpairs, eigenvalues, stiffness_matrix
+from ...analysis.spectrum.spectrum import (
+    SAFETY,
+    Complexes,
+    active_coordinates,
+    believable,
+    mass_weighted,
+    unit_rounding,
+)
+from ...pywrap import Engine, Equilibrium, Scene
+from ...pywrap.runs.path import EquilibriumPath
+from ...pywrap.scenes.refusals import needed
+from ...pywrap.scenes.study_sections import Modes
+from ..sweep.onset import AT_LIMIT, Start
+
+SMALL = 300
+"""Disks up to which b is switched: three more decompositions a load."""
+
+BESIDE = 1e-9
+"""Distance of a shift from the eigenvalue whose vectors are wanted, in units of the eigenvalue."""
+
+DIGITS = 7
+"""Digits of the frequencies that are stored."""
+
+
+@dataclass(frozen=True)
+class Counted:
+    """The complex pairs of one packing.
+
+    Attributes
+    ----------
+    omega : ndarray of complex, shape (P,)
+        Of each pair the frequency with positive real and imaginary part, fastest growing first, 1 / time.
+    modes : int
+        Number of eigenvalues.
+    """
+
+    omega: Complexes
+    modes: int
+
+    @classmethod
+    def of(cls, values: Complexes) -> Counted:
+        """Those of some eigenvalues, of which all with positive imaginary part count."""
+        omega = np.sqrt(values[values.imag > 0])
+        return cls(omega[np.argsort(-omega.imag)], len(values))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers: pairs, share, growth_rate, omega (of the fastest pair), least_q."""
+        fastest = self.omega[0] if len(self.omega) else None
+        return {
+            "pairs": len(self.omega),
+            "share": 2 * len(self.omega) / self.modes if self.modes else 0.0,
+            "growth_rate": 0.0 if fastest is None else float(2 * fastest.imag),
+            "omega": None if fastest is None else float(fastest.real),
+            "least_q": float(np.min(self.omega.real / (2 * self.omega.imag))) if len(self.omega) else None,
+        }
+
+
+def counted(packing: Packing) -> Counted:
+    """The complex pairs of a packing that exceed their rounding uncertainty.
+
+    Parameters
+    ----------
+    packing : Packing
+        In equilibrium.
+    """
+    values = eigenvalues(packing)
+    rounding = unit_rounding(dynamical_matrix(packing)[0].data)
+    surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))
+    doubtful = np.flatnonzero((values.imag > 0) & (values.imag <= surely))
+    noise = [k for k in doubtful if not _is_real(packing, values[k], rounding)]
+    values = values.copy()
+    values[noise] = values[noise].real
+    return Counted.of(values)
+
+
+def _is_real(packing: Packing, value: complex, rounding: float) -> bool:
+    found = eigenpairs(packing, value * (1 + BESIDE), 2)
+    nearest = int(np.argmin(np.abs(found.values - value)))
+    return believable(value, float(found.overlap[nearest]), rounding)
+
+
+def switched(packing: Packing) -> dict[str, dict[str, Any]]:
+    """The complex pairs with b of sticking contacts alone, of sliding contacts alone, and of none."""
+    slip, limit = np.abs(packing.contacts.slip), packing.law.slip_limit(packing.geometry.overlap)
+    sliding = slip >= AT_LIMIT * limit
+    return {
+        name: Counted.of(_values(packing, coupled)).as_dict()
+        for name, coupled in (("sticking", ~sliding), ("sliding", sliding), ("none", np.zeros_like(sliding)))
+    }
+
+
+def _values(packing: Packing, coupled: NDArray[np.bool_]) -> Complexes:
+    """Eigenvalues of K in which b counts for some contacts; pairs within the bound of rounding are made real."""
+    matrix = mass_weighted(stiffness_matrix(packing, coupled=coupled), packing)
+    active = active_coordinates(matrix)
+    dense = matrix[active][:, active].toarray()
+    values = np.asarray(eigvals(dense, check_finite=False), dtype=np.complex128)
+    surely = np.sqrt(SAFETY * unit_rounding(dense) * np.abs(values).max(initial=0.0))
+    return np.where(np.abs(values.imag) > surely, values, values.real)
+
+
+def modes(scene: Scene, start: Start) -> dict[str, Any]:
+    """The complex pairs of a scene at the loads of its section [modes], as a row of a sweep.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no section [ramp].
+    NoEquilibriumError
+        If the packing does not settle.
+    """
+    step, wanted = needed(scene.ramp, "ramp").step, (scene.modes or Modes()).fx_over_fy
+    rest = start(scene.law.mus[0])
+    row: dict[str, Any] = {"ends": "until", "loads": []}
+    with Engine(rest.packing, MPI.COMM_SELF) as engine:
+        path = EquilibriumPath(engine, rest, scene)
+        for share in sorted(wanted):
+            try:
+                packing = _climbed(path, share * scene.load.fy, step)
+            except NoEquilibriumError:
+                row["ends"] = "no equilibrium"
+                break
+            row["loads"].append({"fx_over_fy": share, "fx": packing.fx} | _load(packing, rest))
+    return row | {"reach": path.kept[-1].fx, "contacts": len(rest.packing.contacts)}
+
+
+def _climbed(path: EquilibriumPath, fx: float, step: float) -> Packing:
+    """The packing at fx, by multiples of the step up to there."""
+    for k in range(round(path.kept[-1].fx / step), int(fx / step) + 1):
+        if path.kept[-1].fx < k * step < fx:
+            path(k * step)
+            del path.kept[:-2]  # thousands of equilibria of a large packing would fill the memory
+    return path(fx)
+
+
+def _load(packing: Packing, rest: Equilibrium) -> dict[str, Any]:
+    """What is told of one load."""
+    found = counted(packing)
+    slip, limit = np.abs(packing.contacts.slip), packing.law.slip_limit(packing.geometry.overlap)
+    row = found.as_dict() | {
+        "modes": found.modes,
+        "contacts": len(packing.contacts),
+        "sliding": int(np.count_nonzero(slip >= AT_LIMIT * limit)),
+        "rattlers": len(packing.rattlers),
+    }
+    if len(found.omega):
+        value = found.omega[0] ** 2
+        pair = eigenpairs(packing, value * (1 + BESIDE), 1)
+        row |= {"participation": float(pair.participation[0]), "rotation": float(pair.rotation[0])}
+    if len(packing) <= SMALL:
+        row["b_of"] = switched(packing)
+    digits = [[float(f"{w.real:.{DIGITS}g}"), float(f"{w.imag:.{DIGITS}g}")] for w in found.omega.tolist()]
+    return row | {"frequencies": digits}
