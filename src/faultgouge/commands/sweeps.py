@@ -1,9 +1,9 @@
-"""Many scenes: sweep, merge, and the study of how generic the onset is."""
+"""Many scenes: sweep, merge, and the studies of how generic the onset is, and of the complex modes beyond it."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -111,3 +111,59 @@ def genericity(
         compute(output, say, lambda ended, count: progress(ended, "scenes", count), share, workers)
     if is_root():
         say(f"written: {write_page(output)}")
+
+
+@app.command(epilog="Example: faultgouge modes modes.toml -o modes")
+def modes(
+    file: Annotated[
+        Path, typer.Argument(metavar="SCENE|SWEEP", help="A scene, or a sweep of the task modes.", show_default=False)
+    ],
+    output: Folder = Path("modes"),
+    shard: Annotated[str, typer.Option(metavar="K/N", help="Part K of N of a sweep alone.")] = "1/1",
+    workers: Workers = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what there is to do and what it will cost.")] = False,
+) -> None:
+    """Complex modes along the ramp: how many, how fast they grow, and which loss would stop them.
+
+    At each load of the section \\[modes], all eigenvalues: the share of complex
+    ones, the largest growth rate, and the least Q, the quality factor below which
+    dissipation stops all growth. Leaves modes.json, modes.csv, pictures over the
+    load and of the plane of frequencies, and a film of that plane. Of a sweep,
+    medians over its packings.
+    """
+    from faultgouge.studies.modes.study import modes as count_modes
+    from faultgouge.studies.modes.study import wanted_of
+    from faultgouge.studies.sweep.compute import LINES
+    from faultgouge.studies.sweep.estimate import estimate
+    from faultgouge.studies.sweep.points import shard as part_of
+
+    wanted, part = wanted_of(file), _shard(shard)
+    if is_root():
+        for line in estimate(wanted.task, part_of(wanted.points, part)).words():
+            say(line)
+    if dry_run:
+        return
+    keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there")
+    result = count_modes(wanted, output, part, say, lambda rows, count: progress(rows, "scenes", count), workers)
+    if is_root():
+        _show_modes(result["rows"])
+        failed = [each["says"] for each in result["packings"] if each["says"] is not None]
+        say(f"{len(result['packings'])} packings, {len(failed)} of them failed; written: {output}/modes.json")
+        for sentence in failed[:1]:
+            say(f"the first that failed: {sentence}")
+
+
+def _show_modes(rows: list[dict[str, Any]]) -> None:
+    """The loads of a packing, or the first of many, as a table on standard error."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q", box=box.SIMPLE_HEAD)
+    first = [row for row in rows if (row["disks"], row["seed"]) == (rows[0]["disks"], rows[0]["seed"])]
+    for row in first:
+        least = "" if row["least_q"] is None else f"{row['least_q']:.4g}"
+        numbers = f"{row['pairs']}", f"{row['share']:.3f}", f"{row['growth_rate']:.4g}", least
+        table.add_row(f"{row['fx_over_fy']:g}", *numbers)
+    if first:
+        Console(stderr=True, highlight=False).print(table)

@@ -1,0 +1,128 @@
+"""Complex modes of a scene or of a sweep, computed, drawn and written into a folder."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from ...analysis.files.wholefile import write_text
+from ...figures.style import save
+from ...figures.writers import write_film
+from ...pywrap import Scene
+from ..sweep.compute import Progress, Row, Say, run_sweep
+from ..sweep.points import Sweep
+from ..sweep.tasks import TASKS
+from .draw import PlaneFilm, over_load, plane
+from .numbers import along
+from .tables import Table
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q")
+
+PANELS = 4
+"""Loads whose frequencies are drawn side by side."""
+
+RATE = 2.0
+"""Frames of the film a second."""
+
+
+def wanted_of(path: Path) -> Sweep:
+    """The sweep of a file that has a sweep of the task "modes", or a scene, which is a sweep of one point.
+
+    Raises
+    ------
+    SceneError
+        If the file has neither.
+    """
+    try:
+        has_task = "task" in tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        has_task = False  # the reader of scenes says what is wrong
+    if has_task:
+        return Sweep.from_toml(path, {"modes": TASKS["modes"]})
+    return Sweep.from_mapping({"task": "modes", "scene": Scene.from_toml(path).resolved()}, TASKS)
+
+
+def modes(
+    sweep: Sweep,
+    output: Path,
+    part: tuple[int, int] = (1, 1),
+    say: Say = print,
+    progress: Progress = lambda rows, _: rows,
+    workers: int | None = 1,
+) -> dict[str, Any]:
+    """Count the complex pairs of every scene of a sweep at the loads of [modes].
+
+    Parameters
+    ----------
+    sweep : Sweep
+        Of the task "modes".
+    output : Path
+        The folder: results.jsonl as of any sweep, modes.json, modes.csv, pictures and a film.
+    part, say, progress, workers
+        As of :func:`~faultgouge.studies.sweep.compute.run_sweep`.
+
+    Returns
+    -------
+    dict
+        What modes.json holds; empty on ranks other than 0.
+    """
+    rows = run_sweep(sweep, output, part, say, progress, workers)
+    if not rows:
+        return {}
+    by_key = {point.key: point for point in sweep.points}
+    lines = [line for row in rows for line in _lines(row, by_key[row["key"]].scene)]
+    ends = [{"values": row["values"], "says": row["says"], **_end(row)} for row in rows]
+    result = {"asked": sweep.as_dict(), "rows": lines, "packings": ends}
+    write_text(output / "modes.json", json.dumps(result, indent=1) + "\n")
+    text = StringIO()
+    table = csv.DictWriter(text, COLUMNS, extrasaction="ignore", lineterminator="\n")
+    table.writeheader()
+    table.writerows(lines)
+    write_text(output / "modes.csv", text.getvalue())
+    _draw(rows, lines, output, say)
+    return result
+
+
+def _lines(row: Row, scene: Scene | None) -> list[dict[str, Any]]:
+    """A line for each load of a packing."""
+    if scene is None or row["says"] is not None:
+        return []
+    packing = scene.packing.model_dump()
+    known = {"disks": packing.get("disks"), "seed": packing.get("seed")}
+    return [known | {k: v for k, v in load.items() if k != "frequencies"} for load in row["result"]["loads"]]
+
+
+def _end(row: Row) -> dict[str, Any]:
+    return {key: row["result"].get(key) for key in ("ends", "reach", "contacts")}
+
+
+def _draw(rows: list[Row], lines: list[dict[str, Any]], output: Path, say: Say) -> None:
+    """Pictures of all packings over the load, and of the first packing in the plane of frequencies."""
+    found = [{"cpu_seconds": row["cpu_seconds"], **row["result"]} for row in rows if row["says"] is None]
+    if not lines:
+        say("no packing bears any of the loads: there is nothing to draw")
+        return
+    sizes = sorted({line["disks"] for line in lines if line["disks"] is not None})
+    if len(sizes) < 2:
+        courses = {"all": along(Table("all", tuple(found)))}
+    else:
+        of_size = {n: {line["seed"] for line in lines if line["disks"] == n} for n in sizes}
+        keyed = [(row["values"].get("packing.disks"), row["result"]) for row in rows if row["says"] is None]
+        courses = {str(n): along(Table(str(n), tuple(each for disks, each in keyed if disks == n))) for n in of_size}
+    save(over_load(courses), output / "modes")
+    complex_loads = [load for load in found[0]["loads"] if load["pairs"]]
+    if not complex_loads:
+        say("the first packing has no complex pair at these loads: its plane of frequencies is not drawn")
+        return
+    step = max(1, -(-len(complex_loads) // PANELS))
+    save(plane(complex_loads[::-1][::step][::-1]), output / "plane")
+    write_film(PlaneFilm(complex_loads), output / "plane.gif", RATE)

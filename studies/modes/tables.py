@@ -1,0 +1,109 @@
+"""The tables of the study: a line for each packing and load, and medians over packings with their intervals."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...analysis.files.wholefile import write_text
+from ...analysis.packing.packing import Floats
+from ..sweep.compute import LINES, stored
+
+ENDING = ".jsonl"
+
+DRAWS = 2000
+"""Resamples of the packings for an interval."""
+
+LEFT_OUT = ("frequencies",)
+"""What a line of a table lacks of a result: as long as the spectrum itself."""
+
+
+def condense(results: Path, tables: Path) -> None:
+    """Write the tables from the folders that the sweeps have left, one a set.
+
+    Parameters
+    ----------
+    results : Path
+        With a folder for each set.
+    tables : Path
+        The folder of the tables.
+    """
+    tables.mkdir(parents=True, exist_ok=True)
+    for folder in sorted(path for path in results.iterdir() if (path / LINES).exists()):
+        rows = sorted(stored(folder / LINES).values(), key=lambda row: row["values"]["packing.seed"])
+        write_text(tables / f"{folder.name}{ENDING}", "".join(json.dumps(_line(row)) + "\n" for row in rows))
+
+
+def _line(row: dict[str, Any]) -> dict[str, Any]:
+    result = row["result"]
+    loads = [{k: v for k, v in load.items() if k not in LEFT_OUT} for load in result.get("loads", [])]
+    line = {"seed": row["values"]["packing.seed"], "says": row["says"], "cpu_seconds": row["cpu_seconds"]}
+    return line | result | {"loads": loads}
+
+
+@dataclass(frozen=True)
+class Table:
+    """One set of packings.
+
+    Attributes
+    ----------
+    name : str
+        Of the set, such as "force 100".
+    rows : tuple of dict
+        A packing each, by seed.
+    """
+
+    name: str
+    rows: tuple[dict[str, Any], ...]
+
+    @property
+    def disks(self) -> int:
+        """Disks of each packing."""
+        words = self.name.split()
+        return int(words[-1]) if words[-1].isdecimal() else 100
+
+    @property
+    def loads(self) -> list[float]:
+        """F_x/F_y that some packing has borne."""
+        return sorted({load["fx_over_fy"] for row in self.rows for load in row.get("loads", ())})
+
+    def at(self, fx_over_fy: float, key: str) -> Floats:
+        """A number of every packing that has borne a load, shape (n,): least Q is inf where there is no pair."""
+        found = [load[key] for row in self.rows for load in row.get("loads", ()) if load["fx_over_fy"] == fx_over_fy]
+        return np.array([np.inf if value is None else value for value in found], dtype=float)
+
+
+def read_tables(folder: Path) -> dict[str, Table]:
+    """The tables of a folder by name; packings that failed are left out, and counted by `failures`."""
+    found = {}
+    for path in sorted(folder.glob(f"*{ENDING}")):
+        rows = [json.loads(line) for line in path.read_text().splitlines()]
+        name = path.stem.replace("_", " ")
+        found[name] = Table(name, tuple(row for row in rows if row["says"] is None))
+    return found
+
+
+def median(values: Sequence[float] | Floats, seed: int = 0) -> list[float]:
+    """Median with its 95 % interval from resampled packings: [median, low, high]; inf where half have no pair."""
+    values = np.sort(np.asarray(values, dtype=float))
+    if len(values) == 0:
+        return [np.nan] * 3
+    chosen = np.sort(np.random.default_rng(seed).integers(len(values), size=(DRAWS, len(values))), axis=1)
+    middles = np.sort(values[chosen[:, len(values) // 2]])
+    return [float(values[len(values) // 2]), float(middles[int(0.025 * DRAWS)]), float(middles[int(0.975 * DRAWS)])]
+
+
+def power(sizes: Iterable[int], samples: Sequence[Floats], seed: int = 0) -> list[float]:
+    """Exponent p of medians that go as N^p, with its 95 % interval from resampled packings: [p, low, high]."""
+    logs, generator = np.log(list(sizes)), np.random.default_rng(seed)
+
+    def fitted(each: Sequence[Floats]) -> float:
+        return float(np.polyfit(logs, np.log([np.median(one) for one in each]), 1)[0])
+
+    drawn = [fitted([generator.choice(one, len(one)) for one in samples]) for _ in range(DRAWS)]
+    return [fitted(samples), *(float(each) for each in np.quantile(drawn, [0.025, 0.975]))]

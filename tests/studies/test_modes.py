@@ -1,0 +1,83 @@
+"""Complex modes over the load: counts against NumPy's, what is left in the folder, and where b matters."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import spectrum, stiffness_matrix
+from faultgouge.pywrap import Engine, Scene, equilibrate, settle
+from faultgouge.studies.modes.compute import counted, modes, switched
+
+SCENE = {
+    "packing": {"disks": 60, "width": 9.2, "seed": 77},
+    "law": {"kn": 2e5},
+    "load": {"fy": 3.0},
+    "ramp": {"step": 0.03, "until": 0.9},
+    "modes": {"fx_over_fy": [0.02, 0.1, 0.2]},
+}
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    """Packings of 60 disks at three loads."""
+    state, found = settle(Scene.from_mapping(SCENE)), []
+    with Engine(state.packing) as engine:
+        for fx in (0.06, 0.3, 0.6):
+            state = equilibrate(engine, state, fx=fx)
+            found.append(state.packing)
+    return found
+
+
+def test_counts_are_those_of_numpy(loaded):
+    for packing in loaded:
+        found = counted(packing)
+        mass = np.tile(packing.mass, 3)  # the inertia factor is 1
+        dense = stiffness_matrix(packing).toarray() / np.sqrt(mass[:, None] * mass)
+        plain = np.linalg.eigvals(dense[np.ix_(*[np.flatnonzero(dense.any(axis=1))] * 2)])
+        assert len(found.omega) == np.count_nonzero(plain.imag > 0)
+        assert found.modes == len(plain)
+        # the least Q is that of a pair far from coalescing: two orders of the coordinates give ten digits
+        assert (found.as_dict()["least_q"] or np.inf) == pytest.approx(spectrum(packing).least_q, rel=1e-9)
+    assert len(found.omega) > 3
+
+
+def test_without_b_no_pair_is_complex(loaded):
+    """What is left is the turning of the tangent; b of all contacts is K itself."""
+    packing = loaded[-1]
+    every = np.ones(len(packing.contacts), dtype=bool)
+    same = stiffness_matrix(packing, coupled=every) - stiffness_matrix(packing)
+    assert abs(same).max() == 0
+    found = switched(packing)
+    assert found["none"]["pairs"] == 0
+    assert found["sticking"]["pairs"] > 0
+    assert counted(packing).as_dict()["pairs"] >= found["sticking"]["pairs"]
+
+
+@pytest.mark.slow
+def test_the_command_leaves_rows_pictures_and_a_film(faultgouge, tmp_path):
+    text = "".join(f"[{name}]\n" + "".join(f"{k} = {v}\n" for k, v in part.items()) for name, part in SCENE.items())
+    (tmp_path / "scene.toml").write_text(text)
+    done = faultgouge("modes", "scene.toml", "-o", "out")
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "out/modes.json").read_text())
+    assert [row["fx_over_fy"] for row in result["rows"]] == [0.02, 0.1, 0.2]
+    assert all(row["disks"] == 60 and row["seed"] == 77 for row in result["rows"])
+    scene = Scene.from_mapping(SCENE)
+    here = modes(scene, lambda mu: settle(scene, mu))
+    assert [row["pairs"] for row in result["rows"]] == [load["pairs"] for load in here["loads"]]
+    with (tmp_path / "out/modes.csv").open() as file:
+        assert [int(row["pairs"]) for row in csv.DictReader(file)] == [row["pairs"] for row in result["rows"]]
+    assert {"modes.png", "plane.png", "plane.gif"} <= {path.name for path in (tmp_path / "out").iterdir()}
+    again = faultgouge("modes", "scene.toml", "-o", "out")
+    assert "1 of 1 points are in out/results.jsonl already" in again.stderr
+
+
+@pytest.mark.slow
+def test_loads_beyond_the_last_equilibrium_are_left_out():
+    scene = Scene.from_mapping(SCENE | {"modes": {"fx_over_fy": [0.2, 5.0]}, "ramp": {"step": 0.03, "until": 20.0}})
+    found = modes(scene, lambda mu: settle(scene, mu))
+    assert found["ends"] == "no equilibrium"
+    assert [load["fx_over_fy"] for load in found["loads"]] == [0.2]
+    assert 0.6 <= found["reach"] < 15
