@@ -1,8 +1,8 @@
 """The study of complex modes: its tables computed, its page made from them, or a tenth of them computed again.
 
-    python docs/modes/make.py compute FOLDER     all sweeps, on all cores, resumable; hours. Then the tables
-    python docs/modes/make.py page               modes.md, modes.json and the pictures, from the tables beside this file
-    python docs/modes/make.py check FOLDER       one packing in ten once more, compared with the tables
+python docs/modes/make.py compute FOLDER     all sweeps, on all cores, resumable; hours. Then the tables
+python docs/modes/make.py page               modes.md, modes.json and the pictures, from the tables beside this file
+python docs/modes/make.py check FOLDER       one packing in ten once more, compared with the tables
 """
 
 import json

@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import Packing
+from ...analysis import Packing, nearest_image, touching
 from ..lammps.trial import EPSILON, Trial
 from .newton_matrix import Factors, factored
 from .rattlers import middle_of_cage
@@ -70,6 +70,9 @@ GAIN = 1e-2
 """Factor by which the first iteration reduces the residual, where nothing is known yet: 1e-2 is that of an increment of
 1e-3 from no displacement, and smaller ones have smaller factors."""
 
+
+NEAR = 0.25
+"""Displacement, in units of the smallest radius, up to which no centre of a disk comes to lie in another disk."""
 
 REACH = 0.99
 """Displacement of a disk from an equilibrium, in units of its radius, up to which a trial is made."""
@@ -252,5 +255,19 @@ def _out_of_the_way(trial: Packing, disks: NDArray[np.int64], displacement: Floa
 
 
 def _beyond_reach(displacement: Floats, packing: Packing) -> bool:
-    """Whether a disk is to move by about its radius, which LAMMPS refuses: no iteration that converges goes there."""
-    return bool(np.any(np.hypot(*displacement.reshape(3, -1)[:2]) > REACH * packing.radius))
+    """Whether LAMMPS would refuse to go there: a disk moves by its radius, or the centre of another comes to lie in it.
+
+    No iteration that converges goes there.
+    """
+    moved = displacement.reshape(3, -1)[:2]
+    far = np.hypot(*moved)
+    if far.max(initial=0.0) <= NEAR * packing.radius.min():
+        return False
+    if np.any(far > REACH * packing.radius):
+        return True
+    there = packing.position + moved.T
+    contacts = touching(there, packing.radius, packing.box_length)
+    pairs = ~contacts.floor
+    i, j = contacts.i[pairs], contacts.j[pairs]
+    apart = np.linalg.norm(nearest_image(there[i] - there[j], packing.box_length), axis=1)
+    return bool(np.any(apart <= np.maximum(packing.radius[i], packing.radius[j])))

@@ -9,6 +9,7 @@ import pytest
 from faultgouge.analysis import spectrum, stiffness_matrix
 from faultgouge.pywrap import Engine, Scene, equilibrate, settle
 from faultgouge.studies.modes.compute import counted, modes, switched
+from faultgouge.studies.modes.sets import sets
 
 SCENE = {
     "packing": {"disks": 60, "width": 9.2, "seed": 77},
@@ -81,3 +82,12 @@ def test_loads_beyond_the_last_equilibrium_are_left_out():
     assert found["ends"] == "no equilibrium"
     assert [load["fx_over_fy"] for load in found["loads"]] == [0.2]
     assert 0.6 <= found["reach"] < 15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "seed"), [("force 50", 6), ("force 100", 25)])
+def test_displacements_that_lammps_would_refuse_end_no_ramp(name, seed):
+    """On the way Newton's method tries displacements with which the centre of a disk lies in another disk."""
+    (point,) = (point for point in sets()[name].points if point.values["packing.seed"] == seed)
+    found = modes(point.scene, lambda mu: settle(point.scene, mu))
+    assert len(found["loads"]) >= 9
