@@ -121,10 +121,10 @@ def levels(scene: Scene, start: Start) -> dict[str, Any]:
     """
     pencil = pencil_of(scene, start)
     gaps = np.diff(pencil.values)
-    spacing = _local(gaps)
+    spacing = local_mean(gaps)
     neighbours = np.arange(len(gaps)), np.arange(1, len(gaps) + 1)
-    coupling = np.sqrt(_local(pencil.antisymmetric[neighbours] ** 2)) / spacing
-    speed = np.sqrt(_local(pencil.symmetric[neighbours] ** 2)) / spacing
+    coupling = np.sqrt(local_mean(pencil.antisymmetric[neighbours] ** 2)) / spacing
+    speed = np.sqrt(local_mean(pencil.symmetric[neighbours] ** 2)) / spacing
     ratios = np.minimum(gaps[1:], gaps[:-1]) / np.maximum(gaps[1:], gaps[:-1])
     weight = np.sum(pencil.basis.reshape(3, -1, len(pencil.values)) ** 2, axis=0)
     return {
@@ -152,7 +152,7 @@ def entry_factor(ratio: Floats) -> Floats:
     return np.asarray(0.5 + (ratio + np.arctan2(1.0, ratio)) / np.pi)
 
 
-def _local(values: Floats) -> Floats:
+def local_mean(values: Floats) -> Floats:
     """The mean over neighbouring levels."""
     from scipy.ndimage import uniform_filter1d  # slow to import
 

@@ -22,6 +22,7 @@ contacts alone, and of none, at the same equilibria. (The turning of the tangent
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,7 +40,7 @@ from ...analysis.spectrum.spectrum import (
     mass_weighted,
     unit_rounding,
 )
-from ...pywrap import Engine, Equilibrium, Scene
+from ...pywrap import Engine, Scene
 from ...pywrap.runs.path import EquilibriumPath
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.study_sections import Modes
@@ -133,7 +134,7 @@ def _values(packing: Packing, coupled: NDArray[np.bool_]) -> Complexes:
 
 
 def modes(scene: Scene, start: Start) -> dict[str, Any]:
-    """The complex pairs of a scene at the loads of its section [modes], as a row of a sweep.
+    """The complex pairs of a scene at the loads of its section [modes], as a row of a sweep: the task "modes".
 
     Raises
     ------
@@ -141,6 +142,21 @@ def modes(scene: Scene, start: Start) -> dict[str, Any]:
         If the scene has no section [ramp].
     NoEquilibriumError
         If the packing does not settle.
+    """
+    return along_ramp(scene, start, _load)
+
+
+def along_ramp(scene: Scene, start: Start, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
+    """What there is to see of the packing at each load of [modes] that it bears.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a section [ramp].
+    start : callable
+        mu -> the settled packing.
+    look : callable
+        Packing -> the numbers of one load.
     """
     step, wanted = needed(scene.ramp, "ramp").step, (scene.modes or Modes()).fx_over_fy
     rest = start(scene.law.mus[0])
@@ -153,7 +169,7 @@ def modes(scene: Scene, start: Start) -> dict[str, Any]:
             except NoEquilibriumError:
                 row["ends"] = "no equilibrium"
                 break
-            row["loads"].append({"fx_over_fy": share, "fx": packing.fx} | _load(packing, rest))
+            row["loads"].append({"fx_over_fy": share, "fx": packing.fx} | look(packing))
     return row | {"reach": path.kept[-1].fx, "contacts": len(rest.packing.contacts)}
 
 
@@ -166,7 +182,7 @@ def _climbed(path: EquilibriumPath, fx: float, step: float) -> Packing:
     return path(fx)
 
 
-def _load(packing: Packing, rest: Equilibrium) -> dict[str, Any]:
+def _load(packing: Packing) -> dict[str, Any]:
     """What is told of one load."""
     found = counted(packing)
     slip, limit = np.abs(packing.contacts.slip), packing.law.slip_limit(packing.geometry.overlap)

@@ -26,14 +26,17 @@ def numbers(tables: Mapping[str, Table]) -> dict[str, Any]:
     -------
     dict
         sizes : by number of disks, medians of each quantity over the loads, and the load of the last equilibrium;
-        powers : exponents of N; sets : medians at `COMPARED` of every set; switches : the same with b of some contacts.
+        powers : exponents of N; random : shares of random matrices beside those of the packings; sets : medians at
+        `COMPARED` of every set; switches : the same with b of some contacts.
     """
     by_size = {table.disks: table for name, table in sorted(tables.items()) if name.startswith("force ")}
     by_size = dict(sorted(by_size.items()))
+    randoms = sorted((each for name, each in tables.items() if name.startswith("random ")), key=lambda each: each.disks)
     return {
         "sizes": {disks: along(table) for disks, table in by_size.items()},
         "powers": powers(by_size),
         "sets": {name: compared(table) for name, table in tables.items()},
+        "random": {table.disks: against_random(table, by_size) for table in randoms},
         "switches": switches(by_size[100]) if 100 in by_size else {},
         "packings": sum(len(table.rows) for table in tables.values()),
         "cpu_hours": sum(row["cpu_seconds"] for table in tables.values() for row in table.rows) / 3600,
@@ -129,3 +132,17 @@ def switches(table: Table) -> dict[str, Any]:
             )
         }
     return found
+
+
+def against_random(table: Table, by_size: Mapping[int, Table]) -> dict[str, Any]:
+    """Shares of complex modes: measured, of random matrices, and by the formula, of the same packings at each load."""
+    seeds = {row["seed"] for row in table.rows}
+    own = Table(table.name, tuple(row for row in by_size[table.disks].rows if row["seed"] in seeds))
+    return {
+        "packings": len(table.rows),
+        "loads": table.loads,
+        "measured": [median(own.at(load, "share")) for load in table.loads],
+        "random": [median(table.at(load, "share")) for load in table.loads],
+        "formula": [median(table.at(load, "weak")) for load in table.loads],
+        "coupling": [median(table.at(load, "coupling")) for load in table.loads],
+    }

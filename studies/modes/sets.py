@@ -37,6 +37,12 @@ CHECKS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
 }
 """Packings of 100 disks once more: which seeds, and what differs."""
 
+RANDOM = {50: 20, 100: 20, 200: 10, 400: 4}
+"""Packings whose levels and couplings make random matrices, by number of disks; they are the first ones of `SIZES`."""
+
+AT = [0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3]
+"""F_x/F_y of these."""
+
 SHARES = (0.2, 0.5, 1.0)
 """Rounds, so that a study that is cut off has something of all."""
 
@@ -64,6 +70,8 @@ def sets(share: float = 1.0) -> dict[str, Sweep]:
             found[f"pressure {disks}"] = _sweep(disks, _first(most, share), pressed)
     for name, (most, changes) in KINDS.items():
         found[name] = _sweep(100, _first(most, share), changes)
+    for disks, most in RANDOM.items():
+        found[f"random {disks}"] = _sweep(disks, _first(most, share), {"modes": {"fx_over_fy": AT}}, "random matrices")
     for name, (seeds, changes) in CHECKS.items():
         found[name] = _sweep(100, seeds, changes)
     return found
@@ -73,9 +81,9 @@ def _first(most: int, share: float) -> str:
     return f"1:{max(1, ceil(most * share))}"
 
 
-def _sweep(disks: int, seeds: str, changes: Mapping[str, Any]) -> Sweep:
+def _sweep(disks: int, seeds: str, changes: Mapping[str, Any], task: str = "modes") -> Sweep:
     packing = {"disks": disks, "width": WIDTH * sqrt(disks / 100)}
     scene: dict[str, Any] = {"packing": packing} | {name: dict(section) for name, section in STANDARD.items()}
     for name, value in changes.items():
         scene[name] = scene.get(name, {}) | dict(value) if isinstance(value, Mapping) else value
-    return Sweep.from_mapping({"task": "modes", "sweep": {"packing.seed": seeds}, "scene": scene}, TASKS)
+    return Sweep.from_mapping({"task": task, "sweep": {"packing.seed": seeds}, "scene": scene}, TASKS)

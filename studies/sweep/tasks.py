@@ -16,6 +16,7 @@ from ...pywrap.scenes.study_sections import Modes
 from ..genericity.levels import growth, levels
 from ..genericity.surrogates import surrogates
 from ..modes.compute import modes
+from ..modes.random_matrices import random_matrices
 from .events import eruptions, trigger
 from .onset import Start, onset
 from .triggering import triggering
@@ -101,6 +102,7 @@ TASKS: Mapping[str, Task] = {
     "trigger": Task(trigger, trigger_seconds),
     "eruptions": Task(eruptions, eruptions_seconds),
     "modes": Task(modes, modes_seconds),
+    "random matrices": Task(random_matrices, lambda scene: 3 * modes_seconds(scene)),
     "levels": Task(levels, dense_seconds),
     "growth": Task(growth, lambda scene: increments(scene) * dense_seconds(scene)),
     "surrogates": Task(surrogates, lambda scene: 3 * onset_seconds(scene)),

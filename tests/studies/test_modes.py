@@ -90,4 +90,4 @@ def test_displacements_that_lammps_would_refuse_end_no_ramp(name, seed):
     """On the way Newton's method tries displacements with which the centre of a disk lies in another disk."""
     (point,) = (point for point in sets()[name].points if point.values["packing.seed"] == seed)
     found = modes(point.scene, lambda mu: settle(point.scene, mu))
-    assert len(found["loads"]) >= 9
+    assert len(found["loads"]) >= 8

@@ -1,0 +1,86 @@
+"""The page of the study of complex modes: it comes out of the committed tables, and says what they hold."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from faultgouge.studies.modes.page import write_page
+from faultgouge.studies.modes.random_matrices import weak_share
+from faultgouge.studies.modes.tables import median, power
+
+DOCS = Path(__file__).parents[2] / "docs" / "modes"
+
+
+@pytest.fixture(scope="module")
+def found():
+    return json.loads((DOCS / "modes.json").read_text())
+
+
+@pytest.mark.slow
+def test_the_page_comes_out_of_the_tables(tmp_path):
+    write_page(DOCS / "tables", tmp_path)
+    for name in ("modes.md", "modes.json"):
+        assert (tmp_path / name).read_text() == (DOCS / name).read_text()
+
+
+def test_the_load_of_a_share_falls_as_the_root_of_the_number_of_disks(found):
+    for level in ("0.1", "0.3"):
+        middle, low, high = found["powers"][f"load of share {level}"]["power"]
+        assert low < middle < high < -0.4
+        assert low > -0.65
+
+
+def test_nothing_saturates_in_these_sizes(found):
+    assert found["powers"]["growth_rate at 0.1"]["power"][1] > 0
+    assert found["powers"]["least_q at 0.1"]["power"][2] < 0
+
+
+def test_without_b_there_is_no_pair_and_sliding_contacts_make_the_strong_growth(found):
+    for load, parts in found["switches"].items():
+        assert parts["none"]["with_pairs"] == 0
+        if float(load) >= 0.2:
+            least = {name: each["least_q"][0] for name, each in parts.items()}
+            assert least["sliding"] < 1.6 * least["all"]
+            assert least["sticking"] > 3 * least["all"]
+    first = found["switches"]["0.01"]
+    assert first["sticking"]["with_pairs"] >= 0.9 * first["all"]["with_pairs"] > first["sliding"]["with_pairs"]
+
+
+def test_random_matrices_have_the_measured_shares(found):
+    """Where a tenth and more is complex, to a quarter of the share; packings differ by as much."""
+    for course in found["random"].values():
+        for measured, drawn in zip(course["measured"], course["random"], strict=True):
+            if measured[0] > 0.1:
+                assert drawn[0] == pytest.approx(measured[0], rel=0.25)
+
+
+def test_checks_agree_with_the_same_packings(found):
+    sets = found["sets"]
+    for load in ("0.1", "0.2"):
+        assert sets["compensated"][load]["share"] == pytest.approx(sets["halved increments"][load]["share"], rel=0.05)
+        ours, others = sets["force 100"][load]["share"], sets["other seeds"][load]["share"]
+        assert ours[1] < others[2]
+        assert others[1] < ours[2]
+
+
+def test_intervals_hold_what_they_should():
+    generator = np.random.default_rng(3)
+    held = 0
+    for _ in range(60):
+        middle, low, high = median(generator.standard_normal(30))
+        assert low <= middle <= high
+        held += low <= 0 <= high
+    assert held >= 52  # 95 % of 60 are 57; fewer than 52 come once in a hundred times
+    samples = [n**-0.5 * np.exp(0.1 * generator.standard_normal(40)) for n in (50, 100, 200)]
+    middle, low, high = power((50, 100, 200), samples)
+    assert low < -0.5 < high
+    assert high - low < 0.2
+
+
+def test_the_formula_of_weak_non_symmetry():
+    """Small couplings: two neighbouring levels; large ones: all but a few are complex."""
+    small, large = weak_share(np.array([1e-3, 10.0]), np.ones(2))
+    assert small == pytest.approx(2 * np.pi**2 / 3 * 1e-6, rel=1e-4)
+    assert 1 - large == pytest.approx(np.sqrt(np.pi) / (2 * np.sqrt(2) * np.pi * 10), rel=1e-6)
