@@ -83,10 +83,12 @@ def reach(scene: Scene, fx: float) -> Iterator[Equilibrium]:
 
 
 def loads(settings: Ramp) -> NDArray[np.float64]:
-    """F_x of the equilibria of a ramp, force, from 0: multiples of the step, to the bit."""
+    """F_x of the equilibria of a ramp, force, from 0: multiples of the step, to the bit, and `until` in the end."""
     # half a step in a million is far above the rounding of until/step, and far below a step
-    multiples = np.arange(int(settings.until / settings.step * (1 + 5e-7)) + 1, dtype=np.float64)
-    return multiples * settings.step
+    rounding = 5e-7
+    multiples = np.arange(int(settings.until / settings.step * (1 + rounding)) + 1, dtype=np.float64) * settings.step
+    left = settings.until - multiples[-1]
+    return np.append(multiples, settings.until) if left > rounding * settings.until else multiples
 
 
 def next_equilibrium(

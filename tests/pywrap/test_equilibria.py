@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from faultgouge.pywrap import Scene, reach
+from faultgouge.pywrap import Scene, ramp, reach
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 SCENE = {
@@ -21,3 +21,10 @@ def test_the_last_equilibrium_is_at_the_load_also_within_the_first_increment(fx,
     assert found[-1].fx == fx
     assert len(found) == count
     assert found[-1].packing.residual < 1e-9
+
+
+def test_a_ramp_ends_at_until_with_a_shorter_increment():
+    scene = Scene.from_mapping(SCENE | {"ramp": {"step": 7e-4, "until": 3e-3}})
+    assert [each.fx for each in ramp(scene)] == [0.0, 7e-4, 1.4e-3, 3 * 7e-4, 2.8e-3, 3e-3]
+    whole = Scene.from_mapping(SCENE | {"ramp": {"step": 1e-3, "until": 3e-3}})
+    assert [each.fx for each in ramp(whole)] == [0.0, 1e-3, 2e-3, 3e-3]

@@ -67,7 +67,7 @@ def import_(
     frame: Annotated[int | None, typer.Option(help="Which of several frames; negative ones from the last.")] = None,
     relax: Annotated[bool, typer.Option("--relax", help="Bring to rest what is out of balance.")] = False,
 ) -> None:
-    """Take a packing of another code, as run.h5 for draw, spectrum, and \\[packing] file of a scene.
+    """Take a packing of another code, as run.h5 for draw, spectrum, and the key packing.file of a scene.
 
     A packing in balance is taken as it is, to the bit. With --relax one out of balance
     comes to rest under law and load: without friction, which then begins with zero
@@ -175,11 +175,12 @@ def _packing(
     from faultgouge.pywrap.exchange import packing_of, upper_layer
     from faultgouge.pywrap.settling.bed import drag_time, law_of
 
-    layer = upper_layer(disks, top)
     options = {key: value for key, value in {**laws, **loads}.items() if value is not None}
     if scene is not None and options.keys() - {"fx"}:
         raise typer.BadParameter(f"--{min(options)} cannot stand beside --scene, which decides it: leave one out")
     values = {**disks.given, **options}
+    _refuse_gaps(disks, top, scene, values)
+    layer = upper_layer(disks, top)
     wanted = _scene(scene, disks, values)
     inertia = wanted.inertia_factor if scene else values.get("inertia_factor", 1.0)
     return packing_of(
@@ -193,15 +194,34 @@ def _packing(
     )
 
 
+def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict[str, Any]) -> None:
+    """Say in one sentence all that neither file nor options say, with the command that would do."""
+    from faultgouge.analysis import BadInputError
+    from faultgouge.pywrap.exchange.layer import WAYS
+
+    gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
+    if scene is None:
+        laws = {
+            "kn": ("--kn 2e5", "the normal stiffness"),
+            "fy": ("--fy 3", "the load on each disk of the upper layer"),
+        }
+        gaps |= dict(words for key, words in laws.items() if key not in values)
+    if not gaps:
+        return
+    *others, last = gaps.values()
+    missing = f"{', '.join(others)} and {last}" if others else last
+    ways = f"; --top takes {WAYS}" if "--top 10" in gaps else ""
+    example = f"faultgouge import {disks.source} {' '.join(gaps)}"
+    options = " ".join(each.split()[0] for each in gaps)
+    raise BadInputError(f"{disks.source} does not say {missing}: add {options}, as in `{example}`{ways}")
+
+
 def _scene(scene: Path | None, disks: Disks, values: dict[str, Any]) -> Scene:
     """The scene, or one that says what options and file say."""
     from faultgouge.pywrap.scenes.scene import Scene
 
     if scene is not None:
         return Scene.from_toml(scene, packing={})
-    for key, what in (("kn", "the normal stiffness"), ("fy", "the load on each disk of the upper layer")):
-        if key not in values:
-            raise typer.BadParameter(f"{disks.source} does not say {what}: add --{key}, or --scene with a scene")
     damping = {key: values[key] for key in ("cn", "ct", "tau") if key in values}
     sections = {
         "packing": {},
