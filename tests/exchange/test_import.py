@@ -240,7 +240,7 @@ def test_options_that_do_not_fit(tmp_path, faultgouge_here, sheared):
     for words, says in (
         (("a.dump", *LAW), "does not say which disks are the upper layer: add --top"),
         (("a.dump", "--top", "y>99", *LAW), "the upper layer holds no disk"),
-        (("a.dump",), "add --top --kn --fy, as in `faultgouge import a.dump --top 10 --kn 2e5 --fy 3`"),
+        (("a.dump",), "add --top --kn --fy, as in `faultgouge import ... --top 10 --kn 2e5 --fy 3`"),
         (("a.dump", "--top", "type:2"), "add --kn --fy"),
         (("a.dump", "--top", "type:2", "--kn", "2e5"), "add --fy"),
         (("a.dump", "--top", "type:2", "--kn", "-1", "--fy", "3"), "law.kn = -1.0 is refused"),

@@ -211,7 +211,7 @@ def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict
     *others, last = gaps.values()
     missing = f"{', '.join(others)} and {last}" if others else last
     ways = f"; --top takes {WAYS}" if "--top 10" in gaps else ""
-    example = f"faultgouge import {disks.source} {' '.join(gaps)}"
+    example = f"faultgouge import ... {' '.join(gaps)}"
     options = " ".join(each.split()[0] for each in gaps)
     raise BadInputError(f"{disks.source} does not say {missing}: add {options}, as in `{example}`{ways}")
 
