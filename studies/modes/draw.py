@@ -138,7 +138,8 @@ def collapse(sizes: Mapping[int, Course], power: float, random: Mapping[int, Cou
         right.plot(measured, formula, "x", color=f"C{number}", markersize=4)
     right.plot([0, 0.7], [0, 0.7], "-", color="0.6", linewidth=1, zorder=0)
     right.set(xlabel="share, measured", ylabel="share, random matrices (o), formula (x)", xlim=(0, 0.7), ylim=(0, 0.7))
-    right.legend(title="disks")
+    if random:
+        right.legend(title="disks")
     for axes in (left, right):
         axes.grid(alpha=0.3)
     return figure

@@ -19,6 +19,9 @@ ENDING = ".jsonl"
 DRAWS = 2000
 """Resamples of the packings for an interval."""
 
+DIGITS = 7
+"""Of the numbers in a table."""
+
 LEFT_OUT = ("frequencies",)
 """What a line of a table lacks of a result: as long as the spectrum itself."""
 
@@ -41,9 +44,16 @@ def condense(results: Path, tables: Path) -> None:
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:
     result = row["result"]
-    loads = [{k: v for k, v in load.items() if k not in LEFT_OUT} for load in result.get("loads", [])]
+    loads = [_rounded({k: v for k, v in load.items() if k not in LEFT_OUT}) for load in result.get("loads", [])]
     line = {"seed": row["values"]["packing.seed"], "says": row["says"], "cpu_seconds": row["cpu_seconds"]}
     return line | result | {"loads": loads}
+
+
+def _rounded(value: Any) -> Any:
+    """Numbers to the digits that a table keeps."""
+    if isinstance(value, dict):
+        return {key: _rounded(each) for key, each in value.items()}
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 
 @dataclass(frozen=True)

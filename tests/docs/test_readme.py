@@ -1,4 +1,4 @@
-"""What the README shows is what its commands print now."""
+"""What the README and the page of decks show is what their commands print now."""
 
 from pathlib import Path
 
@@ -6,12 +6,17 @@ import pytest
 
 from docs.run_page import commands, run
 
-PAGE = Path(__file__).parents[2] / "README.md"
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.ranks  # two ranks that share their cores with others take ten times as long
 @pytest.mark.slow
 @pytest.mark.long
-def test_readme_shows_what_its_commands_print(tmp_path):
-    assert len(list(commands(PAGE))) == 9
-    assert run(PAGE, tmp_path) == []
+@pytest.mark.parametrize(("page", "count"), [("README.md", 4), ("docs/decks.md", 4)])
+def test_a_page_shows_what_its_commands_print(tmp_path, page, count):
+    assert len(list(commands(ROOT / page))) == count
+    assert run(ROOT / page, tmp_path) == []
+
+
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 150
