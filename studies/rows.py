@@ -4,11 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from ..pywrap import Scene
+
+
+def complete_lines(path: Path) -> list[bytes]:
+    """The lines of a file, none if there is no file. A last line that a kill has cut short is taken off the file."""
+    if not path.exists():
+        return []
+    data = path.read_bytes()
+    complete = data[: data.rfind(b"\n") + 1]
+    if complete != data:
+        os.truncate(path, len(complete))
+    return complete.splitlines()
 
 
 class Rows:
@@ -28,13 +40,9 @@ class Rows:
         self.path = path
         resolved = {name: keys for name, keys in scene.resolved().items() if name != beside}
         self._scene = hashlib.sha256(json.dumps(resolved, sort_keys=True).encode()).hexdigest()[:12]
-        self.rows: list[dict[str, Any]] = []
-        if path.exists():
-            text = path.read_text()
-            complete = text[: text.rfind("\n") + 1]
-            if complete != text:
-                path.write_text(complete)
-            self.rows = [row for line in complete.splitlines() if (row := json.loads(line))["scene"] == self._scene]
+        self.rows: list[dict[str, Any]] = [
+            row for line in complete_lines(path) if (row := json.loads(line))["scene"] == self._scene
+        ]
 
     def append(self, **row: Any) -> dict[str, Any]:
         """Write a line; it is in the file when this returns."""

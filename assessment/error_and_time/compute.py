@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from importlib.metadata import version
@@ -20,11 +21,11 @@ from threadpoolctl import threadpool_info
 
 from ...analysis import FaultgougeError
 from ...analysis.files.wholefile import make_folder, write_text
+from ...figures.pages import render
 from ...figures.style import save
 from ...pywrap import Scene, ramp
 from .draw import figure_of
 from .draw_coverage import coverage_figure
-from .page import report_page, stem
 from .work_precision.dumps import dumps
 from .work_precision.eigenvalues import far, near
 from .work_precision.frequency import frequency, growth
@@ -57,16 +58,11 @@ class ReportError(FaultgougeError):
     """Studies that failed, in one sentence."""
 
 
-def no_progress(items: Sequence[int], _: str) -> Iterable[int]:
-    """Show nothing."""
-    return items
-
-
 def report(
     output: Path,
     quick: bool = False,
     say: Say = print,
-    progress: Callable[[Sequence[int], str], Iterable[int]] = no_progress,
+    progress: Callable[[Sequence[int], str], Iterable[int]] = lambda runs, _: runs,
     studies: dict[str, Ask] = STUDIES,
 ) -> dict[str, Any]:
     """Run the studies and leave report.md, report.json and a figure for each in a folder.
@@ -123,6 +119,11 @@ def report(
     return result
 
 
+def stem(name: str) -> str:
+    """A study's name as that of a file, and of its heading's anchor."""
+    return re.sub("[^a-z ]", "", name.lower()).replace(" ", "-")
+
+
 def machine() -> dict[str, Any]:
     """What the times depend on: processor, cores, load, versions."""
     model = platform.processor() or platform.machine()
@@ -162,5 +163,6 @@ def _written(output: Path, quick: bool, done: list[Study], failed: dict[str, str
         "failed": [{"name": name, "says": says} for name, says in failed.items()],
     }
     write_text(output / "report.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
-    write_text(output / "report.md", report_page(where, quick, done, failed))
+    page = render(__package__ or "", "report.md.j2", where=where, quick=quick, done=done, failed=failed, stem=stem)
+    write_text(output / "report.md", page)
     return result

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,11 @@ from mpi4py import MPI
 
 from ...analysis import FaultgougeError
 from ...analysis.files.wholefile import make_folder, write_text
+from ...figures.pages import render
 from ...figures.style import save
 from .cases import dynamics, eigenvalues, geometry, loads, restarts
 from .cases.case import Case, Outcome
 from .draw import stability_figure
-from .page import stability_page
 
 Say = Callable[[str], None]
 
@@ -35,16 +36,11 @@ class StabilityError(FaultgougeError):
     """Cases that failed, in one sentence."""
 
 
-def no_progress(cases: Sequence[Case]) -> Iterable[Case]:
-    """Show nothing."""
-    return cases
-
-
 def stability(
     output: Path,
     quick: bool = False,
     say: Say = print,
-    progress: Callable[[Sequence[Case]], Iterable[Case]] = no_progress,
+    progress: Callable[[Sequence[Case]], Iterable[Case]] = lambda cases: cases,
     cases: Sequence[Case] = CASES,
 ) -> dict[str, Any]:
     """Try the cases and leave stability.json, stability.md and stability.png in a folder.
@@ -94,7 +90,10 @@ def check(result: dict[str, Any]) -> None:
 def _write(done: Sequence[tuple[Case, Outcome]], output: Path) -> None:
     """stability.json and stability.md with what there is."""
     write_text(output / "stability.json", json.dumps(_as_dict(done), indent=1, allow_nan=False) + "\n")
-    write_text(output / "stability.md", stability_page(done))
+    statuses = [outcome.status for _, outcome in done]
+    groups = [(name, list(members)) for name, members in groupby(done, lambda each: each[0].group)]
+    page = render(__package__ or "", "stability.md.j2", done=done, statuses=statuses, groups=groups)
+    write_text(output / "stability.md", page)
 
 
 def _as_dict(done: Sequence[tuple[Case, Outcome]]) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from mpi4py import MPI
 
 from ...analysis.files.wholefile import make_folder, write_text
 from ...pywrap import SceneError
+from ..rows import complete_lines
 from .examine import Row
 from .points import Sweep, shard
 from .table import write_tables
@@ -102,15 +103,8 @@ def _kept(rows: Iterable[Row], file: IO[str]) -> Iterator[Row]:
 
 def stored(path: Path) -> dict[str, Row]:
     """The rows of results.jsonl by key. A last line that a kill has cut short is taken off the file."""
-    if not path.exists():
-        return {}
-    data = path.read_bytes()
-    complete = data[: data.rfind(b"\n") + 1]
-    if complete != data:
-        with path.open("r+b") as file:
-            file.truncate(len(complete))
     rows = {}
-    for number, line in enumerate(complete.splitlines(), 1):
+    for number, line in enumerate(complete_lines(path), 1):
         try:
             row = json.loads(line)
             rows[row["key"]] = row

@@ -150,11 +150,11 @@ def test_a_row_is_what_the_onset_of_its_scene_is(tmp_path):
 
 @pytest.mark.slow
 def test_a_settled_packing_is_shared(tmp_path, monkeypatch):
-    from faultgouge.studies.sweep import compute
+    from faultgouge.studies.sweep import examine
 
     settled = []
-    original = compute.settled_bed
-    monkeypatch.setattr(compute, "settled_bed", lambda *given: settled.append(given) or original(*given))
+    original = examine.settled_bed
+    monkeypatch.setattr(examine, "settled_bed", lambda *given: settled.append(given) or original(*given))
     run_sweep(sweep_of({"packing.seed": "1:2", "law.mu": [0.5, 1.0]}), tmp_path, say=silent)
     assert len(settled) == 2
 

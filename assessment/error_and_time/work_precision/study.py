@@ -19,11 +19,6 @@ T = TypeVar("T")
 Progress = Callable[[Sequence[T]], Iterable[T]]
 
 
-def no_progress(items: Sequence[T]) -> Iterable[T]:
-    """Show nothing."""
-    return items
-
-
 @dataclass(frozen=True)
 class Settings:
     """What a study is given.
@@ -46,7 +41,7 @@ class Settings:
     ramp: tuple[Equilibrium, ...]
     quick: bool = False
     repeats: int = 3
-    progress: Progress = no_progress
+    progress: Progress = lambda items: items
 
     def at(self, fx: float) -> Equilibrium:
         """The equilibrium of the ramp nearest to a load."""

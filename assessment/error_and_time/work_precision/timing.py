@@ -13,12 +13,14 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from .study import Progress, no_progress
+from .study import Progress
 
 T = TypeVar("T")
 
 
-def timed(jobs: Sequence[Callable[[], T]], repeats: int, progress: Progress = no_progress) -> list[tuple[T, float]]:
+def timed(
+    jobs: Sequence[Callable[[], T]], repeats: int, progress: Progress = lambda items: items
+) -> list[tuple[T, float]]:
     """Run every job several times.
 
     Parameters

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any
 
 import typer
 
 from ..guard import keeps
 from .terminal import AsJson, ScenePath, print_json, progress, read_scene, say
-
-T = TypeVar("T")
 
 Folder = Annotated[
     Path, typer.Option("-o", "--output", help="The folder for numbers, pictures and page; an interrupted one goes on.")
@@ -30,15 +28,7 @@ def trigger(scene: ScenePath, output: Folder = Path("trigger"), as_json: AsJson 
     """
     from faultgouge.studies.trigger import trigger_map
 
-    def bar(results: Iterable[T], count: int) -> Iterator[T]:
-        return progress(results, "bisections", count)
-
-    wanted = read_scene(scene)
-    keeps(f"{output}/trigger.jsonl has what was found so far; the same command goes on from there")
-    result = trigger_map(wanted, output, say, bar)
-    say(f"written: {output}/trigger.md")
-    if as_json:
-        print_json(result)
+    _into_folder(trigger_map, scene, output, "trigger", "bisections", "what was found so far", as_json)
 
 
 @app.command(epilog="Example: mpiexec -n 3 faultgouge eruptions eruptions.toml -o eruptions")
@@ -49,12 +39,16 @@ def eruptions(scene: ScenePath, output: Folder = Path("eruptions"), as_json: AsJ
     """
     from faultgouge.studies.eruptions import eruptions as run_all
 
-    def bar(results: Iterable[T], count: int) -> Iterator[T]:
-        return progress(results, "runs", count)
+    _into_folder(run_all, scene, output, "eruptions", "runs", "the runs that were over", as_json)
 
+
+def _into_folder(
+    study: Callable[..., dict[str, Any]], scene: Path, output: Path, name: str, what: str, kept: str, as_json: bool
+) -> None:
+    """Run a study of a scene that goes on in its folder; `what` is counted, and `kept` is what an interrupt leaves."""
     wanted = read_scene(scene)
-    keeps(f"{output}/eruptions.jsonl has the runs that were over; the same command goes on from there")
-    result = run_all(wanted, output, say, bar)
-    say(f"written: {output}/eruptions.md")
+    keeps(f"{output}/{name}.jsonl has {kept}; the same command goes on from there")
+    result = study(wanted, output, say, lambda results, count: progress(results, what, count))
+    say(f"written: {output}/{name}.md")
     if as_json:
         print_json(result)

@@ -40,17 +40,9 @@ def spectrum(
         return
     result = eigenvalues_of(packing)
     gain = _gain_of(packing)
+    names = ("condition", "overlap", "growth_rate", "frequency", "quality", "participation", "rotation")
     pairs: list[dict[str, Any]] = [
-        {
-            "eigenvalue": [pair.eigenvalue.real, pair.eigenvalue.imag],
-            "condition": pair.condition,
-            "overlap": pair.overlap,
-            "growth_rate": pair.growth_rate,
-            "frequency": pair.frequency,
-            "quality": pair.quality,
-            "participation": pair.participation,
-            "rotation": pair.rotation,
-        }
+        {"eigenvalue": [pair.eigenvalue.real, pair.eigenvalue.imag]} | {name: getattr(pair, name) for name in names}
         for pair in result.pairs
     ]
     if as_json:
