@@ -10,15 +10,13 @@ increment is split into
 Times are those of the processor, with one thread, so that others on the machine disturb them little: medians over the
 increments, in milliseconds.
 
-    python benchmarks/increment.py [--output increment.json]
+    python benchmarks/increment.py
 """
 
 import os
 
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
-import argparse
-import json
 import platform
 import statistics
 import time
@@ -81,11 +79,7 @@ def increments(engine: Engine, start: Equilibrium, solve: Stopwatch, lammps: Sto
 
 
 def main() -> None:
-    """Print the table, and write it as JSON if asked to."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--output", type=Path, help="also write the numbers to this file")
-    options = parser.parse_args()
-
+    """Print the table."""
     scene = {"packing": {"file": str(PACKING)}, "law": {"kn": 2e5, "mu": 1.0}, "load": {"fy": 3.0}}
     start = settle(Scene.from_mapping(scene))
     solve, lammps = Stopwatch(), Stopwatch()
@@ -103,8 +97,6 @@ def main() -> None:
         tenths = statistics.quantiles(values, n=10)
         print(f"{name:12s}{statistics.median(values):10.3f}{min(values):8.3f}{tenths[-1]:8.3f}")
     print(f"\nevaluations of the forces: {statistics.mean(row['evaluations'] for row in rows):.2f} an increment")
-    if options.output:
-        options.output.write_text(json.dumps(rows, indent=1) + "\n")
 
 
 if __name__ == "__main__":

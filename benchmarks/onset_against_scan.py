@@ -12,7 +12,7 @@ compare where others use the machine too. The scan takes a minute or more and is
 than a second and is repeated: the run of median time on the processor counts. The first one, which also loads the
 libraries, is not among them and shown beside.
 
-    python benchmarks/onset_against_scan.py [--output onset_against_scan.json]
+    python benchmarks/onset_against_scan.py
 """
 
 import os
@@ -20,13 +20,11 @@ import os
 # before NumPy is imported: one thread each, for a fair comparison
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
-import argparse
-import json
 import platform
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -149,11 +147,7 @@ def compared(fast: Result, slow: Result) -> dict[str, float]:
 
 
 def main() -> None:
-    """Print the table, and write it as JSON if asked to."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--output", type=Path, help="also write the numbers to this file")
-    options = parser.parse_args()
-
+    """Print the table."""
     cold, *warm = (solved(announce) for _ in range(1 + REPEATS))
     fast, slow = sorted(warm, key=lambda result: result.processor_seconds)[REPEATS // 2], scanned(announce)
     print(file=sys.stderr)
@@ -178,15 +172,6 @@ def main() -> None:
     print(
         f"\nThe first solution in the process: {cold.seconds:.2f} s, {cold.processor_seconds:.2f} s on the processor."
     )
-    if options.output:
-        result = {
-            "exact": EXACT,
-            "first": asdict(cold),
-            "solved": asdict(fast),
-            "scanned": asdict(slow),
-            "ratios": ratios,
-        }
-        options.output.write_text(json.dumps(result, indent=1) + "\n")
 
 
 if __name__ == "__main__":

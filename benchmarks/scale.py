@@ -16,7 +16,7 @@ Memory is the peak of all stages before the onsets, and of all.
 
 Beside these, square crystals of disks, whose equilibria are known and need no settling.
 
-    python benchmarks/scale.py [--disks 1000 3000 10000] [--crystals 10000 100000] [--no-onset] [--output scale.json]
+    python benchmarks/scale.py [--disks 1000 3000 10000] [--crystals 10000 100000] [--no-onset]
 
 The exponent is that of the cost between the smallest and the largest size. To settle 10,000 disks takes half a minute.
 """
@@ -172,13 +172,12 @@ def text(value: float | int | None, format_: str) -> str:
 
 
 def main() -> None:
-    """Print the table, and write it as JSON if asked to."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--disks", type=int, nargs="+", default=[1000, 3000, 10_000])
     parser.add_argument("--crystals", type=int, nargs="*", default=[10_000, 100_000])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--no-onset", action="store_true", help="settle and ramp alone")
-    parser.add_argument("--output", type=Path, help="also write the numbers to this file")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
@@ -188,12 +187,8 @@ def main() -> None:
         return
 
     extra = ["--seed", str(options.seed), *["--no-onset"] * options.no_onset]
-    rows = {
-        "settled": table("settled packings", options.disks, ["--crystals", *extra]),
-        "crystals": table("crystals", options.crystals, ["--crystals", "1"]),
-    }
-    if options.output:
-        options.output.write_text(json.dumps(rows, indent=1) + "\n")
+    table("settled packings", options.disks, ["--crystals", *extra])
+    table("crystals", options.crystals, ["--crystals", "1"])
 
 
 COLUMNS = {
@@ -213,7 +208,7 @@ UNITS = {"memory": "GB", "in all": "GB", "file": "MB"}
 FORCES = {"fx_part": "F_x^c of part", "fx_c": "F_x^c"}
 
 
-def table(title: str, sizes: list[int], arguments: list[str]) -> list[Row]:
+def table(title: str, sizes: list[int], arguments: list[str]) -> None:
     """Measure packings of several sizes, each in a process of its own, and print them."""
     print(f"\n{title:18s}" + "".join(f"{name:>9s}" for name in COLUMNS) + "".join(f"{f:>16s}" for f in FORCES.values()))
     print(f"{'':18s}" + "".join(f"{UNITS.get(name, 's'):>9s}" for name in COLUMNS))
@@ -234,7 +229,6 @@ def table(title: str, sizes: list[int], arguments: list[str]) -> list[Row]:
             name: math.log(large[name] / small[name]) / span for name in COLUMNS if small.get(name) and large.get(name)
         }
         print(f"{'exponent':18s}" + "".join(text(exponents.get(name), "9.2f") for name in COLUMNS))
-    return rows
 
 
 if __name__ == "__main__":

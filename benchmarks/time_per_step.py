@@ -10,7 +10,6 @@ alike; medians and the spread of several turns are printed, and ratios within on
 
 import argparse
 import itertools
-import json
 import platform
 import statistics
 import subprocess
@@ -113,9 +112,8 @@ def microseconds_per_step(style: str, disks: int, ranks: int, data: Path | None 
     return 1e6 * float(loops[1][3]) / float(loops[1][8])
 
 
-def table(title: str, turns: list[dict[tuple[str, int], float]], all_ranks: list[int]) -> list[dict[str, object]]:
-    """Print one packing, and return its rows."""
-    rows: list[dict[str, object]] = []
+def table(title: str, turns: list[dict[tuple[str, int], float]], all_ranks: list[int]) -> None:
+    """Print one packing."""
     for ranks in all_ranks:
         print(
             f"\n{title + f', {ranks} rank' + 's' * (ranks > 1):66s}of gran/hertz/history   speed-up over {all_ranks[0]}"
@@ -128,16 +126,12 @@ def table(title: str, turns: list[dict[tuple[str, int], float]], all_ranks: list
                 f"  {style:30s}{statistics.median(times):12.2f} {f'[{min(times):.2f}, {max(times):.2f}]':24s}"
                 f"{ratio:10.2f}{gain:20.2f}"
             )
-            rows.append(
-                {"packing": title, "ranks": ranks, "style": style, "microseconds": times, "ratio": ratio, "gain": gain}
-            )
         cost = sorted(turn["mindlin/smooth, compensated", ranks] / turn["mindlin/smooth", ranks] for turn in turns)
         print(f"  compensated of double {statistics.median(cost):.2f} [{cost[0]:.2f}, {cost[-1]:.2f}]")
-    return rows
 
 
 def main() -> None:
-    """Print the table, and write it as JSON if asked to."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--disks", type=int, nargs="+", default=[100, 10_000])
@@ -145,11 +139,9 @@ def main() -> None:
         "--packing", nargs="+", choices=["hexagonal", "disordered"], default=["hexagonal", "disordered"]
     )
     parser.add_argument("--turns", type=int, default=5)
-    parser.add_argument("--output", type=Path, help="also write the numbers to this file")
     options = parser.parse_args()
 
     print(f"{platform.processor() or platform.machine()}; microseconds per step, median of {options.turns} [extremes]")
-    rows = []
     with tempfile.TemporaryDirectory() as folder:
         data = settled(Path(folder)) if "disordered" in options.packing else None
         for packing, disks in itertools.product(options.packing, options.disks):
@@ -165,9 +157,7 @@ def main() -> None:
                 }
                 for _ in range(options.turns)
             ]
-            rows += table(f"{packing}, {disks} disks", turns, options.ranks)
-    if options.output:
-        options.output.write_text(json.dumps(rows, indent=1) + "\n")
+            table(f"{packing}, {disks} disks", turns, options.ranks)
 
 
 if __name__ == "__main__":

@@ -83,7 +83,7 @@ def few_decades(axes: Axes, count: int = 7) -> None:
             axis.set_major_locator(LogLocator(numticks=count))
 
 
-def scientific(value: float, digits: int = 1) -> str:
+def scientific(value: float) -> str:
     """1.2 x 10^-3 for mathtext."""
     exponent = int(np.floor(np.log10(value)))
-    return rf"{value / 10.0**exponent:.{digits}f} \times 10^{{{exponent}}}"
+    return rf"{value / 10.0**exponent:.1f} \times 10^{{{exponent}}}"

@@ -22,19 +22,9 @@ styled = matplotlib.rc_context(fname=STYLE)
 the figure is saved if the colour is `to_hex("C0")`: matplotlib looks up "C0" itself only when the line is drawn."""
 
 
-def panel(axes: Axes | None, figsize: tuple[float, float] | None = None) -> Axes:
-    """The axes that were given, or those of a new figure.
-
-    Parameters
-    ----------
-    axes : Axes or None
-        Where to draw.
-    figsize : tuple of (float, float), optional
-        Width and height of a new figure, inches.
-    """
-    if axes is not None:
-        return axes
-    return Figure(figsize, layout="constrained").add_subplot()
+def panel(axes: Axes | None) -> Axes:
+    """The axes that were given, or those of a new figure."""
+    return Figure(layout="constrained").add_subplot() if axes is None else axes
 
 
 def figure_of(axes: Axes) -> Figure:

@@ -25,13 +25,12 @@ from ...analysis import (
 )
 from ...analysis.onset.pair_form import pair_eigenvalues
 from ...figures.pair import PairCurve
-from ...pywrap import Engine, Equilibrium, Record, Sample, Scene, SceneError, reach
+from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
 from ...pywrap.onset.undamped import OnsetRun, onset_run
-from ...pywrap.runs.path import next_equilibrium
 from ...pywrap.runs.undamped import perturb, time_step
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction, Perturb
-from ..triggering import Sensitivity, Triggering, sensitivity, trigger
+from ..triggering import Sensitivity, Triggering, equilibrium_at, sensitivity, trigger
 from ..triggering import summary as triggering_summary
 
 Floats = NDArray[np.float64]
@@ -139,7 +138,8 @@ def triggering_run(
         says = f"F_x = {settings.fx:g} is above the onset {run.onset.fx_c:g}: nothing is stable there to be triggered."
         return TriggeringRun(scene, settings, runs, says=says)
     *_, start = reach(scene, settings.fx)  # to the bit the one of `perturb`, and so is v_0
-    control = _equilibrium_at(scene, run, max(0.0, 2 * weakened[0].onset.fx_c - settings.fx)) if weakened else None
+    lower = max(0.0, 2 * weakened[0].onset.fx_c - settings.fx) if weakened else None
+    control = None if lower is None else equilibrium_at(scene, run.equilibria, lower)
     found = trigger(scene, start, control, settings, friction, path)
     return TriggeringRun(scene, settings, runs, found, sensitivity(run))
 
@@ -250,9 +250,3 @@ def pair_curve(run: OnsetRun) -> PairCurve:
     below, beyond = fx[fx <= first.fx_onset][::-1], fx[fx > first.fx_onset]
     values = [pair_eigenvalues([packings[load] for load in side], first.eigenvalue) for side in (below, beyond)]
     return PairCurve(run.mu, fx, np.concatenate([values[0][::-1], values[1]]), first.fx_onset)
-
-
-def _equilibrium_at(scene: Scene, run: OnsetRun, fx: float) -> Equilibrium:
-    below = max((each for each in run.equilibria if each.fx <= fx), key=lambda each: each.fx)
-    with Engine(below.packing) as engine:
-        return below if below.fx == fx else next_equilibrium(engine, below, fx, scene)

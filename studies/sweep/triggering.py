@@ -31,11 +31,11 @@ from ...analysis.packing.packing import Floats
 from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening
 from ...pywrap.onset.path_error import with_path_error
-from ...pywrap.runs.path import EquilibriumPath, next_equilibrium
-from ...pywrap.runs.undamped import perturb, weakening_of
+from ...pywrap.runs.path import EquilibriumPath
+from ...pywrap.runs.undamped import perturb
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction, Perturb
-from ..triggering import GROWTH_FACTOR, column, jump
+from ..triggering import GROWTH_FACTOR, calibrated, column, equilibrium_at, jump
 from .onset import Ends, Start, first_window
 
 FINEST_STEP = 1e-3
@@ -202,14 +202,14 @@ def eruption(
 ) -> Eruption:
     """The runs in a window between two onsets, and the control; path leads up to the upper one."""
     middle = 0.5 * (window[0] + window[1])
-    start, below = (_equilibrium_at(scene, path, fx) for fx in (middle, max(0.0, 2 * window[0] - middle)))
+    loads = middle, max(0.0, 2 * window[0] - middle)
+    start, below = (equilibrium_at(scene, path, fx, MPI.COMM_SELF) for fx in loads)
 
     def msd(start: Equilibrium, weakening: Weakening | None) -> Floats:
         return column(_undamped(scene, settings, start, settings.amplitude, weakening), "msd")
 
     quiet = _undamped(scene, settings, start, 0.0)
-    v0 = np.abs(column(quiet, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
-    weakening = weakening_of(friction, float(v0))
+    weakening = calibrated(friction, quiet)
     weakened = _undamped(scene, settings, start, settings.amplitude, weakening)
     return Eruption(
         fx=start.fx,
@@ -221,12 +221,6 @@ def eruption(
         control=float(msd(below, weakening).max()),
         jump=jump(weakened),
     )
-
-
-def _equilibrium_at(scene: Scene, path: tuple[Equilibrium, ...], fx: float) -> Equilibrium:
-    below = max((each for each in path if each.fx <= fx), key=lambda each: each.fx)
-    with Engine(below.packing, MPI.COMM_SELF) as engine:
-        return below if below.fx == fx else next_equilibrium(engine, below, fx, scene)
 
 
 def _undamped(

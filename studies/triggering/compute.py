@@ -16,11 +16,13 @@ Closer and closer to the onset, the response of the pair that is about to coales
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ...analysis import Growth, RunFile, fit_growth
@@ -28,9 +30,10 @@ from ...analysis.motion.power_law import PowerLaw, fit_power_law
 from ...analysis.motion.response import Response, layer_force, linear_response
 from ...analysis.onset.pair_form import PairForm, pair_forms
 from ...analysis.spectrum.normal_form import LEAST_CROSSOVER
-from ...pywrap import Equilibrium, Sample, Scene
+from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening
 from ...pywrap.onset.undamped import OnsetRun
+from ...pywrap.runs.path import next_equilibrium
 from ...pywrap.runs.undamped import perturb, time_step, weakening_of
 from ...pywrap.scenes.sections import Friction, Perturb
 from .forecast import JUMP_SHARE, Forecast, forecast
@@ -164,6 +167,12 @@ def column(samples: tuple[Sample, ...], name: str) -> Floats:
     return np.array([getattr(sample, name) for sample in samples])
 
 
+def calibrated(friction: Friction, unperturbed: tuple[Sample, ...]) -> Weakening:
+    """mu(v) with the v_0 of the scene, or with the largest velocity of the layer in an unperturbed run."""
+    v0 = np.abs(column(unperturbed, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
+    return weakening_of(friction, float(v0))
+
+
 def jump(samples: tuple[Sample, ...]) -> float:
     """The largest D in the first `JUMP_SHARE` of a run, length^2."""
     time, msd = column(samples, "time"), column(samples, "msd")
@@ -211,8 +220,7 @@ def trigger(
         return samples
 
     unperturbed = run("unperturbed", 0.0, early=200)  # as `perturb` calibrates v_0
-    v0 = np.abs(column(unperturbed, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
-    weakening = weakening_of(friction, float(v0))
+    weakening = calibrated(friction, unperturbed)
     perturbed = run("perturbed", settings.amplitude)
     erupting = run("erupting", settings.amplitude, weakening, early=FALL)
     control = None if below is None else run("control", settings.amplitude, weakening, start=below)
@@ -227,6 +235,15 @@ def trigger(
     )
     foreseen = forecast(start, packing.law.mu * friction.mu_ss, settings.time)
     return Triggering(start, weakening, unperturbed, perturbed, erupting, control, strong, response, foreseen)
+
+
+def equilibrium_at(
+    scene: Scene, path: Sequence[Equilibrium], fx: float, communicator: MPI.Comm | None = None
+) -> Equilibrium:
+    """The equilibrium at a load, from the last one of a path that is not beyond."""
+    below = max((each for each in path if each.fx <= fx), key=lambda each: each.fx)
+    with Engine(below.packing, communicator) as engine:
+        return below if below.fx == fx else next_equilibrium(engine, below, fx, scene)
 
 
 def sensitivity(run: OnsetRun) -> Sensitivity:

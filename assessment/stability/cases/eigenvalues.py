@@ -19,7 +19,6 @@ values at equal distances on either side, however close.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
@@ -28,13 +27,13 @@ import numpy as np
 from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 
-from ....analysis import Contacts, spectrum
+from ....analysis import spectrum
 from ....analysis.onset import Modes, full_operator
 from ....analysis.spectrum.spectrum import SAFETY, unit_rounding
 from ....pywrap import Scene
 from ....pywrap.onset.undamped import OnsetRun, onset_run
 from .case import Case, Outcome, measured
-from .packings import bed, crystal, law, sheared
+from .packings import bed, crystal, law, sheared, with_rattlers
 
 GROUP = "eigenvalues"
 
@@ -110,18 +109,9 @@ def _rattlers() -> Outcome:
     """30 % of the disks touch nothing: the others' eigenvalues are what they were."""
     settled = sheared(bed()).packing
     extra = round(len(settled) * 3 / 7)
-    c = settled.contacts
     height = settled.position[:, 1].max() + 2.0 + 1.5 * np.arange(extra)
     hovering = np.column_stack([np.linspace(0.0, 5.0, extra), height])
-    both = replace(
-        settled,
-        position=np.vstack([settled.position, hovering]),
-        radius=np.append(settled.radius, np.full(extra, 0.5)),
-        angle=np.append(settled.angle, np.zeros(extra)),
-        mass=np.append(settled.mass, np.ones(extra)),
-        top=np.append(settled.top, np.zeros(extra, bool)),
-        contacts=Contacts(c.i, c.j, c.slip),
-    )
+    both = with_rattlers(settled, hovering, top=False)
     alone, found = spectrum(settled), spectrum(both)
     if len(found.eigenvalues) != len(alone.eigenvalues):
         return Outcome("fails", None, None, f"{len(found.eigenvalues)} eigenvalues instead of {len(alone.eigenvalues)}")

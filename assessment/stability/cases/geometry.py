@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,7 +11,7 @@ from ....pywrap import Engine, Scene, SceneError
 from .alone import refused_by_lammps
 from .case import Case, Outcome, measured, refused
 from .checks import balance
-from .packings import KN, at_rest, bed, crystal, law, sheared
+from .packings import KN, at_rest, bed, crystal, law, sheared, with_rattlers
 
 GROUP = "geometry"
 
@@ -71,16 +70,7 @@ def _no_contact() -> Outcome:
     """A rattler stays where it is, and has no eigenvalues."""
     settled = bed()
     hovering = np.array([[2.0, settled.position[:, 1].max() + 3.0]])
-    c = settled.contacts
-    packing = replace(
-        settled,
-        position=np.vstack([settled.position, hovering]),
-        radius=np.append(settled.radius, 0.5),
-        angle=np.append(settled.angle, 0.0),
-        mass=np.append(settled.mass, 1.0),
-        top=np.append(settled.top, True),
-        contacts=Contacts(c.i, c.j, c.slip),
-    )
+    packing = with_rattlers(settled, hovering, top=True)
     last = len(packing) - 1
     with Engine(packing) as engine, engine.undamped(1e-4) as dynamics:
         moved = dynamics.advance(10_000).position[last] - hovering[0]

@@ -18,6 +18,7 @@ from functools import cache
 import numpy as np
 
 from ....analysis import Contacts, MindlinLaw, Packing, touching
+from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 from ....pywrap.equilibria.quasistatic import rounding_floor
 
@@ -106,6 +107,20 @@ def with_low_parts(packing: Packing) -> Packing:
         packing,
         position_low=np.zeros_like(packing.position),
         contacts=Contacts(c.i, c.j, c.slip, np.zeros(len(c))),
+    )
+
+
+def with_rattlers(packing: Packing, position: Floats, top: bool) -> Packing:
+    """The packing with small disks that touch nothing at further positions, shape (n, 2), in the upper layer or not."""
+    c, extra = packing.contacts, len(position)
+    return replace(
+        packing,
+        position=np.vstack([packing.position, position]),
+        radius=np.append(packing.radius, np.full(extra, 0.5)),
+        angle=np.append(packing.angle, np.zeros(extra)),
+        mass=np.append(packing.mass, np.ones(extra)),
+        top=np.append(packing.top, np.full(extra, top)),
+        contacts=Contacts(c.i, c.j, c.slip),
     )
 
 
