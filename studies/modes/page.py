@@ -39,7 +39,9 @@ def write_page(tables: Path, folder: Path) -> Path:
     write_text(folder / "modes.json", json.dumps(finite(found), indent=1) + "\n")
     page = folder / "modes.md"
     names = {"planned": SIZES, "fewer": FEWER, "kinds": KINDS, "compared": COMPARED}
-    write_text(page, render(__package__ or "", "modes.md.j2", **found, **names, middle=middle, exponent=exponent))
+    write_text(
+        page, render(__package__ or "", "modes.md.j2", **found, **names, middle=middle, plain=plain, exponent=exponent)
+    )
     return page
 
 
@@ -58,6 +60,11 @@ def middle(value: list[float], digits: str = ".2g", factor: float = 1.0) -> str:
         return "-"
     words = ["none" if np.isinf(each) else format(each * factor, digits) for each in value]
     return f"{words[0]} ({words[1]} to {words[2]})"
+
+
+def plain(value: float) -> str:
+    """A number, or a word where it is infinite."""
+    return "none" if np.isinf(value) else format(value, ".3g")
 
 
 def exponent(value: list[float] | None) -> str:
