@@ -7,9 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 from ...analysis import NoEquilibriumError
+from ...figures.pages import render
 from ...pywrap import Engine, Equilibrium, Scene, SceneError
 from ...pywrap.onset.sharing import Progress, Say, shared_out
 from ...pywrap.runs.path import EquilibriumPath, loads
@@ -18,8 +20,8 @@ from ...pywrap.scenes.study_sections import Eruptions
 from ...pywrap.scenes.units import real_units
 from ...pywrap.settling.bed import settle
 from ..rows import Rows
-from . import draw, page
-from .compute import Start, erupt
+from . import draw
+from .compute import DECADES, OVER, QUIET, Start, erupt
 
 
 def eruptions(
@@ -85,7 +87,7 @@ def eruptions(
     result = summary(scene, runs)
     (output / "eruptions.json").write_text(json.dumps(result, indent=1) + "\n")
     draw.figures(result, {row["fx"]: row["series"] for row in runs if not row["damped"]}, output)
-    (output / "eruptions.md").write_text(page.page(result))
+    (output / "eruptions.md").write_text(_page(result))
     return result
 
 
@@ -99,6 +101,28 @@ def summary(scene: Scene, runs: list[dict[str, Any]]) -> dict[str, Any]:
         "units": None if real is None else real.as_dict(),
         "runs": [{key: value for key, value in row.items() if key not in leave_out} for row in ordered],
     }
+
+
+def _page(result: dict[str, Any]) -> str:
+    """eruptions.md, from what eruptions.json holds."""
+    runs = result["runs"]
+    damped = {run["fx"]: run for run in runs if run["damped"]}
+    damping = result["scene"].get("damping") or {}
+    grown = [run["msd"] for run in runs if run["ends"] != "stable" and not run["damped"]]
+    return render(
+        __package__ or "",
+        "eruptions.md.j2",
+        runs=runs,
+        units=result["units"],
+        fy=result["scene"]["load"]["fy"],
+        words=draw.WORDS,
+        beside=[(run, damped[run["fx"]]) for run in runs if not run["damped"] and run["fx"] in damped],
+        damping=", ".join(f"{key} = {value:g}" for key, value in damping.items() if value),
+        decades=float(np.log10(max(grown) / min(grown))) if grown else 0.0,
+        noise=(min(run["noise"] for run in runs), max(run["noise"] for run in runs)),
+        balance=max(run["balance"] for run in runs if not run["damped"]),
+        criterion=(OVER, DECADES, QUIET),
+    )
 
 
 def starts_of(scene: Scene) -> tuple[list[Start], float | None]:

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from ...analysis.digits import with_uncertainty
+from ...figures.pages import render
 from ...pywrap import Scene, SceneError
 from ...pywrap.onset.sharing import Progress, Say, Share, shared_out
 from ...pywrap.scenes.units import real_units
 from ..rows import Rows
-from . import draw, page
+from . import draw
 from .compute import (
     Measured,
     Prediction,
@@ -74,7 +75,7 @@ def trigger_map(
     result = summary(scene, onset, predicted, measured)
     (output / "trigger.json").write_text(json.dumps(result, indent=1) + "\n")
     draw.figures(result, output)
-    (output / "trigger.md").write_text(page.page(scene, result))
+    (output / "trigger.md").write_text(_page(scene, result))
     return result
 
 
@@ -104,6 +105,26 @@ def summary(
         "largest_deviation": max(off, default=None),
         "map": rows,
     }
+
+
+def _page(scene: Scene, result: dict[str, Any]) -> str:
+    """trigger.md, from what trigger.json holds."""
+    rows = result["map"]
+    distances = sorted({row["distance"] for row in rows}, reverse=True)
+    weakest = [min((r for r in rows if r["distance"] == d), key=lambda r: r["predicted"]) for d in distances]
+    slowest = [min((r for r in rows if r["distance"] == d), key=lambda r: r["omega"]) for d in distances]
+    return render(
+        __package__ or "",
+        "trigger.md.j2",
+        result=result,
+        runs=[row for row in rows if row["measured"] is not None],
+        distances=list(zip(distances, weakest, slowest, strict=True)),
+        wave="a force a cos(omega t) along x on each disk of the upper layer"
+        if result["on"] == "layer"
+        else "an acceleration a cos(omega t) of the floor along x",
+        units=result["units"],
+        damped=scene.damping is not None,
+    )
 
 
 def _onset(scene: Scene, rows: Rows, say: Say) -> dict[str, Any]:
