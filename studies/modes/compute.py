@@ -15,6 +15,14 @@ over the number of eigenvalues; rattlers have none.
 the largest eigenvalue, so that a pair beyond that bound is real without a look at its vectors. Of the others the
 vectors are computed, and decide.
 
+**Large packings.** Of more than `ALL` disks the pairs are counted in slices of the spectrum, with a stated error
+(:mod:`~faultgouge.studies.modes.sliced`): the key pairs_error of a load.
+
+**A bound.** The imaginary part of an eigenvalue is at most the norm of the antisymmetric part, :math:`|\mathrm{Im}\,
+\lambda| \le |(A - A^T)/2|_2` with A the mass-weighted operator (Bendixson, Acta Math. 25, 359 (1902)): the key bound. A
+contact couples two disks alone, so that the norm does not grow with the number of disks unless contacts become
+stiffer or more loaded: growth rates cannot grow with it for ever.
+
 **Where b matters.** A tangential force that depends on the overlap, :math:`b = \partial f_t/\partial\delta`, makes K
 non-symmetric. Of packings of up to `SMALL` disks pairs are also counted with b of sticking contacts alone, of sliding
 contacts alone, and of none, at the same equilibria. (The turning of the tangent, which is non-symmetric too, stays.)
@@ -30,6 +38,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.linalg import eigvals
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import eigsh
 
 from ...analysis import NoEquilibriumError, Packing, dynamical_matrix, eigenpairs, eigenvalues, stiffness_matrix
 from ...analysis.spectrum.spectrum import (
@@ -45,12 +55,19 @@ from ...pywrap.runs.path import EquilibriumPath
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.study_sections import Modes
 from ..sweep.onset import AT_LIMIT, Start
+from .sliced import sliced
+
+ALL = 1000
+"""Disks up to which all eigenvalues are computed: ten seconds a load, and 70 MB."""
 
 SMALL = 300
 """Disks up to which b is switched: three more decompositions a load."""
 
 BESIDE = 1e-9
 """Distance of a shift from the eigenvalue whose vectors are wanted, in units of the eigenvalue."""
+
+NORM = 1e-6
+"""Relative error of the norm squared: it is a bound that is several times larger than what it bounds."""
 
 DIGITS = 7
 """Digits of the frequencies that are stored."""
@@ -66,10 +83,13 @@ class Counted:
         Of each pair the frequency with positive real and imaginary part, fastest growing first, 1 / time.
     modes : int
         Number of eigenvalues.
+    error : int or None
+        Of the number of pairs, where these are counted in slices.
     """
 
     omega: Complexes
     modes: int
+    error: int | None = None
 
     @classmethod
     def of(cls, values: Complexes) -> Counted:
@@ -97,6 +117,10 @@ def counted(packing: Packing) -> Counted:
     packing : Packing
         In equilibrium.
     """
+    if len(packing) > ALL:
+        found = sliced(packing)
+        omega = np.sqrt(found.values)
+        return Counted(omega[np.argsort(-omega.imag)], found.modes, found.error)
     values = eigenvalues(packing)
     rounding = unit_rounding(dynamical_matrix(packing)[0].data)
     surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))
@@ -111,6 +135,17 @@ def _is_real(packing: Packing, value: complex, rounding: float) -> bool:
     found = eigenpairs(packing, value * (1 + BESIDE), 2)
     nearest = int(np.argmin(np.abs(found.values - value)))
     return believable(value, float(found.overlap[nearest]), rounding)
+
+
+def antisymmetric_norm(packing: Packing) -> float:
+    """|(A - A^T)/2|_2 of the mass-weighted operator, which no |Im lambda| exceeds, 1 / time^2."""
+    matrix, _ = dynamical_matrix(packing)
+    skew = csr_array(0.5 * (matrix - matrix.T))
+    if skew.shape[0] < 3 or abs(skew).max() == 0:
+        return 0.0
+    start = np.random.default_rng(0).standard_normal(skew.shape[0])
+    largest = eigsh(csr_array(skew.T @ skew), 1, which="LA", v0=start, tol=NORM, return_eigenvectors=False)
+    return float(np.sqrt(largest[0]))
 
 
 def switched(packing: Packing) -> dict[str, dict[str, Any]]:
@@ -191,7 +226,10 @@ def _load(packing: Packing) -> dict[str, Any]:
         "contacts": len(packing.contacts),
         "sliding": int(np.count_nonzero(slip >= AT_LIMIT * limit)),
         "rattlers": len(packing.rattlers),
+        "bound": antisymmetric_norm(packing),
     }
+    if found.error is not None:
+        row["pairs_error"] = found.error
     if len(found.omega):
         value = found.omega[0] ** 2
         pair = eigenpairs(packing, value * (1 + BESIDE), 1)

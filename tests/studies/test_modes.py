@@ -2,14 +2,17 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from faultgouge.analysis import spectrum, stiffness_matrix
+from faultgouge.analysis.onset import LIMITS
 from faultgouge.pywrap import Engine, Scene, equilibrate, settle
-from faultgouge.studies.modes.compute import counted, modes, switched
+from faultgouge.studies.modes.compute import antisymmetric_norm, counted, modes, switched
 from faultgouge.studies.modes.sets import sets
+from faultgouge.studies.modes.sliced import sliced
 
 SCENE = {
     "packing": {"disks": 60, "width": 9.2, "seed": 77},
@@ -91,3 +94,23 @@ def test_displacements_that_lammps_would_refuse_end_no_ramp(name, seed):
     (point,) = (point for point in sets()[name].points if point.values["packing.seed"] == seed)
     found = modes(point.scene, lambda mu: settle(point.scene, mu))
     assert len(found["loads"]) >= 8
+
+
+@pytest.mark.slow
+def test_pairs_counted_in_slices_are_those_of_all_eigenvalues(loaded):
+    """Five slices of 60 disks, whose neighbours do not cover the spectrum."""
+    for packing in loaded:
+        found, every = sliced(packing, replace(LIMITS, own=35)), counted(packing)
+        assert abs(len(found.values) - len(every.omega)) <= found.error
+        assert found.error <= 2
+        assert found.modes == every.modes
+    assert np.sqrt(found.values).imag.max() == pytest.approx(every.omega[0].imag, rel=1e-2)
+
+
+def test_no_imaginary_part_exceeds_the_norm_of_the_antisymmetric_part(loaded):
+    for packing in loaded:
+        mass = np.tile(packing.mass, 3)
+        dense = stiffness_matrix(packing).toarray() / np.sqrt(mass[:, None] * mass)
+        bound = antisymmetric_norm(packing)
+        assert bound == pytest.approx(np.linalg.norm(0.5 * (dense - dense.T), 2), rel=1e-5)
+        assert (counted(packing).omega ** 2).imag.max(initial=0.0) <= bound

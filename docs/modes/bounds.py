@@ -1,0 +1,44 @@
+"""How large imaginary parts are and could be: the largest |Im lambda| beside the norm of the antisymmetric part.
+
+python docs/modes/bounds.py FOLDER     rows of bounds.jsonl: packings of seeds 1, 2, ..., all of them, at three loads
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from faultgouge.analysis import NoEquilibriumError, eigenvalues
+from faultgouge.pywrap import Engine, Scene, equilibrate, settle
+from faultgouge.studies.modes.compute import antisymmetric_norm
+
+PACKINGS = {50: 12, 100: 12, 200: 8, 400: 6, 1000: 3}
+LOADS = (0.03, 0.1, 0.2)
+FY, STEP = 3.0, 0.03
+
+
+def rows(disks: int, seed: int):
+    """The numbers of one packing at each load that it bears."""
+    packing = {"disks": disks, "width": 11.9 * (disks / 100) ** 0.5, "seed": seed}
+    state = settle(Scene.from_mapping({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": FY}}))
+    with Engine(state.packing) as engine:
+        for load in LOADS:
+            fx = load * FY
+            try:
+                for each in np.linspace(state.fx, fx, round((fx - state.fx) / STEP) + 1)[1:]:
+                    state = equilibrate(engine, state, fx=float(each))
+            except NoEquilibriumError:
+                return
+            largest = float(eigenvalues(state.packing).imag.max())
+            bound = antisymmetric_norm(state.packing)
+            yield {"disks": disks, "seed": seed, "fx_over_fy": load, "imaginary": largest, "bound": bound}
+
+
+if __name__ == "__main__":
+    with (Path(sys.argv[1]) / "bounds.jsonl").open("w") as file:
+        for disks, count in PACKINGS.items():
+            for seed in range(1, count + 1):
+                for row in rows(disks, seed):
+                    file.write(json.dumps(row) + "\n")
+                    file.flush()

@@ -1,0 +1,68 @@
+"""The page for referees states what its tables hold."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import MindlinLaw
+
+DOCS = Path(__file__).parents[2] / "docs" / "modes"
+PAGE = (DOCS / "referee.md").read_text()
+
+
+def rows(name):
+    return [json.loads(line) for line in (DOCS / name).read_text().splitlines()]
+
+
+def bounds(load, disks):
+    return np.array(
+        [(r["imaginary"], r["bound"]) for r in rows("bounds.jsonl") if r["fx_over_fy"] == load and r["disks"] == disks]
+    )
+
+
+def test_the_table_of_bounds_is_that_of_the_rows():
+    for row in rows("bounds.jsonl"):
+        assert row["imaginary"] <= row["bound"]
+        found = bounds(row["fx_over_fy"], row["disks"])
+        imaginary, bound = np.median(found, axis=0)
+        assert f"| {row['disks']} | {row['fx_over_fy']:g} | {len(found)} | {imaginary:.3g} | {bound:.3g} |" in PAGE
+
+
+def test_the_sentences_about_bounds_hold():
+    for load in (0.1, 0.2):
+        shares = [np.median(found[:, 0] / found[:, 1]) for n in (50, 100, 200, 400) if len(found := bounds(load, n))]
+        assert 0.03 < min(shares) < max(shares) < 0.13
+    small, large = (np.median(bounds(0.1, n)[:, 1]) for n in (50, 1000))
+    assert large / small == pytest.approx(5, abs=1)
+
+
+def test_counts_in_slices_are_within_their_errors():
+    for row in rows("slices.jsonl"):
+        assert abs(row["sliced"] - row["pairs"]) <= row["error"]
+        assert (
+            f"| {row['disks']} | {row['seed']} | {row['fx_over_fy']:g} | {row['pairs']} | {row['sliced']} ± {row['error']} |"
+            in PAGE
+        )
+
+
+def test_packings_that_bear_more_are_no_others_from_the_start():
+    """Medians at 0.1 of those that bear 0.2, and of those that do not, are within each other's spread."""
+    for disks in (50, 100, 200, 400):
+        packings = [json.loads(line) for line in (DOCS / "tables" / f"force_{disks}.jsonl").read_text().splitlines()]
+        loads = [{load["fx_over_fy"]: load for load in row.get("loads", ())} for row in packings]
+        for key in ("share", "growth_rate"):
+            on = [each[0.1][key] for each in loads if 0.2 in each]
+            ended = [each[0.1][key] for each in loads if 0.1 in each and 0.2 not in each]
+            low, high = np.quantile(on, [0.25, 0.75])
+            assert low <= np.median(ended) <= high
+
+
+def test_b_is_at_most_friction_times_the_normal_stiffness():
+    law, overlap = MindlinLaw(2e5, 5e4, 0.7), np.full(201, 1e-4)
+    slip = np.linspace(-1, 1, 201) * law.slip_limit(overlap)
+    b = np.abs(law.derivatives(overlap, slip).overlap_derivative)
+    ceiling = law.mu * law.normal_stiffness(overlap)
+    assert np.all(b <= ceiling * (1 + 1e-12))
+    assert b[[0, -1]] == pytest.approx(ceiling[[0, -1]], rel=1e-12)
