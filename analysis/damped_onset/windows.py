@@ -106,7 +106,9 @@ def growing_windows(
         return walked(Growing(pencil, LIMITS.narrowest * float(np.abs(loads).max()), None), places, first, watch)
 
 
-def walked(oracle: Growing, loads: Floats, first: bool, watch: Callable[[str], None]) -> tuple[DampedWindow, ...]:
+def walked(
+    oracle: Growing, loads: Floats, first: bool = False, watch: Callable[[str], None] = lambda says: None
+) -> tuple[DampedWindow, ...]:
     """The windows that an oracle finds along a ramp."""
     here = oracle.at(float(loads[0]))
     for load in loads[1:]:
