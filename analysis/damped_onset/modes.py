@@ -19,18 +19,22 @@ which triples the digits in every step: :math:`x \leftarrow T(s)^{-1} T'(s) x`, 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eig, lu_solve
-from scipy.linalg.lapack import zgetrf
+from scipy.linalg import eig
+from scipy.sparse import csc_array, csr_array, eye_array
+from scipy.sparse.linalg import SuperLU, splu
 
 from ..motion.state_space import StateSpace
 from ..onset import force_bearing
 from ..onset.edge import load_error
 from ..onset.modes import matched
+from ..operators.damping import damping_matrix
+from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
-from ..spectrum.spectrum import SAFETY, Complexes, unit_rounding
+from ..spectrum.spectrum import SAFETY, Complexes, active_coordinates, mass_weighted, unit_rounding
 
 STEADY = 1e-3
 """Digits of an eigenvalue smaller than this share of |Z|_F are not asked for."""
@@ -47,27 +51,23 @@ class Pencil:
     ----------
     fx : float
         The load, force per top disk.
-    system : StateSpace
-        On the coordinates that feel a force, of the packing without contacts whose force is unknown.
-    stiffness, damping : ndarray, shape (3N, 3N)
-        A, 1 / time^2, and G, 1 / time, on all coordinates.
+    stiffness, damping : scipy.sparse.csr_array, shape (3N, 3N)
+        A, 1 / time^2, and G, 1 / time, of the packing without contacts whose force is unknown, on all coordinates.
     balance : float
         Error of fx that goes with the packing's residual, see :class:`~faultgouge.analysis.Window`.
-    rounding : float
-        u |Z|_F, 1 / time: uncertainty of a perfectly conditioned s.
     """
 
     fx: float
-    system: StateSpace
-    stiffness: Floats
-    damping: Floats
-    balance: float
-    rounding: float
+    stiffness: csr_array
+    damping: csr_array
+    balance: float = 0.0
 
     @classmethod
     def of(cls, packing: Packing) -> "Pencil":
         """That of a packing with dashpots or drag."""
-        return cls.of_system(packing.fx, StateSpace.of(force_bearing(packing)), 3 * len(packing), load_error(packing))
+        bearing = force_bearing(packing)
+        a, g = (mass_weighted(each(bearing), bearing) for each in (stiffness_matrix, damping_matrix))
+        return cls(packing.fx, a, g, load_error(packing))
 
     @classmethod
     def of_system(cls, fx: float, system: StateSpace, size: int, balance: float = 0.0) -> "Pencil":
@@ -75,7 +75,27 @@ class Pencil:
         inner = np.ix_(system.active, system.active)
         stiffness, damping = np.zeros((2, size, size))
         stiffness[inner], damping[inner] = system.stiffness, system.damping
-        return cls(fx, system, stiffness, damping, balance, unit_rounding(system.matrix))
+        return cls(fx, csr_array(stiffness), csr_array(damping), balance)
+
+    @cached_property
+    def active(self) -> Indices:
+        """The coordinates that feel a force, shape (E,)."""
+        return active_coordinates(self.stiffness)
+
+    def inner(self, matrix: csr_array) -> csr_array:
+        """A matrix on these coordinates alone."""
+        return csr_array(matrix[self.active][:, self.active])
+
+    @cached_property
+    def system(self) -> StateSpace:
+        """The first-order system on these coordinates."""
+        return StateSpace.of_matrices(self.stiffness, self.damping, np.ones(self.stiffness.shape[0]))
+
+    @cached_property
+    def rounding(self) -> float:
+        """u |Z|_F, 1 / time: uncertainty of a perfectly conditioned s. W has the norm (tr A)^(1/2)."""
+        squares = 2 * np.abs(self.stiffness.diagonal()).sum() + np.sum(self.damping.data**2)
+        return unit_rounding(np.sqrt(squares))
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,14 +151,13 @@ class DampedMode:
         guess : complex, optional
             Where to begin; the first-order change by default.
         """
-        active = pencil.system.active
-        a, g = pencil.system.stiffness, pencil.system.damping
+        active, a, g = pencil.active, pencil.inner(pencil.stiffness), pencil.inner(pencil.damping)
         x, y, s = self.right[active], self.left[active], self.rate + self.change(pencil) if guess is None else guess
-        unit, last = np.eye(len(active)), np.inf
+        unit, last = eye_array(len(active)), np.inf
         for _ in range(STEPS):
-            factors = _factors(a + s * g + s * s * unit)
-            x = _unit(lu_solve(factors, 2 * s * x + g @ x, check_finite=False))
-            y = _unit(lu_solve(factors, 2 * np.conj(s) * y + g @ y, trans=2, check_finite=False))
+            factors = _factors(csc_array(a + s * g + s * s * unit))
+            x = _unit(factors.solve(2 * s * x + g @ x))
+            y = _unit(factors.solve(2 * np.conj(s) * y + g @ y, trans="H"))
             slant = np.vdot(y, 2 * s * x + g @ x)
             step = np.vdot(y, a @ x + s * (g @ x) + s * s * x) / slant
             s = complex(s - step)
@@ -195,7 +214,7 @@ class DampedModes:
         kept = np.flatnonzero(values.imag >= 0)
         kept = kept[np.lexsort((values[kept].real, values[kept].imag))]
         overlap = np.abs(np.sum(left[:, kept].conj() * right[:, kept], axis=0))
-        x, y = np.zeros((2, len(pencil.stiffness), len(kept)), complex)
+        x, y = np.zeros((2, pencil.stiffness.shape[0], len(kept)), complex)
         x[system.active] = _unit(system.unweight @ right[:size, kept])
         y[system.active] = _unit(left[size:, kept])
         with np.errstate(divide="ignore"):
@@ -236,12 +255,13 @@ class DampedModes:
         return matched(weight * (1 - np.abs(a - b) / (np.abs(a) + np.abs(b) + np.finfo(float).tiny)))
 
 
-def _factors(matrix: Complexes) -> tuple[Complexes, Indices]:
-    """LU factors; where s is an eigenvalue to the last bit, a pivot of rounding stands for one that is zero."""
-    factors, pivots, _ = zgetrf(matrix)
-    zero = np.flatnonzero(np.diag(factors) == 0)
-    factors[zero, zero] = np.finfo(float).eps * np.abs(matrix).max()
-    return factors, pivots
+def _factors(matrix: csc_array) -> SuperLU:
+    """LU factors; where s is an eigenvalue to the last bit, a shift by rounding stands for a pivot that is zero."""
+    try:
+        return splu(matrix)
+    except RuntimeError:
+        rounding = np.finfo(float).eps * np.abs(matrix.data).max()
+        return splu(csc_array(matrix + rounding * eye_array(matrix.shape[0])))
 
 
 def _unit(vectors: NDArray) -> Complexes:

@@ -175,7 +175,7 @@ def damped_onset_run(
         found = damped_windows(
             lambda fx: dissipation(ramp.path(fx)),
             ramp.forces,
-            look=() if undamped is None else _inside(undamped.windows),
+            look=() if undamped is None else inside(undamped.windows),
             watch=watch,
         )
         last = float(ramp.forces[-1])
@@ -195,7 +195,7 @@ def damped_onset_run(
         )
 
 
-def _inside(windows: Iterable[Window]) -> list[float]:
+def inside(windows: Iterable[Window]) -> list[float]:
     """The onsets of undamped windows, and the middles of those that end: growth is largest there."""
     ends = [0.5 * (each.fx_onset + each.fx_end) for each in windows if each.fx_end is not None]
     return [each.fx_onset for each in windows] + ends

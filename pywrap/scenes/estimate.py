@@ -49,6 +49,8 @@ SECONDS_AN_INCREMENT = 1e-3, 1e-4
 """Of Newton's method: of an increment, and for each disk."""
 SECONDS_A_SEARCH = 2.5e-7, 3e-3
 """Of the search for complex pairs in an increment: for each disk cubed up to `DENSE` disks, for each disk beyond."""
+DAMPED = 2.0
+"""Of the search for growing motion beside that for complex pairs, in units of the latter: 1.6 to 5 for 100 disks."""
 DENSE = 300
 """Disks up to which the search takes all eigenvalues."""
 GROWTH = 300_000
@@ -151,6 +153,8 @@ def estimated(scene: Keys, task: Task) -> Estimate:
             steps += TRIGGERING_RUNS * perturb.time / (perturb.time_step or _undamped_step(scene))
     if task in ("onset", "reproduce"):
         search = SECONDS_A_SEARCH[0] * disks**3 if disks <= DENSE else SECONDS_A_SEARCH[1] * disks
+        if task == "onset" and scene.damping is not None:
+            search *= 1 + DAMPED
         seconds = len(scene.law.mus) * (seconds + increments * search)
         kept = increments + 1
     seconds += steps * (SECONDS_A_STEP[0] + SECONDS_A_STEP[1] * disks)

@@ -194,7 +194,7 @@ def _damped_onset(scene: Scene, mu: float) -> dict[str, Any]:
     from faultgouge.pywrap.onset.damped import damped_onset_run
 
     with status(f"mu = {mu:g}") as show:
-        run = damped_onset_run(scene, mu, watch=partial(_under_way, show, f"mu = {mu:g}"))
+        run = damped_onset_run(scene, mu, watch=partial(_under_way, show, f"mu = {mu:g}", tells=True))
     first = run.windows[0]
     say(
         f"mu = {mu:g}: with dissipation F_x^c = {with_uncertainty(run.fx_c, run.error)} ({first.kind}, "
@@ -262,10 +262,15 @@ def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]]) -> 
     Console(stderr=True, highlight=False).print(table)
 
 
-def _under_way(show: Callable[[str], None], what: str, now: str, folder: Path | None = None) -> None:
+def _under_way(
+    show: Callable[[str], None], what: str, now: str, folder: Path | None = None, tells: bool = False
+) -> None:
+    """Say what is under way; at an interrupt, what a folder has, or how far the search had come if it `tells`."""
     show(f"{what}: {now}")
     if folder is not None and folder.is_dir():
         keeps(f"{folder} has what was found so far; the same command goes on from there")
+    if tells:
+        keeps(f"no file was written. {what}: {now}")
 
 
 def _modes(text: str) -> tuple[int, int]:

@@ -1,0 +1,306 @@
+"""The oracle of growing motion, for the walk along a ramp: what a few modes do, or all of them.
+
+**A few modes.** On most increments nothing happens, or one mode crosses the axis. The clusters that perturbation theory
+names (:mod:`~faultgouge.analysis.damped_onset.screening`) tell which modes grow, or nearly do, at the upper load. These
+are found again with the operator, one by one. Those that grow are followed: from the lower load to the upper one if
+they grew already, else back to where they did not. An increment in which a cluster has a window of its own, or a mode
+is not recognised, is divided, up to `DEPTH` times.
+
+**All modes.** What is still in doubt is told by all modes of both loads
+(:mod:`~faultgouge.analysis.damped_onset.step`).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from ..errors import FaultgougeError, NoEquilibriumError
+from ..onset.edge import LostPairError, track
+from ..onset.modes import matched
+from ..onset.walk import Oracle, between, walk
+from .edge import Crossing, DampedWindow, solved, window_of
+from .modes import DampedMode, DampedModes, Pencil
+from .screening import Cluster, Screen
+from .step import Step, excursion
+
+DEPTH = 4
+"""How often an increment is divided before all modes are asked: they take as long as ten looks at a few."""
+
+CLUSTER = 1e-4
+"""Narrowest windows that are looked for in clusters, in increments: where they begin is known to 1e-2 or so."""
+
+NEARLY = 0.3
+"""A mode of a cluster whose damping is below this share of the median is looked at with the operator, which decides."""
+
+
+class LostTrackError(FaultgougeError):
+    """The motions that grow at a load are not those that were known to."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A load, the pencil there, and all of its modes as soon as somebody asks for them."""
+
+    pencil: Pencil
+
+    @property
+    def fx(self) -> float:
+        return self.pencil.fx
+
+    @cached_property
+    def modes(self) -> DampedModes:
+        """All modes, by LAPACK."""
+        return DampedModes.of(self.pencil)
+
+
+Crossings = dict[tuple[int, int], Crossing]
+"""Where modes, by their numbers at both ends of an increment, cross the axis."""
+
+Open = list[tuple[DampedMode, Crossing]]
+"""Modes that grow at a load, and where each has begun to."""
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """An increment of which the few modes that grow were followed: those that do at its end, and the windows closed."""
+
+    open: Open
+    closed: list[DampedWindow]
+
+
+Announced = Followed | float | None
+"""What the few modes do, or a load at which more is to be seen of them, or neither."""
+
+Sure = Followed | tuple[Step, Crossings]
+"""What is known of an increment."""
+
+
+class Growing:
+    """The oracle of growing motion; it is sure of a step and its crossings, or of the few modes that were followed."""
+
+    finished = False
+
+    def __init__(self, pencil: Callable[[float], Pencil], narrowest: float, screen: Screen | None) -> None:
+        self.pencil, self.narrowest, self.screen = pencil, narrowest, screen
+        self.open: Open | None = None  # at the load reached so far
+        self.closed: list[DampedWindow] = []
+
+    def at(self, fx: float) -> Place:
+        """The pencil at a load."""
+        return Place(self.pencil(fx))
+
+    def over(self, here: Place, there: Place) -> None:
+        """Walk over an increment."""
+        oracle: Oracle[Place, Announced, Sure] = self
+        walk(oracle, [here, there])
+
+    @property
+    def onsets(self) -> list[Crossing]:
+        """Where the windows begin that are open."""
+        return [onset for _, onset in self.open or []]
+
+    def windows(self) -> tuple[DampedWindow, ...]:
+        """All windows by increasing onset."""
+        still = [window_of(onset, None) for onset in self.onsets]
+        return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
+
+    # A few modes
+
+    def candidates(self, places: Sequence[Place], depth: int) -> Iterator[Announced]:
+        """What the few modes do that may grow, or where to look for that; None where all modes have to tell."""
+        for here, there in pairwise(places):
+            if self.open is None:
+                start = here.modes
+                self.open = [
+                    (start.mode(int(k)), Crossing(here.fx, 0.0, float(start.rates[k].imag), "start"))
+                    for k in start.growing
+                ]
+            few = self.screen is not None and depth <= DEPTH
+            clusters = self.screen(here.pencil, there.pencil) if self.screen is not None and few else None
+            course = None if clusters is None else self.followed(clusters, here.pencil, there.pencil)
+            yield None if depth == DEPTH and isinstance(course, float) else course
+
+    def followed(self, clusters: list[Cluster], here: Pencil, there: Pencil) -> Followed | float:
+        """The modes that grow at either load, solved for; else a load in between, at which more is to be seen."""
+        before, middle = self.open or [], 0.5 * (here.fx + there.fx)
+        announced = [announcement(cluster, here.fx, there.fx) for cluster in clusters]
+        hidden = next((modes for modes in announced if isinstance(modes, float)), None)
+        if hidden is not None:
+            return hidden
+        after = [each.at(there, each.rate) for modes in announced if isinstance(modes, list) for each in modes]
+        if any(mode is None for mode in after):
+            return middle
+        growing = distinct([mode for mode in after if mode is not None and mode.growing])
+        now: Open = []
+        closed: list[DampedWindow] = []
+        for mode, onset in before:
+            image = mode.at(there)
+            if image is None:
+                return middle
+            known = next((k for k, each in enumerate(growing) if each.same(image)), None)
+            if known is not None:
+                now.append((growing.pop(known), onset))
+                continue
+            end = None if image.growing else self.crossing(mode, image)
+            if end is None:
+                return middle
+            closed.append(window_of(onset, end))
+        for mode in growing:
+            origin = mode.at(here)
+            if origin is None or origin.growing or any(origin.same(each) for each, _ in before):
+                return middle
+            begin = self.crossing(origin, mode)
+            if begin is None:
+                return middle
+            now.append((mode, begin))
+        return Followed(now, closed)
+
+    # All modes
+
+    def confirm(self, candidates: Announced, here: Place, there: Place, depth: int) -> tuple[Sure | None, list[Place]]:
+        """What the few modes do, else the crossings of all, once nothing can hide in the increment any more."""
+        if isinstance(candidates, Followed):
+            return candidates, []
+        if candidates is not None:
+            divide = between(self.at, here.fx, candidates, there.fx)
+            if divide:
+                return None, divide
+        step = Step.of(here.modes, there.modes)
+        middle = 0.5 * (here.fx + there.fx)
+        divisible = there.fx - here.fx > self.narrowest
+        look = None if not divisible else middle if step.lost else self.unclear(step)
+        crossings: Crossings = {}
+        for pair in [] if look is not None else step.edges:
+            crossing = self.crossing(here.modes.mode(pair[0]), there.modes.mode(pair[1]))
+            if crossing is not None:
+                crossings[pair] = crossing
+            elif divisible:
+                look = middle
+                break
+        divide = [] if look is None else between(self.at, here.fx, look, there.fx)
+        return (None if divide else (step, crossings)), divide
+
+    def unclear(self, step: Step) -> float | None:
+        """A load at which all modes have to be looked at, as a pair grows there or cannot be followed; else None."""
+        for pair in step.suspects(self.narrowest):
+            here = [step.here.mode(k) for k in pair]
+            there = [step.there.mode(int(step.forward[k])) for k in pair]
+            fx = self.inspected(here, there)
+            if fx is not None:
+                return fx
+        return None
+
+    def inspected(self, here: list[DampedMode], there: list[DampedMode]) -> float | None:
+        """The same for one pair: it is followed to where the cubics see it grow, and from there to either side."""
+        span = there[0].fx - here[0].fx
+        slopes = [mode.change(there[0].pencil) for mode in here], [-mode.change(here[0].pencil) for mode in there]
+        width, at = excursion([mode.rate for mode in here], slopes[0], [mode.rate for mode in there], slopes[1])
+        if width * span <= self.narrowest:
+            return None
+        fx = here[0].fx + float(at) * span
+        try:
+            pencil = self.pencil(fx)
+        except NoEquilibriumError:
+            return fx
+        found = [mode.at(pencil) for mode in (here if at < 0.5 else there)]
+        modes = [mode for mode in found if mode is not None]
+        if len(modes) < 2 or modes[0].same(modes[1]):
+            return fx
+        ends = [sorted(mode.growing for mode in each) for each in (here, there)]
+        if sorted(mode.growing for mode in modes) not in ends:
+            return fx
+        return self.inspected(here, modes) or self.inspected(modes, there)
+
+    def crossing(self, here: DampedMode, there: DampedMode) -> Crossing | None:
+        """Where a mode crosses the axis between two loads; None if it cannot be followed or jumps."""
+
+        def follow(nearest: list[DampedMode], fx: float) -> DampedMode:
+            pencil = self.pencil(fx)
+            for mode in nearest:
+                found = mode.at(pencil)
+                if found is not None:
+                    return found
+            raise LostPairError
+
+        try:
+            return solved(track({here.fx: here, there.fx: there}, follow), here.fx, there.fx)
+        except (LostPairError, NoEquilibriumError):
+            return None
+
+    def record(self, sure: Sure) -> None:
+        """Carry the windows over an increment.
+
+        Raises
+        ------
+        LostTrackError
+            If the modes that grow at its beginning are not those of the open windows.
+        """
+        if isinstance(sure, Followed):
+            self.open = sure.open
+            self.closed += sure.closed
+            return
+        step, crossings = sure
+        onsets = self._numbered(step.here)
+        growing = set(step.there.growing.tolist())
+        now: dict[int, Crossing] = {}
+        for k, onset in onsets.items():
+            image = int(step.forward[k])
+            if image in growing:
+                now[image] = onset
+            else:
+                self.closed.append(window_of(onset, crossings.get((k, image)) or _halfway(step, step.here, k)))
+        for image in growing - set(now):
+            before = np.flatnonzero(step.forward == image)
+            known = crossings.get((int(before[0]), image)) if len(before) else None
+            now[image] = known or _halfway(step, step.there, image)
+        self.open = [(step.there.mode(k), onset) for k, onset in now.items()]
+
+    def _numbered(self, here: DampedModes) -> dict[int, Crossing]:
+        """The onsets of the open windows by the numbers of their modes."""
+        known = self.open or []
+        if len(known) != len(here.growing):
+            raise LostTrackError
+        distances = np.abs(
+            np.subtract.outer(np.array([mode.rate for mode, _ in known], complex), here.rates[here.growing])
+        )
+        places = matched(1 / (distances + np.finfo(float).tiny))
+        return {int(here.growing[place]): onset for place, (_, onset) in zip(places, known, strict=True)}
+
+
+def announcement(cluster: Cluster, below: float, above: float) -> list[DampedMode] | float:
+    """Modes that grow in a cluster at the upper load, or nearly do so; a load in between, if others grow there.
+
+    The modes are on all coordinates. Their pencil is the cluster's: they are where to begin with the operator.
+    """
+    oracle = Growing(cluster.pencil, CLUSTER * (above - below), None)
+    here, there = oracle.at(below), oracle.at(above)
+    oracle.over(here, there)
+    for each in oracle.closed:
+        if each.kind != "start" and each.fx_end is not None and cluster.owns(each.frequency):
+            return 0.5 * (each.fx_onset + each.fx_end)
+    modes = there.modes
+    nearly = modes.rates.real > NEARLY * np.median(modes.rates.real)
+    found = []
+    for k in (int(each) for each in np.flatnonzero(nearly)):
+        if cluster.owns(modes.rates[k].imag):
+            right, left = cluster.lifted(modes.right[:, k], modes.left[:, k])
+            found.append(DampedMode(modes.pencil, complex(modes.rates[k]), right, left))
+    return found
+
+
+def distinct(modes: Sequence[DampedMode]) -> list[DampedMode]:
+    """Modes of one pencil, each of them once."""
+    found: list[DampedMode] = []
+    for mode in modes:
+        if not any(mode.same(each) for each in found):
+            found.append(mode)
+    return found
+
+
+def _halfway(step: Step, modes: DampedModes, number: int) -> Crossing:
+    """An edge that could not be solved for."""
+    half = 0.5 * (step.there.fx - step.here.fx)
+    return Crossing(step.here.fx + half, half, float(modes.rates[number].imag), "contact change")
