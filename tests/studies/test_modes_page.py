@@ -48,12 +48,12 @@ def test_without_b_there_is_no_pair_and_sliding_contacts_make_the_strong_growth(
     assert first["sticking"]["with_pairs"] >= 0.9 * first["all"]["with_pairs"] > first["sliding"]["with_pairs"]
 
 
-def test_random_matrices_have_the_measured_shares(found):
-    """Where a tenth and more is complex, to a quarter of the share; packings differ by as much."""
+def test_random_matrices_and_the_formula_are_as_near_as_the_page_says(found):
     for course in found["random"].values():
-        for measured, drawn in zip(course["measured"], course["random"], strict=True):
-            if measured[0] > 0.1:
-                assert drawn[0] == pytest.approx(measured[0], rel=0.25)
+        for measured, drawn, formula in zip(course["measured"], course["random"], course["formula"], strict=True):
+            if measured[0] > 0.15:
+                assert formula[0] == pytest.approx(measured[0], rel=0.125)
+                assert measured[0] < drawn[0] <= 1.25 * measured[0]
 
 
 def test_checks_agree_with_the_same_packings(found):
