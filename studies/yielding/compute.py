@@ -143,7 +143,7 @@ def loaded(path: Branch, cn: float, rate: float) -> dict[str, Any]:
     distances = []
     with (
         Engine(packing) as engine,
-        engine.undamped(dt, signal=Signal([0.0, 2 * duration], [0.0, 2 * last])) as dynamics,
+        engine.undamped(dt, signal=Signal(np.array([0.0, 2 * duration]), np.array([0.0, 2 * last]))) as dynamics,
     ):
         for look in range(1, looks + 1):
             dynamics.advance(int(duration / dt * look / looks) - int(duration / dt * (look - 1) / looks))

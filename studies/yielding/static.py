@@ -74,7 +74,8 @@ class Branch:
 
 def branch(start: Equilibrium, say: Callable[[str], None] = lambda _: None) -> Branch:
     """Follow a packing from its first equilibrium to its static yield."""
-    kept, jumps = [start], []
+    kept = [start]
+    jumps: list[tuple[float, float]] = []
     newton: float | None = None
     step = STEP * start.packing.fy
     while True:
