@@ -233,7 +233,29 @@ def levels(table: Table) -> dict[str, Any]:
             | {name: _mean(values[mine]) for name, values in columns.items()}
         )
     exponents = {name: _slope(disks, values) for name, values in columns.items() if name != "ratio"}
-    return {"rows": rows, "exponents": exponents, "f0": (good.numbers("f0") / load).tolist(), "disks": disks.tolist()}
+    return {
+        "rows": rows,
+        "exponents": exponents,
+        "f0": (good.numbers("f0") / load).tolist(),
+        "disks": disks.tolist(),
+    } | {"expected": expected(good.numbers("f0")[disks == 100])}
+
+
+def expected(f0: Floats, until: float = 0.03, draws: int = 10) -> dict[str, Any] | None:
+    """Onsets up to a load that packings with these F_0 have on average, and the Weibull shape that their spread gives.
+
+    The shape is fitted to the quantiles of (F/F_0)^2, `draws` a packing, censored at `until`; None without packings.
+    """
+    if not len(f0):
+        return None
+    quantiles = (np.arange(draws) + 0.5) / draws
+    loads = np.outer(f0, np.sqrt(-np.log1p(-quantiles))).ravel()
+    found = shape(np.minimum(loads, until), loads <= until)
+    return {
+        "packings": len(f0),
+        "onsets": float(np.sum(-np.expm1(-((until / f0) ** 2)))),
+        "shape": found["shape"]["value"],
+    }
 
 
 def growth(table: Table) -> list[dict[str, Any]]:
@@ -261,15 +283,39 @@ def surrogates(table: Table, reference: Table) -> dict[str, Any]:
     seeds = set(table.words("packing.seed"))
     own = Table(tuple(row for row in reference.rows if row["packing.seed"] in seeds)).settled
     result: dict[str, Any] = {"packings": len(seeds), "own": _ends(own)}
+    mine = _by_seed(own)
     for name in ("linear", "random", "shuffled"):
         rows = tuple(
-            {"ends": row[f"{name}.ends"], "reach": row[f"{name}.reach"]}
+            {"packing.seed": row["packing.seed"], "ends": row[f"{name}.ends"], "reach": row[f"{name}.reach"]}
             for row in table.rows
             if row.get(f"{name}.ends")
         )
         part = Table(rows)
-        result[name] = _ends(part) | {"p": _logrank(part, own)}
+        result[name] = _ends(part) | signs(mine, {int(row["packing.seed"]): row for row in part.rows})
     return result
+
+
+def signs(own: dict[int, dict[str, str]], other: dict[int, dict[str, str]]) -> dict[str, Any]:
+    """The sign test of pairs, packing by packing: in how many the other has the lower onset, of how many that differ.
+
+    Parameters
+    ----------
+    own, other : dict
+        Rows with "ends" and "reach" by seed.
+
+    Returns
+    -------
+    dict
+        "lower", "of", and "p", the probability of a division as uneven, or more, if both were equally likely. Pairs are
+        left out that are equal or of which it is not known which onset is the lower.
+    """
+    from scipy.stats import binomtest  # half a second to import
+
+    pairs = [(own[seed], other[seed]) for seed in sorted(own.keys() & other.keys())]
+    differ = [pair for pair in pairs if pair[0]["reach"] != pair[1]["reach"]]
+    decided = [verdict for pair in differ if (verdict := _lowers(*pair)) is not None]
+    lower = sum(decided)
+    return {"lower": lower, "of": len(decided), "p": binomtest(lower, len(decided)).pvalue if decided else None}
 
 
 def _ends(table: Table) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from ..genericity.levels import growth, levels
 from ..genericity.surrogates import surrogates
 from ..modes.compute import modes
 from ..modes.random_matrices import random_matrices
+from ..yielding.compute import yielding
 from .events import eruptions, trigger
 from .onset import Start, onset
 from .triggering import triggering
@@ -91,6 +92,12 @@ def modes_seconds(scene: Scene) -> float:
     return 0.02 * loads * (disks_of(scene) / 100) ** 2.7 + 3e-3 * increments(scene) * disks_of(scene) / 100
 
 
+def yield_seconds(scene: Scene) -> float:
+    """CPU seconds of the path to static yield, fifteen runs from equilibria and four with a load that rises: 60 s for
+    100 disks."""
+    return 60.0 * disks_of(scene) / 100
+
+
 def disks_of(scene: Scene) -> int:
     """Number of disks, of a stored packing as many as in the paper's."""
     return int(getattr(scene.packing, "disks", 100))
@@ -103,6 +110,7 @@ TASKS: Mapping[str, Task] = {
     "eruptions": Task(eruptions, eruptions_seconds),
     "modes": Task(modes, modes_seconds),
     "random matrices": Task(random_matrices, lambda scene: 3 * modes_seconds(scene)),
+    "yield": Task(yielding, yield_seconds),
     "levels": Task(levels, dense_seconds),
     "growth": Task(growth, lambda scene: increments(scene) * dense_seconds(scene)),
     "surrogates": Task(surrogates, lambda scene: 3 * onset_seconds(scene)),

@@ -1,0 +1,180 @@
+r"""The yield of one packing: static, dynamic, and at finite rates of loading.
+
+**Dynamic.** From the equilibria at the shares `SHARES` of the static yield, the disks are moved at random by `NOISE`
+and let go, for `TIME`: undamped, and with dashpots of each restitution in `LOSSES`. Where no mode grows the noise stays
+what it is: the layer is *stable*, and no run is made. A layer that moves by more than a
+diameter of the largest disk flows. Otherwise the disks are brought to rest by damped dynamics, under the same load, and
+the equilibrium that they reach is compared with the first: D, slip of the layer, contacts that are lost and gained.
+
+**Finite rates.** With dashpots of restitution 0.9 the load rises as F_x = rate t from zero, at the rates `RATES` of F_y
+per unit of time, up to the static yield. The distance from the quasi-static path is the root of D from the equilibrium
+of the same load (between kept ones, by straight lines). The load is given at which this distance first exceeds each
+of `BOUNDS`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from ...analysis import Packing, mean_square_displacement, nearest_image
+from ...analysis.motion.signals import Signal
+from ...pywrap import Engine, Equilibrium, Scene
+from ...pywrap.runs.undamped import time_step
+from ...pywrap.scenes.units import dashpot, real_units
+from ..eruptions.compute import growth_rate
+from ..sweep.onset import Start
+from .static import Branch, FailedError, branch, layer_slip, rest
+
+SHARES = (0.25, 0.5, 0.75, 0.9, 0.97)
+"""Loads of the dynamic runs, in units of the static yield."""
+
+LOSSES = (1.0, 0.9, 0.7)
+"""Restitutions of the dynamic runs; 1 is undamped."""
+
+TANGENTIAL = 2 / 7
+"""C_T/C_N."""
+
+IMPACT = 0.093
+"""Velocity of the impact with these restitutions where a scene has no units: 1 m/s in the units of quartz.toml."""
+
+NOISE = 1e-12
+"""Standard deviation of the random displacement of each coordinate."""
+
+TIME = 50.0
+"""Length of a dynamic run, time."""
+
+LOOKS = 50
+"""Looks at the disks in a run."""
+
+RATES = (10.0, 1.0, 0.1, 0.01)
+"""Rates of loading, F_y per unit of time."""
+
+BOUNDS = (1e-3, 1e-2)
+"""Distances from the quasi-static path, in diameters of a small disk."""
+
+
+def yielding(scene: Scene, start: Start) -> dict[str, Any]:
+    """One row: the static yield, the dynamic runs, the runs at finite rates."""
+    path = branch(start(scene.law.mus[0]))
+    fy, last = scene.load.fy, path.kept[-1].fx
+    result: dict[str, Any] = {
+        "newton": path.newton / fy,
+        "static": last / fy,
+        "jumps": [[fx / fy, moved] for fx, moved in path.jumps],
+        "dynamic": [],
+    }
+    dashpots = {each: _dashpot(scene, each) for each in LOSSES}
+    for share in SHARES:
+        try:
+            here = path.at(share * last)
+        except FailedError:
+            continue  # between two loads that are borne
+        for loss, cn in dashpots.items():
+            run = dynamic(here, cn, scene.packing.model_dump().get("seed", 0))
+            result["dynamic"].append({"share": share, "restitution": loss, "fx_over_fy": here.fx / fy} | run)
+    result["loading"] = [{"rate": rate} | loaded(path, dashpots[0.9], rate) for rate in RATES]
+    return result
+
+
+def _dashpot(scene: Scene, restitution: float) -> float:
+    real = real_units(scene)
+    velocity = IMPACT if real is None else real.time / real.length  # 1 m/s
+    return dashpot(scene.law.kn, restitution, 1.0, velocity)
+
+
+def dynamic(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
+    """A run from an equilibrium with noise, and where it comes to rest."""
+    packing = with_dashpots(start.packing, cn)
+    noise = np.zeros(3 * len(packing))
+    noise[: 2 * len(packing)] = NOISE * np.random.default_rng(seed).standard_normal(2 * len(packing))
+    dt = time_step(packing)
+    rate = growth_rate(packing)
+    if rate == 0:
+        return {"rate": rate, "ends": "stable", "largest_D": NOISE**2, "slip": 0.0, "D": NOISE**2}
+    slip = largest = 0.0
+    with Engine(packing) as engine:
+        engine.restore(engine.displace(packing, noise))
+        before = engine.packing
+        with engine.undamped(dt) as dynamics:
+            for _ in range(LOOKS):
+                dynamics.advance(int(TIME / dt / LOOKS))
+                now = engine.packing
+                slip, before = slip + layer_slip(before, now), now
+                largest = max(largest, _distance(packing, now))
+                if abs(slip) > 2 * packing.radius.max():
+                    return {"rate": rate, "ends": "flows", "largest_D": largest, "slip": slip}
+        return {"rate": rate, "largest_D": largest} | _rested(engine, packing, slip, start.residual)
+
+
+def _rested(engine: Engine, packing: Packing, slip: float, residual: float) -> dict[str, Any]:
+    """Where the disks come to rest after a run in which the layer has moved by `slip`."""
+    ends: Literal["rests", "fails at rest"] = "rests"
+    try:
+        found, moved = rest(engine)
+    except FailedError:
+        ends = "fails at rest"
+        return {"ends": ends, "slip": slip}
+    first, last = (_pairs(each, residual) for each in (packing, found.packing))
+    return {
+        "ends": ends,
+        "slip": slip + moved,
+        "D": _distance(packing, found.packing),
+        "lost": len(first - last),
+        "gained": len(last - first),
+    }
+
+
+def with_dashpots(packing: Packing, cn: float) -> Packing:
+    """The packing with dashpots C_N and C_T = 2/7 C_N, and without drag."""
+    return replace(packing, law=replace(packing.law, cn=cn, ct=TANGENTIAL * cn), drag_time=None)
+
+
+def loaded(path: Branch, cn: float, rate: float) -> dict[str, Any]:
+    """The load rises at a rate up to the static yield: loads at which the layer leaves the quasi-static path."""
+    packing = with_dashpots(path.kept[0].packing, cn)
+    fy, last = packing.fy, path.kept[-1].fx
+    duration = last / (rate * fy)
+    dt = time_step(packing)
+    looks = min(LOOKS, int(duration / dt))
+    left: dict[float, float | None] = dict.fromkeys(BOUNDS)
+    distances = []
+    with (
+        Engine(packing) as engine,
+        engine.undamped(dt, signal=Signal(np.array([0.0, 2 * duration]), np.array([0.0, 2 * last]))) as dynamics,
+    ):
+        for look in range(1, looks + 1):
+            dynamics.advance(int(duration / dt * look / looks) - int(duration / dt * (look - 1) / looks))
+            fx = dynamics.steps * dt * rate * fy
+            off = _off(path, fx, engine.packing)
+            distances.append(off)
+            for bound in BOUNDS:
+                if left[bound] is None and off > bound:
+                    left[bound] = fx / fy
+    return {"left": [left[each] for each in BOUNDS], "largest": max(distances), "last": distances[-1]}
+
+
+def _off(path: Branch, fx: float, now: Packing) -> float:
+    """Root of D from the equilibrium at fx, disks that carry nothing there left out."""
+    place = max(1, next((k for k, each in enumerate(path.kept) if each.fx >= fx), len(path.kept) - 1))
+    below, above = path.kept[place - 1].packing, path.kept[place].packing
+    share = (fx - below.fx) / (above.fx - below.fx)
+    between = below.position + share * nearest_image(above.position - below.position, below.box_length)
+    away = nearest_image(now.position - between, below.box_length)
+    carrying = np.ones(len(now), dtype=bool)
+    carrying[below.rattlers] = carrying[above.rattlers] = False
+    return float(np.sqrt(np.mean(np.sum(away[carrying] ** 2, axis=1))))
+
+
+def _distance(first: Packing, now: Packing) -> float:
+    """D of the disks that carry load at the start."""
+    kept = np.ones(len(first), dtype=bool)
+    kept[first.rattlers] = False
+    return float(mean_square_displacement(now.position[kept], first.position[kept], first.box_length))
+
+
+def _pairs(packing: Packing, residual: float) -> set[tuple[int, int]]:
+    contacts = packing.loaded(residual).contacts
+    return set(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True))

@@ -1,0 +1,142 @@
+"""The page of the study of yield, from its table: numbers with intervals, the picture, the text."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...figures.style import save
+from ..statistics import share
+from .compute import LOSSES, RATES, SHARES
+
+FLOWING = ("flows", "fails at rest")
+"""How a run ends after which the layer does not rest."""
+
+ELSEWHERE = 1e-8
+"""D beyond which the layer rests in another equilibrium: a ten-thousandth of a small disk's diameter, squared."""
+
+TEXT = """# Yield, static and dynamic
+
+Made by `python docs/yield/make.py` from `tables/quartz_100.jsonl`, which `faultgouge sweep scenes/sweeps/yield.toml`
+writes. 100 disks, mu = 0.6, k_n/F_y as quartz under 10 MPa. The rule of selection is in that file. So far
+{packings} packings have been followed, and {failed} did not settle. Shares have Wilson's 95 % intervals.
+
+**Static.** Newton's method first finds no equilibrium beyond F_x/F_y = {newton}. Damped dynamics goes on: the layer
+moves and rests again, and fails at {static} (medians). What Newton's method tells is the end of its branch, and not
+flow. {{mod}}`faultgouge.studies.yielding.static` says what *fails* means.
+
+**Dynamic.** From an equilibrium at a share of the static yield, with noise of 1e-12, for 50 units of time:
+
+| F_x over static yield | restitution | packings | flow | elsewhere | median slip of those that rest, diameters |
+|---|---|---|---|---|---|
+{dynamic}
+
+*Flow* counts runs that do not come to rest afterwards. *Elsewhere* are those that rest at D above 1e-8.
+
+![Share of packings that flow](yield.png)
+
+*Share of packings that flow below their static yield, over the load, for three restitutions. Bars are intervals.*
+
+**Loads that rise.** With restitution 0.9 and F_x = rate t, the distance from the quasi-static path exceeds 1e-3 and
+1e-2 diameters at these F_x/F_y (medians of the packings in which it does):
+
+| rate, F_y per unit of time | 1e-3 | 1e-2 |
+|---|---|---|
+{loading}
+
+What is missing: 400 disks, other depths, runs longer than 50 units of time, and rates below {slowest:g}.
+"""
+
+
+def rows_of(table: Path) -> tuple[list[dict[str, Any]], int]:
+    """The results of the packings that settled, and how many did not."""
+    rows = [json.loads(line) for line in table.read_text().splitlines()]
+    good = [row["result"] for row in rows if row["result"]]
+    return good, len(rows) - len(good)
+
+
+def numbers(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Medians of static yield, shares of the dynamic runs, loads at which the path is left."""
+    return {
+        "newton": float(np.median([row["newton"] for row in rows])),
+        "static": float(np.median([row["static"] for row in rows])),
+        "dynamic": [_of_runs(rows, load, loss) for load in SHARES for loss in LOSSES],
+        "loading": [{"rate": rate, "left": _left(rows, rate)} for rate in RATES],
+    }
+
+
+def _of_runs(rows: list[dict[str, Any]], load: float, loss: float) -> dict[str, Any]:
+    runs = [run for row in rows for run in row["dynamic"] if (run["share"], run["restitution"]) == (load, loss)]
+    rest = [run for run in runs if run["ends"] not in FLOWING]
+    return {
+        "share": load,
+        "restitution": loss,
+        "flow": share(len(runs) - len(rest), len(runs)),
+        "elsewhere": share(sum(run["D"] > ELSEWHERE for run in rest), len(runs)),
+        "slip": float(np.median([abs(run["slip"]) for run in rest])) if rest else None,
+    }
+
+
+def _left(rows: list[dict[str, Any]], rate: float) -> list[float | None]:
+    found = [run["left"] for row in rows for run in row["loading"] if run["rate"] == rate]
+    columns = [[value for value in column if value is not None] for column in zip(*found, strict=True)]
+    return [float(np.median(column)) if column else None for column in columns]
+
+
+def text(found: dict[str, Any], packings: int, failed: int) -> str:
+    """The page."""
+    dynamic = [
+        f"| {row['share']} | {row['restitution']} | {row['flow']['of']} | {_percent(row['flow'])} | "
+        f"{_percent(row['elsewhere'])} | {'-' if row['slip'] is None else format(row['slip'], '.2g')} |"
+        for row in found["dynamic"]
+    ]
+    loading = [
+        f"| {row['rate']:g} | " + " | ".join("-" if each is None else f"{each:.3g}" for each in row["left"]) + " |"
+        for row in found["loading"]
+    ]
+    return TEXT.format(
+        packings=packings,
+        failed=failed,
+        newton=f"{found['newton']:.2g}",
+        static=f"{found['static']:.2g}",
+        dynamic="\n".join(dynamic),
+        loading="\n".join(loading),
+        slowest=min(RATES),
+    )
+
+
+def _percent(part: dict[str, Any]) -> str:
+    if part["share"] is None:
+        return "-"
+    return f"{part['count']} of {part['of']} ({100 * part['low']:.0f} to {100 * part['high']:.0f} %)"
+
+
+def figure(found: dict[str, Any]) -> Figure:
+    """Share of packings that flow over the load, for each restitution."""
+    drawn = Figure(figsize=(6, 4), layout="constrained")
+    axes = drawn.subplots()
+    for k, loss in enumerate(LOSSES):
+        rows = [row for row in found["dynamic"] if row["restitution"] == loss and row["flow"]["of"]]
+        middle = np.array([row["flow"]["share"] for row in rows])
+        bars = [[m - row["flow"]["low"], row["flow"]["high"] - m] for m, row in zip(middle, rows, strict=True)]
+        place = np.array([row["share"] for row in rows]) + 0.01 * (k - 1)
+        label = "undamped" if loss == 1 else f"restitution {loss}"
+        axes.errorbar(place, middle, yerr=np.clip(np.array(bars).T, 0, 1), fmt="o-", capsize=3, label=label)
+    axes.axvline(1.0, color="black", linestyle="--", label="static yield")
+    axes.set(xlabel="F_x over static yield", ylabel="share of packings that flow", ylim=(-0.02, 1.02))
+    axes.legend(loc="upper left")
+    return drawn
+
+
+def write_page(folder: Path) -> Path:
+    """The page and the picture of a folder with a table; the path of the page."""
+    rows, failed = rows_of(folder / "tables" / "quartz_100.jsonl")
+    found = numbers(rows)
+    save(figure(found), folder / "yield")
+    page = folder / "yield.md"
+    page.write_text(text(found, len(rows), failed))
+    return page

@@ -1,0 +1,17 @@
+"""The page of the study of yield says what its table says."""
+
+from pathlib import Path
+
+from faultgouge.studies.yielding.page import numbers, rows_of, text
+
+FOLDER = Path(__file__).parents[2] / "docs" / "yield"
+
+
+def test_the_page_is_that_of_its_table():
+    rows, failed = rows_of(FOLDER / "tables" / "quartz_100.jsonl")
+    assert (FOLDER / "yield.md").read_text() == text(numbers(rows), len(rows), failed)
+
+
+def test_the_static_yield_lies_beyond_the_end_of_newtons_branch():
+    rows, _ = rows_of(FOLDER / "tables" / "quartz_100.jsonl")
+    assert all(row["static"] >= row["newton"] for row in rows)
