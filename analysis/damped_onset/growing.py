@@ -29,6 +29,9 @@ from .step import Step, excursion
 DEPTH = 4
 """How often an increment is divided before all modes are asked: they take as long as ten looks at a few."""
 
+MOST = 2
+"""Clusters of an increment beyond which all modes take less time than the clusters."""
+
 CLUSTER = 1e-4
 """Narrowest windows that are looked for in clusters, in increments: where they begin is known to 1e-2 or so."""
 
@@ -120,6 +123,8 @@ class Growing:
                 ]
             few = self.screen is not None and depth <= DEPTH
             clusters = self.screen(here.pencil, there.pencil) if self.screen is not None and few else None
+            if clusters is not None and len(clusters) > MOST:
+                clusters = None
             course = None if clusters is None else self.followed(clusters, here.pencil, there.pencil)
             yield None if depth == DEPTH and isinstance(course, float) else course
 

@@ -56,7 +56,8 @@ def test_onset_with_dissipation_as_json(faultgouge, tmp_path):
     assert result["fx_c"] == pytest.approx(0.0218328368, abs=1e-10)
     assert result["undamped"]["fx_c"] == pytest.approx(0.0218330564080, rel=1e-9)
     window = result["windows"][0]
-    assert window.keys() == {"fx_onset", "fx_end", "frequency", "error", "kind"}
+    assert window.keys() == {"fx_onset", "fx_end", "frequency", "error", "error_of_path", "kind"}
+    assert 0 < window["error_of_path"] <= window["error"]
     assert (window["kind"], window["fx_end"]) == ("hopf", None)
     assert window["frequency"] == pytest.approx(45.367, abs=1e-3)
 
