@@ -1,10 +1,10 @@
 """run.h5: the equilibria of a run, to the bit, written as they come.
 
-The file is H5MD 1.1, which MDAnalysis opens with
-``Universe.empty(N, trajectory=True).load_new("run.h5", format="H5MD", convert_units=False)``::
+The file is H5MD 1.1, which MDAnalysis opens after ``import faultgouge.pywrap.exchange.mdanalysis``::
 
-    /h5md                          version, author, creator
-    /particles/disks/position      (T, N, 3)  centres, z = 0
+    /h5md                          version, author, creator (the program's name and version)
+    /particles/disks/position      (T, N, 3)  centres, z = 0; a link /observables/position leads to them
+    /particles/disks/mass          (N,)       a link to the masses among the parameters
     /particles/disks/box           dimension 3, periodic along x or not
     /particles/disks/box/edges     (T, 3)     period, twice the height, largest diameter; only if periodic
     /observables/angle             (T, N)     orientations
@@ -118,8 +118,8 @@ class RunFile(SealedFile):
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """Names of everything that is stored with a frame."""
-        return tuple(self._file["observables"])
+        """Names of everything that is stored with a frame beside positions."""
+        return tuple(name for name in self._file["observables"] if name != "position")
 
     def observable(self, name: str) -> NDArray:
         """An observable in every complete frame, shape (T, ...).

@@ -147,6 +147,8 @@ def _check_parameters(file: h5py.File, disks: int) -> None:
 
 def _check_observables(file: h5py.File, disks: int, frames: int, size: int) -> None:
     group = file["observables"]
+    if "position" in group and group["position"] != file["particles/disks/position"]:
+        raise _UnsoundError("is damaged: /observables/position is no link to /particles/disks/position")
     for name in group:
         item = _dataset(group, f"{name}/value", size, frames)
         if item.ndim < 1 or item.shape[0] < frames:

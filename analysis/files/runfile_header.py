@@ -4,6 +4,7 @@ The format is told in :mod:`~faultgouge.analysis.files.runfile`.
 """
 
 from dataclasses import MISSING, fields
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import h5py
@@ -45,13 +46,21 @@ def parameters_of(packing: Packing) -> dict[str, Any]:
     return values
 
 
+def _version() -> str:
+    """The program's version; empty where the analysis runs without being installed."""
+    try:
+        return version(CREATOR)
+    except PackageNotFoundError:
+        return ""
+
+
 def write_header(file: h5py.File, packing: Packing) -> None:
     """The groups and parameters of a file without frames, for the disks of a packing."""
     h5md = file.create_group("h5md")
     h5md.attrs["version"] = np.array([1, 1])
     h5md.create_group("author").attrs["name"] = CREATOR
     creator = h5md.create_group("creator")
-    creator.attrs["name"], creator.attrs["version"] = CREATOR, "1"
+    creator.attrs["name"], creator.attrs["version"] = CREATOR, _version()
     disks = file.create_group("particles/disks")
     box = disks.create_group("box")
     box.attrs["dimension"] = 3
@@ -62,7 +71,9 @@ def write_header(file: h5py.File, packing: Packing) -> None:
     position.create_dataset("time", (0,), np.float64, maxshape=(None,), **CHECKED)
     shape = (len(packing), 3)
     position.create_dataset("value", (0, *shape), np.float64, maxshape=(None, *shape), chunks=(1, *shape), **COMPACT)
-    file.create_group("observables")
+    # readers of H5MD take positions as float32, and observables as they are: a link, which takes no room
+    file["observables/position"] = position
     parameters = file.create_group("parameters")
     for name, value in parameters_of(packing).items():
         parameters[name] = value
+    disks["mass"] = parameters["mass"]

@@ -1,4 +1,4 @@
-"""Packings from and to other codes: LAMMPS, GSD, extended XYZ, CSV, VTK.
+"""Packings from and to other codes: LAMMPS, MercuryDPM, YADE, GSD, extended XYZ, CSV, VTK.
 
 `readers` says which module reads which file. A reader returns `Disks`, plain columns; `packing_of` makes a packing of
 them, `upper_layer` finds the layer that carries the load, `resting` brings to rest what is out of balance. `writers`
@@ -6,21 +6,26 @@ says which module writes which file.
 """
 
 from .disks import Disks, Slips, packing_of
+from .frames import chosen_frames, frames_of
 from .layer import upper_layer
-from .quantities import ModeVectors
+from .quantities import Frame, ModeVectors
 from .readers import format_of, is_hdf5, known_formats, read_disks
-from .writers import WRITERS, write_packing
+from .writers import WRITERS, write_frames, write_packing
 
 __all__ = [
     "WRITERS",
     "Disks",
+    "Frame",
     "ModeVectors",
     "Slips",
+    "chosen_frames",
     "format_of",
+    "frames_of",
     "is_hdf5",
     "known_formats",
     "packing_of",
     "read_disks",
     "upper_layer",
+    "write_frames",
     "write_packing",
 ]

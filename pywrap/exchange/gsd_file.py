@@ -7,6 +7,7 @@ see float32. The y axis of a GSD box has its middle at zero; an export says wher
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 from ...analysis import Packing, PackingFileError
 from .disks import Disks, of_columns
 from .needs import needed_library
-from .quantities import ModeVectors, disk_force, disk_mobilised, disk_pressure
+from .quantities import Frame, ModeVectors, disk_force, disk_mobilised, disk_pressure
 from .record import contact_rows, given, scalars, slips_of
 
 OWN = "particles/faultgouge/"
@@ -48,13 +49,13 @@ def _disks(path: Path, frame: Any) -> Disks:
         columns = {name: array.astype(np.float64) for name, array in own.items()}
         values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
         period = values.get("box_length")
-        rows = np.asarray(log[CONTACTS], dtype=np.float64).reshape(-1, 4 if "x_low" in columns else 3)
+        rows = np.asarray(log.get(CONTACTS, []), dtype=np.float64).reshape(-1, 4 if "x_low" in columns else 3)
         return of_columns(
             str(path),
             columns,
             box_length=None if period is None else float(period),
             given=given(values),
-            slips=slips_of(rows[rows[:, 0] > 0]),
+            slips=slips_of(rows[rows[:, 0] > 0]) if CONTACTS in log else None,
         )
     if particles.diameter is None or not particles.N:
         raise PackingFileError(f"{path} has no disks with diameters.")
@@ -72,7 +73,50 @@ def _disks(path: Path, frame: Any) -> Disks:
 def write_gsd(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
     """A GSD file with one frame; what is in it, in words."""
     hoomd = needed_library("gsd.hoomd", path)
-    frame, n, force = hoomd.Frame(), len(packing), disk_force(packing)
+    frame = _frame(hoomd, packing)
+    frame.log |= _forces(packing)
+    for mode in modes:
+        frame.log[f"particles/{mode.name}"] = np.ascontiguousarray(mode.displacement.real.T)
+        frame.log[f"particles/{mode.name}_imag"] = np.ascontiguousarray(mode.displacement.imag.T)
+    with hoomd.open(str(path), "w") as file:
+        file.append(frame)
+    return f"{SINGLE}; the logged quantities have all of the packing in float64, and import takes these"
+
+
+def write_gsd_frames(path: Path, frames: Iterable[Frame]) -> None:
+    """A GSD file of several frames."""
+    hoomd = needed_library("gsd.hoomd", path)
+    with hoomd.open(str(path), "w") as file:
+        for number, each in enumerate(frames):
+            frame = _frame(hoomd, each.packing)
+            frame.configuration.step = number
+            frame.log["particles/displacement"] = _in_space(each.displacement)
+            frame.log["particles/normal_force"] = disk_pressure(each.packing)
+            frame.log |= {f"faultgouge/{key}": np.array([value]) for key, value in each.number.items()}
+            if each.whole:
+                frame.log |= _forces(each.packing)
+            file.append(frame)
+
+
+def _in_space(vectors: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(np.column_stack([vectors, np.zeros(len(vectors))]))
+
+
+def _forces(packing: Packing) -> dict[str, np.ndarray]:
+    """What follows from slips, and these."""
+    # gsd has no empty arrays: a row of zeros stands for no contact
+    rows = contact_rows(packing)
+    return {
+        CONTACTS: rows if len(rows) else np.zeros((1, 4 if packing.compensated else 3)),
+        "particles/net_force": _in_space(disk_force(packing)[:, :2]),
+        "particles/normal_force": disk_pressure(packing),
+        "particles/mobilised": disk_mobilised(packing),
+    }
+
+
+def _frame(hoomd: Any, packing: Packing) -> Any:
+    """The disks, the box, law and load."""
+    frame, n = hoomd.Frame(), len(packing)
     x, y = packing.position.T
     box = packing.box_length
     width = box if box is not None else 2 * (np.abs(x).max() + packing.radius.max())
@@ -95,17 +139,6 @@ def write_gsd(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
     if packing.position_low is not None:
         columns |= {"x_low": packing.position_low[:, 0], "y_low": packing.position_low[:, 1]}
     frame.log = {OWN + name: np.ascontiguousarray(column, dtype=np.float64) for name, column in columns.items()}
-    # gsd has no empty arrays: a row of zeros stands for no contact
-    rows = contact_rows(packing)
-    frame.log[CONTACTS] = rows if len(rows) else np.zeros((1, 4 if packing.compensated else 3))
     numbers = scalars(packing) | ({} if box is None else {"box_length": box})
     frame.log |= {f"faultgouge/{key}": np.array([value], dtype=np.float64) for key, value in numbers.items()}
-    frame.log["particles/net_force"] = np.ascontiguousarray(np.column_stack([force[:, :2], np.zeros(n)]))
-    frame.log["particles/normal_force"] = disk_pressure(packing)
-    frame.log["particles/mobilised"] = disk_mobilised(packing)
-    for mode in modes:
-        frame.log[f"particles/{mode.name}"] = np.ascontiguousarray(mode.displacement.real.T)
-        frame.log[f"particles/{mode.name}_imag"] = np.ascontiguousarray(mode.displacement.imag.T)
-    with hoomd.open(str(path), "w") as file:
-        file.append(frame)
-    return f"{SINGLE}; the logged quantities have all of the packing in float64, and import takes these"
+    return frame

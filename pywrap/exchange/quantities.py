@@ -31,6 +31,33 @@ class ModeVectors:
     displacement: NDArray[np.complex128]
 
 
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A frame of a film of packings.
+
+    Attributes
+    ----------
+    packing : Packing
+        The packing. Its contacts are those that touch, without slips, if it is not `whole`.
+    time : float
+        F_x of an equilibrium, or the time of an undamped run.
+    displacement : ndarray, shape (N, 2)
+        From the first frame, length.
+    whole : bool
+        Whether angles and slips, and so the forces, are known: an undamped run stores positions alone.
+    """
+
+    packing: Packing
+    time: float
+    displacement: Floats
+    whole: bool
+
+    @property
+    def number(self) -> dict[str, float]:
+        """The time by its name: a ramp has none beside fx."""
+        return {} if self.whole else {"time": self.time}
+
+
 def contact_force(packing: Packing) -> Floats:
     """f_n n + f_t tau, the force on the first partner of each contact, shape (C, 2)."""
     g = packing.geometry

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -10,6 +11,8 @@ from typing import NamedTuple
 from ...analysis import PackingFileError
 from ...analysis.files.wholefile import BEGINNINGS
 from .disks import Disks
+
+NUMBER = re.compile(rb"[-+.\deE]+")
 
 
 class Format(NamedTuple):
@@ -33,6 +36,8 @@ class Format(NamedTuple):
 
 DATA = Format("LAMMPS data (atom style sphere)", "data", "read_data", False)
 DUMP = Format("LAMMPS dump", "dump", "read_custom_dump", True)
+YADE = Format("YADE's text", "yade", "read_yade", False)
+MERCURY = Format("MercuryDPM's data", "mercury", "read_mercury", True)
 RESTART = Format("LAMMPS restart", "restart", "read_restart", False)
 OTHER = Format("what MDAnalysis reads with radii", "universe", "read_universe", True)
 
@@ -50,11 +55,14 @@ FORMATS: dict[str, Format] = {
 }
 """By suffix. LAMMPS has no suffixes of its own: data.NAME, dump.NAME and restart.NAME are known as well."""
 
+BY_BEGINNING: dict[str, Format] = {"line 1 is #format x_y_z_r": YADE, ".data, line 1 is N time bounds": MERCURY}
+"""What the first line tells, whatever the name is; MercuryDPM's files have the suffix of LAMMPS's."""
+
 
 def known_formats() -> str:
     """All formats that are read, in words."""
     words: dict[str, list[str]] = {}
-    for suffix, each in FORMATS.items():
+    for suffix, each in {**FORMATS, **BY_BEGINNING}.items():
         words.setdefault(each.words, []).append(suffix)
     listed = [f"{what} ({', '.join(suffixes)})" for what, suffixes in words.items()]
     return ", ".join([*listed, "run.h5", f"and {OTHER.words} (pip install 'faultgouge[export]')"])
@@ -76,6 +84,9 @@ def format_of(path: Path) -> Format:
     """
     from .restart import is_restart
 
+    begun = _by_beginning(path)
+    if begun is not None:
+        return begun
     if path.suffix.lower() in FORMATS:
         return FORMATS[path.suffix.lower()]
     begin = path.name.split(".")[0].lower()
@@ -90,6 +101,19 @@ def format_of(path: Path) -> Format:
     if path.suffix and known(path):
         return OTHER
     raise PackingFileError(f"{path} is of no format that is read: give {known_formats()}.")
+
+
+def _by_beginning(path: Path) -> Format | None:
+    """YADE and MercuryDPM, which the first line tells."""
+    try:
+        with path.open("rb") as stream:
+            words = stream.readline(400).split()
+    except OSError:
+        return None
+    if words[:1] == [b"#format"]:
+        return YADE
+    numbers = len(words) in (6, 8) and all(NUMBER.fullmatch(word) for word in words)
+    return MERCURY if numbers and ".data" in path.name.lower() else None
 
 
 def read_disks(path: Path, frame: int | None = None) -> Disks:

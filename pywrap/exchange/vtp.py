@@ -9,6 +9,7 @@ of an end is 0. The file is XML with arrays in base64 (VTK file formats, "XML fi
 from __future__ import annotations
 
 import base64
+from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing
-from .quantities import ModeVectors, contact_force, contact_mobilised, disk_force, disk_mobilised, disk_pressure
+from .quantities import Frame, ModeVectors, contact_force, contact_mobilised, disk_force, disk_mobilised, disk_pressure
 from .record import scalars
 
 Element = ElementTree.Element
@@ -24,13 +25,36 @@ Element = ElementTree.Element
 TYPES = {"f": "Float64", "i": "Int64"}
 
 
+FORCES = ("angle", "net_force", "torque_over_radius", "mobilised", "contact_force", "contact_tangential_force")
+SLIPS = ("contact_slip", "contact_mobilised")
+
+
 def write_vtp(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
     """A .vtp file; what is in it, in words."""
+    _tree(packing, modes).write(path, xml_declaration=True, encoding="utf-8")
+    return f"{len(packing)} disks and {len(packing.contacts)} contacts, in float64"
+
+
+def write_pvd(path: Path, frames: Iterable[Frame]) -> None:
+    """A .pvd file, ParaView's list of frames, and a folder of its name with a .vtp for each."""
+    folder = path.with_suffix("")
+    folder.mkdir(exist_ok=True)
+    root = Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    collection = ElementTree.SubElement(root, "Collection")
+    for number, frame in enumerate(frames):
+        name = f"{folder.name}/{number:05d}.vtp"
+        _tree(frame.packing, [], frame).write(path.parent / name, xml_declaration=True, encoding="utf-8")
+        ElementTree.SubElement(collection, "DataSet", timestep=repr(float(frame.time)), part="0", file=name)
+    ElementTree.ElementTree(root).write(path, xml_declaration=True, encoding="utf-8")
+
+
+def _tree(packing: Packing, modes: list[ModeVectors], frame: Frame | None = None) -> ElementTree.ElementTree:
     n, count = len(packing), len(packing.contacts)
     root = Element("VTKFile", type="PolyData", version="1.0", byte_order="LittleEndian", header_type="UInt64")
     data = ElementTree.SubElement(root, "PolyData")
     fields = ElementTree.SubElement(data, "FieldData")
     numbers = scalars(packing) | ({} if packing.box_length is None else {"box_length": packing.box_length})
+    numbers |= {} if frame is None else frame.number
     numbers |= {f"{mode.name}_eigenvalue": mode.eigenvalue.real for mode in modes}
     numbers |= {f"{mode.name}_eigenvalue_imag": mode.eigenvalue.imag for mode in modes}
     for name, value in numbers.items():
@@ -39,17 +63,22 @@ def write_vtp(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
     none = {"NumberOfStrips": 0, "NumberOfPolys": 0}
     piece = ElementTree.SubElement(data, "Piece", {key: str(value) for key, value in (sizes | none).items()})
     on_points = ElementTree.SubElement(piece, "PointData")
-    for name, values in _of_disks(packing, modes).items():
+    on_disks, unknown = _of_disks(packing, modes), () if frame is None or frame.whole else FORCES + SLIPS
+    if frame is not None:
+        on_disks["displacement"] = _in_space(frame.displacement)
+    for name, values in on_disks.items():
+        if name in unknown:
+            continue
         fill = 0.0 if name == "radius" else np.nan
         _array(on_points, name, _padded(values, 2 * count, fill, behind=True))
     on_cells = ElementTree.SubElement(piece, "CellData")
     for name, values in _of_contacts(packing).items():
-        _array(on_cells, name, _padded(values, n, np.nan, behind=False))
+        if name not in unknown:
+            _array(on_cells, name, _padded(values, n, np.nan, behind=False))
     _array(ElementTree.SubElement(piece, "Points"), "Points", _points(packing))
     _cells(piece, "Verts", np.arange(n), 1)
     _cells(piece, "Lines", n + np.arange(2 * count), 2)
-    ElementTree.ElementTree(root).write(path, xml_declaration=True, encoding="utf-8")
-    return f"{n} disks and {count} contacts, in float64"
+    return ElementTree.ElementTree(root)
 
 
 def _of_disks(packing: Packing, modes: list[ModeVectors]) -> dict[str, NDArray]:

@@ -7,13 +7,14 @@ of numbers; a line a disk follows.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from ...analysis import Packing, PackingFileError
 from .disks import Disks, of_columns
-from .quantities import ModeVectors, disk_force, disk_mobilised, disk_pressure
+from .quantities import Frame, ModeVectors, disk_force, disk_mobilised, disk_pressure
 from .record import contact_rows, given, scalars, slips_of
 from .table import lines_of, number_of
 
@@ -83,7 +84,7 @@ def _columns(properties: str) -> list[tuple[str, str]]:
     return names
 
 
-def _written(packing: Packing, modes: list[ModeVectors]) -> list[tuple[str, str, np.ndarray]]:
+def _written(packing: Packing, modes: list[ModeVectors], frame: Frame | None) -> list[tuple[str, str, np.ndarray]]:
     """Names, kinds and numbers of what stands in a row for each disk."""
     n, force = len(packing), disk_force(packing)
     columns: list[tuple[str, str, np.ndarray]] = [
@@ -92,13 +93,18 @@ def _written(packing: Packing, modes: list[ModeVectors]) -> list[tuple[str, str,
         ("id", "I", np.arange(1, n + 1)),
         ("radius", "R", packing.radius),
         ("mass", "R", packing.mass),
-        ("angle", "R", packing.angle),
         ("top", "I", packing.top.astype(int)),
-        ("forces", "R", np.column_stack([force[:, :2], np.zeros(n)])),
-        ("torque_over_radius", "R", force[:, 2]),
         ("normal_force", "R", disk_pressure(packing)),
-        ("mobilised", "R", disk_mobilised(packing)),
     ]
+    if frame is None or frame.whole:
+        columns += [
+            ("angle", "R", packing.angle),
+            ("forces", "R", np.column_stack([force[:, :2], np.zeros(n)])),
+            ("torque_over_radius", "R", force[:, 2]),
+            ("mobilised", "R", disk_mobilised(packing)),
+        ]
+    if frame is not None:
+        columns.append(("displacement", "R", np.column_stack([frame.displacement, np.zeros(n)])))
     if packing.position_low is not None:
         columns += [("x_low", "R", packing.position_low[:, 0]), ("y_low", "R", packing.position_low[:, 1])]
     for mode in modes:
@@ -112,25 +118,43 @@ def _written(packing: Packing, modes: list[ModeVectors]) -> list[tuple[str, str,
 
 def write_xyz(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
     """An extended XYZ file; what is in it, in words."""
+    path.write_text(_text(packing, modes))
+    return "all of the packing is in it, to the bit"
+
+
+def write_xyz_frames(path: Path, frames: Iterable[Frame]) -> None:
+    """An extended XYZ file of several frames."""
+    with path.open("w") as stream:
+        stream.writelines(_text(frame.packing, [], frame) for frame in frames)
+
+
+def _text(packing: Packing, modes: list[ModeVectors], frame: Frame | None = None) -> str:
+    columns = _written(packing, modes, frame)
+    rows = np.column_stack([array if array.ndim == 2 else array[:, None] for *_, array in columns])
+    whole = np.concatenate([[kind == "I"] * (1 if a.ndim == 1 else a.shape[1]) for _, kind, a in columns])
+    species = np.where(packing.top, "T", "B").tolist()
+    lines = [str(len(packing)), _head(packing, columns, frame)]
+    for name, row in zip(species, rows.tolist(), strict=True):
+        words = (str(int(value)) if is_whole else repr(value) for value, is_whole in zip(row, whole, strict=True))
+        lines.append(f"{name} " + " ".join(words))
+    return "\n".join(lines) + "\n"
+
+
+def _head(packing: Packing, columns: list[tuple[str, str, np.ndarray]], frame: Frame | None) -> str:
+    """The second line."""
     box = packing.box_length
     width = box if box is not None else 2 * np.ptp(packing.position[:, 0]) + 2 * packing.radius.max()
     height = (packing.position[:, 1] + packing.radius).max()
-    columns = _written(packing, modes)
     properties = ":".join(f"{name}:{kind}:{1 if array.ndim == 1 else array.shape[1]}" for name, kind, array in columns)
-    numbers = " ".join(repr(value) for value in contact_rows(packing).ravel().tolist())
     says = [
         f'Lattice="{float(width)!r} 0.0 0.0 0.0 {float(height)!r} 0.0 0.0 0.0 {2 * float(packing.radius.max())!r}"',
         f'pbc="{"F" if box is None else "T"} F F"',
         f"Properties=species:S:1:{properties}",
-        *(f"{key}={value!r}" for key, value in scalars(packing).items()),
-        f'contacts="{numbers}"',
+        *(f"{key}={float(value)!r}" for key, value in scalars(packing).items()),
     ]
-    rows = np.column_stack([array if array.ndim == 2 else array[:, None] for *_, array in columns])
-    whole = np.concatenate([[kind == "I"] * (1 if a.ndim == 1 else a.shape[1]) for _, kind, a in columns])
-    species = np.where(packing.top, "T", "B").tolist()
-    lines = [str(len(packing)), " ".join(says)]
-    for name, row in zip(species, rows.tolist(), strict=True):
-        words = (str(int(value)) if is_whole else repr(value) for value, is_whole in zip(row, whole, strict=True))
-        lines.append(f"{name} " + " ".join(words))
-    path.write_text("\n".join(lines) + "\n")
-    return "all of the packing is in it, to the bit"
+    if frame is not None:
+        says += [f"{key}={float(value)!r}" for key, value in frame.number.items()]
+    if frame is None or frame.whole:
+        numbers = " ".join(repr(value) for value in contact_rows(packing).ravel().tolist())
+        says.append(f'contacts="{numbers}"')
+    return " ".join(says)

@@ -63,6 +63,58 @@ def test_csv_as_others_write_it(tmp_path, sheared, names, mark):
     np.testing.assert_array_equal(disks.radius, sheared.radius)
 
 
+def yade(packing, columns="x_y_z_r", digits="%.17g"):
+    """As yade.export.textExt writes it, which has %g."""
+    values = {"x": packing.position[:, 0], "y": packing.position[:, 1], "z": 0 * packing.radius, "r": packing.radius}
+    values |= {"matId": 1 + packing.top, "id": np.arange(len(packing)), "attrs": packing.mass}
+    rows = np.column_stack([values[name] for name in columns.split("_")])
+    lines = ["\t".join(digits % value for value in row) for row in rows.tolist()]
+    return "\n".join([f"#format {columns}", "# mass", *lines]) + "\n"
+
+
+def mercury(packing, dimensions=2, times=(0.0, 0.5)):
+    """As MercuryDPM's DPMBase::outputXBallsData writes it; at earlier times the particles are higher."""
+    lines, n, width = [], len(packing), packing.box_length
+    for time in times:
+        place = packing.position + np.array([0, times[-1] - time])
+        bounds = [0, 0, width, 9] if dimensions == 2 else [0, 0, -1, width, 9, 1]
+        lines.append(" ".join(map(repr, [n, time, *bounds])))
+        gap = np.zeros((n, 2 if dimensions == 2 else 3))
+        columns = [place, gap, packing.radius[:, None], gap, packing.top[:, None]]
+        if dimensions == 3:
+            columns = [place, gap[:, :1], gap, packing.radius[:, None], gap, gap, packing.top[:, None]]
+        lines += [" ".join(map(repr, row)) for row in np.hstack(columns).tolist()]
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("columns", ["x_y_z_r", "x_y_z_r_matId", "id_x_y_z_r_matId", "x_y_z_r_attrs"])
+def test_yade_text(tmp_path, sheared, columns):
+    (tmp_path / "packing.txt").write_text(yade(sheared, columns))
+    disks = read_disks(tmp_path / "packing.txt")
+    np.testing.assert_array_equal(disks.position, sheared.position)
+    np.testing.assert_array_equal(disks.radius, sheared.radius)
+    assert disks.box_length is None
+    assert disks.remark == ""
+    if "matId" in columns:
+        np.testing.assert_array_equal(upper_layer(disks, "type:2"), sheared.top)
+    (tmp_path / "short.txt").write_text(yade(sheared, columns, "%g"))
+    disks = read_disks(tmp_path / "short.txt")
+    assert "six digits" in disks.remark
+    np.testing.assert_allclose(disks.position, sheared.position, rtol=5e-6)  # half of the sixth digit
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+@pytest.mark.parametrize("name", ["run.data", "run.data.0012"])
+def test_mercury_data(tmp_path, sheared, dimensions, name):
+    (tmp_path / name).write_text(mercury(sheared, dimensions))
+    disks = read_disks(tmp_path / name)
+    np.testing.assert_array_equal(disks.position, sheared.position)
+    np.testing.assert_array_equal(disks.radius, sheared.radius)
+    assert disks.box_length == sheared.box_length
+    np.testing.assert_array_equal(upper_layer(disks, "type:1"), sheared.top)
+    np.testing.assert_array_equal(read_disks(tmp_path / name, 0).position, sheared.position + np.array([0, 0.5]))
+
+
 def test_the_layer_may_be_said_in_six_ways(tmp_path, sheared):
     (tmp_path / "a.dump").write_text(dump(sheared))
     (tmp_path / "ids").write_text("1 2\n5-7\n")
@@ -213,6 +265,10 @@ BAD = {
     "unknown suffix": ("a.doc", lambda p: "?", "is of no format that is read: give dumps of the decks (.disks)"),
     "no data": ("a.data", lambda p: "LAMMPS\n\n3 atoms\n", "no section Atoms"),
     "data of points": ("a.data", lambda p: "LAMMPS\n\n1 atoms\n\nAtoms # atomic\n\n1 1 1 1 0\n", "atom style atomic"),
+    "yade without radii": ("a.txt", lambda p: "#format x_y_z\n1 1 0\n", "names no columns x, y, z and r"),
+    "yade cut off": ("a.txt", lambda p: "#format x_y_z_r\n1 1 0\n", "line 2: it has 3 columns, and line 1 announces 4"),
+    "mercury cut off": ("a.data", lambda p: "2 0.5 0 0 9 9\n1 1 0 0 0.5 0 0 0\n", "breaks off"),
+    "mercury in 3 D": ("a.data", lambda p: mercury(p, 3, (0.0,)).replace(" 0.0 0.0", " 1.0 0.0", 1), "three dim"),
     "no restart": ("a.restart", lambda p: "?", "no LAMMPS restart file"),
     "no gsd": ("a.gsd", lambda p: "?", "GSD"),
     "plain xyz": ("a.xyz", lambda p: "1\nhello\nH 1 1 0\n", "no Properties"),

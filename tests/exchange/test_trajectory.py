@@ -1,5 +1,7 @@
 """A trajectory is H5MD: MDAnalysis steps through it, and its analyses agree with ours."""
 
+from importlib import import_module
+from importlib.metadata import version
 from importlib.util import find_spec
 
 import numpy as np
@@ -102,6 +104,90 @@ def test_its_radial_distribution_is_ours(run):
     # a distance on the edge of a bin may fall on either side of it in float32
     np.testing.assert_allclose(np.asarray(found.results.count), counts, atol=4 * len(place))
     assert counts.sum() > 1e4
+
+
+@pytest.mark.slow
+def test_a_universe_of_the_file_has_radii_masses_and_layer(run):
+    import MDAnalysis
+
+    import faultgouge.pywrap.exchange.mdanalysis  # noqa: F401  # it registers parser and reader
+
+    path, packing = run
+    universe = MDAnalysis.Universe(str(path))
+    np.testing.assert_array_equal(universe.atoms.radii, packing.radius)
+    np.testing.assert_array_equal(universe.atoms.masses, packing.mass)
+    np.testing.assert_array_equal(universe.select_atoms("type top").indices, np.flatnonzero(packing.top))
+    np.testing.assert_array_equal(universe.select_atoms("type bed").indices, np.flatnonzero(~packing.top))
+    with RunFile(path) as file:
+        series = file.series("trajectory")
+    place = np.insert(series["position"], 0, packing.position, axis=0)
+    for k, frame in enumerate(universe.trajectory[:20]):
+        assert frame.data["position"].dtype == np.float64
+        np.testing.assert_array_equal(frame.data["position"][:, :2], place[k])
+        if packing.compensated and k:
+            np.testing.assert_array_equal(frame.data["position_low"], series["position_low"][k - 1])
+
+
+@pytest.mark.slow
+def test_d_of_t_in_mdanalysis_is_that_of_the_run(run):
+    import MDAnalysis
+
+    from faultgouge.pywrap.exchange.mdanalysis import MeanSquareDisplacement
+
+    path, packing = run
+    universe = MDAnalysis.Universe(str(path))
+    everything = MeanSquareDisplacement(universe.atoms).run()
+    with RunFile(path) as file:
+        sampled = file.series("undamped")
+    np.testing.assert_array_equal(everything.times[1:], sampled["time"])
+    # sums over the disks are rounded; LAMMPS's positions are those of the file to the bit
+    np.testing.assert_allclose(everything.results.msd[1:], sampled["msd"], rtol=1e-13)
+    layer = MeanSquareDisplacement(universe.select_atoms("type top")).run()
+    bed = MeanSquareDisplacement(universe.select_atoms("type bed")).run()
+    share = packing.top.mean()
+    weighted = share * layer.results.msd + (1 - share) * bed.results.msd
+    np.testing.assert_allclose(weighted, everything.results.msd, rtol=1e-13)
+
+
+def test_h5md_as_others_read_it(tmp_path, reference_packing):
+    import h5py
+
+    packing = reference_packing(1.0)
+    with RunFile.create(tmp_path / "run.h5", packing) as file:
+        file.append(packing)
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert file["observables/position"] == file["particles/disks/position"]  # one object, two names
+        np.testing.assert_array_equal(file["particles/disks/mass"], packing.mass)
+        assert file["h5md/creator"].attrs["version"] == version("faultgouge")
+
+
+def test_a_file_without_the_link_is_read_and_continued(tmp_path, reference_packing):
+    from faultgouge.analysis.files.sealedfile import new_file, write
+
+    packing = reference_packing(1.0)
+    with RunFile.create(tmp_path / "run.h5", packing) as file:
+        file.append(packing)
+    copy = tmp_path / "before.h5"
+    with RunFile(tmp_path / "run.h5") as source, new_file() as file:
+        for name in ("h5md", "particles", "parameters", "observables"):
+            source._file.copy(name, file)
+        file.attrs.update(source._file.attrs)
+        del file["observables/position"]
+        write(copy, file)
+    with RunFile(copy, "a") as file:
+        file.append(packing)
+    with RunFile(copy) as file:
+        assert len(file) == 2
+        np.testing.assert_array_equal(file.packing(1).position, packing.position)
+
+
+def test_without_mdanalysis_the_import_says_the_one_command(monkeypatch):
+    import sys
+
+    monkeypatch.delitem(sys.modules, "faultgouge.pywrap.exchange.mdanalysis", raising=False)
+    monkeypatch.setitem(sys.modules, "MDAnalysis.analysis.base", None)
+    with pytest.raises(ImportError, match=r"pip install 'faultgouge\[export\]'"):
+        import_module("faultgouge.pywrap.exchange.mdanalysis")
 
 
 @pytest.mark.slow

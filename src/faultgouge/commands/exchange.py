@@ -9,7 +9,7 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import say, status, stored_packing
+from .terminal import progress, say, status, stored_packing
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -104,7 +104,15 @@ def export(
         str | None,
         typer.Option("--mode", metavar="pair|N", help="Also a mode as vectors, as of `faultgouge draw`."),
     ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The file: .vtp, .xyz, .data or .gsd.")] = Path(
+    frames: Annotated[
+        str | None,
+        typer.Option(
+            "--frames",
+            metavar="all|START:STOP[:STEP]",
+            help="Frames of the undamped run if the file has its trajectory, else of the ramp; to .xyz, .gsd or .pvd.",
+        ),
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The file: .vtp, .pvd, .xyz, .data or .gsd.")] = Path(
         "packing.vtp"
     ),
 ) -> None:
@@ -113,10 +121,16 @@ def export(
     Disks with radii, net forces and mobilised friction; contacts with forces and
     slips (in .vtp as lines); modes as vectors (not in .data). `faultgouge import`
     takes .xyz, .data and .gsd back to the bit. A .gsd needs pip install
-    'faultgouge\\[export]'.
+    'faultgouge\\[export]'. With --frames a film of displacements: a .pvd for ParaView
+    comes with a folder of .vtp.
     """
     from faultgouge.pywrap.exchange.writers import check_writer, write_packing
 
+    if frames is not None:
+        if mode is not None or frame != -1:
+            raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")
+        _export_frames(file, frames, output)
+        return
     check_writer(output, mode is not None)
     packing = stored_packing(file, frame)
     if not is_root():
@@ -124,6 +138,24 @@ def export(
     vectors = [] if mode is None else _vectors(packing, mode)
     words = write_packing(output, packing, vectors)
     say(f"F_x = {packing.fx:g}: {words}; written to {output}")
+
+
+def _export_frames(file: Path, says: str, output: Path) -> None:
+    """The frames of a ramp or of an undamped run."""
+    from faultgouge.analysis import PackingFileError, RunFile
+    from faultgouge.pywrap.exchange.frames import chosen_frames, frames_of
+    from faultgouge.pywrap.exchange.writers import check_frames_writer, write_frames
+
+    check_frames_writer(output)
+    if file.suffix == ".disks":
+        raise PackingFileError(f"{file} is one packing: leave --frames out, or give a run.h5.")
+    if not is_root():
+        return
+    with RunFile(file) as run:
+        numbers = chosen_frames(run, says)
+        write_frames(output, progress(frames_of(run, numbers), "frames", len(numbers)))
+        what = "an undamped run" if "trajectory" in run.names_of_series else "equilibria"
+    say(f"{len(numbers)} frames of {what}; written to {output}")
 
 
 def _vectors(packing: Packing, mode: str) -> list[ModeVectors]:

@@ -1,0 +1,87 @@
+"""The frames of a run.h5: its undamped run if the file has its trajectory, else its ramp."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ...analysis import BadInputError, Packing, RunFile, nearest_image, touching
+from .quantities import Frame
+
+
+def chosen_frames(run: RunFile, says: str) -> range:
+    """The numbers of the frames that are meant.
+
+    Parameters
+    ----------
+    run : RunFile
+        The file.
+    says : str
+        "all", or START:STOP or START:STOP:STEP as in Python.
+
+    Raises
+    ------
+    BadInputError
+        If it is neither, or means no frame.
+    """
+    total = len(run)
+    if "trajectory" in run.names_of_series:
+        total = 1 + len(run.series("trajectory")["time"])
+    parts = says.split(":")
+    try:
+        wanted = slice(None) if says == "all" else slice(*(int(part) if part else None for part in parts))
+        found = range(total)[wanted]
+    except (TypeError, ValueError):
+        found = None
+    if found is None or (says != "all" and len(parts) < 2):
+        raise BadInputError(f"--frames {says}: give all, START:STOP or START:STOP:STEP, counted from 0.")
+    if not found:
+        raise BadInputError(f"--frames {says}: {run.path} has {total} frames, and none of them is meant.")
+    return found
+
+
+def frames_of(run: RunFile, numbers: range) -> Iterator[Frame]:
+    """The frames of a file, one after the other.
+
+    Parameters
+    ----------
+    run : RunFile
+        The file, open until the last frame has been taken. Frame 0 of an undamped run is the equilibrium where it
+        began.
+    numbers : range
+        Of :func:`chosen_frames`.
+    """
+    if "trajectory" in run.names_of_series:
+        yield from _of_run(run, numbers)
+        return
+    first = run.packing(0)
+    for number in numbers:
+        packing = run.packing(number)
+        yield Frame(packing, packing.fx, _displacement(packing, first), whole=True)
+
+
+def _of_run(run: RunFile, numbers: range) -> Iterator[Frame]:
+    start, series = run.packing(-1), run.series("trajectory")
+    low = series.get("position_low")
+    for number in numbers:
+        time, place, place_low = 0.0, start.position, start.position_low
+        if number:
+            time, place = float(series["time"][number - 1]), series["position"][number - 1]
+            place_low = None if low is None else low[number - 1]
+        packing = replace(
+            start,
+            position=place,
+            position_low=place_low,
+            contacts=touching(place, start.radius, start.box_length),
+            angle=np.zeros(len(start)),
+        )
+        yield Frame(packing, time, _displacement(packing, start), whole=False)
+
+
+def _displacement(packing: Packing, start: Packing) -> np.ndarray:
+    moved = nearest_image(packing.position - start.position, packing.box_length)
+    if packing.position_low is not None and start.position_low is not None:
+        moved = moved + (packing.position_low - start.position_low)
+    return moved
