@@ -98,7 +98,8 @@ def format_of(path: Path) -> Format:
         raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
     from .universe import known
 
-    if path.suffix and known(path):
+    own = path.suffix.lower() == ".h5"  # MDAnalysis has a parser of it once `mdanalysis` is imported
+    if path.suffix and not own and known(path):
         return OTHER
     raise PackingFileError(f"{path} is of no format that is read: give {known_formats()}.")
 
