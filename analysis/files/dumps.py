@@ -10,8 +10,8 @@ to one disk. Pairs that do not overlap, which LAMMPS lists up to its cutoff, are
 there are neither slips nor angles, and their columns may be missing.
 
 Law, load and inertia are no part of a dump. They are given by the caller or by a sidecar file of the same
-name with the suffix ".params", which has one ``key value`` a line out of kn, kt, mu, exponent, cn, ct, tau, fx, fy,
-inertia_factor;
+name with the suffix ".params", which has one ``key value`` a line out of kn, kt, mu, exponent, rescaled, cn, ct, tau,
+fx, fy, inertia_factor;
 what the caller gives wins.
 """
 
@@ -158,7 +158,7 @@ def _law(given: Mapping[str, float], disks: Path) -> MindlinLaw:
     try:
         return MindlinLaw(
             *(given[name] for name in ("kn", "kt", "mu")),
-            **{name: given[name] for name in ("exponent", "cn", "ct") if name in given},
+            **{name: given[name] for name in ("exponent", "cn", "ct", "rescaled") if name in given},
         )
     except KeyError as error:
         sidecar = disks.with_suffix(".params")

@@ -260,6 +260,8 @@ def _scene(scene: Path | None, disks: Disks, values: dict[str, Any]) -> Scene:
         "law": {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values},
         "load": {"fy": values["fy"]},
     }
+    if values.get("rescaled"):
+        sections["law"]["history"] = "rescaled"
     return Scene.from_mapping(sections | ({"damping": damping} if damping else {}))
 
 
