@@ -305,16 +305,14 @@ FAULTGOUGE_INLINE int with_friction(Features features, ContactPairs &pairs, cons
 }
 
 template <Exponent P, class Number>
-FAULTGOUGE_INLINE FloorContact<Number> on_floor(const MindlinLaw &law, Number overlap, Number slip,
-                                                const FloorStep &step, const FloorRates &rates, Features features)
+FAULTGOUGE_INLINE FloorContact<Number> on_floor(const MindlinLaw &law, Number overlap, Number slip, double increment,
+                                                const FloorRates &rates, Features features)
 {
   const Number elastic = law.normal_force<P>(overlap);
   FloorContact<Number> contact{elastic, 0.0, slip, 0.0};
   if (features.damped) contact.normal = law.damped_normal<P>(elastic, value(overlap), rates.opening);
   if (!features.friction) return contact;
   contact.slip_limit = law.slip_limit_ratio<Number>() * overlap;
-  double increment = step.slip;
-  if (features.rescaled) increment = rescaled_increment(value(slip), step.slip, step.overlap, value(overlap));
   if (features.advance) contact.slip = advanced_slip(slip, increment, contact.slip_limit);
   contact.tangential = law.tangential_force(elastic, contact.slip, contact.slip_limit);
   if (features.damped)
@@ -382,21 +380,21 @@ void take_compensated_forces(ContactPairs &pairs, const Disks &disks, const Forc
 }
 
 FAULTGOUGE_DISPATCH
-FloorContact<double> floor_contact(const MindlinLaw &law, double overlap, double slip, const FloorStep &step,
+FloorContact<double> floor_contact(const MindlinLaw &law, double overlap, double slip, double increment,
                                    const FloorRates &rates, Features features)
 {
   if (law.exponent == Exponent::HARMONIC)
-    return on_floor<Exponent::HARMONIC>(law, overlap, slip, step, rates, features);
-  return on_floor<Exponent::HERTZ>(law, overlap, slip, step, rates, features);
+    return on_floor<Exponent::HARMONIC>(law, overlap, slip, increment, rates, features);
+  return on_floor<Exponent::HERTZ>(law, overlap, slip, increment, rates, features);
 }
 
 FAULTGOUGE_DISPATCH
-FloorContact<Compensated> floor_contact(const MindlinLaw &law, Compensated overlap, Compensated slip,
-                                        const FloorStep &step, const FloorRates &rates, Features features)
+FloorContact<Compensated> floor_contact(const MindlinLaw &law, Compensated overlap, Compensated slip, double increment,
+                                        const FloorRates &rates, Features features)
 {
   if (law.exponent == Exponent::HARMONIC)
-    return on_floor<Exponent::HARMONIC>(law, overlap, slip, step, rates, features);
-  return on_floor<Exponent::HERTZ>(law, overlap, slip, step, rates, features);
+    return on_floor<Exponent::HARMONIC>(law, overlap, slip, increment, rates, features);
+  return on_floor<Exponent::HERTZ>(law, overlap, slip, increment, rates, features);
 }
 
 }    // namespace faultgouge

@@ -108,9 +108,9 @@ struct Grids {
 // What is compiled into a run
 struct Features {
   bool friction;
-  bool advance;     // slips advance by v dt and omega dt
-  bool damped;      // dashpots
-  bool rescaled;    // slips, while overlaps grow
+  bool advance;             // slips advance by v dt and omega dt
+  bool damped;              // dashpots
+  bool rescaled = false;    // slips, while overlaps grow
 };
 
 // All pairs: their forces, slips and whether they touch. Returns a pair with one centre inside of the other disk, where
@@ -126,20 +126,15 @@ template <class Number> struct FloorContact {
   Number normal, tangential, slip, slip_limit;
 };
 
-// by how much such a contact slips, and its overlap changes, in a time step
-struct FloorStep {
-  double slip, overlap;
-};
-
 // how fast a contact with the floor opens and slips
 struct FloorRates {
   double opening, slip;
 };
 
-FloorContact<double> floor_contact(const MindlinLaw &law, double overlap, double slip, const FloorStep &step,
+FloorContact<double> floor_contact(const MindlinLaw &law, double overlap, double slip, double increment,
                                    const FloorRates &rates, Features features);
-FloorContact<Compensated> floor_contact(const MindlinLaw &law, Compensated overlap, Compensated slip,
-                                        const FloorStep &step, const FloorRates &rates, Features features);
+FloorContact<Compensated> floor_contact(const MindlinLaw &law, Compensated overlap, Compensated slip, double increment,
+                                        const FloorRates &rates, Features features);
 
 // Where forces go: rows of f and torque, and with compensated arithmetic of fix low/parts
 struct Forces {

@@ -260,16 +260,16 @@ template <class NUMBER, bool FRICTION, bool DAMPED> void FixWallMindlinSmooth::c
   const bool known = contact[OVERLAP] > 0.0;    // a new contact begins without slip
   NUMBER slip = known && FRICTION ? contact[SLIP] : 0.0;
   if constexpr (COMPENSATED && FRICTION) slip.low = known ? contact[SLIP_LOW] : 0.0;
-  faultgouge::FloorStep step{0.0, 0.0};
-  if (known && FRICTION)
-    step = {-(atom->v[i][0] + radius * atom->omega[i][2]) * update->dt, -atom->v[i][1] * update->dt};
+  double increment = known && FRICTION ? -(atom->v[i][0] + radius * atom->omega[i][2]) * update->dt : 0.0;
+  if (known && FRICTION && law.rescaled)
+    increment = faultgouge::rescaled_increment(value(slip), increment, -atom->v[i][1] * update->dt, value(overlap));
   faultgouge::FloorRates rates{};
   if constexpr (DAMPED) {
     const double *const felt = dashpots->array_atom[i];
     rates = {felt[1], -(felt[0] + radius * felt[2])};
   }
   const auto [normal, tangential, kept, limit] =
-      faultgouge::floor_contact(law, overlap, slip, step, rates, {FRICTION, advance, DAMPED, law.rescaled});
+      faultgouge::floor_contact(law, overlap, slip, increment, rates, {FRICTION, advance, DAMPED});
   if constexpr (FRICTION) {
     contact[TANGENTIAL] = value(tangential);
     contact[SLIP] = leading(kept);

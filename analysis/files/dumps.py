@@ -156,10 +156,9 @@ def read_dump(
 def _law(given: Mapping[str, float], disks: Path) -> MindlinLaw:
     """The law of a sidecar file."""
     try:
-        return MindlinLaw(
-            *(given[name] for name in ("kn", "kt", "mu")),
-            **{name: given[name] for name in ("exponent", "cn", "ct", "rescaled") if name in given},
-        )
+        kn, kt, mu = (given[name] for name in ("kn", "kt", "mu"))
+        more = {name: given[name] for name in ("exponent", "cn", "ct") if name in given}
+        return MindlinLaw(kn, kt, mu, rescaled=bool(given.get("rescaled")), **more)
     except KeyError as error:
         sidecar = disks.with_suffix(".params")
         raise PackingFileError(f"The law of {disks} is not given: {sidecar} does not name {error}.") from None

@@ -287,7 +287,7 @@ class MindlinLaw:
         if not self.rescaled:
             return falling
         growing = p * x * (2 * x - 1)
-        return growing + parting * (falling - growing)
+        return growing + np.asarray(parting, dtype=np.float64) * (falling - growing)
 
     def derivatives(self, overlap: Floats, slip: Floats, parting: ArrayLike = 0.0) -> Derivatives:
         """All of the above at once, at a fraction of the cost; overlaps that are not positive give zeros."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, read_dump, stiffness_matrix
 from faultgouge.pywrap.lammps.engine import Engine
 
 KN, KT = 2e5, 2e5 * 2 / 7
@@ -176,3 +176,10 @@ def test_matrix_is_the_one_sided_derivative(reference_packing, mu, sign):
     assert np.abs(difference - closing).max() > 1e-3 * np.abs(matrix).max()
     total = stiffness_matrix(replace(packing, law=replace(law, rescaled=False))).toarray()
     np.testing.assert_allclose(parting, total, rtol=0, atol=4e-16 * np.abs(matrix).max())  # b is summed otherwise
+
+
+def test_dumps_keep_the_history(tmp_path):
+    packing = two_disks(1e-3, 2e-4)
+    with Engine(packing) as engine:
+        engine.dump(tmp_path / "packing")
+    assert read_dump(tmp_path / "packing.disks").law == LAW
