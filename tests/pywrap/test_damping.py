@@ -93,7 +93,7 @@ def test_time_step_stays_below_what_dashpots_allow(runs):
 
 @pytest.mark.parametrize("precision", ["double", "compensated"])
 def test_rescaled_slips_climb_with_newtons_method(precision):
-    """An increment in one displacement, or in several: the path of the overlaps is nearly the same, and so are slips."""
+    """Increments of half the length lead to nearly the same slips; those of the total law are others."""
     law = {"law": {"kn": 2e5, "history": "rescaled"}, "precision": precision}
     found = []
     for step in (2e-2, 1e-2):
