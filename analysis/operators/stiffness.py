@@ -61,7 +61,7 @@ def stiffness_matrix(
     packing: Packing,
     form: Form = "consistent",
     coupled: NDArray[np.bool_] | None = None,
-    parting: ArrayLike = 0.0,
+    parting: ArrayLike = 0.5,
 ) -> csr_array:
     """Assemble K = -dF/dq.
 
@@ -75,8 +75,8 @@ def stiffness_matrix(
         Contacts whose tangential force depends on their overlap; all by default. Of the others b = d f_t / d overlap
         counts as zero. That is no derivative of this law: it tells what comes of b.
     parting : array_like, shape () or (C,)
-        Share of the derivative while a contact parts, for a law whose history is rescaled: 0, that of contacts which
-        close, by default; 1/2 is the first harmonic of a small vibration
+        Share of the derivative while a contact parts, for a law whose history is rescaled: 0 that of contacts which
+        close, 1 that of contacts which part, and by default 1/2, the first harmonic of a small vibration
         (:mod:`~faultgouge.analysis.packing.law`).
 
     Returns

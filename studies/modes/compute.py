@@ -26,8 +26,8 @@ stiffer or more loaded: growth rates cannot grow with it for ever.
 **Where b matters.** A tangential force that depends on the overlap, :math:`b = \partial f_t/\partial\delta`, makes K
 non-symmetric. Of packings of up to `SMALL` disks pairs are also counted with b of sticking contacts alone, of sliding
 contacts alone, and of none, at the same equilibria. (The turning of the tangent, which is non-symmetric too, stays.)
-With rescaled slips b is that of contacts which close; the key while has the pairs with that of contacts which part, and
-with the mean of both (:mod:`~faultgouge.analysis.packing.law`).
+With rescaled slips b is the mean of that of contacts which close and of contacts which part, and the key while has the
+pairs with either (:mod:`~faultgouge.analysis.packing.law`).
 """
 
 from __future__ import annotations
@@ -161,13 +161,14 @@ def switched(packing: Packing) -> dict[str, dict[str, Any]]:
 
 
 def parting(packing: Packing) -> dict[str, dict[str, Any]]:
-    """The complex pairs of a law with rescaled slips while all contacts part, and of the mean of both derivatives."""
+    """The complex pairs of a law with rescaled slips while all contacts close, and while all part."""
     return {
-        name: Counted.of(_values(packing, parting=share)).as_dict() for name, share in (("mean", 0.5), ("parting", 1.0))
+        name: Counted.of(_values(packing, parting=share)).as_dict()
+        for name, share in (("closing", 0.0), ("parting", 1.0))
     }
 
 
-def _values(packing: Packing, coupled: NDArray[np.bool_] | None = None, parting: float = 0.0) -> Complexes:
+def _values(packing: Packing, coupled: NDArray[np.bool_] | None = None, parting: float = 0.5) -> Complexes:
     """Eigenvalues of K in which b counts for some contacts; pairs within the bound of rounding are made real."""
     matrix = mass_weighted(stiffness_matrix(packing, coupled=coupled, parting=parting), packing)
     active = active_coordinates(matrix)

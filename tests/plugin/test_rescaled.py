@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, read_dump, stiffness_matrix
+from faultgouge.analysis.spectrum.spectrum import mass_weighted
+from faultgouge.pywrap import Scene, perturb, ramp
 from faultgouge.pywrap.lammps.engine import Engine
 
 KN, KT = 2e5, 2e5 * 2 / 7
@@ -183,3 +185,23 @@ def test_dumps_keep_the_history(tmp_path):
     with Engine(packing) as engine:
         engine.dump(tmp_path / "packing")
     assert read_dump(tmp_path / "packing.disks").law == LAW
+
+
+@pytest.mark.slow
+def test_growth_is_that_of_the_mean_of_both_derivatives():
+    """D(t) of an undamped run: its rate lies a few per cent below that of K, since tangential forces fall meanwhile."""
+    keys = {"packing": {"disks": 100, "width": 11.9, "seed": 5}, "law": {"kn": 2e5, "history": "rescaled"}}
+    push = {"fx": 0.3, "time": 10.0, "amplitude": 1e-7, "omega": 50.0}
+    ramped = {"load": {"fy": 3.0}, "ramp": {"step": 3e-3, "until": 0.3}, "perturb": push}
+    scene = Scene.from_mapping(keys | ramped)
+    *_, last = ramp(scene)
+    rates = {}
+    for share in (0.0, 0.5, 1.0):
+        matrix = mass_weighted(stiffness_matrix(last.packing, parting=share), last.packing).toarray()
+        rates[share] = 2 * np.sqrt(np.linalg.eigvals(matrix).astype(complex)).imag.max()
+    time, msd = np.array([(sample.time, sample.msd) for sample in perturb(scene, last, samples=500, early=0)]).T
+    grows = slice(np.flatnonzero(msd > 1e-17)[0], np.flatnonzero(msd > 1e-13)[0])
+    measured = np.polyfit(time[grows], np.log(msd[grows]), 1)[0]
+    assert 0.93 * rates[0.5] < measured < rates[0.5]
+    assert measured < 0.9 * rates[0.0]
+    assert measured > 1.1 * rates[1.0]
