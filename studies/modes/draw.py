@@ -20,6 +20,7 @@ LABELS = {
     "share": "share of complex modes",
     "growth_rate": r"largest $2\,|\mathrm{Im}\,\omega|$",
     "least_q": "least Q",
+    "critical_restitution": "critical restitution",
 }
 
 Course = Mapping[str, Any]
@@ -42,7 +43,7 @@ def over_load(courses: Mapping[str, Course], names: Sequence[str] = ("share", "g
         for number, (label, course) in enumerate(courses.items()):
             _band(axes, course["loads"], np.array(course[name], dtype=float), f"C{number}", label)
         axes.set(xscale="log", xlabel=r"$F_x/F_y$", ylabel=LABELS[name])
-        if name != "share":
+        if name in ("growth_rate", "least_q"):
             axes.set_yscale("log")
         if name == "least_q":
             axes.axhspan(*ROCK, color="0.9", zorder=0)

@@ -12,13 +12,19 @@ from ...analysis.files.wholefile import write_text
 from ...figures.pages import render
 from ...figures.style import save_as
 from .draw import collapse, over_load
-from .numbers import COMPARED, numbers
-from .sets import FEWER, KINDS, SIZES
+from .loss import EVERY, RESTITUTIONS
+from .numbers import COMPARED, QUALITIES, numbers
+from .sets import SIZES
 from .tables import read_tables
+
+PAGES = ("modes.md", "tables.md")
+
+LOSSES = ("least_q", "critical_restitution")
+"""Quantities of the picture of loss."""
 
 
 def write_page(tables: Path, folder: Path) -> Path:
-    """Write modes.md, modes.json and the pictures from tables.
+    """Write modes.md, tables.md, modes.json and the pictures from tables.
 
     Parameters
     ----------
@@ -30,19 +36,39 @@ def write_page(tables: Path, folder: Path) -> Path:
     Returns
     -------
     Path
-        The page.
+        The first page.
     """
     found = numbers(read_tables(tables))
     save_as(over_load({str(disks): course for disks, course in found["sizes"].items()}), folder / "sizes.png")
     power = found["powers"]["load of share 0.1"]["power"]
     save_as(collapse(found["sizes"], power[0], found["random"]), folder / "collapse.png")
     write_text(folder / "modes.json", json.dumps(finite(found), indent=1) + "\n")
-    page = folder / "modes.md"
-    names = {"planned": SIZES, "fewer": FEWER, "kinds": KINDS, "compared": COMPARED}
-    write_text(
-        page, render(__package__ or "", "modes.md.j2", **found, **names, middle=middle, plain=plain, exponent=exponent)
-    )
-    return page
+    save_as(over_load({str(disks): course for disks, course in found["loss"].items()}, LOSSES), folder / "loss.png")
+    names = {"planned": SIZES, "compared": COMPARED, "qualities": QUALITIES, **told(found)}
+    formats = {"middle": middle, "plain": plain, "exponent": exponent, "part": part, "critical": critical}
+    for name in PAGES:
+        write_text(folder / name, render(__package__ or "", f"{name}.j2", **found, **names, **formats))
+    return folder / PAGES[0]
+
+
+def told(found: dict[str, Any]) -> dict[str, Any]:
+    """What the page says of loss in words: whether growth comes back, and how near LAMMPS is to the pencil."""
+    runs = [run for each in found["runs"].values() for run in each if run["measured"] is not None]
+    off = {
+        kind: [run["measured"] / run["predicted"] - 1 for run in runs if (run["ct_over_cn"] == 0) == (kind == "still")]
+        for kind in ("still", "both")
+    }
+    sizes = {kind: 100 * np.abs(each) for kind, each in off.items()}
+    errors = {kind: f"{np.median(each):.2g}" for kind, each in sizes.items()}
+    errors |= {f"{kind}_most": f"{each.max():.2g}" for kind, each in sizes.items()}
+    returns = sum(course["returns"] for course in found["loss"].values())
+    counted = "no load" if returns == 0 else f"{returns} loads"
+    return {
+        "run_count": len(runs),
+        "run_errors": errors | {"faster": sum(each > 0 for each in off["both"]), "of": len(off["both"])},
+        "returning": f"Growth that a stronger loss brings back was seen at {counted} of packings of {EVERY} disks, for "
+        "which every restitution was looked at.",
+    }
 
 
 def finite(value: Any) -> Any:
@@ -65,6 +91,17 @@ def middle(value: list[float], digits: str = ".2g", factor: float = 1.0) -> str:
 def plain(value: float) -> str:
     """A number, or a word where it is infinite."""
     return "none" if np.isinf(value) else format(value, ".3g")
+
+
+def part(value: dict[str, Any]) -> str:
+    """A share of packings with its interval."""
+    return "-" if value["share"] is None else f"{value['count']} ({value['low']:.2f} to {value['high']:.2f})"
+
+
+def critical(value: list[float]) -> str:
+    """A critical restitution with its interval; the strongest loss that was looked at stands for all below."""
+    words = [f"under {each:.2g}" if each <= min(RESTITUTIONS) + 1e-6 else f"{each:.3g}" for each in value]
+    return "-" if np.isnan(value[0]) else f"{words[0]} ({words[1]} to {words[2]})"
 
 
 def exponent(value: list[float] | None) -> str:
