@@ -78,7 +78,7 @@ def along(table: Table, names: Sequence[str] = QUANTITIES) -> dict[str, Any]:
 
 def to_the_end(table: Table) -> dict[str, Any]:
     """The same, and F_x/F_y at the last equilibrium with the share just before it."""
-    found = along(table)
+    found = along(table, (*QUANTITIES, "omega"))
     ended = [row for row in table.rows if row["ends"] != "until"]
     found["ended"] = len(ended)
     found["end"] = median(ends(table))

@@ -11,10 +11,13 @@ import numpy as np
 from ...analysis.files.wholefile import write_text
 from ...figures.pages import render
 from ...figures.style import save_as
+from ...pywrap import Scene
+from ...pywrap.scenes.refusals import needed
+from ...pywrap.scenes.units import real_units
 from .draw import collapse, over_load
 from .loss import EVERY, RESTITUTIONS
 from .numbers import COMPARED, QUALITIES, numbers
-from .sets import SIZES
+from .sets import SIZES, quartz
 from .tables import read_tables
 
 PAGES = ("modes.md", "tables.md")
@@ -91,6 +94,24 @@ def middle(value: list[float], digits: str = ".2g", factor: float = 1.0) -> str:
 def plain(value: float) -> str:
     """A number, or a word where it is infinite."""
     return "none" if np.isinf(value) else format(value, ".3g")
+
+
+def in_real_units(found: dict[str, Any]) -> list[str]:
+    """Rows of the table of quartz in docs/units.md: growth in microseconds and frequencies in megahertz."""
+    rows = []
+    for name, course in found["quartz"].items():
+        if not name.startswith("quartz"):
+            continue
+        real = needed(real_units(Scene.from_mapping(quartz(name.removeprefix("quartz ")))), "units")
+        for k, load in enumerate(course["loads"]):
+            rate, omega = course["growth_rate"][k][0], course["omega"][k][0]
+            grows = "none" if rate == 0 else f"{1e6 * real.time / rate:.2g}"
+            frequency = "none" if omega is None or np.isinf(omega) else f"{real.frequency(omega) / 1e6:.2g}"
+            least = [np.inf if each is None else each for each in course["least_q"][k]]
+            cells = [name.removeprefix("quartz "), f"{load:g}", f"{course['count'][k]}", grows, frequency, middle(least)]
+            cells += [critical(course["critical_restitution"][k]), part(course["grows"]["0.9"][k])]
+            rows.append("| " + " | ".join(cells) + " |")
+    return rows
 
 
 def part(value: dict[str, Any]) -> str:
