@@ -108,7 +108,14 @@ def in_real_units(found: dict[str, Any]) -> list[str]:
             grows = "none" if rate == 0 else f"{1e6 * real.time / rate:.2g}"
             frequency = "none" if omega is None or np.isinf(omega) else f"{real.frequency(omega) / 1e6:.2g}"
             least = [np.inf if each is None else each for each in course["least_q"][k]]
-            cells = [name.removeprefix("quartz "), f"{load:g}", f"{course['count'][k]}", grows, frequency, middle(least)]
+            cells = [
+                name.removeprefix("quartz "),
+                f"{load:g}",
+                f"{course['count'][k]}",
+                grows,
+                frequency,
+                middle(least),
+            ]
             cells += [critical(course["critical_restitution"][k]), part(course["grows"]["0.9"][k])]
             rows.append("| " + " | ".join(cells) + " |")
     return rows
