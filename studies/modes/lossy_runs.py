@@ -42,6 +42,9 @@ LOOKS = 20
 LONGEST = 60.0
 """Time of a run, in units of that in which D grows e-fold."""
 
+GOLDEN = 0.618
+"""Golden section of one."""
+
 
 def lossy_runs(scene: Scene, start: Start) -> dict[str, Any]:
     """The runs of a packing along its ramp, as a row of a sweep."""
@@ -53,9 +56,9 @@ def lossy_runs(scene: Scene, start: Start) -> dict[str, Any]:
             cn = dashpot(scene.law.kn, each, 1.0, velocity)
             for ratio in (TANGENTIAL, 0.0):
                 damped = with_dashpots(packing, cn, ratio)
-                rate = 2 * fastest(damped).real
-                if rate >= 2 * LEAST:
-                    run = {"restitution": each, "ct_over_cn": ratio, "predicted": rate}
+                rate = fastest(damped)
+                if rate.real >= LEAST:
+                    run = {"restitution": each, "ct_over_cn": ratio, "predicted": 2 * rate.real}
                     runs.append(run | {"measured": grown(damped, rate)})
         limit = packing.law.slip_limit(packing.geometry.overlap)
         sliding = np.abs(packing.contacts.slip) >= AT_LIMIT * limit
@@ -64,19 +67,25 @@ def lossy_runs(scene: Scene, start: Start) -> dict[str, Any]:
     return along_ramp(scene, start, look)
 
 
-def grown(packing: Packing, rate: float) -> float | None:
-    """Growth rate of D from a small random displacement, 1 / time; None if D does not come to `TO`."""
+def grown(packing: Packing, rate: complex) -> float | None:
+    """Growth rate of D from a small random displacement, 1 / time; None if D does not come to `TO`.
+
+    Looks that were a multiple of the period of D apart would all see it in the same phase, or drift through its phases
+    slowly; the golden section of a period spreads them over all phases.
+    """
     noise = np.zeros(3 * len(packing))
     noise[: 2 * len(packing)] = SEED * np.random.default_rng(0).standard_normal(2 * len(packing))
     dt = time_step(packing)
-    steps = max(1, int(1 / (LOOKS * rate * dt)))
+    period = np.pi / rate.imag
+    periods = GOLDEN + max(0, round(1 / (LOOKS * 2 * rate.real * period)))
+    steps = max(1, round(periods * period / dt))
     held = np.ones(len(packing), dtype=bool)
     held[packing.rattlers] = False
     times, squares = [], []
     with Engine(packing, MPI.COMM_SELF) as engine:
         engine.restore(engine.displace(packing, noise))
         with engine.undamped(dt) as dynamics:
-            for _ in range(int(LONGEST * LOOKS)):
+            for _ in range(int(LONGEST / (2 * rate.real * steps * dt))):
                 dynamics.advance(steps)
                 now = mean_square_displacement(
                     engine.packing.position[held], packing.position[held], packing.box_length

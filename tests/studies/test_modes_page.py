@@ -73,10 +73,7 @@ def test_growth_with_dashpots_is_that_of_the_pencil_unless_contacts_slide(found)
     off = np.array([abs(run["measured"] / run["predicted"] - 1) for run in runs])
     assert len(off) >= 12
     assert np.median(off) < 2e-3
-    assert {(run["seed"], run["fx_over_fy"]) for run, each in zip(runs, off, strict=True) if each > 0.02} <= {
-        (3, 0.2),
-        (3, 0.1),
-    }
+    assert {(run["seed"], run["fx_over_fy"]) for run, each in zip(runs, off, strict=True) if each > 0.02} <= {(3, 0.2)}
 
 
 def test_units_says_what_the_table_of_quartz_says(found):
