@@ -22,8 +22,10 @@ import numpy as np
 from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
-from ...analysis import Packing, eigenvalues
-from ...analysis.damped_onset.modes import Pencil
+from ...analysis import Packing, eigenvalues, stiffness_matrix
+from ...analysis.onset import force_bearing
+from ...analysis.operators.damping import damping_matrix
+from ...analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from ...pywrap import Scene
 from ...pywrap.scenes.units import dashpot, real_units, restitution
 from ..sweep.onset import Start
@@ -89,8 +91,10 @@ def with_dashpots(packing: Packing, cn: float, ratio: float = TANGENTIAL) -> Pac
 
 def fastest(packing: Packing) -> complex:
     """The eigenvalue of s^2 M + s C + K with the largest real part, Im s >= 0, 1 / time."""
-    pencil = Pencil.of(packing)
-    stiffness, damping = (pencil.inner(each).toarray() for each in (pencil.stiffness, pencil.damping))
+    bearing = force_bearing(packing)
+    a, g = (mass_weighted(each(bearing), bearing) for each in (stiffness_matrix, damping_matrix))
+    active = active_coordinates(a)
+    stiffness, damping = (each[active][:, active].toarray() for each in (a, g))
     size = len(stiffness)
     companion = np.block([[np.zeros((size, size)), np.eye(size)], [-stiffness, -damping]])
     rates = eigvals(companion, check_finite=False)

@@ -58,7 +58,7 @@ def lossy_runs(scene: Scene, start: Start) -> dict[str, Any]:
                 damped = with_dashpots(packing, cn, ratio)
                 rate = fastest(damped)
                 if rate.real >= LEAST:
-                    run = {"restitution": each, "ct_over_cn": ratio, "predicted": 2 * rate.real}
+                    run: dict[str, Any] = {"restitution": each, "ct_over_cn": ratio, "predicted": 2 * rate.real}
                     runs.append(run | {"measured": grown(damped, rate)})
         limit = packing.law.slip_limit(packing.geometry.overlap)
         sliding = np.abs(packing.contacts.slip) >= AT_LIMIT * limit

@@ -35,8 +35,8 @@ writes. 100 disks, mu = 0.6, k_n/F_y as quartz under 10 MPa. The rule of selecti
 share of packings that flow below their static yield, over the load. Bars are 95 % intervals.*
 
 **Static.** Newton's method first finds no equilibrium beyond F_x/F_y = {newton}. Damped dynamics goes on: the layer
-moves and rests again, and fails at {static}; both are medians. What Newton's method tells is the end of its branch, and not
-flow. {{mod}}`faultgouge.studies.yielding.static` says what *fails* means.
+moves and rests again, and fails at {static}; both are medians. What Newton's method tells is the end of its
+branch, and not flow. {{mod}}`faultgouge.studies.yielding.static` says what *fails* means.
 
 **Dynamic.** From an equilibrium at a share of the static yield, with noise of 1e-12, for 50 units of time:
 
@@ -75,7 +75,7 @@ def numbers(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def yields(rows: list[dict[str, Any]], loss: float) -> dict[str, list[float]]:
+def yields(rows: list[dict[str, Any]], loss: float) -> dict[str, Any]:
     """The dynamic yield with a loss, medians with intervals: the least load of `SHARES` at which a packing flows.
 
     A packing that does not flow at any of them has its static yield. "least" is F_x/F_y, "share" over the static yield.
@@ -89,7 +89,7 @@ def yields(rows: list[dict[str, Any]], loss: float) -> dict[str, list[float]]:
         "restitution": loss,
         "least": median(shares * static),
         "share": median(shares),
-        "flow": sum(np.less(shares, 1)),
+        "flow": int(np.sum(np.less(shares, 1))),
     }
 
 
