@@ -1,6 +1,7 @@
 """The page of the study of complex modes: it comes out of the committed tables, and says what they hold."""
 
 import json
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -80,6 +81,19 @@ def test_units_says_what_the_table_of_quartz_says(found):
     page = (DOCS.parent / "units.md").read_text()
     for row in in_real_units(found):
         assert row in page
+    place = {name: course["loads"].index(0.2) for name, course in found["quartz"].items()}
+    for depth in ("1 MPa", "10 MPa", "100 MPa"):
+        grows = found["quartz"][f"quartz {depth}"]["grows"]["0.9"][place[f"quartz {depth}"]]
+        assert re.search(rf"{grows['count']} of {grows['of']}( packings)? under {depth}", page)
+        assert grows["count"] > grows["of"] / 2
+    for name, middle in (("quartz 1 MPa", 0.87), ("quartz 10 MPa", 0.95), ("quartz 100 MPa", 0.99)):
+        course = found["quartz"][name]
+        assert course["critical_restitution"][course["loads"].index(0.1)][0] == pytest.approx(middle, abs=0.006)
+        assert all(grows["count"] == 0 for grows in course["grows"]["0.9"][:1])
+        assert course["least_q"][place[name]][0] < 50
+    omega = [course["omega"][course["loads"].index(0.1)][0] for course in found["sizes"].values()]
+    assert min(omega) > 80 / 1.2
+    assert max(omega) < 80 * 1.2
 
 
 def test_checks_agree_with_the_same_packings(found):
