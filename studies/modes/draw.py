@@ -9,12 +9,16 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from ...figures.film import Film
 from ...figures.style import INK, styled
 
 ROCK = (50, 300)
 """Quality factors of rock."""
+
+TICKS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4)
+"""F_x/F_y that stand below an axis, where they were looked at."""
 
 LABELS = {
     "share": "share of complex modes",
@@ -43,6 +47,9 @@ def over_load(courses: Mapping[str, Course], names: Sequence[str] = ("share", "g
         for number, (label, course) in enumerate(courses.items()):
             _band(axes, course["loads"], np.array(course[name], dtype=float), f"C{number}", label)
         axes.set(xscale="log", xlabel=r"$F_x/F_y$", ylabel=LABELS[name])
+        seen = {load for course in courses.values() for load in course["loads"]}
+        axes.set_xticks([load for load in TICKS if load in seen], [f"{load:g}" for load in TICKS if load in seen])
+        axes.xaxis.set_minor_formatter(NullFormatter())
         if name in ("growth_rate", "least_q"):
             axes.set_yscale("log")
         if name == "least_q":
