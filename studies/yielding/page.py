@@ -25,7 +25,8 @@ TEXT = """# Yield, static and dynamic
 
 Made by `python docs/yield/make.py` from `tables/quartz_100.jsonl`, which `faultgouge sweep scenes/sweeps/yield.toml`
 writes. 100 disks, mu = 0.6, k_n/F_y as quartz under 10 MPa. The rule of selection is in that file. So far
-{packings} packings have been followed, and {failed} failed, for which the table has the reason. Shares have Wilson's 95 % intervals.
+{packings} packings have been followed, and {failed} failed, for which the table has the reason. Shares have Wilson's
+95 % intervals.
 
 **In a sentence.** {main}
 
