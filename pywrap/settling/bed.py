@@ -130,6 +130,8 @@ def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None, watch
             "only a layer that closes the box stays on top, so put more disks into it (leave packing.top out for as "
             "many as it takes), or try another seed"
         )
+    # where disks rest does not depend on their masses
+    packing = replace(packing, mass=scene.packing.mass_of(packing.radius))
     if scene.packing.settle_friction:
         return packing
     packing = clear_rattlers(packing, rounding_floor(packing))

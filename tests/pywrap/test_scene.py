@@ -23,6 +23,7 @@ FULL = {
         "width": 8,
         "seed": 3,
         "settle_friction": True,
+        "masses": "spheres",
     },
     "law": {"kn": 1e5, "kt": 0.5, "mu": [1, 0.8], "exponent": 1, "history": "total"},
     "load": {"fy": 2},
@@ -124,7 +125,8 @@ def test_upper_layer_that_is_left_out_is_a_number_in_the_resolved_scene():
 def test_shipped_scenes_are_scenes(path):
     scene = Scene.from_toml(path)
     assert scene.law.kn == 2e5
-    assert scene.load.fy == (74.7 if path.stem == "quartz" else 3.0)
+    quartz = {"quartz": 74.7, "quartz_1MPa": 7.47, "quartz_10MPa": 74.7, "quartz_100MPa": 747}
+    assert scene.load.fy == quartz.get(path.stem, 3.0)
 
 
 def test_the_paper_scene_holds_the_papers_numbers():
