@@ -38,6 +38,15 @@ def render(package: str, name: str, **numbers: Any) -> str:
     **numbers
         What the template names; a name that is missing is an error.
     """
+    return filled(_text(package, name, numbers))
+
+
+def lines(package: str, name: str, **numbers: Any) -> list[str]:
+    """Lines for a terminal, as wide as they are; arguments as of `render`."""
+    return [line for line in _text(package, name, numbers).splitlines() if line]
+
+
+def _text(package: str, name: str, numbers: dict[str, Any]) -> str:
     folder = files(package)
     environment = Environment(
         loader=FunctionLoader(lambda template: (folder / template).read_text()),
@@ -49,7 +58,7 @@ def render(package: str, name: str, **numbers: Any) -> str:
     )
     environment.filters["number"] = format
     environment.filters["uncertain"] = with_uncertainty
-    return filled(environment.get_template(name).render(**numbers))
+    return environment.get_template(name).render(**numbers)
 
 
 def filled(text: str) -> str:
