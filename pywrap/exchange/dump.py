@@ -12,8 +12,8 @@ import numpy as np
 
 from ...analysis import PackingFileError, read_dump
 from ...analysis.files.dumps import DumpFrame, dump_frames
+from . import quantities
 from .disks import Disks, of_columns
-from .record import contact_rows, scalars, slips_of
 
 
 def read_deck_dump(path: Path, frame: int | None = None) -> Disks:
@@ -30,8 +30,8 @@ def read_deck_dump(path: Path, frame: int | None = None) -> Disks:
         packing.top,
         packing.position_low,
         packing.box_length,
-        slips_of(contact_rows(packing)),
-        scalars(packing),
+        quantities.slips_of(quantities.contact_rows(packing), packing.compensated),
+        quantities.scalars(packing),
     )
 
 
