@@ -65,7 +65,7 @@ def refusal(key: str, says: str) -> PydanticCustomError:
     return PydanticCustomError("refused", "{key} {says}", {"key": key, "says": says})
 
 
-def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[BaseModel], ...]]) -> str:
+def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ...]]) -> str:
     """One error of pydantic as: where, what is wrong, what to do; `sections` has the models of each section."""
     kind, context = error["type"], error.get("ctx", {})
     path = [str(part) for part in error["loc"] if part not in ("generated", "stored")]
@@ -85,7 +85,7 @@ def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[BaseModel], 
     return f"{place} = {reprlib.repr(error['input'])} is refused: {rule}"
 
 
-def _unknown_key(path: list[str], stored: bool, sections: Mapping[str, tuple[type[BaseModel], ...]]) -> str:
+def _unknown_key(path: list[str], stored: bool, sections: Mapping[str, tuple[type[Section], ...]]) -> str:
     *above, key = path
     homes = [name for name, models in sections.items() if any(key in model.model_fields for model in models)]
     if not above:

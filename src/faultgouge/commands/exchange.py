@@ -122,7 +122,7 @@ def export(
     'faultgouge\\[export]'. With --frames a film of displacements: a .pvd for ParaView
     comes with a folder of .vtp.
     """
-    from faultgouge.pywrap.exchange.writers import check_writer, write_packing
+    from faultgouge.pywrap.exchange.formats import check_writer, write_packing
 
     if frames is not None:
         if mode is not None or frame != -1:
@@ -141,8 +141,8 @@ def export(
 def _export_frames(file: Path, says: str, output: Path) -> None:
     """The frames of a ramp or of an undamped run."""
     from faultgouge.analysis import PackingFileError, RunFile
+    from faultgouge.pywrap.exchange.formats import check_frames_writer, write_frames
     from faultgouge.pywrap.exchange.frames import chosen_frames, frames_of
-    from faultgouge.pywrap.exchange.writers import check_frames_writer, write_frames
 
     check_frames_writer(output)
     if file.suffix == ".disks":
