@@ -24,7 +24,7 @@ from .packing import LEAST_SHARE, PackingArtist, View, mobilised
 from .style import EDGE, FLOOR, MOBILIZATION
 
 if TYPE_CHECKING:
-    from bokeh.plotting import figure as Plot
+    from bokeh.plotting import figure
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -221,7 +221,7 @@ def _frame(packing: Packing, course: Followed, k: int) -> dict[str, Any]:
     }
 
 
-def _plot(name: str, x: str, y: str, **more: Any) -> "Plot":
+def _plot(name: str, x: str, y: str, **more: Any) -> "figure":
     from bokeh.plotting import figure
 
     tools: dict[str, Any] = {"tools": "pan,wheel_zoom,box_zoom,reset", "toolbar_location": "above"}
@@ -231,7 +231,7 @@ def _plot(name: str, x: str, y: str, **more: Any) -> "Plot":
     return plot
 
 
-def _packing_plot(packings: Sequence[Packing], sources: dict[str, Any]) -> "Plot":
+def _packing_plot(packings: Sequence[Packing], sources: dict[str, Any]) -> "figure":
     """Disks and force chains; the floor."""
     from bokeh.models import BoxAnnotation, ColorBar, LogColorMapper
 
@@ -257,7 +257,7 @@ def _packing_plot(packings: Sequence[Packing], sources: dict[str, Any]) -> "Plot
     return plot
 
 
-def _plane(course: Followed, sources: dict[str, Any]) -> "Plot":
+def _plane(course: Followed, sources: dict[str, Any]) -> "figure":
     """The plane of eigenvalues about the pair, with the way of the pair."""
     known = course.pair[np.isfinite(course.pair).all(axis=1)]
     low, high = float(known.real.min()), float(known.real.max())
@@ -272,10 +272,10 @@ def _plane(course: Followed, sources: dict[str, Any]) -> "Plot":
     return plot
 
 
-def _curves(packings: Sequence[Packing], course: Followed, sources: dict[str, Any]) -> list["Plot"]:
+def _curves(packings: Sequence[Packing], course: Followed, sources: dict[str, Any]) -> list["figure"]:
     """Real and imaginary parts of the pair over the load."""
     fx = np.array([packing.fx for packing in packings])
-    plots = []
+    plots: list[figure] = []
     for name, label, part in (("real", "Re λ", course.pair.real), ("imaginary", "Im λ", course.pair.imag)):
         more = {"x_range": plots[0].x_range} if plots else {}
         plot = _plot(name, "Fₓ", label, **more)
@@ -286,7 +286,7 @@ def _curves(packings: Sequence[Packing], course: Followed, sources: dict[str, An
     return plots
 
 
-def _growth(series: dict[str, Any]) -> "Plot":
+def _growth(series: dict[str, Any]) -> "figure":
     """D(t) of an undamped run, on a logarithmic axis."""
     seen = series["msd"] > 0
     plot = _plot("growth", "t", "D(t)", y_axis_type="log")
