@@ -98,7 +98,8 @@ def settled_bed(
 
 def law_of(scene: Scene, mu: float) -> MindlinLaw:
     cn, ct = (scene.damping.cn, scene.damping.ct) if scene.damping else (0.0, 0.0)
-    return MindlinLaw(scene.law.kn, scene.law.kt, mu, scene.law.exponent, cn, ct)
+    rescaled = scene.law.history == "rescaled"
+    return MindlinLaw(scene.law.kn, scene.law.kt, mu, scene.law.exponent, cn, ct, rescaled)
 
 
 def drag_time(scene: Scene) -> float | None:

@@ -27,6 +27,7 @@ KINDS: Mapping[str, tuple[int, Mapping[str, Mapping[str, Any]]]] = {
     "settled with friction": (6, {"packing": {"settle_friction": True}}),
     "harmonic": (40, {"law": {"exponent": 1, "kn": 7e3}}),
     "stiff tangent": (40, {"law": {"kt": "1/2 kn"}}),
+    "rescaled history": (20, {"law": {"history": "rescaled"}}),
 }
 """Packings of 100 disks of other kinds: how many, and what differs. k_n of the harmonic law as in docs/genericity."""
 

@@ -24,7 +24,7 @@ FULL = {
         "seed": 3,
         "settle_friction": True,
     },
-    "law": {"kn": 1e5, "kt": 0.5, "mu": [1, 0.8], "exponent": 1},
+    "law": {"kn": 1e5, "kt": 0.5, "mu": [1, 0.8], "exponent": 1, "history": "total"},
     "load": {"fy": 2},
     "relax": {"damping": 3.0, "time_step": 0.01},
     "ramp": {"step": 1e-3, "until": 0.02, "method": "overdamped", "force_tolerance": 1e-12},
@@ -153,6 +153,11 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         # law and damping
         ({"law": {"exponent": 2.0}}, "law.exponent = 2 is refused: give 1.5 (Hertz) or 1 (harmonic disks)"),
         ({"law": {"exponent": "one"}}, "law.exponent = 'one' is refused: give a number"),
+        ({"law": {"history": "whole"}}, "law.history = 'whole' is refused"),
+        (
+            {"law": {"history": "rescaled", "exponent": 1}},
+            'law.history = "rescaled" needs law.exponent = 1.5: harmonic disks have one stiffness',
+        ),
         ({"damping": {"cn": -1.0}}, "damping.cn = -1.0 is refused: give a number of at least 0"),
         ({"damping": {"ct": float("inf")}}, "damping.ct = inf is refused: give a finite number"),
         ({"damping": {"tau": 0.0}}, "damping.tau = 0.0 is refused: give a number above 0"),
