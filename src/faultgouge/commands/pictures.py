@@ -1,4 +1,4 @@
-"""Packings, modes and runs to look at: draw, movie."""
+"""Packings, modes and runs to look at: draw, movie, view."""
 
 from __future__ import annotations
 
@@ -115,6 +115,38 @@ def movie(
     write_film(film, output, rate, lambda frames, total: progress(frames, "frames", total))
     width, height = film.size
     say(f"{count} frames of {width} x {height} dots; written to {output}")
+
+
+@app.command(epilog="Example: faultgouge view run.h5 -o page.html")
+def view(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5 of a ramp, or perturb.h5.", show_default=False)],
+    loads: Annotated[int, typer.Option(min=1, help="Equilibria on the page, equally spaced if there are more.")] = 60,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The page: .html.")] = Path("page.html"),
+) -> None:
+    """Make one page that any browser opens offline: a ramp with its pair, under a slider.
+
+    The page has the packing with its force chains, the plane of eigenvalues, in which
+    two meet, both over F_x, and D(t) if the file has it. The modes of the pair move.
+    It needs pip install 'faultgouge\\[view]'.
+    """
+    if output.suffix.lower() != ".html":
+        raise typer.BadParameter(f"-o {output}: a page is an .html")
+    from faultgouge.analysis import RunFile
+    from faultgouge.analysis.files.wholefile import check_folder
+    from faultgouge.figures.view import check_library, equally_spaced, write_view
+
+    check_library()
+    check_folder(output)
+    if not is_root():
+        return
+    with RunFile(file) as run:
+        packings = [run.packing(k) for k in equally_spaced(len(run), loads)]
+        series = run.series("undamped") if "undamped" in run.names_of_series else None
+    span = " to ".join(f"{fx:g}" for fx in dict.fromkeys((packings[0].fx, packings[-1].fx)))
+    what = "undamped run" if series is not None else "equilibria"
+    title = f"{file.name}: {what} of {len(packings[0])} disks, F_x = {span}"
+    write_view(packings, output, title, series, lambda them: progress(them, "loads"))
+    say(f"{len(packings)} loads, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
 
 
 def _film_of_mode(file: Path, frame: int, mode: str, count: int, seconds: float, dots: int) -> Film:
