@@ -115,18 +115,20 @@ class Growing:
     def candidates(self, places: Sequence[Place], depth: int) -> Iterator[Announced]:
         """What the few modes do that may grow, or where to look for that; None where all modes have to tell."""
         for here, there in pairwise(places):
-            if self.open is None:
-                start = here.modes
-                self.open = [
-                    (start.mode(int(k)), Crossing(here.fx, 0.0, float(start.rates[k].imag), "start"))
-                    for k in start.growing
-                ]
             few = self.screen is not None and depth <= DEPTH
             clusters = self.screen(here.pencil, there.pencil) if self.screen is not None and few else None
+            if self.open is None:  # where no mode is a suspect, none grows
+                self.open = [] if clusters == [] else self.started(here)
             if clusters is not None and len(clusters) > MOST:
                 clusters = None
             course = None if clusters is None else self.followed(clusters, here.pencil, there.pencil)
             yield None if depth == DEPTH and isinstance(course, float) else course
+
+    def started(self, here: Place) -> Open:
+        """The modes that grow at the smallest load."""
+        modes = here.modes
+        rates = [(int(k), float(modes.rates[k].imag)) for k in modes.growing]
+        return [(modes.mode(k), Crossing(here.fx, 0.0, frequency, "start")) for k, frequency in rates]
 
     def followed(self, clusters: list[Cluster], here: Pencil, there: Pencil) -> Followed | float:
         """The modes that grow at either load, solved for; else a load in between, at which more is to be seen."""

@@ -10,7 +10,6 @@ from faultgouge.analysis import damping_matrix, find_onset, stiffness_matrix
 from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil
 from faultgouge.analysis.damped_onset.weak import balancing_ratio, drag_onset, weak_limit
 from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating, growing_windows
-from faultgouge.analysis.motion.state_space import StateSpace
 
 RNG = np.random.default_rng(11)
 TURN = np.linalg.qr(RNG.normal(size=(8, 8)))[0]
@@ -22,8 +21,7 @@ def family(block, damping):
     def pencil(fx):
         a = block_diag(block(fx), np.diag([30.0, 40, 50, 60, 70, 80]))
         g = block_diag(np.diag(damping), 0.02 * np.eye(6))
-        parts = (csr_array(TURN @ each @ TURN.T) for each in (a, g))
-        return Pencil.of_system(fx, StateSpace.of_matrices(*parts, np.ones(8)), 8)
+        return Pencil(fx, *(csr_array(TURN @ each @ TURN.T) for each in (a, g)))
 
     return pencil
 
