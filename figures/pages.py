@@ -18,6 +18,9 @@ LAID_OUT = re.compile(r"[|#<$!]|```| {4}")
 """What a line begins with that is no prose: tables, headings, tags, formulas, pictures, code."""
 
 
+ITEM = re.compile(r"- |\d+\. ")
+"""What an item of a list begins with."""
+
 NO_BEGINNING = re.compile(r" (?=(?:[-+*>#=]|\d+[.)]) )")
 """The blank before a word that would make a list, a quotation or a heading of the line that begins with it."""
 
@@ -62,7 +65,7 @@ def _folded(text: str) -> str:
     open_paragraph = False
     for line in text.split("\n"):
         prose = bool(line.strip()) and not LAID_OUT.match(line)
-        if open_paragraph and prose and not line.startswith("- "):
+        if open_paragraph and prose and not ITEM.match(line):
             done[-1] += " " + line.strip()
         else:
             done.append(line)
@@ -71,7 +74,8 @@ def _folded(text: str) -> str:
 
 
 def _wrapped(line: str) -> str:
-    bound = NO_BEGINNING.sub("\0", line)
-    indent = "  " if line.startswith("- ") else ""
+    item = ITEM.match(line)
+    mark = item.end() if item else 0
+    bound, indent = line[:mark].replace(" ", "\0") + NO_BEGINNING.sub("\0", line[mark:]), " " * mark
     lines = textwrap.wrap(bound, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     return "\n".join(lines).replace("\0", " ")

@@ -16,7 +16,7 @@ COLOURS = 64
 
 UNSEEN = 18
 """A dot stays as it was while each of its three colours is off by no more than this, of 255. Without this a film of 20
-units of time is three times as large; with twice as much contacts that moved leave gaps in others."""
+units of time is twice as large; with twice as much contacts that moved leave gaps in others."""
 
 NEVER_SEEN = [1, 255, 1]
 """The colour whose place in the palette stands for a dot that stays as it was: no figure has this green."""

@@ -104,7 +104,8 @@ def settled_bed(
 
 def law_of(scene: Scene, mu: float) -> MindlinLaw:
     cn, ct = (scene.damping.cn, scene.damping.ct) if scene.damping else (0.0, 0.0)
-    return MindlinLaw(scene.law.kn, scene.law.kt, mu, scene.law.exponent, cn, ct)
+    rescaled = scene.law.history == "rescaled"
+    return MindlinLaw(scene.law.kn, scene.law.kt, mu, scene.law.exponent, cn, ct, rescaled)
 
 
 def drag_time(scene: Scene) -> float | None:
@@ -115,17 +116,20 @@ def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None, watch
     """The first of the seed's loose starts whose upper layer stays on top, settled."""
     assert isinstance(scene.packing, GeneratedPacking)
     for draw in range(STARTS):
+        if draw:
+            watch(f"the upper layer sank through the bed: loose start {draw + 1} of {STARTS}")
         packing = _laid(scene, scene.packing.start(draw), law, communicator, watch)
         idle = len(packing.loaded(rounding_floor(packing)).rattlers)
         if idle <= 0.5 * len(packing):
             break
-        watch(f"the upper layer sank through the bed: loose start {draw + 2} of {STARTS}")
     else:
         raise NoEquilibriumError(
             f"the upper layer sank through the bed from each of {STARTS} loose starts, and {idle} of {len(packing)} "
             "disks carry nothing: without friction only a layer that closes the box stays on top, so put more disks "
             "into it (leave packing.top out for as many as it takes)"
         )
+    # where disks rest does not depend on their masses
+    packing = replace(packing, mass=scene.packing.mass_of(packing.radius))
     if scene.packing.settle_friction:
         return packing
     packing = clear_rattlers(packing, rounding_floor(packing))

@@ -255,9 +255,12 @@ def _scene(scene: Path | None, disks: Disks, values: dict[str, Any]) -> Scene:
     if scene is not None:
         return Scene.from_toml(scene, packing={})
     damping = {key: values[key] for key in ("cn", "ct", "tau") if key in values}
+    law: dict[str, Any] = {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values}
+    if values.get("rescaled"):
+        law["history"] = "rescaled"
     sections = {
         "packing": {},
-        "law": {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values},
+        "law": law,
         "load": {"fy": values["fy"]},
     }
     return Scene.from_mapping(sections | ({"damping": damping} if damping else {}))
