@@ -33,7 +33,7 @@ class GeneratedPacking(Section):
         Number of disks in the upper layer: free disks, above all others at the start, the load on each. By default a
         tenth of the disks, and at least as many as fit side by side (`loose.layer_size`). The paper gives no number.
     seed : int
-        Seed of the loose start.
+        Seed of the loose start; and of further ones, should the disks not come to rest from the first.
     periodic : bool
         Whether x is periodic, which the paper does not say. With false the sides are open, and nothing holds the disks
         there: that is refused, unless the packing is one row of disks, all of the upper layer.
@@ -88,9 +88,9 @@ class GeneratedPacking(Section):
             raise refusal("", f"is refused because {error}: widen the box, or take fewer disks") from None
         return self
 
-    def start(self) -> Start:
-        """The loose start that this section describes."""
-        return loose_start(self.disks, self.radii, self.top, self.width, self.seed, periodic=self.periodic)
+    def start(self, draw: int = 0) -> Start:
+        """The loose start that this section describes, or a later one of its seed."""
+        return loose_start(self.disks, self.radii, self.top, self.width, self.seed, periodic=self.periodic, draw=draw)
 
     def mass_of(self, radius: NDArray[np.float64]) -> NDArray[np.float64]:
         """Masses of disks, shape (N,), in units of that of the smallest."""

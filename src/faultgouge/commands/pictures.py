@@ -85,12 +85,12 @@ def movie(
     frame: Frame = -1,
     color: WhichColour = Colour.MOBILISED,
     seconds: Annotated[float, typer.Option(min=0.1, max=600, help="Length of the film.")] = 10.0,
-    rate: Annotated[float, typer.Option(min=1, max=60, help="Frames a second.")] = 20.0,
+    rate: Annotated[float, typer.Option(min=1, max=60, help="Frames a second.")] = 10.0,
     span: Annotated[
         tuple[float, float] | None,
         typer.Option(metavar="T0 T1", help="Times of the run between which it is shown; all by default."),
     ] = None,
-    dots: Annotated[int, typer.Option(min=30, max=400, help="Dots an inch; a film is some five inches wide.")] = 130,
+    dots: Annotated[int, typer.Option(min=30, max=400, help="Dots an inch; a film is some five inches wide.")] = 110,
     output: Annotated[Path, typer.Option("-o", "--output", help="The film: .gif or .mp4.")] = Path("film.gif"),
 ) -> None:
     """Make a film of an undamped run, of a mode, or of a ramp.
