@@ -49,8 +49,8 @@ MARGIN = 20
 APART = 10
 """Suspects that are closer belong to one cluster."""
 
-LARGEST = 100
-"""Modes of a cluster: all modes take no longer than a few larger ones."""
+LARGEST = 100, 1 / 3
+"""Modes of a cluster, and the same as a share of all modes where that is more: beyond, all modes take no longer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,8 @@ class Screen:
         if suspects is None:
             return None
         cores = np.split(suspects, np.flatnonzero(np.diff(suspects) > APART) + 1) if len(suspects) else []
-        if any(core[-1] - core[0] + 2 * MARGIN > LARGEST for core in cores):
+        largest = max(LARGEST[0], LARGEST[1] * len(basis.active))
+        if any(core[-1] - core[0] + 2 * MARGIN > largest for core in cores):
             return None
         return list(_clusters(basis, (here, before), (there, after), cores))
 
@@ -189,7 +190,7 @@ def _clusters(
     ordered = np.sort(middle.frequencies)
     for core in cores:
         modes = np.arange(max(0, core[0] - MARGIN), min(size, core[-1] + 1 + MARGIN))
-        coupling = middle.stiffness.coupling
+        coupling = np.asarray(middle.stiffness.coupling, np.float64)
         right, left = (_with_others(each, level, modes) for each in (coupling, coupling.T))
         left = left @ np.linalg.inv(left.T @ right).T
         ends = here[1].between(left, right), there[1].between(left, right)

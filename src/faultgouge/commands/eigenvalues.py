@@ -18,6 +18,7 @@ from .terminal import AsJson, ScenePath, print_json, read_scene, say, status, st
 if TYPE_CHECKING:
     from ..analysis import DampedWindow, Packing, Spectrum, Window
     from ..pywrap import Scene
+    from ..pywrap.onset.damped import DampedOnset
 
 app = typer.Typer()
 
@@ -155,13 +156,23 @@ def onset(
     if output:
         check_folder(output)
     folder = _search_folder(output)
-    of_a_mu = _damped_onset if wanted.damping is not None else partial(_undamped_onset, part, folder)
-    found = [of_a_mu(wanted, mu) for mu in wanted.law.mus]
-    result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
-    if output and is_root():
-        write_text(output, json.dumps(result, indent=1) + "\n")
-        if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
+    found: list[dict[str, Any]] = []
+
+    def write(last: dict[str, Any]) -> dict[str, Any]:
+        each = [*found, last]
+        result = each[0] | ({"each_mu": each} if len(each) > 1 else {})
+        if output and is_root():
+            write_text(output, json.dumps(result, indent=1) + "\n")
+        return result
+
+    for mu in wanted.law.mus:
+        if wanted.damping is not None:
+            found.append(_damped_onset(wanted, mu, output, write))
+        else:
+            found.append(_undamped_onset(part, folder, wanted, mu))
+    result = write(found.pop())
+    if output and is_root() and folder is not None:
+        shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
     if as_json:
         print_json(result)
 
@@ -188,13 +199,23 @@ def _undamped_onset(modes: tuple[int, int] | None, folder: Path | None, scene: S
     return {"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond} | real
 
 
-def _damped_onset(scene: Scene, mu: float) -> dict[str, Any]:
-    """The onset of a scene with dissipation, as its JSON; and what a user reads of it."""
+def _damped_onset(
+    scene: Scene, mu: float, output: Path | None, write: Callable[[dict[str, Any]], object]
+) -> dict[str, Any]:
+    """The onset of a scene with dissipation, as its JSON; and what a user reads of it.
+
+    What is known is written as it comes, with the load up to which that is all as the key `searched_to`.
+    """
     from faultgouge.analysis.digits import with_uncertainty
     from faultgouge.pywrap.onset.damped import damped_onset_run
 
+    def known(so_far: DampedOnset, fx: float) -> None:
+        if output is not None:
+            write({"mu": mu, "searched_to": fx} | so_far.as_dict())
+            keeps(f"{output} has the windows with dissipation up to F_x = {fx:.6g}, without the errors of the path")
+
     with status(f"mu = {mu:g}") as show:
-        run = damped_onset_run(scene, mu, watch=partial(_under_way, show, f"mu = {mu:g}", tells=True))
+        run = damped_onset_run(scene, mu, partial(_under_way, show, f"mu = {mu:g}", tells=output is None), known)
     first = run.windows[0]
     say(
         f"mu = {mu:g}: with dissipation F_x^c = {with_uncertainty(run.fx_c, run.error)} ({first.kind}, "
