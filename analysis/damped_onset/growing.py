@@ -29,8 +29,8 @@ from .step import Step, excursion
 DEPTH = 4
 """How often an increment is divided before all modes are asked: they take as long as ten looks at a few."""
 
-MOST = 2.2e-5
-"""Clusters of an increment, for each coordinate squared, beyond which all modes take less time: two of 100 disks."""
+MOST = 9e-5
+"""Clusters of an increment, for each coordinate squared, beyond which all modes take less time: eight of 100 disks."""
 
 CLUSTER = 1e-4
 """Narrowest windows that are looked for in clusters, in increments: where they begin is known to 1e-2 or so."""
