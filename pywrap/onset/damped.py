@@ -96,6 +96,13 @@ class Ramped:
     forces: NDArray[np.float64]
     flows: bool
 
+    def undamped(self) -> Onset | None:
+        """All windows without dissipation; None if there is none."""
+        try:
+            return find_onset(dissipating(self.path), self.forces)
+        except OnsetError:
+            return None
+
     def first_window(self) -> Window | None:
         """The first window without dissipation, as far as a few increments show it; None if there is none."""
         for k in range(0, len(self.forces) - 1, FEW):
@@ -172,10 +179,7 @@ def damped_onset_run(
     damping = scene.damping
     with ramped(scene, mu, watch) as ramp:
         watch(f"pairs that become complex without dissipation, up to F_x = {ramp.forces[-1]:.6g}")
-        try:
-            undamped = find_onset(dissipating(ramp.path), ramp.forces)
-        except OnsetError:
-            undamped = None
+        undamped = ramp.undamped()
 
         def so_far(windows: tuple[DampedWindow, ...], fx: float) -> None:
             if windows:

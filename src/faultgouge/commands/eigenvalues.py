@@ -148,7 +148,7 @@ def onset(
     With a section [damping]: the windows in which some motion grows in spite of
     the dissipation, or because of it, and beside them the undamped onset.
     """
-    from faultgouge.analysis.files.wholefile import check_folder, write_text
+    from faultgouge.analysis.files.wholefile import check_folder
 
     wanted, part = read_scene(scene, "onset"), None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
@@ -157,24 +157,26 @@ def onset(
         check_folder(output)
     folder = _search_folder(output)
     found: list[dict[str, Any]] = []
-
-    def write(last: dict[str, Any]) -> dict[str, Any]:
-        each = [*found, last]
-        result = each[0] | ({"each_mu": each} if len(each) > 1 else {})
-        if output and is_root():
-            write_text(output, json.dumps(result, indent=1) + "\n")
-        return result
-
     for mu in wanted.law.mus:
         if wanted.damping is not None:
-            found.append(_damped_onset(wanted, mu, output, write))
+            found.append(_damped_onset(wanted, mu, output, found))
         else:
             found.append(_undamped_onset(part, folder, wanted, mu))
-    result = write(found.pop())
+    result = _written(output, found)
     if output and is_root() and folder is not None:
         shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
     if as_json:
         print_json(result)
+
+
+def _written(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]:
+    """The JSON of all friction coefficients, written if there is a file for it."""
+    from faultgouge.analysis.files.wholefile import write_text
+
+    result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
+    if output and is_root():
+        write_text(output, json.dumps(result, indent=1) + "\n")
+    return result
 
 
 def _search_folder(output: Path | None) -> Path | None:
@@ -199,19 +201,18 @@ def _undamped_onset(modes: tuple[int, int] | None, folder: Path | None, scene: S
     return {"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond} | real
 
 
-def _damped_onset(
-    scene: Scene, mu: float, output: Path | None, write: Callable[[dict[str, Any]], object]
-) -> dict[str, Any]:
+def _damped_onset(scene: Scene, mu: float, output: Path | None, before: list[dict[str, Any]]) -> dict[str, Any]:
     """The onset of a scene with dissipation, as its JSON; and what a user reads of it.
 
-    What is known is written as it comes, with the load up to which that is all as the key `searched_to`.
+    What is known is written as it comes, beside what is known `before` of other friction coefficients, with the load
+    up to which that is all as the key `searched_to`.
     """
     from faultgouge.analysis.digits import with_uncertainty
     from faultgouge.pywrap.onset.damped import damped_onset_run
 
     def known(so_far: DampedOnset, fx: float) -> None:
         if output is not None:
-            write({"mu": mu, "searched_to": fx} | so_far.as_dict())
+            _written(output, [*before, {"mu": mu, "searched_to": fx} | so_far.as_dict()])
             keeps(f"{output} has the windows with dissipation up to F_x = {fx:.6g}, without the errors of the path")
 
     with status(f"mu = {mu:g}") as show:
