@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing
-from ...analysis.files.runfile import LAW_DEFAULTS
+from ...analysis.files.runfile_header import unusual
 from .disks import Slips
 
-KEYS = ("kn", "kt", "mu", "exponent", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
+KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
 """Names of law, load and inertia in files."""
 
 
@@ -25,7 +25,7 @@ def scalars(packing: Packing) -> dict[str, float]:
     """Law, load and inertia by name; those that are not there, or as always, are left out."""
     law = packing.law
     values = {"kn": law.kn, "kt": law.kt, "mu": law.mu}
-    values |= {name: getattr(law, name) for name, default in LAW_DEFAULTS.items() if getattr(law, name) != default}
+    values |= unusual(law)
     if packing.drag_time is not None:
         values["tau"] = packing.drag_time
     return {**values, "fx": packing.fx, "fy": packing.fy, "inertia_factor": packing.inertia_factor}

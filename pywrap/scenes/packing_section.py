@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,9 @@ class GeneratedPacking(Section):
         False: settled without friction, which then starts with zero slips, so that K is symmetric at F_x = 0.
         True: settled with friction, so that the packing carries tangential load from the start. The paper
         does not say which.
+    masses : {"equal", "spheres"}
+        Equal masses, of one, as in the paper; or those of spheres of one material, as the cube of the radius, the
+        smallest one.
     """
 
     disks: int = Field(100, gt=0, le=10_000_000)
@@ -51,6 +54,7 @@ class GeneratedPacking(Section):
     seed: int = Field(7, ge=0, lt=2**63)
     periodic: bool = True
     settle_friction: bool = False
+    masses: Literal["equal", "spheres"] = "equal"
 
     @field_validator("top", mode="before")
     @classmethod
@@ -87,6 +91,11 @@ class GeneratedPacking(Section):
     def start(self) -> Start:
         """The loose start that this section describes."""
         return loose_start(self.disks, self.radii, self.top, self.width, self.seed, periodic=self.periodic)
+
+    def mass_of(self, radius: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Masses of disks, shape (N,), in units of that of the smallest."""
+        power = 3 if self.masses == "spheres" else 0
+        return np.asarray((radius / min(self.radii)) ** power)
 
 
 class StoredPacking(Section):

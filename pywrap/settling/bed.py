@@ -98,7 +98,8 @@ def settled_bed(
 
 def law_of(scene: Scene, mu: float) -> MindlinLaw:
     cn, ct = (scene.damping.cn, scene.damping.ct) if scene.damping else (0.0, 0.0)
-    return MindlinLaw(scene.law.kn, scene.law.kt, mu, scene.law.exponent, cn, ct)
+    rescaled = scene.law.history == "rescaled"
+    return MindlinLaw(scene.law.kn, scene.law.kt, mu, scene.law.exponent, cn, ct, rescaled)
 
 
 def drag_time(scene: Scene) -> float | None:
@@ -129,6 +130,8 @@ def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None, watch
             "only a layer that closes the box stays on top, so put more disks into it (leave packing.top out for as "
             "many as it takes), or try another seed"
         )
+    # where disks rest does not depend on their masses
+    packing = replace(packing, mass=scene.packing.mass_of(packing.radius))
     if scene.packing.settle_friction:
         return packing
     packing = clear_rattlers(packing, rounding_floor(packing))

@@ -85,6 +85,14 @@ def test_damping_is_in_the_file_if_it_is_in_the_packing(tmp_path, cluster):
     assert parameters[1] - parameters[0] == {"cn", "ct", "drag_time"}
 
 
+def test_a_rescaled_history_is_in_the_file_if_the_law_has_it(tmp_path, cluster):
+    state = replace(cluster, law=replace(cluster.law, exponent=1.5, rescaled=True))
+    with RunFile.create(tmp_path / "run.h5", state) as run:
+        run.append(state)
+        assert_identical(run.packing(), state)
+        assert run.packing().law.rescaled is True
+
+
 def test_open_box_and_frictionless_law(tmp_path, cluster):
     state = replace(cluster, box_length=None, law=MindlinLaw(1.0, 0.0, 0.0))
     with RunFile.create(tmp_path / "run.h5", state) as run:

@@ -1,22 +1,14 @@
 """Commands on scenes with [damping], and what spectrum says of transient growth."""
 
 import json
-from pathlib import Path
 
 import pytest
+from reference_layer import LAYER, REFERENCE
 
 from faultgouge.analysis import RunFile
 from faultgouge.analysis.motion.transient import transient_gain
 
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
-
-SCENE = f"""
-[packing]
-file = "{REFERENCE}"
-[law]
-kn = 2e5
-[load]
-fy = 3.0
+SCENE = f"""{LAYER}
 [ramp]
 step = 1e-3
 until = 4e-3

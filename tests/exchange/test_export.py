@@ -32,7 +32,7 @@ def need(suffix):
         pytest.importorskip("gsd.hoomd", reason="GSD needs the extra export: pip install 'faultgouge[export]'")
 
 
-@pytest.mark.parametrize("kind", ["as it is", "open sides", "compensated", "no contacts", "far image"])
+@pytest.mark.parametrize("kind", ["as it is", "open sides", "compensated", "rescaled", "no contacts", "far image"])
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
     need(suffix)
@@ -44,6 +44,8 @@ def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
     elif kind == "compensated":
         low = 1e-18 * np.arange(len(c))
         packing = replace(packing, position_low=packing.position * 1e-17, contacts=c.slipped(c.slip, low))
+    elif kind == "rescaled":
+        packing = replace(packing, law=replace(packing.law, rescaled=True))
     elif kind == "no contacts":
         packing = replace(packing, contacts=Contacts([], [], []))
     elif kind == "far image":
@@ -55,6 +57,7 @@ def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
     assert {name: disks.given[name] for name in ("kn", "kt", "mu")} == {
         name: getattr(packing.law, name) for name in ("kn", "kt", "mu")
     }
+    assert disks.given.get("rescaled", 0.0) == packing.law.rescaled
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

@@ -2,17 +2,15 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from reference_layer import REFERENCE
 
 from faultgouge.analysis import MindlinLaw, Packing, PackingFileError, touching
 from faultgouge.figures.film import LARGEST_SHOWN, Motion, RampFilm, RunFilm
 from faultgouge.figures.writers import FilmError, write_film
-
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
 
 @pytest.fixture(scope="module")

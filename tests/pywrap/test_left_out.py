@@ -25,7 +25,7 @@ BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
 MODEL = {"decks", "data", "sides", "kn", "kt", "mu", "fx", "fy", "inertia", "precision", "compensated", "rotation"}
-MODEL |= {"dt", "mobile", "exponent", "stiffness"}
+MODEL |= {"dt", "mobile", "exponent", "history", "stiffness"}
 PUSH = {"amplitude", "omega", "target", "push"}
 WEAKEN = {"B", "w", "mu_ss", "v0", "v_ss", "friction"}
 

@@ -23,8 +23,9 @@ FULL = {
         "width": 8,
         "seed": 3,
         "settle_friction": True,
+        "masses": "spheres",
     },
-    "law": {"kn": 1e5, "kt": 0.5, "mu": [1, 0.8], "exponent": 1},
+    "law": {"kn": 1e5, "kt": 0.5, "mu": [1, 0.8], "exponent": 1, "history": "total"},
     "load": {"fy": 2},
     "relax": {"damping": 3.0, "time_step": 0.01},
     "ramp": {"step": 1e-3, "until": 0.02, "method": "overdamped", "force_tolerance": 1e-12},
@@ -124,7 +125,8 @@ def test_upper_layer_that_is_left_out_is_a_number_in_the_resolved_scene():
 def test_shipped_scenes_are_scenes(path):
     scene = Scene.from_toml(path)
     assert scene.law.kn == 2e5
-    assert scene.load.fy == (74.7 if path.stem == "quartz" else 3.0)
+    quartz = {"quartz": 74.7, "quartz_1MPa": 7.47, "quartz_10MPa": 74.7, "quartz_100MPa": 747}
+    assert scene.load.fy == quartz.get(path.stem, 3.0)
 
 
 def test_the_paper_scene_holds_the_papers_numbers():
@@ -153,6 +155,11 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         # law and damping
         ({"law": {"exponent": 2.0}}, "law.exponent = 2 is refused: give 1.5 (Hertz) or 1 (harmonic disks)"),
         ({"law": {"exponent": "one"}}, "law.exponent = 'one' is refused: give a number"),
+        ({"law": {"history": "whole"}}, "law.history = 'whole' is refused"),
+        (
+            {"law": {"history": "rescaled", "exponent": 1}},
+            'law.history = "rescaled" needs law.exponent = 1.5: harmonic disks have one stiffness',
+        ),
         ({"damping": {"cn": -1.0}}, "damping.cn = -1.0 is refused: give a number of at least 0"),
         ({"damping": {"ct": float("inf")}}, "damping.ct = inf is refused: give a finite number"),
         ({"damping": {"tau": 0.0}}, "damping.tau = 0.0 is refused: give a number above 0"),

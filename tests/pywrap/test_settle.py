@@ -67,3 +67,10 @@ def test_settling_with_friction_leaves_slips(settled):
     packing = settle(scene(disks=20, top=4, width=4.9, settle_friction=True)).packing
     assert np.abs(packing.contacts.slip).max() > 0
     assert packing.residual < 1e-9
+
+
+def test_spheres_rest_where_disks_of_equal_masses_do():
+    equal, spheres = (settle(scene(disks=20, top=4, width=4.9, masses=each)).packing for each in ("equal", "spheres"))
+    np.testing.assert_array_equal(spheres.position, equal.position)
+    np.testing.assert_array_equal(equal.mass, 1.0)
+    np.testing.assert_allclose(spheres.mass, (spheres.radius / 0.5) ** 3, rtol=1e-15)

@@ -13,7 +13,18 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import AsJson, ScenePath, print_json, read_scene, say, status, stored_packing
+from .terminal import (
+    AsJson,
+    Frame,
+    PackingFile,
+    ScenePath,
+    print_json,
+    read_scene,
+    say,
+    show_table,
+    status,
+    stored_packing,
+)
 
 if TYPE_CHECKING:
     from ..analysis import DampedWindow, Packing, Spectrum, Window
@@ -25,8 +36,8 @@ app = typer.Typer()
 
 @app.command(epilog="Example: faultgouge spectrum run.h5 --json")
 def spectrum(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.")],
-    frame: Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")] = -1,
+    file: PackingFile,
+    frame: Frame = -1,
     values: Annotated[
         bool, typer.Option("--values", help="Eigenvalues alone: of a thousand disks in a third of the time.")
     ] = False,
@@ -267,21 +278,15 @@ def _say_of_one_path(windows: Sequence[Window] | Sequence[DampedWindow]) -> None
 
 def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]]) -> None:
     """The windows of complex eigenvalues as a table, on standard error; in SI where the scene has units."""
-    if not is_root():
-        return
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     from faultgouge.analysis.digits import with_uncertainty
 
-    more = ("in Pa", "F_x/F_y", "in Hz") if si else ("eigenvalue",)
-    table = Table("from F_x", "to F_x", *more, "begins with", box=box.SIMPLE_HEAD)
+    rows = []
     for k, each in enumerate(windows):
         until = "the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}"
         numbers = _columns(si[k]) if si else [f"{each.eigenvalue:.6g}"]
-        table.add_row(with_uncertainty(each.fx_onset, each.error), until, *numbers, each.kind)
-    Console(stderr=True, highlight=False).print(table)
+        rows.append([with_uncertainty(each.fx_onset, each.error), until, *numbers, each.kind])
+    more = ("in Pa", "F_x/F_y", "in Hz") if si else ("eigenvalue",)
+    show_table(("from F_x", "to F_x", *more, "begins with"), rows)
 
 
 def _under_way(

@@ -9,7 +9,7 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import progress, say, status, stored_packing
+from .terminal import Frame, PackingFile, progress, say, status, stored_packing
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -96,10 +96,8 @@ def import_(
 
 @app.command(epilog="Example: faultgouge export run.h5 --mode pair -o packing.vtp")
 def export(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.", show_default=False)
-    ],
-    frame: Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")] = -1,
+    file: PackingFile,
+    frame: Frame = -1,
     mode: Annotated[
         str | None,
         typer.Option("--mode", metavar="pair|N", help="Also a mode as vectors, as of `faultgouge draw`."),
@@ -255,9 +253,12 @@ def _scene(scene: Path | None, disks: Disks, values: dict[str, Any]) -> Scene:
     if scene is not None:
         return Scene.from_toml(scene, packing={})
     damping = {key: values[key] for key in ("cn", "ct", "tau") if key in values}
+    law: dict[str, Any] = {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values}
+    if values.get("rescaled"):
+        law["history"] = "rescaled"
     sections = {
         "packing": {},
-        "law": {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values},
+        "law": law,
         "load": {"fy": values["fy"]},
     }
     return Scene.from_mapping(sections | ({"damping": damping} if damping else {}))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..ranks import is_root
-from .terminal import progress, say, stored_packing
+from .terminal import Frame, PackingFile, progress, say, stored_packing
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -28,10 +28,6 @@ class Colour(str, Enum):
     NONE = "none"
 
 
-PackingFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.", show_default=False)
-]
-Frame = Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")]
 WhichMode = Annotated[
     str | None,
     typer.Option(
