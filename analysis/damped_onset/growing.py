@@ -29,8 +29,9 @@ from .step import Step, excursion
 DEPTH = 4
 """How often an increment is divided before all modes are asked: they take as long as ten looks at a few."""
 
-MOST = 2
-"""Clusters of an increment beyond which all modes take less time than the clusters."""
+MOST = 5e-5
+"""Clusters of an increment, for each coordinate squared, beyond which all modes take less time: four of 100 disks. Half
+as many in a half, so that dividing costs no more than that at any depth."""
 
 CLUSTER = 1e-4
 """Narrowest windows that are looked for in clusters, in increments: where they begin is known to 1e-2 or so."""
@@ -119,7 +120,8 @@ class Growing:
             clusters = self.screen(here.pencil, there.pencil) if self.screen is not None and few else None
             if self.open is None:  # where no mode is a suspect, none grows
                 self.open = [] if clusters == [] else self.started(here)
-            if clusters is not None and len(clusters) > MOST:
+            most = max(1, MOST * here.pencil.stiffness.shape[0] ** 2) / 2**depth
+            if clusters is not None and len(clusters) > most:
                 clusters = None
             course = None if clusters is None else self.followed(clusters, here.pencil, there.pencil)
             yield None if depth == DEPTH and isinstance(course, float) else course

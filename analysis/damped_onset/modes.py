@@ -235,7 +235,7 @@ def _solved(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> DampedMod
         last = np.inf
         for _ in range(CORRECTIONS):
             forces = a @ x, g @ x
-            before, s = s, _quotient(s, np.vdot(y, forces[0]), np.vdot(y, forces[1]), np.vdot(y, x))
+            before, s = s, _quotient(s, *(complex(np.vdot(y, each)) for each in (*forces, x)))
             if not np.isfinite(s):
                 return None
             step, size = abs(s - before), abs(s) + floor
@@ -254,7 +254,7 @@ def _quotient(s: complex, stiffness: complex, damping: complex, mass: complex) -
     """The root of y^H T(s) x next to s: the Rayleigh quotient of two vectors."""
     for _ in range(3):
         s = s - (stiffness + s * (damping + s * mass)) / (damping + 2 * s * mass)
-    return complex(s)
+    return s
 
 
 def _factors(matrix: csc_array) -> SuperLU:

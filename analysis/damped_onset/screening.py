@@ -14,6 +14,13 @@ damping is: the root of the sum of squares of its terms, times `SAFE`. A mode su
 this estimate and `SPARE` of :math:`\Gamma_{kk}`, at both loads and half-way, and if no other mode comes so close that
 :math:`|V_{kl}/g_{kl}|` exceeds `CLOSE` in between.
 
+**A cluster is quiet** where no motion of it can be fed as much as it loses. On the axis, :math:`s = i\omega`, a unit
+vector x has :math:`x^H A_s x = \omega^2` and :math:`\omega\, x^H G x = |x^H A_a x|`, with the symmetric and the
+antisymmetric part of A. So nothing crosses the axis if :math:`\omega_0 G + i A_a` is positive definite, where
+:math:`\omega_0^2` is the lowest level of the cluster. Along the straight line between two loads that holds if it does
+at both ends; and as it goes on holding while :math:`A_a` is scaled down to zero, nothing grows there. A Cholesky
+factorisation tells.
+
 **All other modes** are *suspects*. They form clusters with `MARGIN` modes on either side. A cluster is a small pencil:
 that of vectors to which the modes outside are added in first order. It is a straight line between the loads, and all of
 its windows are found as those of a small system. The operator has the last word about what begins or ends there.
@@ -21,8 +28,10 @@ its windows are found as those of a small system. The operator has the last word
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg import eigvalsh
 from scipy.sparse import csr_array
 
 from ..onset.basis import Basis, Levels
@@ -46,11 +55,14 @@ WEAK = 0.3
 MARGIN = 20
 """Modes of a cluster on either side: farther ones mix by less than a hundredth, and are there in first order."""
 
+TAKEN = 0.7
+"""Share of what dashpots take that has to exceed what the motion is fed: a cluster knows both to a few per cent."""
+
 APART = 10
 """Suspects that are closer belong to one cluster."""
 
-LARGEST = 100
-"""Modes of a cluster: all modes take no longer than a few larger ones."""
+LARGEST = 100, 1 / 3
+"""Modes of a cluster, and the same as a share of all modes where that is more: beyond, all modes take no longer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +76,13 @@ class Reduced:
         """Half-way to another load."""
         return Reduced(self.stiffness.beyond(other.stiffness, 0.5), self.damping.beyond(other.damping, 0.5))
 
-    @property
+    @cached_property
     def frequencies(self) -> Floats:
         """omega_k, 1 / time; nan of a level below zero."""
         with np.errstate(invalid="ignore"):
             return np.sqrt(self.stiffness.diagonal)
 
+    @cached_property
     def damping_of_modes(self) -> Floats:
         """d_k in second order, shape (E,), 1 / time."""
         h, gamma = self.stiffness.diagonal, self.damping.diagonal
@@ -123,6 +136,19 @@ class Cluster:
         t = (fx - self.loads[0]) / (self.loads[1] - self.loads[0])
         return Pencil(fx, *(csr_array((1 - t) * one + t * other) for one, other in zip(*self.ends, strict=True)))
 
+    @property
+    def quiet(self) -> bool:
+        """Whether nothing can begin to grow in its pencil between the loads; see the module."""
+        (a, g), (b, h) = self.ends
+        softest = min(float(eigvalsh(0.5 * (each + each.T))[0]) for each in (a, b))
+        turning = max(float(np.linalg.norm(each - each.T)) for each in (g, h))
+        frequency = np.sqrt(max(0.0, softest)) - turning
+        forms = (TAKEN * frequency * (loss + loss.T) + 1j * (force - force.T) for force, loss in self.ends)
+        try:
+            return frequency > 0 and all(np.linalg.cholesky(form).size > 0 for form in forms)
+        except np.linalg.LinAlgError:
+            return False
+
     def owns(self, frequency: float) -> bool:
         """Whether a motion of this frequency is its own, and no other cluster's."""
         return self.owned[0] <= frequency <= self.owned[1]
@@ -163,9 +189,10 @@ class Screen:
         if suspects is None:
             return None
         cores = np.split(suspects, np.flatnonzero(np.diff(suspects) > APART) + 1) if len(suspects) else []
-        if any(core[-1] - core[0] + 2 * MARGIN > LARGEST for core in cores):
+        largest = max(LARGEST[0], LARGEST[1] * len(basis.active))
+        if any(core[-1] - core[0] + 2 * MARGIN > largest for core in cores):
             return None
-        return list(_clusters(basis, (here, before), (there, after), cores))
+        return [each for each in _clusters(basis, (here, before), (there, after), cores) if not each.quiet]
 
 
 def _changed(basis: Basis, here: Pencil, reduced: Reduced, there: Pencil) -> Reduced:
@@ -189,7 +216,7 @@ def _clusters(
     ordered = np.sort(middle.frequencies)
     for core in cores:
         modes = np.arange(max(0, core[0] - MARGIN), min(size, core[-1] + 1 + MARGIN))
-        coupling = middle.stiffness.coupling
+        coupling = np.asarray(middle.stiffness.coupling, np.float64)
         right, left = (_with_others(each, level, modes) for each in (coupling, coupling.T))
         left = left @ np.linalg.inv(left.T @ right).T
         ends = here[1].between(left, right), there[1].between(left, right)
@@ -213,7 +240,7 @@ def may_grow(here: Reduced, there: Reduced) -> Indices | None:
     if not np.all(gamma < WEAK * frequency):
         return None
     mixing, third = _mixing_and_third_order(here, there, np.max([each.frequencies for each in points], axis=0))
-    least = np.min([each.damping_of_modes() for each in points], axis=0)
+    least = np.min([each.damping_of_modes for each in points], axis=0)
     own = np.min([each.damping.diagonal for each in points], axis=0)
     return np.flatnonzero((least - SAFE * third / frequency <= SPARE * own) | (mixing > CLOSE))
 

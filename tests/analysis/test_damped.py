@@ -86,6 +86,16 @@ def test_a_steady_loss_of_stability_is_no_hopf_point():
     assert window.fx_end is None
 
 
+def test_what_is_known_is_told_as_it_comes():
+    told = []
+    pencil = family(crossing(0.2), (1e-3, 1e-3))
+    found = growing_windows(pencil, [-1.0, 0.0, 0.4, 1.0, 2.0], known=lambda windows, fx: told.append((windows, fx)))
+    assert [fx for _, fx in told] == [0.0, 0.4, 1.0, 2.0]
+    assert [len(windows) for windows, _ in told] == [0, 1, 1, 1]
+    assert [windows[0].fx_end is None for windows, _ in told[1:]] == [True, False, False]
+    assert told[-1][0] == found
+
+
 def test_what_grows_from_the_beginning_says_so():
     (window,) = growing_windows(family(crossing(0.2, place=0.0), (1e-3, 1e-3)), [0.0, 1.0])
     assert (window.kind, window.fx_onset) == ("start", 0.0)
