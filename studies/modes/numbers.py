@@ -38,7 +38,8 @@ def numbers(tables: Mapping[str, Table]) -> dict[str, Any]:
         powers : exponents of N; random : shares of random matrices beside those of the packings; loss : what stops
         the pairs, by number of disks; structural : share of packings that grow, for each quality factor; quartz :
         as loss, of the shipped scenes; runs : growth with dashpots in LAMMPS beside the pencil's; sets : medians
-        at `COMPARED` of every set; switches : the same with b of some contacts.
+        at `COMPARED` of every set; switches : the same with b of some contacts; histories : with total slips and
+        with rescaled ones.
     """
     by_size, randoms, lossy, runs = (_of_sizes(tables, kind) for kind in ("force", "random", "loss", "runs"))
     quartz = {name: table for name, table in tables.items() if name.startswith(("quartz", "thick"))}
@@ -53,6 +54,7 @@ def numbers(tables: Mapping[str, Table]) -> dict[str, Any]:
         "quartz": {name: losses(quartz[name]) for name in sorted(quartz, key=_place)},
         "runs": {disks: measured(table) for disks, table in runs.items()},
         "switches": switches(by_size[100]) if 100 in by_size else {},
+        "histories": histories(tables),
         "packings": sum(len(table.rows) for table in tables.values()),
         "cpu_hours": sum(row["cpu_seconds"] for table in tables.values() for row in table.rows) / 3600,
     }
@@ -202,6 +204,24 @@ def switches(table: Table) -> dict[str, Any]:
             )
         }
     return found
+
+
+HISTORIES = {"total": "force 100", "rescaled": "rescaled history"}
+"""The set of each history of the slip."""
+
+
+def histories(tables: Mapping[str, Table]) -> dict[str, Any]:
+    """Packings of the same seeds with total and with rescaled slips, at each load; nothing where a set is missing."""
+    if not all(name in tables for name in HISTORIES.values()):
+        return {}
+    rows = {law: {row["seed"]: row for row in tables[name].rows} for law, name in HISTORIES.items()}
+    seeds = sorted(set.intersection(*map(set, rows.values())))
+    matched = {law: Table(HISTORIES[law], tuple(rows[law][seed] for seed in seeds)) for law in HISTORIES}
+    return {
+        law: along(table, ("share", "least_q"))
+        | {"with_pairs": [int(np.sum(table.at(load, "pairs") > 0)) for load in table.loads]}
+        for law, table in matched.items()
+    }
 
 
 def against_random(table: Table, by_size: Mapping[int, Table]) -> dict[str, Any]:
