@@ -235,14 +235,6 @@ class Friction(Section):
     v0: NotNegative | Literal["calibrated"] = "calibrated"
     v_ss: Positive | str
 
-    @model_validator(mode="before")
-    @classmethod
-    def _has_scale(cls, section: Any) -> Any:
-        if isinstance(section, Mapping) and "v_ss" not in section:
-            rule = 'give a velocity, or a multiple such as "10 v0"'
-            raise refusal("v_ss", f"is missing, and the paper gives no value: {rule}")
-        return section
-
     @field_validator("v0", mode="before")
     @classmethod
     def _threshold(cls, v0: object) -> object:
