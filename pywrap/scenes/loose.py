@@ -70,6 +70,12 @@ def layer_size(disks: int, radii: tuple[float, ...], width: float) -> int:
     return min(disks, max(1, round(max(LAYER * disks, side_by_side))))
 
 
+def _generator(seed: int, draw: int) -> np.random.Generator:
+    """Random numbers of a seed, of which each draw has its own."""
+    draws = np.random.SeedSequence(seed, spawn_key=(draw,) if draw else ())
+    return np.random.Generator(np.random.PCG64(draws))
+
+
 def loose_start(
     disks: int,
     radii: tuple[float, ...],
@@ -116,8 +122,7 @@ def loose_start(
     if diameter > width:
         raise ValueError(f"a disk of radius {sizes.max()} is wider than the box of width {width}")
 
-    draws = np.random.SeedSequence(seed, spawn_key=(draw,) if draw else ())
-    generator = np.random.Generator(np.random.PCG64(draws))
+    generator = _generator(seed, draw)
     bulk = generator.permutation(bulk)
     columns = max(1, int(width / (CELL * diameter)))
     side = np.array([width / columns, CELL * diameter])
