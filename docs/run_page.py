@@ -4,7 +4,7 @@
 
 A fenced block of a page is used by its language:
 
-- ``toml``, ``python`` or ``lammps`` whose first line is ``# NAME`` alone is the file NAME;
+- ``toml``, ``python`` or ``text`` whose first line is ``# NAME`` alone is the file NAME;
 - ``console`` has commands, each after ``$ ``, and below each what it prints, standard error and output together. A line
   ``...`` stands for any lines.
 
@@ -43,7 +43,7 @@ def files(page: Path) -> dict[str, str]:
     found = {}
     for language, text in BLOCK.findall(page.read_text()):
         name = NAME.match(text)
-        if language in ("toml", "python", "lammps") and name:
+        if language in ("toml", "python", "text") and name:
             found[name[1]] = text
     return found
 

@@ -16,3 +16,14 @@ def test_one_version_of_our_own():
     (version,) = re.findall(r'^version = "(.+)"$', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
     assert f"\n## [{version}] - 20" in (ROOT / "CHANGELOG.md").read_text()
+    assert f'\n  version: "{version}"\n' in (ROOT / "conda/recipe.yaml").read_text()
+
+
+def test_the_conda_package_needs_what_the_wheel_needs():
+    project = (ROOT / "pyproject.toml").read_text()
+    (needed,) = re.findall(r"^dependencies = \[(.*?)^\]", project, re.MULTILINE | re.DOTALL)
+    wanted = dict(re.findall(r'"([a-z0-9]+)([<>=][^";]*)', needed))
+    run = (ROOT / "conda/recipe.yaml").read_text().split("\n  run:\n")[1]
+    found = dict(re.findall(r"- (?:if: .*\n *then: )?([a-z0-9]+)(?:-base)? ([<>=].*)", run))
+    found.pop("python")
+    assert {name: bound.replace(".08.", ".8.") for name, bound in found.items()} == wanted

@@ -147,8 +147,9 @@ def _otherwise(
     engine: Engine, here: Equilibrium, last: Equilibrium, fx: float, force_tolerance: float | None
 ) -> Equilibrium:
     """The equilibrium at fx by the ways of `TRIED`, in that order; `here` if none leads there."""
-    parts = [(last, np.linspace(last.fx, fx, count + 1)[1:]) for count in PARTS]
-    for start, loads in ((here, [fx]), *parts, (last, [2 * fx - last.fx, fx])):
+    routes: list[tuple[Equilibrium, list[float]]] = [(here, [fx])]
+    routes += [(last, np.linspace(last.fx, fx, count + 1)[1:].tolist()) for count in PARTS]
+    for start, loads in (*routes, (last, [2 * fx - last.fx, fx])):
         found = _through(engine, start, loads, force_tolerance)
         if found is not None:
             return found

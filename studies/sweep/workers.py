@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections import defaultdict, deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from typing import Any
 
 from mpi4py import MPI
@@ -47,6 +48,10 @@ class Processes(Executor):
         self._pool = self._started()
 
     def _started(self) -> ProcessPoolExecutor:
+        # the tracker would warn of semaphores where this process is killed; it frees them all the same
+        sys.warnoptions.append("ignore:resource_tracker:UserWarning")
+        resource_tracker.ensure_running()
+        sys.warnoptions.pop()
         # no fork: MPI and LAMMPS do not survive one
         pool = ProcessPoolExecutor(self._number, get_context("spawn"), initializer=end_with, initargs=(os.getpid(),))
         # Ctrl-C is for this process alone, with which the others end: they inherit that SIGINT is blocked

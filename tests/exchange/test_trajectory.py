@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import PackingFileError, RunFile, mean_square_displacement, nearest_image
-from faultgouge.pywrap import Record, Scene, reach
+from faultgouge.pywrap import Record, Scene, SceneError, reach
 
 pytestmark = pytest.mark.skipif(
     find_spec("MDAnalysis") is None, reason="needs the extra export: pip install 'faultgouge[export]'"
@@ -197,3 +197,10 @@ def test_no_equilibrium_follows_a_trajectory(run):
         file.append(packing, floor=0.0, evaluations=0)
     with RunFile(path) as file, pytest.raises(PackingFileError, match="there is no frame 1"):
         file.packing(1)
+
+
+def test_a_file_that_only_claims_to_be_a_run_is_refused_when_the_parser_is_there(tmp_path):
+    import_module("faultgouge.pywrap.exchange.mdanalysis")
+    (tmp_path / "run.h5").write_bytes(b"no HDF5")
+    with pytest.raises(SceneError, match="is of no format that is read: give"):
+        Scene.from_mapping({"packing": {"file": str(tmp_path / "run.h5")}})
