@@ -31,7 +31,7 @@ from .style import BULK, EDGE, INK, styled
 Floats = NDArray[np.float64]
 Frame = NDArray[np.uint8]
 
-DOTS = 130
+DOTS = 110
 """Dots an inch of a frame, unless others are asked for."""
 
 LARGEST_SHOWN = 0.6

@@ -61,15 +61,11 @@ class Mode:
     @classmethod
     def of(cls, packing: Packing, modes: Eigenpairs, number: int) -> "Mode":
         """One of the modes of a packing."""
-        mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
-        vector = modes.right[:, number] / np.sqrt(mass)
-        vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
-        moved = vector.reshape(3, -1)
-        largest = np.sqrt(np.sum(np.abs(moved[:2]) ** 2, axis=0)).max()
+        moved = displacement(packing, modes.right[:, number])
         return cls(
             number,
             complex(modes.values[number]),
-            moved / largest,
+            moved,
             float(modes.participation[number]),
             float(modes.rotation[number]),
         )
@@ -101,6 +97,16 @@ class Mode:
             f"\nparticipation ratio {self.participation:.2f}, "
             f"rotation {100 * self.rotation:.0f} % of the kinetic energy"
         )
+
+
+def displacement(packing: Packing, vector: Complexes) -> Complexes:
+    """A mass-weighted vector, shape (3N,), as of :class:`Mode`: x, y and R theta of every disk, shape (3, N)."""
+    mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
+    vector = vector / np.sqrt(mass)
+    vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
+    moved = vector.reshape(3, -1)
+    largest = np.sqrt(np.sum(np.abs(moved[:2]) ** 2, axis=0)).max()
+    return np.asarray(moved / largest)
 
 
 def unstable_pair(packing: Packing, modes: Eigenpairs, believed: Sequence[complex]) -> tuple[list[Mode], str]:

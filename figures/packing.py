@@ -42,7 +42,8 @@ def _slip_share(packing: Packing) -> Floats:
     return np.divide(np.abs(packing.contacts.slip), limit, out=np.zeros(len(limit)), where=limit > 0)
 
 
-def _mobilised(packing: Packing) -> Floats:
+def mobilised(packing: Packing) -> Floats:
+    """|f_t|/(mu f_n) of each contact: the share of Coulomb's bound that it uses, shape (c,)."""
     limit = packing.law.mu * packing.normal_force
     return np.divide(np.abs(packing.tangential_force), limit, out=np.zeros(len(limit)), where=limit > 0)
 
@@ -56,7 +57,7 @@ def _force_scale(values: Floats) -> Normalize:
 
 
 COLOURS: dict[str, tuple[str, Callable[[Packing], Floats], Callable[[Floats], Normalize], str | Colormap]] = {
-    "mobilised": (r"mobilised friction $|f_t|/(\mu f_n)$", _mobilised, _share_scale, MOBILIZATION),
+    "mobilised": (r"mobilised friction $|f_t|/(\mu f_n)$", mobilised, _share_scale, MOBILIZATION),
     "slip": ("slip / slip limit", _slip_share, _share_scale, MOBILIZATION),
     "force": ("normal force $f_n$", lambda packing: packing.normal_force, _force_scale, "viridis_r"),
 }

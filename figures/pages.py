@@ -18,6 +18,9 @@ LAID_OUT = re.compile(r"[|#<$!]|```| {4}")
 """What a line begins with that is no prose: tables, headings, tags, formulas, pictures, code."""
 
 
+ITEM = re.compile(r"- |\d+\. ")
+"""What an item of a list begins with."""
+
 NO_BEGINNING = re.compile(r" (?=(?:[-+*>#=]|\d+[.)]) )")
 """The blank before a word that would make a list, a quotation or a heading of the line that begins with it."""
 
@@ -35,6 +38,15 @@ def render(package: str, name: str, **numbers: Any) -> str:
     **numbers
         What the template names; a name that is missing is an error.
     """
+    return filled(_text(package, name, numbers))
+
+
+def lines(package: str, name: str, **numbers: Any) -> list[str]:
+    """Lines for a terminal, as wide as they are; arguments as of `render`."""
+    return [line for line in _text(package, name, numbers).splitlines() if line]
+
+
+def _text(package: str, name: str, numbers: dict[str, Any]) -> str:
     folder = files(package)
     environment = Environment(
         loader=FunctionLoader(lambda template: (folder / template).read_text()),
@@ -46,7 +58,7 @@ def render(package: str, name: str, **numbers: Any) -> str:
     )
     environment.filters["number"] = format
     environment.filters["uncertain"] = with_uncertainty
-    return filled(environment.get_template(name).render(**numbers))
+    return environment.get_template(name).render(**numbers)
 
 
 def filled(text: str) -> str:
@@ -62,7 +74,7 @@ def _folded(text: str) -> str:
     open_paragraph = False
     for line in text.split("\n"):
         prose = bool(line.strip()) and not LAID_OUT.match(line)
-        if open_paragraph and prose and not line.startswith("- "):
+        if open_paragraph and prose and not ITEM.match(line):
             done[-1] += " " + line.strip()
         else:
             done.append(line)
@@ -71,7 +83,8 @@ def _folded(text: str) -> str:
 
 
 def _wrapped(line: str) -> str:
-    bound = NO_BEGINNING.sub("\0", line)
-    indent = "  " if line.startswith("- ") else ""
+    item = ITEM.match(line)
+    mark = item.end() if item else 0
+    bound, indent = line[:mark].replace(" ", "\0") + NO_BEGINNING.sub("\0", line[mark:]), " " * mark
     lines = textwrap.wrap(bound, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     return "\n".join(lines).replace("\0", " ")

@@ -35,12 +35,16 @@ struct alignas(64) CompensatedColumn {
   }
 };
 
+// Whether there is friction, and what becomes of slips
+enum class Friction { NONE, LOOKED_AT, ADVANCED, RESCALED };
+
 // What is known at compile time
-template <class NUMBER, Exponent P, bool HAS_FRICTION, bool ADVANCES, bool HAS_DASHPOTS> struct Variant {
+template <class NUMBER, Exponent P, Friction SLIPS, bool HAS_DASHPOTS> struct Variant {
   using Number = NUMBER;
   static constexpr bool COMPENSATED = std::is_same_v<Number, Compensated>;
   static constexpr Exponent EXPONENT = P;
-  static constexpr bool FRICTION = HAS_FRICTION, ADVANCE = ADVANCES, DAMPED = HAS_DASHPOTS;
+  static constexpr bool FRICTION = SLIPS != Friction::NONE, RESCALE = SLIPS == Friction::RESCALED;
+  static constexpr bool ADVANCE = SLIPS == Friction::ADVANCED || RESCALE, DAMPED = HAS_DASHPOTS;
 };
 
 struct alignas(64) DashpotColumns {
@@ -158,7 +162,11 @@ template <class V> FAULTGOUGE_INLINE void normal_forces(Batch<V> &batch, const M
 template <class V> FAULTGOUGE_INLINE double slip_increment(const Batch<V> &batch, int k)
 {
   const Vector r{value(batch.branch_x.load(k)), value(batch.branch_y.load(k))};
-  return midpoint_slip(r, {batch.moved_x[k], batch.moved_y[k]}) - batch.rolled[k];
+  const Vector moved{batch.moved_x[k], batch.moved_y[k]};
+  const double increment = midpoint_slip(r, moved) - batch.rolled[k];
+  if constexpr (!V::RESCALE) return increment;
+  return rescaled_increment(value(batch.slip.load(k)), increment, overlap_change(r, moved),
+                            value(batch.overlap.load(k)));
 }
 
 // slips, advanced if wanted, and tangential forces
@@ -289,9 +297,11 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
 template <class Number, Exponent P, bool DAMPED, class... Rest>
 FAULTGOUGE_INLINE int with_friction(Features features, ContactPairs &pairs, const Rest &...rest)
 {
-  if (!features.friction) return all_forces<Variant<Number, P, false, false, DAMPED>>(pairs, rest...);
-  if (features.advance) return all_forces<Variant<Number, P, true, true, DAMPED>>(pairs, rest...);
-  return all_forces<Variant<Number, P, true, false, DAMPED>>(pairs, rest...);
+  if (!features.friction) return all_forces<Variant<Number, P, Friction::NONE, DAMPED>>(pairs, rest...);
+  if (!features.advance) return all_forces<Variant<Number, P, Friction::LOOKED_AT, DAMPED>>(pairs, rest...);
+  if constexpr (P == Exponent::HERTZ)
+    if (features.rescaled) return all_forces<Variant<Number, P, Friction::RESCALED, DAMPED>>(pairs, rest...);
+  return all_forces<Variant<Number, P, Friction::ADVANCED, DAMPED>>(pairs, rest...);
 }
 
 template <Exponent P, class Number>

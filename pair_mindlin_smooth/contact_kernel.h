@@ -108,8 +108,9 @@ struct Grids {
 // What is compiled into a run
 struct Features {
   bool friction;
-  bool advance;    // slips advance by v dt and omega dt
-  bool damped;     // dashpots
+  bool advance;             // slips advance by v dt and omega dt
+  bool damped;              // dashpots
+  bool rescaled = false;    // slips, while overlaps grow
 };
 
 // All pairs: their forces, slips and whether they touch. Returns a pair with one centre inside of the other disk, where

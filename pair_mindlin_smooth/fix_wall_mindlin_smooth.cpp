@@ -58,15 +58,23 @@ void FixWallMindlinSmooth::read_keywords(int narg, char **arg)
     } else if (strcmp(arg[k], "exponent") == 0) {
       if (++k >= narg || !law.set_exponent(utils::numeric(FLERR, arg[k], false, lmp)))
         error->all(FLERR, "fix wall/mindlin/smooth: exponent must be 1.5 or 1, not {}", k < narg ? arg[k] : "left out");
+    } else if (strcmp(arg[k], "history") == 0) {
+      if (++k >= narg || !law.set_history(arg[k]))
+        error->all(FLERR, "fix wall/mindlin/smooth: history must be total or rescaled, not {}",
+                   k < narg ? arg[k] : "left out");
     } else if (strcmp(arg[k], "damping") == 0) {
       if (k + 2 >= narg) error->all(FLERR, "fix wall/mindlin/smooth: damping takes two numbers, CN CT");
       set_damping(arg[k + 1], arg[k + 2]);
       k += 2;
     } else {
-      error->all(FLERR, "fix wall/mindlin/smooth knows the keywords exponent, damping and compensated, but not {}",
+      error->all(FLERR,
+                 "fix wall/mindlin/smooth knows the keywords exponent, history, damping and compensated, but not {}",
                  arg[k]);
     }
   }
+  if (!law.valid_history())
+    error->all(FLERR, "fix wall/mindlin/smooth: history rescaled needs exponent 1.5, since the stiffness of harmonic "
+                      "disks does not depend on the overlap");
 }
 
 void FixWallMindlinSmooth::set_damping(const char *cn, const char *ct)
@@ -252,7 +260,9 @@ template <class NUMBER, bool FRICTION, bool DAMPED> void FixWallMindlinSmooth::c
   const bool known = contact[OVERLAP] > 0.0;    // a new contact begins without slip
   NUMBER slip = known && FRICTION ? contact[SLIP] : 0.0;
   if constexpr (COMPENSATED && FRICTION) slip.low = known ? contact[SLIP_LOW] : 0.0;
-  const double increment = known && FRICTION ? -(atom->v[i][0] + radius * atom->omega[i][2]) * update->dt : 0.0;
+  double increment = known && FRICTION ? -(atom->v[i][0] + radius * atom->omega[i][2]) * update->dt : 0.0;
+  if (known && FRICTION && law.rescaled)
+    increment = faultgouge::rescaled_increment(value(slip), increment, -atom->v[i][1] * update->dt, value(overlap));
   faultgouge::FloorRates rates{};
   if constexpr (DAMPED) {
     const double *const felt = dashpots->array_atom[i];

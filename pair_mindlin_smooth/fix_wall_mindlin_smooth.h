@@ -1,4 +1,4 @@
-// fix ID group wall/mindlin/smooth KN KT MU ylo COORD [exponent P] [damping CN CT] [compensated]
+// fix ID group wall/mindlin/smooth KN KT MU ylo COORD [exponent P] [history KIND] [damping CN CT] [compensated]
 //
 // The flat floor at y = COORD below the disks: the law of mindlin_law.h with n = (0, 1), tau = (-1, 0).
 // MU may be v_NAME, an equal-style variable that is evaluated in every step; fix_modify ID mu MU changes it, and

@@ -10,7 +10,10 @@
 // never exceeds mu f_n, not even by a rounding, and equals it at x = 1. With a dashpot it is cut off at mu f_n, where
 // f_n is the elastic force. Numbers are double or Compensated; velocities, and so the forces of dashpots, are double.
 //
-// analysis/law.py says the same in Python. See docs/howto_law.md for how to add another.
+// Rescaled, the slip becomes s (delta_old/delta_new)^(p-1) while the overlap grows, and stays while it falls. Growth of
+// a contact then adds no tangential force to what the contact carries.
+//
+// analysis/packing/law.py says the same in Python. See docs/howto_law.md for how to add another.
 
 #ifndef FAULTGOUGE_MINDLIN_LAW_H
 #define FAULTGOUGE_MINDLIN_LAW_H
@@ -19,6 +22,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <type_traits>
 
 namespace faultgouge {
@@ -34,12 +38,15 @@ struct MindlinLaw {
   double kn = 0.0, kt = 0.0, mu = 0.0;
   double cn = 0.0, ct = 0.0;
   Exponent exponent = Exponent::HERTZ;
+  bool rescaled = false;    // slips, while overlaps grow
 
   bool frictional() const { return mu > 0.0 && kt > 0.0; }
   bool valid() const
   {
     return std::isfinite(kn) && std::isfinite(kt) && std::isfinite(mu) && kn > 0.0 && kt >= 0.0 && mu >= 0.0;
   }
+  // the stiffness of harmonic disks does not depend on the overlap
+  bool valid_history() const { return !rescaled || exponent == Exponent::HERTZ; }
   bool valid_dashpots() const { return std::isfinite(cn) && std::isfinite(ct) && cn >= 0.0 && ct >= 0.0; }
 
   // false: there is no such exponent
@@ -47,6 +54,13 @@ struct MindlinLaw {
   {
     exponent = p == 1.0 ? Exponent::HARMONIC : Exponent::HERTZ;
     return p == 1.0 || p == 1.5;
+  }
+
+  // false: there is no such history
+  bool set_history(const char *name)
+  {
+    rescaled = std::strcmp(name, "rescaled") == 0;
+    return rescaled || std::strcmp(name, "total") == 0;
   }
 
   // slip at which the tangential force reaches the Coulomb limit, per unit overlap
@@ -141,6 +155,25 @@ FAULTGOUGE_INLINE double midpoint_slip(Vector r, Vector d)
 {
   const double mx = r.x - 0.5 * d.x, my = r.y - 0.5 * d.y;
   return (r.x * d.y - r.y * d.x) / std::sqrt(mx * mx + my * my);
+}
+
+// Change of the overlap while the branch vector moves by d to r: with |r|^2 - |r - d|^2 = d . (2r - d) no digits of a
+// small displacement are lost.
+FAULTGOUGE_INLINE double overlap_change(Vector r, Vector d)
+{
+  const double ox = r.x - d.x, oy = r.y - d.y;
+  const double both = std::sqrt(r.x * r.x + r.y * r.y) + std::sqrt(ox * ox + oy * oy);
+  return -(d.x * (r.x + ox) + d.y * (r.y + oy)) / both;
+}
+
+// What a rescaled slip gains while a contact slips by an increment and its overlap changes by some length to a positive
+// overlap. The exponent is 3/2. With the ratio q <= 1 of the stiffnesses before and after, the new slip is q s and
+// (1 + q)/2 times the increment, as the trapezoidal rule has it.
+FAULTGOUGE_INLINE double rescaled_increment(double slip, double increment, double change, double overlap)
+{
+  const double share = std::min(std::max(change / overlap, 0.0), 1.0);
+  const double loss = share / (1.0 + std::sqrt(1.0 - share));    // 1 - q
+  return (1.0 - 0.5 * loss) * increment - loss * slip;
 }
 
 // the slip after an increment, within [-limit, limit]

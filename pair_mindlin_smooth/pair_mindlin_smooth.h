@@ -1,9 +1,10 @@
-// pair_style mindlin/smooth KN KT MU [exponent P] [damping CN CT] [compensated]
+// pair_style mindlin/smooth KN KT MU [exponent P] [history KIND] [damping CN CT] [compensated]
 //
 // Frictional disks in the plane: the law of mindlin_law.h with a slip history in fix slip/history. With
 // MU = 0 or KT = 0 there is no tangential force, no history and no fix.
 //
 //   exponent      3/2 by default, or 1
+//   history       total by default, or rescaled: slips are rescaled while overlaps grow (exponent 3/2 alone)
 //   damping       dashpots at the contacts, which feel the velocities of fix dashpot/velocities; none by default, and
 //                 none while fix displace/disc moves the disks
 //   compensated   coordinates, slips and forces with low parts (compensated.h), kept in fix low/parts

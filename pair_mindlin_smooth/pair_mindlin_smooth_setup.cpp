@@ -94,6 +94,10 @@ void PairMindlinSmooth::read_keywords(int narg, char **arg)
       if (++k >= narg || !law.set_exponent(utils::numeric(FLERR, arg[k], false, lmp)))
         error->all(FLERR, "pair_style mindlin/smooth: exponent must be 1.5 or 1, not {}",
                    k < narg ? arg[k] : "left out");
+    } else if (strcmp(arg[k], "history") == 0) {
+      if (++k >= narg || !law.set_history(arg[k]))
+        error->all(FLERR, "pair_style mindlin/smooth: history must be total or rescaled, not {}",
+                   k < narg ? arg[k] : "left out");
     } else if (strcmp(arg[k], "damping") == 0) {
       if (k + 2 >= narg) error->all(FLERR, "pair_style mindlin/smooth: damping takes two numbers, CN CT");
       law.cn = utils::numeric(FLERR, arg[++k], false, lmp);
@@ -103,10 +107,14 @@ void PairMindlinSmooth::read_keywords(int narg, char **arg)
                    arg[k - 1], arg[k]);
       damping = true;
     } else {
-      error->all(FLERR, "pair_style mindlin/smooth knows the keywords exponent, damping and compensated, but not {}",
+      error->all(FLERR,
+                 "pair_style mindlin/smooth knows the keywords exponent, history, damping and compensated, but not {}",
                  arg[k]);
     }
   }
+  if (!law.valid_history())
+    error->all(FLERR, "pair_style mindlin/smooth: history rescaled needs exponent 1.5, since the stiffness of harmonic "
+                      "disks does not depend on the overlap");
 }
 
 void PairMindlinSmooth::coeff(int narg, char **arg)

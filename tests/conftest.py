@@ -11,13 +11,13 @@ import json
 import os
 import shlex
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from reference_layer import BIN, REFERENCE
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -28,11 +28,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 gc.disable()  # until the tests are found: a fifth of that time went into the search for garbage among what is imported
 
-BIN = Path(sys.executable).parent
 LIMIT = 1800
 """Seconds for one command on a busy machine."""
-
-REFERENCE = Path(__file__).parent / "reference" / "packing7.json"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -29,8 +29,9 @@ from .step import Step, excursion
 DEPTH = 4
 """How often an increment is divided before all modes are asked: they take as long as ten looks at a few."""
 
-MOST = 2
-"""Clusters of an increment beyond which all modes take less time than the clusters."""
+MOST = 5e-5
+"""Clusters of an increment, for each coordinate squared, beyond which all modes take less time: four of 100 disks. Half
+as many in a half, so that dividing costs no more than that at any depth."""
 
 CLUSTER = 1e-4
 """Narrowest windows that are looked for in clusters, in increments: where they begin is known to 1e-2 or so."""
@@ -115,18 +116,21 @@ class Growing:
     def candidates(self, places: Sequence[Place], depth: int) -> Iterator[Announced]:
         """What the few modes do that may grow, or where to look for that; None where all modes have to tell."""
         for here, there in pairwise(places):
-            if self.open is None:
-                start = here.modes
-                self.open = [
-                    (start.mode(int(k)), Crossing(here.fx, 0.0, float(start.rates[k].imag), "start"))
-                    for k in start.growing
-                ]
             few = self.screen is not None and depth <= DEPTH
             clusters = self.screen(here.pencil, there.pencil) if self.screen is not None and few else None
-            if clusters is not None and len(clusters) > MOST:
+            if self.open is None:  # where no mode is a suspect, none grows
+                self.open = [] if clusters == [] else self.started(here)
+            most = max(1, MOST * here.pencil.stiffness.shape[0] ** 2) / 2**depth
+            if clusters is not None and len(clusters) > most:
                 clusters = None
             course = None if clusters is None else self.followed(clusters, here.pencil, there.pencil)
             yield None if depth == DEPTH and isinstance(course, float) else course
+
+    def started(self, here: Place) -> Open:
+        """The modes that grow at the smallest load."""
+        modes = here.modes
+        rates = [(int(k), float(modes.rates[k].imag)) for k in modes.growing]
+        return [(modes.mode(k), Crossing(here.fx, 0.0, frequency, "start")) for k, frequency in rates]
 
     def followed(self, clusters: list[Cluster], here: Pencil, there: Pencil) -> Followed | float:
         """The modes that grow at either load, solved for; else a load in between, at which more is to be seen."""

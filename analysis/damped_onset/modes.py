@@ -13,9 +13,11 @@ so that weak damping of an undamped motion, :math:`s = i\sqrt\lambda`, gives it
 conditioned one is uncertain by the unit roundoff times :math:`|Z|_F`; one with unit vectors l, r of Z by
 :math:`1/|l^H r|` of that. Re s > 0 is believed from `SAFETY` times as much.
 
-**One of them** (`DampedMode.at`) is followed to a neighbouring load by Rayleigh quotient iteration with both vectors,
-which triples the digits in every step: :math:`x \leftarrow T(s)^{-1} T'(s) x`, the same for y, and
-:math:`s \leftarrow s - y^H T(s) x / y^H T'(s) x`.
+**One of them** (`DampedMode.at`) is followed to a neighbouring load by inverse iteration of both vectors,
+:math:`x \leftarrow T(\sigma)^{-1} T'(\sigma) x` and the same for y, with s the root of :math:`y^H T(s) x` next to the
+shift. Then the factors of the shift serve on, :math:`x \leftarrow x - T(\sigma)^{-1} T(s) x` (residual inverse
+iteration: Neumaier, SIAM J. Numer. Anal. 22, 914 (1985)). Each step divides the errors of both vectors by
+:math:`\mathrm{gap}/|s - \sigma|`, and that of s by its square.
 """
 
 from dataclasses import dataclass
@@ -34,13 +36,16 @@ from ..onset.modes import matched
 from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
-from ..spectrum.spectrum import SAFETY, Complexes, active_coordinates, mass_weighted, unit_rounding
+from ..spectrum.spectrum import SAFETY, Complexes, mass_weighted, unit_rounding
 
 STEADY = 1e-3
 """Digits of an eigenvalue smaller than this share of |Z|_F are not asked for."""
 
 STEPS = 12
-"""Steps of Rayleigh quotient iteration: each triples the digits, and three or four are enough."""
+"""Factorisations: one or two are enough."""
+
+CORRECTIONS = 8
+"""Corrections with the same factors, as long as each brings a digit at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,23 +73,6 @@ class Pencil:
         bearing = force_bearing(packing)
         a, g = (mass_weighted(each(bearing), bearing) for each in (stiffness_matrix, damping_matrix))
         return cls(packing.fx, a, g, load_error(packing))
-
-    @classmethod
-    def of_system(cls, fx: float, system: StateSpace, size: int, balance: float = 0.0) -> "Pencil":
-        """That of a system with so many coordinates, rattlers' and all."""
-        inner = np.ix_(system.active, system.active)
-        stiffness, damping = np.zeros((2, size, size))
-        stiffness[inner], damping[inner] = system.stiffness, system.damping
-        return cls(fx, csr_array(stiffness), csr_array(damping), balance)
-
-    @cached_property
-    def active(self) -> Indices:
-        """The coordinates that feel a force, shape (E,)."""
-        return active_coordinates(self.stiffness)
-
-    def inner(self, matrix: csr_array) -> csr_array:
-        """A matrix on these coordinates alone."""
-        return csr_array(matrix[self.active][:, self.active])
 
     @cached_property
     def system(self) -> StateSpace:
@@ -151,28 +139,8 @@ class DampedMode:
         guess : complex, optional
             Where to begin; the first-order change by default.
         """
-        active, a, g = pencil.active, pencil.inner(pencil.stiffness), pencil.inner(pencil.damping)
-        x, y, s = self.right[active], self.left[active], self.rate + self.change(pencil) if guess is None else guess
-        unit, last = eye_array(len(active)), np.inf
-        for _ in range(STEPS):
-            factors = _factors(csc_array(a + s * g + s * s * unit))
-            x = _unit(factors.solve(2 * s * x + g @ x))
-            y = _unit(factors.solve(2 * np.conj(s) * y + g @ y, trans="H"))
-            slant = np.vdot(y, 2 * s * x + g @ x)
-            step = np.vdot(y, a @ x + s * (g @ x) + s * s * x) / slant
-            s = complex(s - step)
-            if not np.isfinite(s):
-                return None
-            size = abs(s) + self.pencil.rounding / np.finfo(float).eps * STEADY  # of a steady mode s is zero
-            if abs(step) <= 4 * np.finfo(float).eps * size or (abs(step) < 1e-9 * size and abs(step) >= last):
-                break
-            last = float(abs(step))
-        else:
-            return None
-        right, left = np.zeros((2, len(self.right)), complex)
-        right[active], left[active] = x, y
-        found = DampedMode(pencil, complex(s), right, left)
-        return found if self.resembles(found) else None
+        found = _solved(pencil, self.right, self.left, self.rate + self.change(pencil) if guess is None else guess)
+        return found if found is not None and self.resembles(found) else None
 
     def same(self, other: "DampedMode") -> bool:
         """Whether two modes of one pencil are one and the same: their eigenvalues agree to half of the digits."""
@@ -253,6 +221,40 @@ class DampedModes:
         weight = np.abs(self.right.conj().T @ other.right) * np.abs(self.left.conj().T @ other.left)
         a, b = self.rates[:, None], other.rates[None]
         return matched(weight * (1 - np.abs(a - b) / (np.abs(a) + np.abs(b) + np.finfo(float).tiny)))
+
+
+def _solved(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> DampedMode | None:
+    """The mode nearest to some vectors and an eigenvalue, by the two-sided iteration; None if it does not converge."""
+    a, g, unit = pencil.stiffness, pencil.damping, eye_array(len(x))
+    mirror = a.T, g.T
+    floor = pencil.rounding / np.finfo(float).eps * STEADY  # of a steady mode s is zero
+    for _ in range(STEPS):
+        factors = _factors(csc_array(a + s * g + s * s * unit))
+        x = _unit(factors.solve(2 * s * x + g @ x))
+        y = _unit(factors.solve(2 * np.conj(s) * y + g @ y, trans="H"))
+        last = np.inf
+        for _ in range(CORRECTIONS):
+            forces = a @ x, g @ x
+            before, s = s, _quotient(s, *(complex(np.vdot(y, each)) for each in (*forces, x)))
+            if not np.isfinite(s):
+                return None
+            step, size = abs(s - before), abs(s) + floor
+            if step <= 4 * np.finfo(float).eps * size or (step < 1e-9 * size and step >= last):
+                return DampedMode(pencil, s, x, y)
+            if step > 0.1 * last:
+                break
+            last = step
+            x = _unit(x - factors.solve(forces[0] + s * forces[1] + s * s * x))
+            z = np.conj(s)
+            y = _unit(y - factors.solve(mirror[0] @ y + z * (mirror[1] @ y) + z * z * y, trans="H"))
+    return None
+
+
+def _quotient(s: complex, stiffness: complex, damping: complex, mass: complex) -> complex:
+    """The root of y^H T(s) x next to s: the Rayleigh quotient of two vectors."""
+    for _ in range(3):
+        s = s - (stiffness + s * (damping + s * mass)) / (damping + 2 * s * mass)
+    return s
 
 
 def _factors(matrix: csc_array) -> SuperLU:

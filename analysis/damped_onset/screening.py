@@ -14,6 +14,13 @@ damping is: the root of the sum of squares of its terms, times `SAFE`. A mode su
 this estimate and `SPARE` of :math:`\Gamma_{kk}`, at both loads and half-way, and if no other mode comes so close that
 :math:`|V_{kl}/g_{kl}|` exceeds `CLOSE` in between.
 
+**A cluster is quiet** where no motion of it can be fed as much as it loses. On the axis, :math:`s = i\omega`, a unit
+vector x has :math:`x^H A_s x = \omega^2` and :math:`\omega\, x^H G x = |x^H A_a x|`, with the symmetric and the
+antisymmetric part of A. So nothing crosses the axis if :math:`\omega_0 G + i A_a` is positive definite, where
+:math:`\omega_0^2` is the lowest level of the cluster. Along the straight line between two loads that holds if it does
+at both ends; and as it goes on holding while :math:`A_a` is scaled down to zero, nothing grows there. A Cholesky
+factorisation tells.
+
 **All other modes** are *suspects*. They form clusters with `MARGIN` modes on either side. A cluster is a small pencil:
 that of vectors to which the modes outside are added in first order. It is a straight line between the loads, and all of
 its windows are found as those of a small system. The operator has the last word about what begins or ends there.
@@ -21,12 +28,13 @@ its windows are found as those of a small system. The operator has the last word
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigvalsh
 from scipy.sparse import csr_array
 
-from ..motion.state_space import StateSpace
+from ..onset.basis import Basis, Levels
 from ..packing.packing import Floats, Indices
 from ..spectrum.spectrum import Complexes
 from .modes import Pencil
@@ -47,41 +55,58 @@ WEAK = 0.3
 MARGIN = 20
 """Modes of a cluster on either side: farther ones mix by less than a hundredth, and are there in first order."""
 
+TAKEN = 0.7
+"""Share of what dashpots take that has to exceed what the motion is fed: a cluster knows both to a few per cent."""
+
 APART = 10
 """Suspects that are closer belong to one cluster."""
 
-LARGEST = 100
-"""Modes of a cluster: all modes take no longer than a few larger ones."""
+LARGEST = 100, 1 / 3
+"""Modes of a cluster, and the same as a share of all modes where that is more: beyond, all modes take no longer."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """H and Gamma at one load, shape (E, E), 1 / time^2 and 1 / time."""
+    """H and Gamma at one load, 1 / time^2 and 1 / time."""
 
-    stiffness: Floats
-    damping: Floats
+    stiffness: Levels
+    damping: Levels
 
     def mean(self, other: "Reduced") -> "Reduced":
         """Half-way to another load."""
-        return Reduced(0.5 * (self.stiffness + other.stiffness), 0.5 * (self.damping + other.damping))
+        return Reduced(self.stiffness.beyond(other.stiffness, 0.5), self.damping.beyond(other.damping, 0.5))
 
-    @property
+    @cached_property
     def frequencies(self) -> Floats:
         """omega_k, 1 / time; nan of a level below zero."""
         with np.errstate(invalid="ignore"):
-            return np.sqrt(np.diag(self.stiffness))
+            return np.sqrt(self.stiffness.diagonal)
 
+    @cached_property
     def damping_of_modes(self) -> Floats:
         """d_k in second order, shape (E,), 1 / time."""
-        h, gamma = np.diag(self.stiffness), np.diag(self.damping)
-        s = (-0.5 * gamma + 1j * np.sqrt(h - 0.25 * gamma**2))[:, None]
-        g = (h - h[:, None]) + s * (gamma - gamma[:, None])
-        np.fill_diagonal(g, np.inf)
-        forward = self.stiffness + s * self.damping
-        backward = self.stiffness.T + s * self.damping.T
+        h, gamma = self.stiffness.diagonal, self.damping.diagonal
+        real = (-0.5 * gamma).astype(np.float32)[:, None]  # s, in two parts: complex numbers take three times as long
+        imag = np.sqrt(h - 0.25 * gamma**2).astype(np.float32)[:, None]
+        apart = -self.stiffness.distance - real * self.damping.distance
+        across = -imag * self.damping.distance
+        loss = real * self.damping.coupling
+        forward, backward = self.stiffness.coupling + loss, self.stiffness.coupling.T + loss
+        loss = imag * self.damping.coupling
+        shift = (forward + backward) * loss * apart - (forward * backward - loss * loss) * across
+        size = apart * apart + across * across
+        np.fill_diagonal(size, 1.0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            shift = -np.sum(forward * backward / g, axis=1)
-        return np.asarray(gamma + shift.imag / np.sqrt(h))
+            return np.asarray(gamma - np.sum(shift / size, axis=1, dtype=np.float64) / np.sqrt(h))
+
+    def between(self, left: Floats, right: Floats) -> tuple[Floats, Floats]:
+        """The blocks of both between some left and right vectors, shape (m, m)."""
+        rough = left.T.astype(np.float32), right.astype(np.float32)
+        a, g = (
+            (left * each.diagonal[:, None]).T @ right + rough[0] @ (each.coupling @ rough[1])
+            for each in (self.stiffness, self.damping)
+        )
+        return a, g
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +117,8 @@ class Cluster:
     ----------
     loads : (float, float)
         The lower and the upper load.
-    ends : (Reduced, Reduced)
-        The pencil at both of them, shape (m, m).
+    ends : ((ndarray, ndarray), (ndarray, ndarray)), shape (m, m)
+        The stiffness and the damping of its pencil at both of them.
     right, left : ndarray, shape (3N, m)
         Its right and left vectors on all coordinates.
     owned : (float, float)
@@ -101,7 +126,7 @@ class Cluster:
     """
 
     loads: tuple[float, float]
-    ends: tuple[Reduced, Reduced]
+    ends: tuple[tuple[Floats, Floats], tuple[Floats, Floats]]
     right: Floats
     left: Floats
     owned: tuple[float, float]
@@ -109,14 +134,20 @@ class Cluster:
     def pencil(self, fx: float) -> Pencil:
         """The small pencil at a load."""
         t = (fx - self.loads[0]) / (self.loads[1] - self.loads[0])
-        a, g = (
-            csr_array((1 - t) * one + t * other)
-            for one, other in (
-                (self.ends[0].stiffness, self.ends[1].stiffness),
-                (self.ends[0].damping, self.ends[1].damping),
-            )
-        )
-        return Pencil.of_system(fx, StateSpace.of_matrices(a, g, np.ones(a.shape[0])), a.shape[0])
+        return Pencil(fx, *(csr_array((1 - t) * one + t * other) for one, other in zip(*self.ends, strict=True)))
+
+    @property
+    def quiet(self) -> bool:
+        """Whether nothing can begin to grow in its pencil between the loads; see the module."""
+        (a, g), (b, h) = self.ends
+        softest = min(float(eigvalsh(0.5 * (each + each.T))[0]) for each in (a, b))
+        turning = max(float(np.linalg.norm(each - each.T)) for each in (g, h))
+        frequency = np.sqrt(max(0.0, softest)) - turning
+        forms = (TAKEN * frequency * (loss + loss.T) + 1j * (force - force.T) for force, loss in self.ends)
+        try:
+            return frequency > 0 and all(np.linalg.cholesky(form).size > 0 for form in forms)
+        except np.linalg.LinAlgError:
+            return False
 
     def owns(self, frequency: float) -> bool:
         """Whether a motion of this frequency is its own, and no other cluster's."""
@@ -133,57 +164,66 @@ class Screen:
 
     def __init__(self) -> None:
         self._base: Pencil | None = None
-        self._vectors = np.zeros((0, 0))
-        self._active: Indices = np.zeros(0, np.int64)
+        self._basis: Basis | None = None
         self._seen: tuple[Pencil, Reduced] | None = None
 
     def __call__(self, here: Pencil, there: Pencil) -> list[Cluster] | None:
         """The clusters; None if they are not known."""
-        found = None if self._base is None else self._look(here, there)
+        found = None if self._basis is None else self._look(self._basis, here, there)
         if (found is None or len(found) > 0) and self._base is not here:
-            a = here.inner(here.stiffness).toarray()
-            self._base, self._active, self._seen = here, here.active, None
-            self._vectors = eigh(0.5 * (a + a.T), driver="evd", overwrite_a=True, check_finite=False)[1]
-            found = self._look(here, there)
+            self._base, self._basis, self._seen = here, Basis.of(here.stiffness), None
+            found = self._look(self._basis, here, there)
         return found
 
-    def _look(self, here: Pencil, there: Pencil) -> list[Cluster] | None:
-        if not (np.array_equal(here.active, self._active) and np.array_equal(there.active, self._active)):
+    def _look(self, basis: Basis, here: Pencil, there: Pencil) -> list[Cluster] | None:
+        if not (basis.covers(here.stiffness) and basis.covers(there.stiffness)):
             return None
-        before = self._seen[1] if self._seen is not None and self._seen[0] is here else self._reduced(here)
-        after = self._reduced(there)
+        if self._seen is None:
+            nothing = Levels(np.zeros(len(basis.values)), np.zeros((len(basis.values),) * 2, np.float32))
+            before = Reduced(basis.levels(here.stiffness), basis.change(nothing, here.damping))
+        else:
+            before = _changed(basis, *self._seen, here)
+        after = _changed(basis, here, before, there)
         self._seen = there, after
         suspects = may_grow(before, after)
         if suspects is None:
             return None
         cores = np.split(suspects, np.flatnonzero(np.diff(suspects) > APART) + 1) if len(suspects) else []
-        if any(core[-1] - core[0] + 2 * MARGIN > LARGEST for core in cores):
+        largest = max(LARGEST[0], LARGEST[1] * len(basis.active))
+        if any(core[-1] - core[0] + 2 * MARGIN > largest for core in cores):
             return None
-        return list(self._clusters((here, before), (there, after), cores))
+        return [each for each in _clusters(basis, (here, before), (there, after), cores) if not each.quiet]
 
-    def _reduced(self, pencil: Pencil) -> Reduced:
-        x = self._vectors
-        return Reduced(*(x.T @ (pencil.inner(each) @ x) for each in (pencil.stiffness, pencil.damping)))
 
-    def _clusters(
-        self, here: tuple[Pencil, Reduced], there: tuple[Pencil, Reduced], cores: list[Indices]
-    ) -> Iterator[Cluster]:
-        """The small pencils about some modes each."""
-        middle = here[1].mean(there[1])
-        level, size = np.diag(middle.stiffness), len(self._active)
-        ordered = np.sort(middle.frequencies)
-        for core in cores:
-            modes = np.arange(max(0, core[0] - MARGIN), min(size, core[-1] + 1 + MARGIN))
-            right, left = (_with_others(each, level, modes) for each in (middle.stiffness, middle.stiffness.T))
-            metric = np.linalg.inv(left.T @ right)
-            left = left @ metric.T
-            ends = tuple(
-                Reduced(left.T @ each.stiffness @ right, left.T @ each.damping @ right) for each in (here[1], there[1])
-            )
-            spread = np.zeros((2, here[0].stiffness.shape[0], len(modes)))
-            spread[0, self._active], spread[1, self._active] = self._vectors @ right, self._vectors @ left
-            owned = _between(ordered, int(core[0])), _between(ordered, int(core[-1]) + 1)
-            yield Cluster((here[0].fx, there[0].fx), (ends[0], ends[1]), spread[0], spread[1], owned)
+def _changed(basis: Basis, here: Pencil, reduced: Reduced, there: Pencil) -> Reduced:
+    """What is reduced at one load, at another."""
+    if here is there:
+        return reduced
+    return Reduced(
+        basis.change(reduced.stiffness, there.stiffness - here.stiffness),
+        basis.change(reduced.damping, there.damping - here.damping),
+    )
+
+
+def _clusters(
+    basis: Basis, here: tuple[Pencil, Reduced], there: tuple[Pencil, Reduced], cores: list[Indices]
+) -> Iterator[Cluster]:
+    """The small pencils about some modes each."""
+    if not cores:
+        return
+    middle = here[1].mean(there[1])
+    level, size = middle.stiffness.diagonal, len(basis.active)
+    ordered = np.sort(middle.frequencies)
+    for core in cores:
+        modes = np.arange(max(0, core[0] - MARGIN), min(size, core[-1] + 1 + MARGIN))
+        coupling = np.asarray(middle.stiffness.coupling, np.float64)
+        right, left = (_with_others(each, level, modes) for each in (coupling, coupling.T))
+        left = left @ np.linalg.inv(left.T @ right).T
+        ends = here[1].between(left, right), there[1].between(left, right)
+        spread = np.zeros((2, basis.size, len(modes)))
+        spread[0, basis.active], spread[1, basis.active] = basis.vectors @ right, basis.vectors @ left
+        owned = _between(ordered, int(core[0])), _between(ordered, int(core[-1]) + 1)
+        yield Cluster((here[0].fx, there[0].fx), ends, spread[0], spread[1], owned)
 
 
 def may_grow(here: Reduced, there: Reduced) -> Indices | None:
@@ -196,40 +236,38 @@ def may_grow(here: Reduced, there: Reduced) -> Indices | None:
     """
     points = here, here.mean(there), there
     frequency = np.min([each.frequencies for each in points], axis=0)
-    gamma = np.max([np.diag(each.damping) for each in points], axis=0)
+    gamma = np.max([each.damping.diagonal for each in points], axis=0)
     if not np.all(gamma < WEAK * frequency):
         return None
     mixing, third = _mixing_and_third_order(here, there, np.max([each.frequencies for each in points], axis=0))
-    least = np.min([each.damping_of_modes() for each in points], axis=0)
-    own = np.min([np.diag(each.damping) for each in points], axis=0)
+    least = np.min([each.damping_of_modes for each in points], axis=0)
+    own = np.min([each.damping.diagonal for each in points], axis=0)
     return np.flatnonzero((least - SAFE * third / frequency <= SPARE * own) | (mixing > CLOSE))
 
 
 def _mixing_and_third_order(here: Reduced, there: Reduced, frequency: Floats) -> tuple[Floats, Floats]:
     """The largest |V/g| of each mode with another, and the scale of the third order of Im sigma, 1 / time^2."""
-    h = np.maximum(np.abs(here.stiffness), np.abs(there.stiffness))
-    h = np.maximum(h, h.T).astype(np.float32)
-    p = np.maximum(np.abs(here.damping), np.abs(there.damping)) * np.maximum(frequency, frequency[:, None])
-    p = p.astype(np.float32)
-    for each in (h, p):
-        np.fill_diagonal(each, 0.0)
-    before, after = (np.subtract.outer(np.diag(each.stiffness), np.diag(each.stiffness)) for each in (here, there))
-    real = np.minimum(np.abs(before), np.abs(after))
-    real[before * after < 0] = 0.0
-    loss = [np.diag(each.damping) for each in (here, there)]
-    q = frequency[:, None] * np.max([np.abs(np.subtract.outer(each, each)) for each in loss], axis=0)
-    low = frequency[:, None] * np.min([np.abs(np.subtract.outer(each, each)) for each in loss], axis=0)
+    frequency = frequency.astype(np.float32)
+    h = np.maximum(here.stiffness.largest, there.stiffness.largest)
+    p = np.maximum(here.damping.largest, there.damping.largest) * np.maximum(frequency, frequency[:, None])
+    apart = here.stiffness.distance, there.stiffness.distance
+    real = np.minimum(np.abs(apart[0]), np.abs(apart[1]))
+    real[apart[0] * apart[1] < 0] = 0.0
+    loss = np.abs(here.damping.distance), np.abs(there.damping.distance)
+    q, low = (frequency[:, None] * each(*loss) for each in (np.maximum, np.minimum))
     g = np.hypot(real, low)
     np.fill_diagonal(g, np.inf)
+    h += p
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.nan_to_num((h + p) / g, nan=0.0, posinf=1e9)
-    mixing = ratio.max(axis=1)
-    ratio = np.minimum(ratio, 1.0)
-    imaginary = np.minimum(np.nan_to_num(p / g + ratio * q / g, nan=0.0, posinf=1e9), ratio)
-    ratio, imaginary = (each.astype(np.float32) ** 2 for each in (ratio, imaginary))
-    h, p = (h + p) ** 2, p**2
-    third = np.sum(4 * (ratio @ h) * imaginary + (ratio @ p) * ratio, axis=1)
-    return mixing, np.sqrt(third.astype(np.float64))
+        ratio, imaginary = (np.nan_to_num(each / g, nan=0.0, posinf=1e9) for each in (h, p))
+        mixing = ratio.max(axis=1)
+        np.minimum(ratio, 1.0, out=ratio)
+        imaginary += np.nan_to_num(ratio * q / g, nan=0.0, posinf=1e9)
+    np.minimum(imaginary, ratio, out=imaginary)
+    for each in (ratio, imaginary, h, p):
+        np.square(each, out=each)
+    third = np.sum(4 * (ratio @ h) * imaginary + (ratio @ p) * ratio, axis=1, dtype=np.float64)
+    return mixing, np.sqrt(third)
 
 
 def _with_others(matrix: Floats, level: Floats, modes: Indices) -> Floats:

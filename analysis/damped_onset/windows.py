@@ -35,6 +35,9 @@ from .growing import Growing, LostTrackError
 from .modes import Pencil
 from .screening import Screen
 
+Known = Callable[[tuple[DampedWindow, ...], float], None]
+"""Takes the windows so far, and the load up to which they are all."""
+
 
 class DampedOnsetError(FaultgougeError):
     """No motion grows on the given loads."""
@@ -47,6 +50,7 @@ def damped_windows(
     look: Iterable[float] = (),
     first: bool = False,
     watch: Callable[[str], None] = lambda says: None,
+    known: Known = lambda windows, fx: None,
 ) -> tuple[DampedWindow, ...]:
     """The windows of loads on which some motion of a packing with dashpots or drag grows.
 
@@ -62,6 +66,8 @@ def damped_windows(
         Go no farther than the increment in which the first window begins.
     watch : callable, optional
         Told in words what is being looked at.
+    known : callable, optional
+        Given all windows so far, and the load up to which they are all, after each increment.
 
     Returns
     -------
@@ -78,7 +84,7 @@ def damped_windows(
     start = equilibrium(float(loads[0]))
     if not start.law.damped and start.drag_time is None:
         raise ValueError("The packing has no dissipation: find_onset is what it needs.")
-    return growing_windows(lambda fx: Pencil.of(equilibrium(fx)), loads, look, first, watch)
+    return growing_windows(lambda fx: Pencil.of(equilibrium(fx)), loads, look, first, watch, known)
 
 
 def growing_windows(
@@ -87,6 +93,7 @@ def growing_windows(
     look: Iterable[float] = (),
     first: bool = False,
     watch: Callable[[str], None] = lambda says: None,
+    known: Known = lambda windows, fx: None,
 ) -> tuple[DampedWindow, ...]:
     """The same of a family of pencils s^2 + s G + A, in coordinates that do not depend on the load.
 
@@ -94,33 +101,39 @@ def growing_windows(
     ----------
     pencil : callable
         fx -> Pencil.
-    forces, look, first, watch
+    forces, look, first, watch, known
         As of `damped_windows`.
     """
     loads = increasing(forces)
     looked = [float(fx) for fx in look if loads[0] < fx < loads[-1]]
     places = np.unique(np.concatenate([loads, looked]))
+    narrowest = LIMITS.narrowest * float(np.abs(loads).max())
     try:
-        return walked(Growing(pencil, LIMITS.narrowest * float(np.abs(loads).max()), Screen()), places, first, watch)
+        return walked(Growing(pencil, narrowest, Screen()), places, first, watch, known)
     except LostTrackError:
-        return walked(Growing(pencil, LIMITS.narrowest * float(np.abs(loads).max()), None), places, first, watch)
+        return walked(Growing(pencil, narrowest, None), places, first, watch, known)
 
 
 def walked(
-    oracle: Growing, loads: Floats, first: bool = False, watch: Callable[[str], None] = lambda says: None
+    oracle: Growing,
+    loads: Floats,
+    first: bool = False,
+    watch: Callable[[str], None] = lambda says: None,
+    known: Known = lambda windows, fx: None,
 ) -> tuple[DampedWindow, ...]:
     """The windows that an oracle finds along a ramp."""
     here = oracle.at(float(loads[0]))
+    windows: tuple[DampedWindow, ...] = ()
     for load in loads[1:]:
-        known = [window.fx_onset for window in oracle.windows()]
-        so_far = f"; {len(known)} windows so far, the first from {known[0]:.8g}" if known else ""
+        so_far = f"; {len(windows)} windows so far, the first from {windows[0].fx_onset:.8g}" if windows else ""
         watch(f"motion that grows up to F_x = {load:.6g} of {loads[-1]:.6g}{so_far}")
         there = oracle.at(float(load))
         oracle.over(here, there)
-        here = there
-        if first and (oracle.open or oracle.closed):
+        here, windows = there, oracle.windows()
+        known(windows, here.fx)
+        if first and windows:
             break
-    return oracle.windows()
+    return windows
 
 
 def dissipative(packing: Packing, cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None) -> Packing:

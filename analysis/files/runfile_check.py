@@ -19,7 +19,13 @@ BLOCK = 1 << 20
 
 
 class _UnsoundError(Exception):
-    """What is wrong, in words that follow the name of the file."""
+    """What is wrong, in words."""
+
+
+def _expect(sound: object, says: str) -> None:
+    """Refuse the file if it is not sound, in words that say what is wrong."""
+    if not sound:
+        raise _UnsoundError(says)
 
 
 def check(file: h5py.File, path: Path, size: int) -> None:
@@ -40,13 +46,20 @@ def check(file: h5py.File, path: Path, size: int) -> None:
         If something in the file is not what it should be.
     """
     try:
-        _check_creator(file)
+        creator = file.get("h5md/creator")
+        if creator is None or creator.attrs.get("name") != "faultgouge":
+            raise PackingFileError(f"{path} is an HDF5 file, but not a run of faultgouge.")
         disks, frames = _check_position(file, size)
         _check_parameters(file, disks)
         _check_observables(file, disks, frames, size)
-        _check_series(file, size)
+        for name, group in file.get("faultgouge", {}).items():
+            for column in [_dataset(group, each, size) for each in group]:
+                _expect(column.ndim, f"the series {name} has columns without rows")
+                _check_finite(column)
     except _UnsoundError as error:
-        raise PackingFileError(f"{path} {error}.") from None
+        raise PackingFileError(f"{path} is damaged: {error}.") from None
+    except PackingFileError:
+        raise
     except Exception as error:  # h5py raises nearly every exception there is, depending on what is damaged
         raise PackingFileError(f"{path} is damaged: {str(error).strip() or type(error).__name__}.") from error
 
@@ -59,38 +72,27 @@ def equilibria(file: h5py.File) -> int:
     return frames if "position" in trajectory or "time" not in trajectory else frames - len(trajectory["time"])
 
 
-def _check_creator(file: h5py.File) -> None:
-    creator = file.get("h5md/creator")
-    if creator is None or creator.attrs.get("name") != "faultgouge":
-        raise _UnsoundError("is an HDF5 file, but not a run of faultgouge")
-
-
 def _dataset(file: h5py.Group, name: str, size: int, rows: int | None = None) -> h5py.Dataset:
     """A dataset of numbers whose bytes can stand for its shape, or for its first rows if no others are read.
 
     Behind the equilibria a trajectory has rows that nobody wrote, and that have no bytes.
     """
     item = file.get(name)
-    if not isinstance(item, h5py.Dataset):
-        raise _UnsoundError(f"is damaged: the dataset {name} is missing")
-    if item.dtype.kind not in "fib":
-        raise _UnsoundError(f"is damaged: {item.name} is of type {item.dtype}, and not of numbers")
-    if item.dtype.kind == "f" and item.dtype != np.float64:
-        raise _UnsoundError(f"is damaged: {item.name} is of type {item.dtype}, and not float64")
+    _expect(isinstance(item, h5py.Dataset), f"the dataset {name} is missing")
+    _expect(item.dtype.kind in "fib", f"{item.name} is of type {item.dtype}, and not of numbers")
+    _expect(item.dtype.kind != "f" or item.dtype == np.float64, f"{item.name} is of type {item.dtype}, and not float64")
     stored = min(item.id.get_storage_size(), size)
     read = item.nbytes if rows is None or not item.ndim else item.nbytes // max(len(item), 1) * min(rows, len(item))
-    if read > BEST_COMPRESSION * stored:
-        raise _UnsoundError(f"is damaged: {item.name} has the shape {item.shape}, more than its {stored} bytes hold")
+    says = f"{item.name} has the shape {item.shape}, more than its {stored} bytes hold"
+    _expect(read <= BEST_COMPRESSION * stored, says)
     return item
 
 
 def _shaped(file: h5py.Group, name: str, shape: tuple[int, ...], size: int, kind: str = "f") -> h5py.Dataset:
     """A dataset of this shape and kind, its numbers finite."""
     item = _dataset(file, name, size)
-    if item.shape != shape:
-        raise _UnsoundError(f"is damaged: {item.name} has the shape {item.shape}, and should have {shape}")
-    if item.dtype.kind not in kind:
-        raise _UnsoundError(f"is damaged: {item.name} is of type {item.dtype}")
+    _expect(item.shape == shape, f"{item.name} has the shape {item.shape}, and should have {shape}")
+    _expect(item.dtype.kind in kind, f"{item.name} is of type {item.dtype}")
     _check_finite(item)
     return item
 
@@ -99,92 +101,79 @@ def _check_finite(item: h5py.Dataset, rows: int | None = None) -> None:
     """All numbers of a dataset, or those of its first rows, are finite."""
     if item.dtype.kind != "f":
         return
+    finite = True
     if item.ndim == 0:
         finite = bool(np.isfinite(item[()]))
     else:
         end = len(item) if rows is None else rows
         block = max(1, BLOCK * len(item) // max(item.nbytes, 1))
         finite = all(np.isfinite(item[k : min(k + block, end)]).all() for k in range(0, end, block))
-    if not finite:
-        raise _UnsoundError(f"is damaged: {item.name} has numbers that are not finite")
+    _expect(finite, f"{item.name} has numbers that are not finite")
 
 
 def _check_position(file: h5py.File, size: int) -> tuple[int, int]:
     """Numbers of disks and of frames."""
     value = _dataset(file, "particles/disks/position/value", size)
     step = _dataset(file, "particles/disks/position/step", size)
-    if value.ndim != 3 or value.shape[1] < 1 or value.shape[2] != 3 or step.ndim != 1:
-        raise _UnsoundError(f"is damaged: {value.name} has the shape {value.shape}, and should have (T, N, 3)")
+    shaped = value.ndim == 3 and value.shape[1] >= 1 and value.shape[2] == 3 and step.ndim == 1
+    _expect(shaped, f"{value.name} has the shape {value.shape}, and should have (T, N, 3)")
     disks, frames = value.shape[1], len(step)
-    if value.shape[0] < frames:
-        raise _UnsoundError(f"is damaged: {frames} frames are counted, and {value.shape[0]} are there")
+    _expect(value.shape[0] >= frames, f"{frames} frames are counted, and {value.shape[0]} are there")
     count, first = np.arange(frames), equilibria(file)
     time = _shaped(file, "particles/disks/position/time", (frames,), size)
-    if first < 0 or not (np.array_equal(step[...], count) and np.array_equal(time[:first], count[:first])):
-        raise _UnsoundError(f"is damaged: {step.name} does not count the equilibria")
-    if first < frames and not np.array_equal(time[first:], file["faultgouge/trajectory/time"][...]):
-        raise _UnsoundError(f"is damaged: {time.name} has other times than the trajectory")
-    _shaped(file, "particles/disks/position/value", (value.shape[0], disks, 3), size)
-    if np.any(value[:frames, :, 2]):
-        raise _UnsoundError(f"is damaged: {value.name} has disks outside of the plane")
+    counted = first >= 0 and np.array_equal(step[...], count) and np.array_equal(time[:first], count[:first])
+    _expect(counted, f"{step.name} does not count the equilibria")
+    if first < frames:
+        same = np.array_equal(time[first:], file["faultgouge/trajectory/time"][...])
+        _expect(same, f"{time.name} has other times than the trajectory")
+    _shaped(file, "particles/disks/position/value", value.shape, size)
+    _expect(not np.any(value[:frames, :, 2]), f"{value.name} has disks outside of the plane")
     return disks, first
 
 
 def _check_parameters(file: h5py.File, disks: int) -> None:
-    group = file["parameters"]
-    size = file.id.get_filesize()
+    group, size = file["parameters"], file.id.get_filesize()
     for name in ("radius", "mass"):
-        if not np.all(_shaped(group, name, (disks,), size)[...] > 0):
-            raise _UnsoundError(f"is damaged: /parameters/{name} has numbers that are not above 0")
+        positive = np.all(_shaped(group, name, (disks,), size)[...] > 0)
+        _expect(positive, f"/parameters/{name} has numbers that are not above 0")
     _shaped(group, "top", (disks,), size, "bi")
-    for name in {"kn", "kt", "mu", "inertia_factor"} | set(group):
-        if name not in ("radius", "mass", "top") and _shaped(group, name, (), size, "fi")[()] < 0:
-            raise _UnsoundError(f"is damaged: /parameters/{name} is below 0")
+    for name in {"kn", "kt", "mu", "inertia_factor"} | set(group) - {"radius", "mass", "top"}:
+        _expect(_shaped(group, name, (), size, "fi")[()] >= 0, f"/parameters/{name} is below 0")
     periodic = file["particles/disks/box"].attrs["boundary"][0] == b"periodic"
-    if periodic != ("box_length" in group) or (periodic and group["box_length"][()] == 0):
-        raise _UnsoundError("is damaged: its box is said to be periodic, and has no length, or the other way round")
+    has_length = "box_length" in group and group["box_length"][()] != 0
+    says = "its box is said to be periodic, and has no length, or the other way round"
+    _expect(periodic == has_length == ("box_length" in group), says)
 
 
 def _check_observables(file: h5py.File, disks: int, frames: int, size: int) -> None:
     group = file["observables"]
-    if "position" in group and group["position"] != file["particles/disks/position"]:
-        raise _UnsoundError("is damaged: /observables/position is no link to /particles/disks/position")
-    for name in group:
+    linked = "position" not in group or group["position"] == file["particles/disks/position"]
+    _expect(linked, "/observables/position is no link to /particles/disks/position")
+    shapes = {"angle": (disks,), "fx": (), "fy": (), "residual": (), "position_low": (disks, 2)}
+    needed = {"contacts", *shapes} - {"position_low"} if frames else set()
+    for name in needed | set(group):
         item = _dataset(group, f"{name}/value", size, frames)
-        if item.ndim < 1 or item.shape[0] < frames:
-            raise _UnsoundError(f"is damaged: {item.name} has the shape {item.shape} for {frames} equilibria")
+        enough = item.ndim and item.shape[0] >= frames
+        _expect(enough, f"{item.name} has the shape {item.shape} for {frames} equilibria")
+        fits = not frames or item.shape[1:] == shapes.get(name, item.shape[1:])
+        _expect(fits, f"{item.name} has the shape {item.shape}")
         if name != "contacts":
             _check_finite(item, frames)
     if not frames:
         return
-    rows = {"angle": (disks,), "fx": (), "fy": (), "residual": (), "position_low": (disks, 2)}
-    for name, shape in rows.items():
-        if name != "position_low" or name in group:
-            item = _dataset(group, f"{name}/value", size, frames)
-            if item.shape[1:] != shape:
-                raise _UnsoundError(f"is damaged: {item.name} has the shape {item.shape}")
     if "box_length" in file["parameters"]:
         _dataset(file, "particles/disks/box/edges/value", size, frames)
-    contacts = _dataset(group, "contacts/value", size, frames)
-    if contacts.ndim != 3 or contacts.shape[2] != (4 if "position_low" in group else 3):
-        raise _UnsoundError(f"is damaged: {contacts.name} has the shape {contacts.shape}")
+    contacts = group["contacts/value"]
+    width = 4 if "position_low" in group else 3
+    _expect(contacts.shape[2:] == (width,), f"{contacts.name} has the shape {contacts.shape}")
     for k in range(frames):
         _check_contacts(contacts[k], disks, contacts.name)
 
 
 def _check_contacts(rows: np.ndarray, disks: int, name: str) -> None:
     used = ~np.isnan(rows[:, 0])
-    if not np.isnan(rows[~used]).all() or not np.isfinite(rows[used]).all():
-        raise _UnsoundError(f"is damaged: {name} has numbers that are not finite")
+    finite = np.isnan(rows[~used]).all() and np.isfinite(rows[used]).all()
+    _expect(finite, f"{name} has numbers that are not finite")
     i, j = rows[used, 0], rows[used, 1]
-    if np.any((i < 0) | (i >= disks) | (j < -1) | (j >= disks) | (i != np.rint(i)) | (j != np.rint(j)) | (i == j)):
-        raise _UnsoundError(f"is damaged: {name} names disks that are not there")
-
-
-def _check_series(file: h5py.File, size: int) -> None:
-    for name, group in file.get("faultgouge", {}).items():
-        columns = [_dataset(group, column, size) for column in group]
-        if any(column.ndim < 1 for column in columns):
-            raise _UnsoundError(f"is damaged: the series {name} has columns without rows")
-        for column in columns:
-            _check_finite(column)
+    there = (i >= 0) & (i < disks) & (j >= -1) & (j < disks) & (i == np.rint(i)) & (j == np.rint(j)) & (i != j)
+    _expect(there.all(), f"{name} names disks that are not there")

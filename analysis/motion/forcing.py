@@ -38,7 +38,7 @@ from scipy.linalg import eig, expm
 
 from ..packing.packing import Floats, Packing
 from ..spectrum.spectrum import Complexes
-from .response import Response
+from .response import Response, coordinates
 from .signals import Signal
 from .state_space import StateSpace
 
@@ -145,7 +145,7 @@ def impulse_response(packing: Packing, force: ArrayLike) -> ImpulseResponse:
     ImpulseResponse
     """
     system = StateSpace.of(packing)
-    drive = _vector(packing, force)[system.active] / system.root_mass
+    drive = coordinates(packing, "force", force)[system.active] / system.root_mass
     mean = np.concatenate([packing.top / max(1, packing.top.sum()), np.zeros(2 * len(packing))])
     watch = mean[system.active] / system.root_mass
     if not system.damping.any():
@@ -202,7 +202,7 @@ def sampled_response(
     step, size = time[0] / pieces, len(active)
     forced = np.zeros((2 * size + 2, 2 * size + 2))
     forced[: 2 * size, : 2 * size] = system.matrix
-    forced[size : 2 * size, 2 * size] = _vector(packing, force)[active] / root
+    forced[size : 2 * size, 2 * size] = coordinates(packing, "force", force)[active] / root
     forced[2 * size, 2 * size + 1] = 1.0
     onward = expm(step * forced)[: 2 * size]
     values = signal.at(step * np.arange(pieces * len(time) + 1))
@@ -231,10 +231,3 @@ def _of_time_step(stiffness: Floats, dt: float) -> Floats:
         power = power @ small
         result += 2 * weight * power
     return result / dt**2
-
-
-def _vector(packing: Packing, force: ArrayLike) -> Floats:
-    vector = np.asarray(force, dtype=np.float64)
-    if vector.shape != (3 * len(packing),):
-        raise ValueError(f"force has shape {vector.shape}; {(3 * len(packing),)} is needed.")
-    return vector

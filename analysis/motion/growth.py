@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from ..packing.compensated import separation
 from ..packing.packing import Floats
+from .power_law import fit_line
 
 BLOCKS = 24
 """Stretches over which D is averaged: enough for an error, few enough to hold many periods each."""
@@ -120,15 +121,13 @@ def fit_growth(time: ArrayLike, msd: ArrayLike, lower: float, upper: float) -> G
             f"D has {max(last - first, 0)} samples between {lower:g} and {upper:g}; a fit needs {2 * BLOCKS}."
         )
     centre, level = _stretches(t[first:last], d[first:last])
-    x = centre - centre.mean()
-    rate = float(x @ level / (x @ x))
-    scatter = level - level.mean() - rate * x
+    rate, error, _ = fit_line(centre, level)
     decades = float((level[-1] - level[0]) / np.log(10))
     if decades < 1:
         raise ValueError(f"D grows by {decades:.2g} decades between {lower:g} and {upper:g}; a rate needs one.")
     return Growth(
         rate=rate,
-        error=float(np.sqrt(scatter @ scatter / (BLOCKS - 2) / (x @ x))),
+        error=error,
         decades=decades,
         start=float(t[first]),
         end=float(t[last - 1]),

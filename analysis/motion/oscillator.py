@@ -1,9 +1,9 @@
-r"""One oscillator, driven and damped: the function of a matrix that small motion without dashpots is.
+r"""One oscillator, driven: the function of a matrix that small motion without dissipation is.
 
-Small motion about an equilibrium, under a force f on the coordinates q and with the drag time tau, obeys
-:math:`M \ddot q = -K q + f \cos\omega t - M \dot q / \tau`. In mass-weighted coordinates :math:`z = M^{1/2} q` it is
-a function of one matrix A, and one oscillator :math:`\ddot x = -\lambda x - \dot x/\tau + \cos\omega t` gives it. From
-rest, with :math:`\Omega = \sqrt\lambda` and no drag,
+Small motion about an equilibrium, under a force f on the coordinates q, obeys
+:math:`M \ddot q = -K q + f \cos\omega t`. In mass-weighted coordinates :math:`z = M^{1/2} q` it is a function of one
+matrix A, and one oscillator :math:`\ddot x = -\lambda x + \cos\omega t` gives it. From rest, with
+:math:`\Omega = \sqrt\lambda`,
 
 .. math::
 
@@ -12,10 +12,7 @@ rest, with :math:`\Omega = \sqrt\lambda` and no drag,
     \frac{\sin\tfrac12(\Omega - \omega) t}{\Omega - \omega} ,
 
 whose last form cancels neither in resonance nor at small times; a start from x = 1 at rest gives
-:math:`\cos\Omega t`. With drag, :math:`\gamma = 1/2\tau` and :math:`S^2 = \lambda - \gamma^2`, the motion
-is the stationary one less :math:`e^{-\gamma t}` times a combination of :math:`\cos St` and
-:math:`\sin(St)/S`; in the first moments the two cancel, to the rounding of the stationary motion. All of these
-are entire functions of :math:`\lambda`, so that f(A) exists whatever A is.
+:math:`\cos\Omega t`. Both are entire functions of :math:`\lambda`, so that f(A) exists whatever A is.
 
 **Time steps.** Velocity Verlet with step dt gives the same formulas with
 :math:`\sin\tfrac12\Omega\,dt = \tfrac12\sqrt\lambda\,dt` and with
@@ -42,34 +39,27 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True)
 class Oscillator:
-    """One oscillator x'' = -lambda x - x'/tau + cos(omega t), for any complex lambda.
+    """One oscillator x'' = -lambda x + cos(omega t), for any complex lambda.
 
     Parameters
     ----------
     omega : float
         Angular frequency of the forcing, radian / time.
-    damping_time : float, optional
-        tau, time; no damping by default.
     dt : float, optional
-        Time step of velocity Verlet, for an undamped motion at multiples of dt; exact dynamics by default.
+        Time step of velocity Verlet, for a motion at multiples of dt; exact dynamics by default.
 
     Raises
     ------
     ValueError
-        If the damping time or the step is not positive, or both are given.
+        If the step is not positive.
     """
 
     omega: float = 0.0
-    damping_time: float | None = None
     dt: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("damping_time", "dt"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < np.inf:
-                raise ValueError(f"{name} = {value} must be positive and finite.")
-        if self.damping_time is not None and self.dt is not None:
-            raise ValueError("The dispersion of velocity Verlet is that of undamped runs: give dt or damping_time.")
+        if self.dt is not None and not 0 < self.dt < np.inf:
+            raise ValueError(f"dt = {self.dt} must be positive and finite.")
 
     def released(self, eigenvalue: ArrayLike, time: ArrayLike) -> Motion:
         """From x = 1 at rest, without forcing.
@@ -86,9 +76,6 @@ class Oscillator:
         Motion
         """
         value, t = np.asarray(eigenvalue, dtype=np.complex128), np.asarray(time, dtype=np.float64)
-        if self.damping_time is not None:
-            cosine, sine = self._decaying(value, t)
-            return Motion(cosine + 0.5 / self.damping_time * sine, -value * sine)
         frequency = self._frequency(value)
         # (sin(Omega dt) / dt)^2 of Verlet's velocity is lambda itself at dt = 0
         squared = value if self.dt is None else value * (1 - 0.25 * value * self.dt**2)
@@ -97,8 +84,6 @@ class Oscillator:
     def driven(self, eigenvalue: ArrayLike, time: ArrayLike) -> Motion:
         """From rest at x = 0 under the force cos(omega t); parameters as those of `released`."""
         value, t = np.asarray(eigenvalue, dtype=np.complex128), np.asarray(time, dtype=np.float64)
-        if self.damping_time is not None:
-            return self._driven_and_damped(value, t)
         frequency, half = self._frequency(value), None if self.dt is None else 0.5 * self.dt
         fast, slow = frequency + self.omega, frequency - self.omega
         of_fast, of_slow = _sine_over(fast, 0.5 * t, half), _sine_over(slow, 0.5 * t, half)
@@ -106,30 +91,6 @@ class Oscillator:
         if half is not None:  # central differences of the sines in the displacement
             cos_fast, cos_slow = cos_fast * np.cos(slow * half), cos_slow * np.cos(fast * half)
         return Motion(2 * of_fast * of_slow, of_fast * cos_slow + cos_fast * of_slow)
-
-    def _driven_and_damped(self, value: Complexes, t: Floats) -> Motion:
-        assert self.damping_time is not None
-        gamma, omega = 0.5 / self.damping_time, self.omega
-        cosine, sine = self._decaying(value, t)
-        detuning, loss = value - omega**2, 2 * gamma * omega
-        weight = 1 / (detuning**2 + loss**2)
-        a, b = detuning * weight, loss * weight
-        c, s = np.cos(omega * t), np.sin(omega * t)
-        return Motion(
-            a * (c - cosine) + b * s - (gamma * a + omega * b) * sine,
-            -omega * a * s + omega * b * (c - cosine) + (value * a + gamma * omega * b) * sine,
-        )
-
-    def _decaying(self, value: Complexes, t: Floats) -> tuple[Complexes, Complexes]:
-        """exp(-gamma t) times cos(St) and sin(St)/S, without an overflow where S is imaginary."""
-        assert self.damping_time is not None
-        gamma = 0.5 / self.damping_time
-        root = np.sqrt(value - gamma**2)
-        root = np.where(root.imag < 0, -root, root)
-        slower: Complexes = np.exp((-gamma - 1j * root) * t)
-        turn: Complexes = np.expm1(2j * root * t)
-        safe = np.where(root == 0, 1, root)
-        return slower * (1 + 0.5 * turn), slower * np.where(root == 0, t, turn / (2j * safe))
 
     def _frequency(self, value: Complexes) -> Complexes:
         return np.sqrt(value) if self.dt is None else discrete_frequency(value, self.dt)

@@ -12,7 +12,8 @@ from ..packing.packing import Floats, Indices, Packing
 from ..spectrum.spectrum import Complexes
 from .matrix_functions import WELL_CONDITIONED, Modes, first_order, second_order
 from .oscillator import Oscillator
-from .state_space import StateSpace, released
+from .response import LinearMotion
+from .state_space import released
 
 Norm = Literal["displacement", "energy"]
 
@@ -60,26 +61,15 @@ class NoGainError(FaultgougeError):
     """A packing without a transient gain: it is unstable, or has no energy."""
 
 
-@dataclass(frozen=True, eq=False)
-class Motions:
-    """The modes of a packing: of A, where nothing dissipates, and of Z."""
-
-    disks: int
-    system: StateSpace
-    modes: Modes
-    dissipative: bool
-
-    @classmethod
-    def of(cls, packing: Packing) -> "Motions":
-        """NoGainError if the packing is unstable."""
-        system = StateSpace.of(packing)
-        dissipative = packing.law.damped or packing.drag_time is not None
-        modes = Modes.of(system.matrix if dissipative else system.stiffness)
-        growth = modes.values.real if dissipative else np.abs(np.sqrt(modes.values).imag)
-        size = np.abs(modes.values).max(initial=0.0)
-        if np.any(growth > (SLOW * size if dissipative else NOISE * np.sqrt(size))):
-            raise NoGainError("the packing is unstable: some motion grows for ever, and no gain is the largest")
-        return cls(len(packing), system, modes, dissipative)
+def stable_motion(packing: Packing) -> LinearMotion:
+    """The motion of a packing; NoGainError if the packing is unstable."""
+    motion = LinearMotion.of(packing)
+    values, dissipative = motion.modes.values, motion.dissipative
+    growth = values.real if dissipative else np.abs(np.sqrt(values).imag)
+    size = np.abs(values).max(initial=0.0)
+    if np.any(growth > (SLOW * size if dissipative else NOISE * np.sqrt(size))):
+        raise NoGainError("the packing is unstable: some motion grows for ever, and no gain is the largest")
+    return motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,14 +87,14 @@ class Propagator:
     """Whether the second half of the modes has the mirror images of the first."""
 
     @classmethod
-    def of(cls, motions: Motions, norm: Norm) -> "Propagator":
+    def of(cls, motion: LinearMotion, norm: Norm) -> "Propagator":
         """That of a packing in one of the norms."""
-        system, modes = motions.system, motions.modes
+        system, modes = motion.system, motion.modes
         root, size = system.root_mass, len(system.active)
-        if not motions.dissipative and norm == "displacement":
+        if not motion.dissipative and norm == "displacement":
             outward, inward = modes.basis / root[:, None], modes.inverse * root
             return cls(modes, outward, inward, Oscillator().released, second_order)
-        if not motions.dissipative:
+        if not motion.dissipative:
             modes = modes.oscillating()
             outward = np.concatenate([system.weight @ modes.basis[:size], modes.basis[size:]])
             inward = np.concatenate([modes.inverse[:, :size] @ system.unweight, modes.inverse[:, size:]], axis=1)

@@ -4,12 +4,13 @@ Small motion about an equilibrium, under a force f on the coordinates q and the 
 
 .. math:: M \ddot q + C \dot q + K q = f \cos\omega t .
 
-Without dashpots it is a function of one matrix, and of one oscillator (:mod:`~faultgouge.analysis.motion.oscillator`).
+Without dissipation it is a function of one matrix, and of one oscillator
+(:mod:`~faultgouge.analysis.motion.oscillator`).
 
-**Dashpots** (:mod:`~faultgouge.analysis.operators.damping`) have no modes in common with K. The motion is then that
-of the first-order system of :mod:`~faultgouge.analysis.motion.state_space`, whose eigenvalues s give :math:`e^{st}`
-and, under the force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. What is left of it in the end, if all Re s <
-0, is the transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}` (`transfer` in
+**Dissipation** (:mod:`~faultgouge.analysis.operators.damping`): dashpots have no modes in common with K. The motion is
+then that of the first-order system of :mod:`~faultgouge.analysis.motion.state_space`, whose eigenvalues s give
+:math:`e^{st}` and, under the force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. What is left of it in the end, if
+all Re s < 0, is the transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}` (`transfer` in
 :mod:`~faultgouge.analysis.motion.forcing`).
 
 Functions of the matrix of a packing close to a coalescence of two eigenvalues keep their digits
@@ -72,15 +73,12 @@ class LinearMotion:
         The equilibrium.
     system : StateSpace
         Its matrices.
-    damping_time : float or None
-        tau of the drag, time.
     modes : Modes
-        Of A without dashpots, of the first-order system with them.
+        Of A without dissipation, of the first-order system with it.
     """
 
     packing: Packing
     system: StateSpace
-    damping_time: float | None
     modes: Modes
 
     @classmethod
@@ -89,8 +87,12 @@ class LinearMotion:
         if damping_time is not None:
             packing = replace(packing, drag_time=damping_time)
         system = StateSpace.of(packing)
-        modes = Modes.of(system.matrix if packing.law.damped else system.stiffness)
-        return cls(packing, system, packing.drag_time, modes)
+        return cls(packing, system, Modes.of(system.matrix if _dissipative(packing) else system.stiffness))
+
+    @property
+    def dissipative(self) -> bool:
+        """Whether the packing has dashpots or drag."""
+        return _dissipative(self.packing)
 
     def response(
         self,
@@ -102,30 +104,25 @@ class LinearMotion:
         dt: float | None = None,
     ) -> Response:
         """Motion from rest; parameters and errors as of `linear_response`."""
-        oscillator, time = self._oscillator(omega, dt), _times(times, dt)
+        if dt is not None and self.dissipative:
+            raise ValueError("The dispersion of velocity Verlet is that of undamped runs: give dt without dissipation.")
+        oscillator, time = Oscillator(float(omega), dt), _times(times, dt)
         active, root, count = self.system.active, self.system.root_mass, 3 * len(self.packing)
         displacement, velocity = np.zeros((2, len(time), count))
         for given, name, scale in ((force, "force", 1 / root), (initial, "initial", root)):
             if given is None:
                 continue
-            vector = np.asarray(given, dtype=np.float64)
-            if vector.shape != (count,):
-                raise ValueError(f"{name} has shape {vector.shape}; {(count,)} is needed.")
+            vector = coordinates(self.packing, name, given)
             x, v = self._motion(oscillator, name == "force", vector[active] * scale, time, np.diag(1 / root))
             displacement[:, active] += x
             velocity[:, active] += v
         return Response(time, displacement, velocity, self.packing.top)
 
-    def _oscillator(self, omega: float, dt: float | None) -> Oscillator:
-        if dt is not None and self.packing.law.damped:
-            raise ValueError("The dispersion of velocity Verlet is that of undamped runs: leave dt out with dashpots.")
-        return Oscillator(float(omega), self.damping_time, dt)
-
     def _motion(
         self, oscillator: Oscillator, forced: bool, vector: Floats, time: Floats, observed: Floats
     ) -> tuple[Floats, Floats]:
         """Displacement and velocity of rows of the mass-weighted coordinates, under a force or from a displacement."""
-        if not self.packing.law.damped:
+        if not self.dissipative:
             second = oscillator.driven if forced else oscillator.released
             motion = self.modes.apply(second, time, vector, observed)
             return motion.displacement.real, motion.velocity.real
@@ -175,8 +172,8 @@ def linear_response(
     Raises
     ------
     ValueError
-        If a shape does not fit, a time is negative, a damping time or step is not positive, both are given, or the
-        times are not multiples of the step.
+        If a shape does not fit, a time is negative, a damping time or step is not positive, a step is given with
+        dissipation, or the times are not multiples of the step.
     numpy.linalg.LinAlgError
         If more than two eigenvalues coalesce.
     """
@@ -204,6 +201,18 @@ def layer_force(packing: Packing, amplitude: float, disks: ArrayLike | None = No
     force = np.zeros(3 * len(packing))
     force[: len(packing)] = amplitude * np.asarray(packing.top if disks is None else disks, dtype=bool)
     return force
+
+
+def coordinates(packing: Packing, name: str, values: ArrayLike) -> Floats:
+    """Numbers of all coordinates as an array of shape (3N,); a ValueError if they have another shape."""
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.shape != (3 * len(packing),):
+        raise ValueError(f"{name} has shape {vector.shape}; {(3 * len(packing),)} is needed.")
+    return vector
+
+
+def _dissipative(packing: Packing) -> bool:
+    return packing.law.damped or packing.drag_time is not None
 
 
 def _times(times: ArrayLike, dt: float | None) -> Floats:

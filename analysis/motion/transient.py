@@ -39,7 +39,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..packing.packing import Floats, Packing
-from .propagator import ACCURACY, Motions, NoGainError, Norm, Propagator
+from .propagator import ACCURACY, NoGainError, Norm, Propagator, stable_motion
+from .response import LinearMotion
 
 SYMMETRIC = 1e-6
 """An excess of the bound below this is no gain: K is symmetric, but for rounding."""
@@ -126,20 +127,20 @@ def transient_gain(packing: Packing, norm: Norm = "displacement") -> TransientGa
     numpy.linalg.LinAlgError
         If more than two eigenvalues coalesce.
     """
-    return _gain(Motions.of(packing), norm)
+    return _gain(stable_motion(packing), norm)
 
 
 def transient_gains(packing: Packing) -> tuple[TransientGain, TransientGain]:
     """The gains in displacement and in energy, with the modes computed once; as of :func:`transient_gain`."""
-    motions = Motions.of(packing)
-    return _gain(motions, "displacement"), _gain(motions, "energy")
+    motion = stable_motion(packing)
+    return _gain(motion, "displacement"), _gain(motion, "energy")
 
 
-def _gain(motions: Motions, norm: Norm) -> TransientGain:
-    system, disks = motions.system, motions.disks
+def _gain(motion: LinearMotion, norm: Norm) -> TransientGain:
+    system, disks = motion.system, len(motion.packing)
     if norm == "energy" and not system.positive:
         raise NoGainError("the symmetric part of K is not positive: displacements have no energy to compare with")
-    propagator = Propagator.of(motions, norm)
+    propagator = Propagator.of(motion, norm)
     bound, columns = propagator.bound(), propagator.kept()
     if bound < 1 + SYMMETRIC:
         return _nothing(disks, norm, 0.0, bound)

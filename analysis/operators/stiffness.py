@@ -44,7 +44,7 @@ are empty.
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 
 from ..packing.law import Derivatives
@@ -58,7 +58,10 @@ SIGNS = np.einsum("pa,qb->pqab", SIDES, SIDES)
 
 
 def stiffness_matrix(
-    packing: Packing, form: Form = "consistent", coupled: NDArray[np.bool_] | None = None
+    packing: Packing,
+    form: Form = "consistent",
+    coupled: NDArray[np.bool_] | None = None,
+    parting: ArrayLike = 0.5,
 ) -> csr_array:
     """Assemble K = -dF/dq.
 
@@ -71,6 +74,10 @@ def stiffness_matrix(
     coupled : ndarray of bool, shape (C,), optional
         Contacts whose tangential force depends on their overlap; all by default. Of the others b = d f_t / d overlap
         counts as zero. That is no derivative of this law: it tells what comes of b.
+    parting : array_like, shape () or (C,)
+        Share of the derivative while a contact parts, for a law whose history is rescaled: 0 that of contacts which
+        close, 1 that of contacts which part, and by default 1/2, the first harmonic of a small vibration
+        (:mod:`~faultgouge.analysis.packing.law`).
 
     Returns
     -------
@@ -87,7 +94,7 @@ def stiffness_matrix(
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry
-    law = packing.law.derivatives(overlap, contacts.slip)
+    law = packing.law.derivatives(overlap, contacts.slip, parting)
     if coupled is not None:
         law = law._replace(overlap_derivative=np.where(coupled, law.overlap_derivative, 0.0))
     return assembled(contact_terms(law, normal.T, distance, pairs, form), contacts.i, contacts.j[:pairs], len(packing))

@@ -35,7 +35,7 @@ from ...pywrap.settling.bed import settle
 from .costs import SHARE, TURNS, in_turns
 from .parts import FEW, Part, same_motion
 from .processors import ranks, threads
-from .switches import UNREACHED, Feature, Loaded, Push, Run, Sent, features, where
+from .switches import UNREACHED, Feature, Loaded, Run, features, where
 
 LARGEST = 400
 """Disks up to which a packing is settled to be explained: half a second. Of a larger one a strip of as many is, of the
@@ -77,17 +77,8 @@ class Explanation:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return {
-            "disks": self.disks,
-            "remark": self.remark,
-            "loaded": {name: list(value) for name, value in vars(self.loaded).items()},
-            "imported": list(self.imported),
-            "left_out": list(self.left_out),
-            "parts": [part.as_dict() for part in self.parts],
-            "defaults": self.defaults,
-            "load_average": self.load_average,
-            "cores": os.cpu_count(),
-        }
+        parts = [part.as_dict() for part in self.parts]
+        return vars(self) | {"loaded": vars(self.loaded), "parts": parts, "cores": os.cpu_count()}
 
 
 def explain(scene: Scene) -> Explanation:
@@ -116,7 +107,7 @@ def explain(scene: Scene) -> Explanation:
         with run.started(MPI.COMM_SELF, folder / "scene.log") as (engine, _):
             loaded = Loaded.of(engine, folder / "scene.log")
         imported = tuple(package for package in HEAVY if package in sys.modules)
-        bare = replace(run, push=None, sent=None, weakening=None)
+        bare = replace(run, motion={})
         with bare.started(MPI.COMM_SELF) as (_, dynamics):
             steps = _steps(dynamics)
         parts = [_switched(feature, loaded, steps, folder) for feature in features(run)]
@@ -262,16 +253,19 @@ def _affordable(scene: Scene) -> tuple[Scene, str]:
 
 def _run_of(scene: Scene, packing: Packing) -> Run:
     """The scene's undamped run; friction that weakens does so beyond a threshold that is never reached."""
-    perturb, push, sent, weakening = scene.perturb, None, None, None
+    perturb, motion = scene.perturb, dict[str, Any]()
     if perturb:
-        target = tuple(range(len(packing))) if perturb.target == "all" else perturb.target
-        forced, (amplitude, omega), signal = None if target == "top" else target, perturb.cosine, perturb.forcing()
-        push = Push(amplitude, omega, forced) if amplitude > 0 else None
-        sent = Sent(signal, perturb.on or "layer", forced) if signal else None
+        (amplitude, omega), signal = perturb.cosine, perturb.forcing()
+        if amplitude > 0:
+            motion |= {"amplitude": amplitude, "omega": omega}
+        if signal:
+            motion |= {"signal": signal, "on": perturb.on or "layer"}
+        if motion and perturb.target != "top":
+            motion["target"] = tuple(range(len(packing))) if perturb.target == "all" else perturb.target
     if scene.friction:
         law = scene.friction
-        weakening = Weakening(B=law.B, w=law.w, mu_ss=law.mu_ss, v0=UNREACHED, v_ss=1.0)
-    return Run(packing, push, sent, weakening)
+        motion["weakening"] = Weakening(B=law.B, w=law.w, mu_ss=law.mu_ss, v0=UNREACHED, v_ss=1.0)
+    return Run(packing, motion)
 
 
 def _steps(dynamics: Dynamics) -> int:

@@ -44,9 +44,7 @@ class Part:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        plain = {"name": self.name, "included": self.included, "reason": self.reason, "adds": list(self.adds)}
-        cost = self.cost.as_dict() if self.cost else None
-        return plain | {"cost": cost, "same": self.same, "identical": self.identical}
+        return vars(self) | {"cost": self.cost.as_dict() if self.cost else None}
 
 
 def same_motion(one: Motion, other: Motion) -> bool:

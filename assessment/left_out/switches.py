@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -91,24 +91,6 @@ class Loaded:
 
 
 @dataclass(frozen=True)
-class Push:
-    """The perturbation a cos(omega t) on some disks, the upper layer if None."""
-
-    amplitude: float
-    omega: float
-    target: tuple[int, ...] | None
-
-
-@dataclass(frozen=True)
-class Sent:
-    """A signal, as force along x on some disks, the upper layer if None, or as acceleration of the floor."""
-
-    signal: Signal
-    on: Literal["layer", "floor"]
-    target: tuple[int, ...] | None
-
-
-@dataclass(frozen=True)
 class Run:
     """An undamped run: the scene's, or one that differs from it in one feature.
 
@@ -116,10 +98,8 @@ class Run:
     ----------
     packing : Packing
         Where it starts.
-    push : Push or None
-    sent : Sent or None
-        The signal.
-    weakening : Weakening or None
+    motion : dict
+        What `Engine.undamped` is given beside the time step: perturbation, signal, weakening.
     floor : bool
         Whether the floor is there.
     contacts : Path or None
@@ -127,9 +107,7 @@ class Run:
     """
 
     packing: Packing
-    push: Push | None = None
-    sent: Sent | None = None
-    weakening: Weakening | None = None
+    motion: dict[str, Any] = field(default_factory=dict)
     floor: bool = True
     contacts: Path | None = None
 
@@ -139,13 +117,9 @@ class Run:
         # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
         stiffness = self.packing.law.stiffness_scale(10 * self.packing.fy)
         step = QUIET_SHARE * 0.2 / np.sqrt(12 * stiffness)
-        push, sent = self.push or Push(0.0, 0.0, None), self.sent
-        target = sent.target if sent else push.target
-        on: Literal["layer", "floor"] = sent.on if sent else "layer"
-        signal = sent.signal if sent else None
         with (
             Engine(self.packing, communicator, log) as engine,
-            engine.undamped(step, push.amplitude, push.omega, target, self.weakening, signal=signal, on=on) as dynamics,
+            engine.undamped(step, **self.motion) as dynamics,
         ):
             if not self.floor:
                 engine.lammps.command("unfix floor")
@@ -155,6 +129,13 @@ class Run:
             if self.contacts or not self.floor:
                 engine.lammps.command("run 0 post no")
             yield engine, dynamics
+
+    def moved_by(self, *names: str, otherwise: dict[str, Any]) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+        """What moves the disks, by its names in `motion`, or what else would; and the disks."""
+        own = {key: value for key, value in self.motion.items() if key in (*names, "target")}
+        what = own if names[0] in own else otherwise
+        target = what.get("target")
+        return what, self.packing.top if target is None else where(self.packing, target)
 
 
 @dataclass(frozen=True)
@@ -195,7 +176,7 @@ def features(run: Run) -> Iterator[Feature]:
     """
     law = run.packing.law
     rough_law = law if law.frictional else replace(law, kt=2 / 7 * law.kn, mu=1.0)
-    bare = replace(run, push=None, sent=None, weakening=None)
+    bare = replace(run, motion={})
     yield _floor(bare)
     yield _history(bare, rough_law)
     yield _periodicity(bare)
@@ -235,26 +216,26 @@ def _periodicity(bare: Run) -> Feature:
 
 
 def _weakening(run: Run, rough: Run) -> Feature:
-    weakening = run.weakening or Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=UNREACHED, v_ss=1.0)
-    reason = "section [friction]; measured below its threshold" if run.weakening else "no section [friction]"
-    nobody = where(run.packing, [])
-    return Feature("dynamic friction", reason, rough, replace(rough, weakening=weakening), nobody, moves=False)
+    weakening, reason = run.motion.get("weakening"), "section [friction]; measured below its threshold"
+    if weakening is None:
+        weakening, reason = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=UNREACHED, v_ss=1.0), "no section [friction]"
+    weakens = replace(rough, motion={"weakening": weakening})
+    return Feature("dynamic friction", reason, rough, weakens, where(run.packing, []), moves=False)
 
 
 def _perturbation(run: Run, bare: Run) -> Feature:
-    push = run.push or Push(1e-9, 0.01, None)
-    reason = f"amplitude {push.amplitude:g}" if run.push else "no amplitude in [perturb]"
-    pushed = run.packing.top if push.target is None else where(run.packing, push.target)
-    return Feature("perturbation", reason, bare, replace(bare, push=push), pushed, moves=True)
+    push, pushed = run.moved_by("amplitude", "omega", otherwise={"amplitude": 1e-9, "omega": 0.01})
+    reason = f"amplitude {push['amplitude']:g}" if "amplitude" in run.motion else "no amplitude in [perturb]"
+    return Feature("perturbation", reason, bare, replace(bare, motion=push), pushed, moves=True)
 
 
 def _signal(run: Run, bare: Run) -> Feature:
-    sent = run.sent or Sent(Signal(np.array([0.0, 1e6]), np.array([1e-9, 1e-9])), "layer", None)
-    reason = f"{len(sent.signal)} rows, on the {sent.on}" if run.sent else "no signal in [perturb]"
-    moved = run.packing.top if sent.target is None else where(run.packing, sent.target)
-    if sent.on == "floor":
+    constant = Signal(np.array([0.0, 1e6]), np.array([1e-9, 1e-9]))
+    sent, moved = run.moved_by("signal", "on", otherwise={"signal": constant, "on": "layer"})
+    reason = f"{len(sent['signal'])} rows, on the {sent['on']}" if "signal" in run.motion else "no signal in [perturb]"
+    if sent["on"] == "floor":
         moved = np.ones(len(run.packing), dtype=bool)
-    return Feature("signal", reason, bare, replace(bare, sent=sent), moved, moves=True)
+    return Feature("signal", reason, bare, replace(bare, motion=sent), moved, moves=True)
 
 
 def _damping(bare: Run, law: MindlinLaw) -> Iterator[Feature]:

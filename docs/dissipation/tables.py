@@ -15,7 +15,7 @@ import numpy as np
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.onset.damped import ramped
-from faultgouge.studies.dissipation import RATIOS, over_distance, over_strength, seeded, weak_cases
+from faultgouge.studies.dissipation.compute import RATIOS, over_distance, over_strength, seeded, weak_cases
 
 HERE = Path(__file__).parent
 

@@ -5,15 +5,16 @@ python docs/pictures/dissipation.py
 
 import json
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TypeVar
 
 from faultgouge.analysis.motion.power_law import fit_power_law
-from faultgouge.figures.dissipation import GainCurve, OnsetCurve, dissipation_figure
 from faultgouge.figures.style import save_as
+from faultgouge.studies.dissipation.compute import Gain, Strength
+from faultgouge.studies.dissipation.draw import dissipation_figure
 
 TABLES = Path(__file__).parents[1] / "dissipation"
+
+T = TypeVar("T")
 
 KINDS = {
     (0.0, 0.0): "no dissipation",
@@ -23,33 +24,17 @@ KINDS = {
 }
 
 
-def table(name: str) -> list[dict[str, Any]]:
-    """The records of a table."""
-    return [json.loads(line) for line in (TABLES / f"{name}.jsonl").read_text().splitlines()]
-
-
-def onsets(name: str) -> OnsetCurve:
-    """A table of onsets over the strength."""
-    rows = sorted(table(name), key=lambda row: row["strength"])
-    strength, onset, predicted = (
-        np.array([np.nan if row[key] is None else row[key] for row in rows])
-        for key in ("strength", "onset", "predicted")
-    )
-    return OnsetCurve(strength, onset, predicted, rows[0]["undamped"])
-
-
-def gains() -> list[GainCurve]:
-    """The table of gains, a curve for each kind of dissipation."""
-    rows, curves = sorted(table("gain"), key=lambda row: row["distance"]), []
-    for kind, label in KINDS.items():
-        chosen = [row for row in rows if (row["cn"], row["drag"]) == kind]
-        values = np.array([np.nan if row["gain"] is None else row["gain"] for row in chosen])
-        curves.append(GainCurve(label, np.array([row["distance"] for row in chosen]), values))
-    return curves
+def table(name: str, kind: type[T], by: str) -> list[T]:
+    """The records of a table, in the order of one of their numbers."""
+    records = [json.loads(line) for line in (TABLES / f"{name}.jsonl").read_text().splitlines()]
+    return [kind(**record) for record in sorted(records, key=lambda record: record[by])]
 
 
 if __name__ == "__main__":
-    curves = gains()
-    near = curves[0].distance <= 1e-2
-    print("gain without dissipation:", fit_power_law(curves[0].distance[near], curves[0].gain[near]))
-    save_as(dissipation_figure(onsets("cn"), onsets("drag"), curves), Path(__file__).with_suffix(".png"))
+    gains = table("gain", Gain, "distance")
+    curves = {label: [each for each in gains if (each.cn, each.drag) == kind] for kind, label in KINDS.items()}
+    near = [each for each in curves["no dissipation"] if each.distance <= 1e-2]
+    law = fit_power_law([each.distance for each in near], [each.gain for each in near])
+    print("gain without dissipation:", law)
+    onsets = (table(name, Strength, "strength") for name in ("cn", "drag"))
+    save_as(dissipation_figure(*onsets, curves), Path(__file__).with_suffix(".png"))

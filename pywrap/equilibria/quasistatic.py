@@ -83,6 +83,7 @@ def equilibrate(
     fx: float,
     force_tolerance: float | None = None,
     beside: Equilibrium | None = None,
+    onward: bool = False,
 ) -> Equilibrium:
     """The equilibrium at fx that follows from the last one.
 
@@ -99,6 +100,9 @@ def equilibrate(
     beside : Equilibrium, optional
         Another one near the last, at another fx: its displacement is a better guess than none. It does not change what
         is found, except for the rounding.
+    onward : bool
+        Whether the ways of `TRIED` are taken where halving the increment leads nowhere. By default the branch of
+        equilibria ends there.
 
     Returns
     -------
@@ -107,14 +111,15 @@ def equilibrate(
     Raises
     ------
     NoEquilibriumError
-        If neither halving the increment nor any way of `TRIED` leads there.
+        If no way that may be taken leads there.
     """
     guess = _response(engine, last, fx) if beside is None else _in_proportion(last, beside, fx)
     here = _halving(engine, last, fx, force_tolerance, guess)
-    if here.fx != fx and last.fx != fx:
+    onward = onward and last.fx != fx
+    if here.fx != fx and onward:
         here = _otherwise(engine, here, last, fx, force_tolerance)
     if here.fx != fx or here is last:
-        tried = "" if last.fx == fx else f"; tried were {TRIED}"
+        tried = f"; tried were {TRIED}" if onward else ""
         raise NoEquilibriumError(
             f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there{tried}"
             f"{'' if here.packing.law.frictional else SMOOTH}"

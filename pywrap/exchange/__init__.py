@@ -1,16 +1,14 @@
 """Packings from and to other codes: LAMMPS, MercuryDPM, YADE, GSD, extended XYZ, CSV, VTK.
 
-`readers` says which module reads which file. A reader returns `Disks`, plain columns; `packing_of` makes a packing of
-them, `upper_layer` finds the layer that carries the load, `resting` brings to rest what is out of balance. `writers`
-says which module writes which file.
+`formats` says which module reads and writes which file. A reader returns `Disks`, plain columns; `packing_of` makes a
+packing of them, `upper_layer` finds the layer that carries the load, `resting` brings to rest what is out of balance.
 """
 
 from .disks import Disks, Slips, packing_of
+from .formats import WRITERS, format_of, is_hdf5, known_formats, read_disks, write_frames, write_packing
 from .frames import chosen_frames, frames_of
 from .layer import upper_layer
 from .quantities import Frame, ModeVectors
-from .readers import format_of, is_hdf5, known_formats, read_disks
-from .writers import WRITERS, write_frames, write_packing
 
 __all__ = [
     "WRITERS",

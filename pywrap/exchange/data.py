@@ -11,21 +11,21 @@ and the angle of a disk behind its line, since no density may give a mass to the
 
 from __future__ import annotations
 
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 
 from ...analysis import Packing, PackingFileError
 from ..lammps.data_file import box_lines
+from . import quantities
 from .disks import Disks, of_columns, sphere_volume
 from .quantities import ModeVectors
-from .record import contact_rows, given, scalars, slips_of
-from .table import lines_of, number_of
+from .text import columns_of, lines_of, numbers_in, uncommented
 
 MARK = "# faultgouge"
 CONTACT = "# contact"
 COLUMNS = ("id", "type", "diameter", "density", "x", "y", "z")
-SECTIONS = ("Atoms", "Velocities", "Masses", "Bonds", "Angles", "Ellipsoids", "Lines", "Triangles", "Bodies")
 
 
 def read_data(path: Path) -> Disks:
@@ -38,75 +38,56 @@ def read_data(path: Path) -> Disks:
     style = lines[start].partition("#")[2].strip() or "sphere"
     if style != "sphere":
         raise PackingFileError(f"{path} is of atom style {style}, which has no radii: write it with atom_style sphere.")
-    header = lines[:start]
-    count = _header_number(path, header, "atoms")
-    rows, comments = [], []
-    for number, line in enumerate(lines[start + 1 :], start + 2):
-        text, _, comment = line.partition("#")
-        words = text.split()
-        if not words:
-            continue
-        if words[0][0].isalpha():
-            break
-        if len(words) < len(COLUMNS):
-            raise PackingFileError(
-                f"{path}, line {number}: a disk has {len(words)} columns, and 7 are needed: {COLUMNS}."
-            )
-        rows.append([number_of(word, f"{path}, line {number}") for word in words[: len(COLUMNS)]])
-        comments.append(comment.split())
-    if len(rows) != count:
-        raise PackingFileError(f"{path} announces {count} atoms, and {len(rows)} are there.")
-    if not count:
+    header = _header(path, lines[:start])
+    rows = list(takewhile(lambda row: not row[1][0][0].isalpha(), uncommented(lines[start + 1 :], start + 2)))
+    columns = columns_of(path, rows, COLUMNS, f"7 are needed: {', '.join(COLUMNS)}")
+    if len(rows) != header["atoms"][0]:
+        raise PackingFileError(f"{path} announces {header['atoms'][0]:g} atoms, and {len(rows)} are there.")
+    if not rows:
         raise PackingFileError(f"{path} has no disks.")
-    columns = dict(zip(COLUMNS, np.array(rows).T, strict=True))
-    marked = next((line for line in header if MARK in line), None)
+    low, high = header["xlo xhi"]
+    marked = next((line for line in lines[:start] if MARK in line), None)
     if marked is None:
-        return of_columns(str(path), columns, box_length=_width(path, header))
-    return _own(path, header, marked, columns, comments)
-
-
-def _own(path: Path, header: list[str], marked: str, columns: dict, comments: list[list[str]]) -> Disks:
-    """A file that faultgouge wrote."""
-    names = ("mass", "angle", "x_low", "y_low")
-    extra = np.array([[number_of(word, str(path)) for word in comment] for comment in comments])
-    columns |= dict(zip(names, extra.T, strict=False))
+        return of_columns(str(path), columns, box_length=high - low)
+    # a file that faultgouge wrote
+    comments = [(number, lines[number - 1].partition("#")[2].split()) for number, _ in rows]
+    names = ("mass", "angle", "x_low", "y_low")[: len(comments[0][1])]
+    columns |= columns_of(path, comments, names, f"{len(names)} behind the #")
     columns["top"] = columns["type"] - 1
     values = dict(part.split("=") for part in marked.partition(MARK)[2].split() if "=" in part)
-    listed = [line.split()[2:] for line in header if line.startswith(CONTACT)]
-    rows = np.array([[number_of(word, str(path)) for word in row] for row in listed])
-    if not len(rows):
-        rows = np.zeros((0, 4 if "x_low" in columns else 3))
-    period = _width(path, header) if values.get("sides") == "p" else None
-    return of_columns(str(path), columns, box_length=period, given=given(values), slips=slips_of(rows))
+    contacts = " ".join(line.removeprefix(CONTACT) for line in lines[:start] if line.startswith(CONTACT))
+    slips = quantities.slips_of(numbers_in(contacts, path), "x_low" in columns)
+    period = high - low if values.get("sides") == "p" else None
+    return of_columns(str(path), columns, box_length=period, given=quantities.given(values), slips=slips)
 
 
-def _header_number(path: Path, header: list[str], name: str) -> int:
-    for line in header:
-        words = line.split("#")[0].split()
-        if words[1:] == [name] and words[0].isdecimal():
-            return int(words[0])
-    raise PackingFileError(f"{path} is no LAMMPS data file: its header has no line 'N {name}'.")
-
-
-def _width(path: Path, header: list[str]) -> float:
-    for line in header:
-        words = line.split("#")[0].split()
-        if words[2:] == ["xlo", "xhi"]:
-            low, high = (number_of(word, str(path)) for word in words[:2])
-            return high - low
-        if words[3:] == ["xy", "xz", "yz"] and any(float(word) != 0 for word in words[:3]):
-            raise PackingFileError(f"{path} has a tilted box: give one with right angles.")
-    raise PackingFileError(f"{path} is no LAMMPS data file: its header has no line 'xlo xhi'.")
+def _header(path: Path, lines: list[str]) -> dict[str, list[float]]:
+    """The numbers of the header by the names behind them."""
+    found = {}
+    for line in lines:
+        words = line.partition("#")[0].split()
+        first = next((k for k, word in enumerate(words) if word[0].isalpha()), len(words))
+        if 0 < first < len(words):
+            found[" ".join(words[first:])] = numbers_in(" ".join(words[:first]), path)
+    for name in ("atoms", "xlo xhi"):
+        if name not in found:
+            says = f"N {name}" if name == "atoms" else name
+            raise PackingFileError(f"{path} is no LAMMPS data file: its header has no line '{says}'.")
+    if any(found.get("xy xz yz", ())):
+        raise PackingFileError(f"{path} has a tilted box: give one with right angles.")
+    return found
 
 
 def write_data(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
     """A data file that `read_data` takes back to the bit; what LAMMPS itself reads of it is returned in words."""
     density = densities(packing)
     sides = "f" if packing.box_length is None else "p"
-    lines = [f"{MARK} sides={sides} " + " ".join(f"{key}={value!r}" for key, value in scalars(packing).items())]
+    lines = [
+        f"{MARK} sides={sides} " + " ".join(f"{key}={value!r}" for key, value in quantities.scalars(packing).items())
+    ]
     lines += ["", f"{len(packing)} atoms", "2 atom types", *box_lines(packing), ""]
     # behind the numbers of the header: readers look for these in the first lines to know the format
-    for first, second, *slips in contact_rows(packing).tolist():
+    for first, second, *slips in quantities.contact_rows(packing).tolist():
         lines.append(" ".join([CONTACT, str(int(first)), str(int(second)), *map(repr, slips)]))
     lines += ["", "Atoms # sphere", ""]
     extra = [packing.mass, packing.angle]

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ...analysis import FLOOR, BadInputError, Contacts, MindlinLaw, Packing, PackingFileError, nearest_image, touching
+from ...analysis import FLOOR, Contacts, MindlinLaw, Packing, PackingFileError, nearest_image, touching
 
 Floats = NDArray[np.float64]
-T = TypeVar("T")
 
 FLAT = 1e-6
 """Spread of z up to which disks lie in a plane, in smallest radii: text with seven digits, or float32, leaves less."""
@@ -80,7 +79,8 @@ class Disks:
     slips : Slips or None
         None if the file has none.
     given : mapping
-        Law, load and inertia, as far as the file has them: kn, kt, mu, exponent, cn, ct, tau, fx, fy, inertia_factor.
+        Law, load and inertia, as far as the file has them: kn, kt, mu, exponent, rescaled, cn, ct, tau, fx,
+        fy, inertia_factor.
     groups : mapping
         Groups of disks by name, as booleans.
     remark : str
@@ -127,40 +127,37 @@ def of_columns(source: str, columns: Mapping[str, Floats], **more: Any) -> Disks
     PackingFileError
         If a column is missing, or holds what it cannot hold.
     """
-    found = {name: next((columns[each] for each in names if each in columns), None) for name, names in NAMES.items()}
-    if found["radius"] is None and "diameter" in columns:
-        found["radius"] = 0.5 * columns["diameter"]
+    found = {name: columns[each] for name, names in NAMES.items() for each in reversed(names) if each in columns}
+    if "diameter" in columns:
+        found.setdefault("radius", 0.5 * columns["diameter"])
     for name in ("x", "y", "radius"):
-        if found[name] is None:
+        if name not in found:
             has = ", ".join(columns) or "none"
             also = " or diameter" if name == "radius" else ""
             raise PackingFileError(f"{source} has no column {name}{also} (its columns: {has}): write it with one.")
-    count = len(_there(found["x"]))
-    ids = np.arange(1, count + 1) if found["id"] is None else _whole(source, "id", found["id"])
+    ids = _whole(source, "id", found["id"]) if "id" in found else np.arange(1, len(found["x"]) + 1)
     _check_numbers(source, columns, ids)
-    _check_plane(source, columns, _there(found["radius"]))
+    _check_plane(source, columns, found["radius"])
+    if "density" in columns:
+        found.setdefault("mass", columns["density"] * sphere_volume(found["radius"]))
     order = np.argsort(ids, kind="stable")
     ids = ids[order]
     twice = ids[1:][ids[1:] == ids[:-1]]
     if len(twice):
         raise PackingFileError(f"{source} has disk {twice[0]} twice: give each disk an ID of its own.")
-    sorted_ = {name: None if column is None else column[order] for name, column in found.items()}
-    mass = sorted_["mass"]
-    if mass is None and "density" in columns:
-        mass = columns["density"][order] * sphere_volume(_there(sorted_["radius"]))
+    found = {name: column[order] for name, column in found.items()}
     low = None
     if "x_low" in columns and "y_low" in columns:
         low = np.column_stack([columns["x_low"], columns["y_low"]])[order]
-    kind, top = sorted_["type"], sorted_["top"]
     return Disks(
         source,
-        np.column_stack([_there(sorted_["x"]), _there(sorted_["y"])]),
-        _there(sorted_["radius"]),
+        np.column_stack([found["x"], found["y"]]),
+        found["radius"],
         ids,
-        mass,
-        sorted_["angle"],
-        None if kind is None else _whole(source, "type", kind),
-        None if top is None else top != 0,
+        found.get("mass"),
+        found.get("angle"),
+        _whole(source, "type", found["type"]) if "type" in found else None,
+        found["top"] != 0 if "top" in found else None,
         low,
         **more,
     )
@@ -299,9 +296,3 @@ def _whole(source: str, name: str, column: Floats) -> NDArray[np.int64]:
     if not np.array_equal(column, np.rint(column)) or (name == "id" and np.any(column < 1)):
         raise PackingFileError(f"{source}: the column {name} must hold whole numbers{' from 1' * (name == 'id')}.")
     return column.astype(np.int64)
-
-
-def _there(value: T | None) -> T:
-    if value is None:
-        raise BadInputError("a column is missing.")
-    return value

@@ -12,8 +12,9 @@ import numpy as np
 
 from ...analysis import PackingFileError, read_dump
 from ...analysis.files.dumps import DumpFrame, dump_frames
+from . import quantities
 from .disks import Disks, of_columns
-from .record import contact_rows, scalars, slips_of
+from .text import chosen_frame
 
 
 def read_deck_dump(path: Path, frame: int | None = None) -> Disks:
@@ -30,15 +31,15 @@ def read_deck_dump(path: Path, frame: int | None = None) -> Disks:
         packing.top,
         packing.position_low,
         packing.box_length,
-        slips_of(contact_rows(packing)),
-        scalars(packing),
+        quantities.slips_of(quantities.contact_rows(packing), packing.compensated),
+        quantities.scalars(packing),
     )
 
 
 def read_custom_dump(path: Path, frame: int | None = None) -> Disks:
     """A snapshot of `dump custom`; the last one by default, if all are of the same disks."""
-    shown, number = _snapshot(path, frame)
-    source = f"{path} (step {shown.step})" if number else str(path)
+    shown = _snapshot(path, frame)
+    source = f"{path} (step {shown.step})"
     if shown.bounds.shape[1] > 2 and np.any(shown.bounds[:, 2]):
         raise PackingFileError(f"{source} has a tilted box: give one with right angles.")
     columns = dict(zip(shown.columns, shown.rows.T, strict=True))
@@ -52,27 +53,23 @@ def read_custom_dump(path: Path, frame: int | None = None) -> Disks:
     return of_columns(source, columns, box_length=float(np.ptp(shown.bounds[0, :2])) if periodic else None)
 
 
-def _snapshot(path: Path, frame: int | None) -> tuple[DumpFrame, int]:
-    """The snapshot, and whether there are others."""
+def _snapshot(path: Path, frame: int | None) -> DumpFrame:
+    """The snapshot that is meant; by default the last one, if all are of the same disks."""
     frames: list[DumpFrame] = []
-    first = None
+    first: tuple[int, tuple[float, ...]] | None = None
     for shown in dump_frames(path):
         disks = _ids(shown)
-        if first is None:
-            first = shown.step, disks
-        elif frame is None and disks != first[1]:
+        first = first or (shown.step, disks)
+        if frame is None and disks != first[1]:
             raise PackingFileError(
                 f"{path} has other disks at step {shown.step} ({len(shown.rows)}) than at step {first[0]} "
                 f"({len(first[1])}): choose a snapshot with --frame; -1 is the last."
             )
         # of a long file the last one alone is kept, unless another is wanted
         frames = [shown] if frame is None else [*frames, shown]
-    if first is None:
+    if not frames:
         raise PackingFileError(f"{path} is not a complete LAMMPS text dump: it is empty.")
-    wanted = -1 if frame is None else frame
-    if not -len(frames) <= wanted < len(frames):
-        raise PackingFileError(f"{path} has {len(frames)} snapshots; there is no --frame {frame}.")
-    return frames[wanted], 1
+    return frames[chosen_frame(path, [len(shown.rows) for shown in frames], frame)]
 
 
 def _ids(shown: DumpFrame) -> tuple[float, ...]:

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from ...analysis import Packing, PackingFileError
+from . import quantities
 from .disks import Disks, of_columns
 from .needs import needed_library
-from .quantities import Frame, ModeVectors, disk_force, disk_mobilised, disk_pressure
-from .record import contact_rows, given, scalars, slips_of
+from .quantities import Frame, ModeVectors
+from .text import chosen_frame
 
 OWN = "particles/faultgouge/"
 CONTACTS = "faultgouge/contacts"
@@ -30,14 +31,7 @@ def read_gsd(path: Path, frame: int | None = None) -> Disks:
     try:
         with hoomd.open(str(path), "r") as file:
             counts = [file[k].particles.N for k in (range(len(file)) if frame is None else ())]
-            if len(set(counts)) > 1:
-                raise PackingFileError(
-                    f"{path} has frames with {min(counts)} and {max(counts)} disks: choose one with --frame."
-                )
-            wanted = -1 if frame is None else frame
-            if not -len(file) <= wanted < len(file):
-                raise PackingFileError(f"{path} has {len(file)} frames; there is no --frame {wanted}.")
-            return _disks(path, file[wanted % len(file)])
+            return _disks(path, file[chosen_frame(path, counts or [0] * len(file), frame)])
     except (OSError, RuntimeError) as error:
         raise PackingFileError(f"{path} is no readable GSD file: {error}.") from error
 
@@ -49,13 +43,13 @@ def _disks(path: Path, frame: Any) -> Disks:
         columns = {name: array.astype(np.float64) for name, array in own.items()}
         values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
         period = values.get("box_length")
-        rows = np.asarray(log.get(CONTACTS, []), dtype=np.float64).reshape(-1, 4 if "x_low" in columns else 3)
+        rows = log.get(CONTACTS)
         return of_columns(
             str(path),
             columns,
             box_length=None if period is None else float(period),
-            given=given(values),
-            slips=slips_of(rows[rows[:, 0] > 0]) if CONTACTS in log else None,
+            given=quantities.given(values),
+            slips=None if rows is None else quantities.slips_of(rows[rows[:, 0] > 0], "x_low" in columns),
         )
     if particles.diameter is None or not particles.N:
         raise PackingFileError(f"{path} has no disks with diameters.")
@@ -90,27 +84,23 @@ def write_gsd_frames(path: Path, frames: Iterable[Frame]) -> None:
         for number, each in enumerate(frames):
             frame = _frame(hoomd, each.packing)
             frame.configuration.step = number
-            frame.log["particles/displacement"] = _in_space(each.displacement)
-            frame.log["particles/normal_force"] = disk_pressure(each.packing)
+            frame.log["particles/displacement"] = quantities.in_space(each.displacement)
+            frame.log["particles/normal_force"] = quantities.disk_pressure(each.packing)
             frame.log |= {f"faultgouge/{key}": np.array([value]) for key, value in each.number.items()}
             if each.whole:
                 frame.log |= _forces(each.packing)
             file.append(frame)
 
 
-def _in_space(vectors: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(np.column_stack([vectors, np.zeros(len(vectors))]))
-
-
 def _forces(packing: Packing) -> dict[str, np.ndarray]:
     """What follows from slips, and these."""
     # gsd has no empty arrays: a row of zeros stands for no contact
-    rows = contact_rows(packing)
+    rows = quantities.contact_rows(packing)
     return {
         CONTACTS: rows if len(rows) else np.zeros((1, 4 if packing.compensated else 3)),
-        "particles/net_force": _in_space(disk_force(packing)[:, :2]),
-        "particles/normal_force": disk_pressure(packing),
-        "particles/mobilised": disk_mobilised(packing),
+        "particles/net_force": quantities.in_space(quantities.disk_force(packing)[:, :2]),
+        "particles/normal_force": quantities.disk_pressure(packing),
+        "particles/mobilised": quantities.disk_mobilised(packing),
     }
 
 
@@ -139,6 +129,6 @@ def _frame(hoomd: Any, packing: Packing) -> Any:
     if packing.position_low is not None:
         columns |= {"x_low": packing.position_low[:, 0], "y_low": packing.position_low[:, 1]}
     frame.log = {OWN + name: np.ascontiguousarray(column, dtype=np.float64) for name, column in columns.items()}
-    numbers = scalars(packing) | ({} if box is None else {"box_length": box})
+    numbers = quantities.scalars(packing) | ({} if box is None else {"box_length": box})
     frame.log |= {f"faultgouge/{key}": np.array([value], dtype=np.float64) for key, value in numbers.items()}
     return frame

@@ -1,15 +1,27 @@
-"""What exports show of disks and contacts beside what a packing is: forces, mobilised friction, modes."""
+"""What files have of a packing: law and load by name, contacts as rows; and what exports show besides.
+
+Law, load and inertia are names with numbers, and contacts rows (first ID, second ID, slip), where a second ID of 0 is
+the floor; low parts of compensated packings are a column more. `float.__repr__` is the shortest text that is the same
+double when it is read. Besides, exports show forces, mobilised friction and modes.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing
+from ...analysis.files.runfile_header import unusual
+from .disks import Slips
 
 Floats = NDArray[np.float64]
+
+KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
+"""Names of law, load and inertia in files."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +41,16 @@ class ModeVectors:
     name: str
     eigenvalue: complex
     displacement: NDArray[np.complex128]
+
+    @property
+    def fields(self) -> dict[str, Floats]:
+        """Vectors, shape (N, 3), and rotations, shape (N,), by the names that they have in a file."""
+        found = {}
+        for part, moved in (("", self.displacement.real), ("_imag", self.displacement.imag)):
+            if not part or np.any(moved):
+                found[f"{self.name}{part}"] = in_space(moved[:2].T)
+                found[f"{self.name}{part}_rotation"] = moved[2]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +80,48 @@ class Frame:
         return {} if self.whole else {"time": self.time}
 
 
+def scalars(packing: Packing) -> dict[str, float]:
+    """Law, load and inertia by name; those that are not there, or as always, are left out."""
+    law = packing.law
+    values = {"kn": law.kn, "kt": law.kt, "mu": law.mu}
+    values |= unusual(law)
+    if packing.drag_time is not None:
+        values["tau"] = packing.drag_time
+    return {**values, "fx": packing.fx, "fy": packing.fy, "inertia_factor": packing.inertia_factor}
+
+
+def given(values: Mapping[str, Any]) -> dict[str, float]:
+    """The names of `KEYS` among others, as numbers; what is no number is left out."""
+    found = {}
+    for key in KEYS:
+        try:
+            found[key] = float(values[key])
+        except (KeyError, TypeError, ValueError):
+            continue
+    return found
+
+
+def contact_rows(packing: Packing) -> Floats:
+    """Rows (first ID, second ID, slip[, low part]), shape (C, 3 or 4); IDs from 1, 0 is the floor."""
+    contacts = packing.contacts
+    columns = [contacts.i + 1, contacts.j + 1, contacts.slip]
+    if contacts.slip_low is not None:
+        columns.append(contacts.slip_low)
+    return np.column_stack(columns).astype(np.float64)
+
+
+def slips_of(numbers: Sequence[float] | Floats, compensated: bool) -> Slips:
+    """The reverse of `contact_rows`, of its numbers in a row."""
+    rows = np.reshape(np.asarray(numbers, dtype=np.float64), (-1, 4 if compensated else 3))
+    low = rows[:, 3] if compensated else None
+    return Slips(rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64), rows[:, 2], low, complete=True)
+
+
+def in_space(vectors: Floats) -> Floats:
+    """Vectors in the plane with z = 0, shape (n, 3)."""
+    return np.ascontiguousarray(np.column_stack([vectors, np.zeros(len(vectors))]))
+
+
 def contact_force(packing: Packing) -> Floats:
     """f_n n + f_t tau, the force on the first partner of each contact, shape (C, 2)."""
     g = packing.geometry
@@ -77,17 +141,18 @@ def disk_force(packing: Packing) -> Floats:
 
 def disk_pressure(packing: Packing) -> Floats:
     """Sum of the normal forces on each disk, shape (N,)."""
-    total = np.zeros(len(packing))
-    pair = ~packing.contacts.floor
-    np.add.at(total, packing.contacts.i, packing.normal_force)
-    np.add.at(total, packing.contacts.j[pair], packing.normal_force[pair])
-    return total
+    return _gathered(np.add, packing, packing.normal_force)
 
 
 def disk_mobilised(packing: Packing) -> Floats:
     """The largest |f_t|/(mu f_n) of the contacts of each disk, shape (N,)."""
-    largest = np.zeros(len(packing))
-    pair, share = ~packing.contacts.floor, contact_mobilised(packing)
-    np.maximum.at(largest, packing.contacts.i, share)
-    np.maximum.at(largest, packing.contacts.j[pair], share[pair])
-    return largest
+    return _gathered(np.maximum, packing, contact_mobilised(packing))
+
+
+def _gathered(operation: np.ufunc, packing: Packing, values: Floats) -> Floats:
+    """Numbers of contacts, put together at their disks."""
+    found = np.zeros(len(packing))
+    pair = ~packing.contacts.floor
+    operation.at(found, packing.contacts.i, values)
+    operation.at(found, packing.contacts.j[pair], values[pair])
+    return found

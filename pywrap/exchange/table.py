@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...analysis import PackingFileError
 from ...analysis.files.dumps import CONTACT, dump_frames
 from .disks import Disks, Slips, of_columns
+from .text import columns_of, lines_of
 
 Floats = NDArray[np.float64]
 
@@ -20,13 +21,12 @@ PARTNERS = {"first": ("id1", "i", "first"), "second": ("id2", "j", "second"), "s
 
 def read_table(path: Path) -> Disks:
     """Disks of a CSV file; commas, semicolons, tabs or blanks between the numbers. Open sides."""
-    return of_columns(str(path), columns_of(path))
+    return of_columns(str(path), _table(path))
 
 
-def columns_of(path: Path) -> dict[str, Floats]:
+def _table(path: Path) -> dict[str, Floats]:
     """The columns of a CSV file by name."""
-    lines = lines_of(path)
-    rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
+    rows = [(number, line) for number, line in enumerate(lines_of(path), 1) if line.strip()]
     if len(rows) < 2:
         raise PackingFileError(
             f"{path} is no table: it needs a line of names, such as x,y,radius, and lines of numbers."
@@ -34,13 +34,8 @@ def columns_of(path: Path) -> dict[str, Floats]:
     head = rows[0][1].lstrip("#").strip()
     mark = next((each for each in ";,\t" if each in head), None)
     names = [name.strip().strip('"').lower() for name in (head.split(mark) if mark else head.split())]
-    table = np.empty((len(rows) - 1, len(names)))
-    for row, (number, line) in enumerate(rows[1:]):
-        words = next(csv.reader([line], delimiter=mark)) if mark else line.split()
-        if len(words) != len(names):
-            raise PackingFileError(f"{path}, line {number}: it has {len(words)} columns, and the first {len(names)}.")
-        table[row] = [number_of(word, f"{path}, line {number}") for word in words]
-    return dict(zip(names, table.T, strict=True))
+    words = [(number, next(csv.reader([line], delimiter=mark)) if mark else line.split()) for number, line in rows[1:]]
+    return columns_of(path, words, names, f"the first {len(names)}", more=False)
 
 
 def read_slips(path: Path) -> Slips:
@@ -51,31 +46,10 @@ def read_slips(path: Path) -> Slips:
         columns = dict(zip(frame.columns, frame.rows.T, strict=True))
         names = {key: (*PARTNERS[key], *CONTACT.get(key, ())) for key in PARTNERS}
     else:
-        columns = columns_of(path)
+        columns = _table(path)
     found = {key: next((columns[each] for each in also if each in columns), None) for key, also in names.items()}
     first, second, slip = (found[key] for key in ("first", "second", "slip"))
     if first is None or second is None or slip is None:
         missing = next(key for key in ("first", "second", "slip") if found[key] is None)
         raise PackingFileError(f"{path} has no column {names[missing][0]} (its columns: {', '.join(columns)}).")
     return Slips(first.astype(np.int64), second.astype(np.int64), slip, found["low"])
-
-
-def lines_of(path: Path) -> list[str]:
-    """The lines of a text file."""
-    try:
-        return path.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
-        raise PackingFileError(f"{path} cannot be read: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise PackingFileError(f"{path} is no text: {error}.") from error
-
-
-def number_of(word: str, where: str) -> float:
-    """A word as a number."""
-    try:
-        return float(word)
-    except ValueError:
-        known = {"true": 1.0, "false": 0.0}
-        if word.strip().lower() in known:
-            return known[word.strip().lower()]
-        raise PackingFileError(f"{where}: {word.strip()!r} is no number.") from None

@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing
-from .quantities import Frame, ModeVectors, contact_force, contact_mobilised, disk_force, disk_mobilised, disk_pressure
-from .record import scalars
+from . import quantities
+from .quantities import Frame, ModeVectors
 
 Element = ElementTree.Element
 
 TYPES = {"f": "Float64", "i": "Int64"}
-
 
 FORCES = ("angle", "net_force", "torque_over_radius", "mobilised", "contact_force", "contact_tangential_force")
 SLIPS = ("contact_slip", "contact_mobilised")
@@ -53,7 +52,7 @@ def _tree(packing: Packing, modes: list[ModeVectors], frame: Frame | None = None
     root = Element("VTKFile", type="PolyData", version="1.0", byte_order="LittleEndian", header_type="UInt64")
     data = ElementTree.SubElement(root, "PolyData")
     fields = ElementTree.SubElement(data, "FieldData")
-    numbers = scalars(packing) | ({} if packing.box_length is None else {"box_length": packing.box_length})
+    numbers = quantities.scalars(packing) | ({} if packing.box_length is None else {"box_length": packing.box_length})
     numbers |= {} if frame is None else frame.number
     numbers |= {f"{mode.name}_eigenvalue": mode.eigenvalue.real for mode in modes}
     numbers |= {f"{mode.name}_eigenvalue_imag": mode.eigenvalue.imag for mode in modes}
@@ -65,7 +64,7 @@ def _tree(packing: Packing, modes: list[ModeVectors], frame: Frame | None = None
     on_points = ElementTree.SubElement(piece, "PointData")
     on_disks, unknown = _of_disks(packing, modes), () if frame is None or frame.whole else FORCES + SLIPS
     if frame is not None:
-        on_disks["displacement"] = _in_space(frame.displacement)
+        on_disks["displacement"] = quantities.in_space(frame.displacement)
     for name, values in on_disks.items():
         if name in unknown:
             continue
@@ -82,22 +81,19 @@ def _tree(packing: Packing, modes: list[ModeVectors], frame: Frame | None = None
 
 
 def _of_disks(packing: Packing, modes: list[ModeVectors]) -> dict[str, NDArray]:
-    force = disk_force(packing)
+    force = quantities.disk_force(packing)
     values = {
         "radius": packing.radius,
         "mass": packing.mass,
         "angle": packing.angle,
         "top": packing.top.astype(np.float64),
-        "net_force": _in_space(force[:, :2]),
+        "net_force": quantities.in_space(force[:, :2]),
         "torque_over_radius": force[:, 2],
-        "normal_force": disk_pressure(packing),
-        "mobilised": disk_mobilised(packing),
+        "normal_force": quantities.disk_pressure(packing),
+        "mobilised": quantities.disk_mobilised(packing),
     }
     for mode in modes:
-        for part, moved in (("", mode.displacement.real), ("_imag", mode.displacement.imag)):
-            if not part or np.any(moved):
-                values[f"{mode.name}{part}"] = _in_space(moved[:2].T)
-                values[f"{mode.name}{part}_rotation"] = moved[2]
+        values |= mode.fields
     return values
 
 
@@ -106,12 +102,12 @@ def _of_contacts(packing: Packing) -> dict[str, NDArray]:
     return {
         "contact_i": contacts.i.astype(np.float64),
         "contact_j": contacts.j.astype(np.float64),
-        "contact_force": _in_space(contact_force(packing)),
+        "contact_force": quantities.in_space(quantities.contact_force(packing)),
         "contact_normal_force": packing.normal_force,
         "contact_tangential_force": packing.tangential_force,
         "contact_slip": contacts.slip,
         "contact_overlap": packing.geometry.overlap,
-        "contact_mobilised": contact_mobilised(packing),
+        "contact_mobilised": quantities.contact_mobilised(packing),
     }
 
 
@@ -119,11 +115,7 @@ def _points(packing: Packing) -> NDArray:
     geometry, i = packing.geometry, packing.contacts.i
     first = packing.position[i]
     second = first - geometry.distance[:, None] * geometry.normal
-    return _in_space(np.concatenate([packing.position, np.stack([first, second], axis=1).reshape(-1, 2)]))
-
-
-def _in_space(vectors: NDArray) -> NDArray:
-    return np.column_stack([vectors, np.zeros(len(vectors))])
+    return quantities.in_space(np.concatenate([packing.position, np.stack([first, second], axis=1).reshape(-1, 2)]))
 
 
 def _padded(values: NDArray, missing: int, fill: float, *, behind: bool) -> NDArray:

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis import Packing, PackingFileError
+from . import quantities
 from .disks import Disks, of_columns
-from .quantities import Frame, ModeVectors, disk_force, disk_mobilised, disk_pressure
-from .record import contact_rows, given, scalars, slips_of
-from .table import lines_of, number_of
+from .quantities import Frame, ModeVectors
+from .text import block_of_frame, columns_of, lines_of, numbers_in
 
 PAIR = re.compile(r'([\w./-]+)=(?:"([^"]*)"|(\S+))')
 VECTORS = {"pos": ("x", "y", "z"), "position": ("x", "y", "z")}
@@ -25,94 +25,64 @@ VECTORS = {"pos": ("x", "y", "z"), "position": ("x", "y", "z")}
 def read_xyz(path: Path, frame: int | None = None) -> Disks:
     """A frame of an extended XYZ file; the last one by default, if all are of as many disks."""
     lines = lines_of(path)
-    begins, at = [], 0
-    while at < len(lines) and lines[at].strip():
+
+    def count_at(at: int) -> int:
         if not lines[at].strip().isdecimal():
             raise PackingFileError(f"{path}, line {at + 1}: {lines[at].strip()!r} is no number of disks.")
-        begins.append(at)
-        at += int(lines[at]) + 2
-    if not begins or at > len(lines):
-        raise PackingFileError(f"{path} is no complete XYZ file: it breaks off.")
-    counts = {int(lines[begin]) for begin in begins}
-    if frame is None and len(counts) > 1:
-        raise PackingFileError(
-            f"{path} has frames with {min(counts)} and {max(counts)} disks: choose one with --frame."
-        )
-    wanted = -1 if frame is None else frame
-    if not -len(begins) <= wanted < len(begins):
-        raise PackingFileError(f"{path} has {len(begins)} frames; there is no --frame {frame}.")
-    begin = begins[wanted]
-    return _frame(path, lines[begin + 1], lines[begin + 2 : begin + 2 + int(lines[begin])], begin + 3)
+        return int(lines[at])
 
-
-def _frame(path: Path, comment: str, lines: list[str], line: int) -> Disks:
-    values = {key: quoted or plain for key, quoted, plain in PAIR.findall(comment)}
+    begin, count = block_of_frame(path, lines, 2, count_at, frame, "XYZ")
+    values = {key: quoted or plain for key, quoted, plain in PAIR.findall(lines[begin + 1])}
     if "Properties" not in values:
         raise PackingFileError(
-            f"{path}, line {line - 1}: it has no Properties=..., so that this is no extended XYZ file."
+            f"{path}, line {begin + 2}: it has no Properties=..., so that this is no extended XYZ file."
         )
-    columns: dict[str, list[float]] = {}
-    names = list(_columns(values["Properties"]))
-    for number, text in enumerate(lines, line):
-        words = text.split()
-        if len(words) != len(names):
-            raise PackingFileError(f"{path}, line {number}: it has {len(words)} columns, and Properties {len(names)}.")
-        for (name, kind), word in zip(names, words, strict=True):
-            if kind != "S":
-                word = {"T": "1", "F": "0"}.get(word, word)
-                columns.setdefault(name, []).append(number_of(word, f"{path}, line {number}"))
-    period = None
-    lattice = [number_of(word, str(path)) for word in values.get("Lattice", "").split()]
-    if len(lattice) == 9 and values.get("pbc", "T T T").split()[0] in ("T", "1", "True"):
-        period = lattice[0]
-    slips = None
-    if "contacts" in values:
-        numbers = np.array([number_of(word, str(path)) for word in values["contacts"].split()])
-        slips = slips_of(numbers.reshape(-1, 4 if "x_low" in columns else 3))
-    arrays = {name: np.array(column) for name, column in columns.items()}
-    return of_columns(str(path), arrays, box_length=period, given=given(values), slips=slips)
+    names = _columns(values["Properties"])
+    rows = [(number + 1, lines[number].split()) for number in range(begin + 2, begin + 2 + count)]
+    columns = columns_of(path, rows, names, f"Properties {len(names)}", more=False)
+    lattice = numbers_in(values.get("Lattice", ""), path)
+    periodic = len(lattice) == 9 and values.get("pbc", "T T T").split()[0] in ("T", "1", "True")
+    listed = values.get("contacts")
+    slips = None if listed is None else quantities.slips_of(numbers_in(listed, path), "x_low" in columns)
+    period = lattice[0] if periodic else None
+    return of_columns(str(path), columns, box_length=period, given=quantities.given(values), slips=slips)
 
 
-def _columns(properties: str) -> list[tuple[str, str]]:
-    """Names and kinds of the columns; those of a vector have a number behind them, but for positions."""
-    words = properties.split(":")
-    names = []
+def _columns(properties: str) -> list[str | None]:
+    """Names of the columns, None for text; those of a vector have a number behind them, but for positions."""
+    words = properties.lower().split(":")
+    names: list[str | None] = []
     for name, kind, count in zip(words[::3], words[1::3], words[2::3], strict=False):
         size = int(count) if count.isdecimal() else 1
-        own = VECTORS.get(name.lower(), tuple(f"{name.lower()}_{k}" for k in range(size)))
-        names += [(name.lower(), kind)] if size == 1 else [(each, kind) for each in own[:size]]
+        own = VECTORS.get(name, tuple(f"{name}_{k}" for k in range(size))) if size > 1 else (name,)
+        names += size * [None] if kind == "s" else own[:size]
     return names
 
 
 def _written(packing: Packing, modes: list[ModeVectors], frame: Frame | None) -> list[tuple[str, str, np.ndarray]]:
     """Names, kinds and numbers of what stands in a row for each disk."""
-    n, force = len(packing), disk_force(packing)
+    n, force = len(packing), quantities.disk_force(packing)
     columns: list[tuple[str, str, np.ndarray]] = [
         # first, for readers of plain XYZ
-        ("pos", "R", np.column_stack([packing.position, np.zeros(n)])),
+        ("pos", "R", quantities.in_space(packing.position)),
         ("id", "I", np.arange(1, n + 1)),
         ("radius", "R", packing.radius),
         ("mass", "R", packing.mass),
         ("top", "I", packing.top.astype(int)),
-        ("normal_force", "R", disk_pressure(packing)),
+        ("normal_force", "R", quantities.disk_pressure(packing)),
     ]
     if frame is None or frame.whole:
         columns += [
             ("angle", "R", packing.angle),
-            ("forces", "R", np.column_stack([force[:, :2], np.zeros(n)])),
+            ("forces", "R", quantities.in_space(force[:, :2])),
             ("torque_over_radius", "R", force[:, 2]),
-            ("mobilised", "R", disk_mobilised(packing)),
+            ("mobilised", "R", quantities.disk_mobilised(packing)),
         ]
     if frame is not None:
-        columns.append(("displacement", "R", np.column_stack([frame.displacement, np.zeros(n)])))
+        columns.append(("displacement", "R", quantities.in_space(frame.displacement)))
     if packing.position_low is not None:
         columns += [("x_low", "R", packing.position_low[:, 0]), ("y_low", "R", packing.position_low[:, 1])]
-    for mode in modes:
-        moved = mode.displacement
-        for part, values in (("", moved.real), ("_imag", moved.imag)):
-            if not part or np.any(values):
-                columns.append((f"{mode.name}{part}", "R", np.column_stack([values[0], values[1], np.zeros(n)])))
-                columns.append((f"{mode.name}{part}_rotation", "R", values[2]))
+    columns += [(name, "R", values) for mode in modes for name, values in mode.fields.items()]
     return columns
 
 
@@ -150,11 +120,11 @@ def _head(packing: Packing, columns: list[tuple[str, str, np.ndarray]], frame: F
         f'Lattice="{float(width)!r} 0.0 0.0 0.0 {float(height)!r} 0.0 0.0 0.0 {2 * float(packing.radius.max())!r}"',
         f'pbc="{"F" if box is None else "T"} F F"',
         f"Properties=species:S:1:{properties}",
-        *(f"{key}={float(value)!r}" for key, value in scalars(packing).items()),
+        *(f"{key}={float(value)!r}" for key, value in quantities.scalars(packing).items()),
     ]
     if frame is not None:
         says += [f"{key}={float(value)!r}" for key, value in frame.number.items()]
     if frame is None or frame.whole:
-        numbers = " ".join(repr(value) for value in contact_rows(packing).ravel().tolist())
+        numbers = " ".join(repr(value) for value in quantities.contact_rows(packing).ravel().tolist())
         says.append(f'contacts="{numbers}"')
     return " ".join(says)

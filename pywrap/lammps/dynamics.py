@@ -98,7 +98,8 @@ class Dynamics:
             self._decks.command("unfix move")
             self._decks.command("variable tau delete")
             if self._packing.law.damped:
-                self._decks.command("pair_style mindlin/smooth ${kn} ${kt} ${mu} exponent ${exponent} ${compensated}")
+                law = "${kn} ${kt} ${mu} exponent ${exponent} history ${history} ${compensated}"
+                self._decks.command(f"pair_style mindlin/smooth {law}")
                 self._decks.command("fix_modify floor damping no")
 
     @contextmanager

@@ -212,7 +212,7 @@ class Engine:
         self._displacing.begin()
         self._wire.write(base, (displacement.reshape(3, -1) / self._wire.levers).T)
         self._displacing.run()
-        return self._wire.read()
+        return self._wire.read(displacement)
 
     def keep(self, trial: Trial) -> Packing:
         """The packing of a trial, for displacements from there: LAMMPS is then given what it gave."""
@@ -296,6 +296,7 @@ class Engine:
                 kt=law.kt,
                 mu=law.mu,
                 exponent=law.exponent,
+                history="rescaled" if law.rescaled else "total",
                 fx=packing.fx,
                 fy=packing.fy,
                 inertia=packing.inertia_factor,

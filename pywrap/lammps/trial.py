@@ -65,6 +65,8 @@ class Trial:
         (Fx.., Fy.., T/R..), load included.
     arrays : dict of ndarray
         All of this as LAMMPS has it, by the names of its arrays.
+    displacement : ndarray, shape (3N,), or None
+        The one that ends here, (dx.., dy.., R dtheta..).
     known : Packing or None
         The configuration, if the trial was made of one.
     """
@@ -79,6 +81,7 @@ class Trial:
     slip_low: Floats | None
     force: Floats
     arrays: dict[str, Floats]
+    displacement: Floats | None = None
     known: Packing | None = None
 
     @classmethod
@@ -88,7 +91,7 @@ class Trial:
         graph = ContactGraph(contacts, packing.radius)
         place = packing.position, packing.position_low, packing.angle
         force = np.full(3 * len(packing), np.nan)
-        return cls(packing, packing.fx, *place, graph, contacts.slip, contacts.slip_low, force, {}, packing)
+        return cls(packing, packing.fx, *place, graph, contacts.slip, contacts.slip_low, force, {}, known=packing)
 
     @cached_property
     def packing(self) -> Packing:
@@ -121,7 +124,19 @@ class Trial:
     @cached_property
     def derivatives(self) -> Derivatives:
         """Forces and stiffnesses of the contacts."""
-        return self.still.law.derivatives(self.branches.overlap, self.slip)
+        return self.still.law.derivatives(self.branches.overlap, self.slip, self._parting)
+
+    @property
+    def _parting(self) -> NDArray[np.bool_] | float:
+        """Contacts whose overlap the displacement has reduced, shape (C,), as far as the law cares."""
+        if not self.still.law.rescaled or self.displacement is None:
+            return 0.0
+        graph, moved = self.graph, self.displacement.reshape(3, -1)[:2]
+        branch = moved.take(graph.i, axis=1)
+        branch[:, : graph.pairs] -= moved.take(graph.j[: graph.pairs], axis=1)
+        middle = self.branches.normal * self.branches.distance - 0.5 * branch
+        middle[0, graph.pairs :] = 0.0  # the floor does not turn
+        return np.einsum("dc,dc->c", middle, branch) > 0
 
     @cached_property
     def residual(self) -> float:

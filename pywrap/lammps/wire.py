@@ -79,8 +79,8 @@ class Wire:
         if not self._static.compensated:  # LAMMPS splits coordinates otherwise than packings do
             self._known = trial.packing, trial.arrays
 
-    def read(self) -> Trial:
-        """All that LAMMPS has."""
+    def read(self, displacement: Floats | None = None) -> Trial:
+        """All that LAMMPS has, at the end of a displacement of shape (3N,)."""
         state = self.state()
         arrays = {"f_move": state}
         if self._static.compensated:
@@ -95,7 +95,9 @@ class Wire:
             angle, contacts = self._angle, touching(position, self._static.radius, self._static.box_length)
             graph, slip, slip_low = ContactGraph(contacts, self._static.radius), contacts.slip, None
         force = self.force(state)
-        return Trial(self._static, self._displacing.fx, position, low, angle, graph, slip, slip_low, force, arrays)
+        return Trial(
+            self._static, self._displacing.fx, position, low, angle, graph, slip, slip_low, force, arrays, displacement
+        )
 
     def motion(self) -> tuple[Floats, Floats | None, Floats]:
         """Positions, their low parts in compensated arithmetic, and velocities (v_x, v_y, omega)."""

@@ -96,6 +96,13 @@ class Ramped:
     forces: NDArray[np.float64]
     flows: bool
 
+    def undamped(self) -> Onset | None:
+        """All windows without dissipation; None if there is none."""
+        try:
+            return find_onset(dissipating(self.path), self.forces)
+        except OnsetError:
+            return None
+
     def first_window(self) -> Window | None:
         """The first window without dissipation, as far as a few increments show it; None if there is none."""
         for k in range(0, len(self.forces) - 1, FEW):
@@ -132,7 +139,7 @@ def ramped(
             f"disks: take {MOST_DISKS} at the most, or leave [damping] out"
         )
     with Engine(start.packing) as engine:
-        path = EquilibriumPath(engine, start, scene)
+        path = EquilibriumPath(engine, start, scene, onward=True)
         watch(f"ramp up to F_x = {wanted[-1]:g}")
         for _ in path.climb(wanted[1:]):
             pass
@@ -144,6 +151,7 @@ def damped_onset_run(
     scene: Scene,
     mu: float,
     watch: Callable[[str], None] = lambda says: None,
+    known: Callable[[DampedOnset, float], None] = lambda found, fx: None,
 ) -> DampedOnset:
     """The windows of growing motion of a scene for one friction coefficient, and its undamped onset.
 
@@ -155,6 +163,9 @@ def damped_onset_run(
         Friction coefficient.
     watch : callable, optional
         Told in words what is under way.
+    known : callable, optional
+        Given what is known, without the errors of the path, and the load up to which that is all, as soon as there is a
+        window and after each increment from there on.
 
     Raises
     ------
@@ -167,16 +178,20 @@ def damped_onset_run(
         raise SceneError("the scene has no section [damping]: add it, with cn, ct or tau")
     damping = scene.damping
     with ramped(scene, mu, watch) as ramp:
-        try:
-            undamped = find_onset(dissipating(ramp.path), ramp.forces)
-        except OnsetError:
-            undamped = None
+        watch(f"pairs that become complex without dissipation, up to F_x = {ramp.forces[-1]:.6g}")
+        undamped = ramp.undamped()
+
+        def so_far(windows: tuple[DampedWindow, ...], fx: float) -> None:
+            if windows:
+                known(DampedOnset(mu, windows, undamped, None), fx)
+
         dissipation = partial(dissipative, cn=damping.cn, ct=damping.ct, drag_time=damping.tau)
         found = damped_windows(
             lambda fx: dissipation(ramp.path(fx)),
             ramp.forces,
             look=() if undamped is None else inside(undamped.windows),
             watch=watch,
+            known=so_far,
         )
         last = float(ramp.forces[-1])
         if not found and ramp.flows:

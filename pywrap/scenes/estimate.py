@@ -18,6 +18,7 @@ import os
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
+from ...analysis import MindlinLaw
 from .keys import Keys
 from .packing_section import GeneratedPacking
 from .refusals import SceneError
@@ -130,7 +131,7 @@ def estimated(scene: Keys, task: Task) -> Estimate:
         Each includes the settling; perturb the ramp up to its equilibrium, onset that up to its end, reproduce the
         onset, a run whose growth is measured and, where the scene has [friction], the runs of [perturb].
     """
-    disks = _disks(scene)
+    disks = scene.packing.disks
     steps = _settling_steps(scene) if isinstance(scene.packing, GeneratedPacking) else 0.0
     increments, kept = 0.0, 1.0
     ramp, perturb = scene.ramp, scene.perturb
@@ -235,27 +236,23 @@ def impossible(scene: Keys) -> tuple[str, str] | None:
     return None
 
 
-def _disks(scene: Keys) -> int:
-    return scene.packing.disks
-
-
 def _searched_bytes(disks: int) -> float:
     """Memory of the search in slices of the spectrum."""
     bases = BYTES_OF_BASES[0] * disks**2
     return disks * BYTES_SEARCHED + (bases if bases < BYTES_OF_BASES[1] else 0.0)
 
 
-def _exponent(scene: Keys) -> float:
-    return float(scene.law.exponent)
-
-
 def _overlap(scene: Keys, force: float) -> float:
-    return float((force / scene.law.kn) ** (1 / _exponent(scene)))
+    return _law(scene).overlap_of_force(force)
 
 
 def _stiffness(scene: Keys, force: float) -> float:
-    p = _exponent(scene)
-    return float(p * scene.law.kn * _overlap(scene, force) ** (p - 1))
+    return float(_law(scene).normal_stiffness(_overlap(scene, force)))
+
+
+def _law(scene: Keys) -> MindlinLaw:
+    """The repulsion alone."""
+    return MindlinLaw(scene.law.kn, kt=0.0, mu=0.0, exponent=scene.law.exponent)
 
 
 def _settling_steps(scene: Keys) -> float:

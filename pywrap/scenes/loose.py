@@ -78,6 +78,7 @@ def loose_start(
     seed: int,
     *,
     periodic: bool = True,
+    draw: int = 0,
 ) -> Start:
     """Disks above the floor that overlap nowhere, the same on every platform for one seed.
 
@@ -95,6 +96,8 @@ def loose_start(
         Seed of numpy's PCG64.
     periodic : bool
         Whether x is periodic. All disks lie within the width in either case.
+    draw : int
+        Which of the loose starts of the seed: 0 is the first.
 
     Returns
     -------
@@ -113,7 +116,8 @@ def loose_start(
     if diameter > width:
         raise ValueError(f"a disk of radius {sizes.max()} is wider than the box of width {width}")
 
-    generator = np.random.Generator(np.random.PCG64(seed))
+    draws = np.random.SeedSequence(seed, spawn_key=(draw,) if draw else ())
+    generator = np.random.Generator(np.random.PCG64(draws))
     bulk = generator.permutation(bulk)
     columns = max(1, int(width / (CELL * diameter)))
     side = np.array([width / columns, CELL * diameter])

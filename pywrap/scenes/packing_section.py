@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ class GeneratedPacking(Section):
         Number of disks in the upper layer: free disks, above all others at the start, the load on each. By default a
         tenth of the disks, and at least as many as fit side by side (`loose.layer_size`). The paper gives no number.
     seed : int
-        Seed of the loose start.
+        Seed of the loose start; and of further ones, should the disks not come to rest from the first.
     periodic : bool
         Whether x is periodic, which the paper does not say. With false the sides are open, and nothing holds the disks
         there: that is refused, unless the packing is one row of disks, all of the upper layer.
@@ -41,6 +41,9 @@ class GeneratedPacking(Section):
         False: settled without friction, which then starts with zero slips, so that K is symmetric at F_x = 0.
         True: settled with friction, so that the packing carries tangential load from the start. The paper
         does not say which.
+    masses : {"equal", "spheres"}
+        Equal masses, of one, as in the paper; or those of spheres of one material, as the cube of the radius, the
+        smallest one.
     """
 
     disks: int = Field(100, gt=0, le=10_000_000)
@@ -51,6 +54,7 @@ class GeneratedPacking(Section):
     seed: int = Field(7, ge=0, lt=2**63)
     periodic: bool = True
     settle_friction: bool = False
+    masses: Literal["equal", "spheres"] = "equal"
 
     @field_validator("top", mode="before")
     @classmethod
@@ -84,9 +88,14 @@ class GeneratedPacking(Section):
             raise refusal("", f"is refused because {error}: widen the box, or take fewer disks") from None
         return self
 
-    def start(self) -> Start:
-        """The loose start that this section describes."""
-        return loose_start(self.disks, self.radii, self.top, self.width, self.seed, periodic=self.periodic)
+    def start(self, draw: int = 0) -> Start:
+        """The loose start that this section describes, or a later one of its seed."""
+        return loose_start(self.disks, self.radii, self.top, self.width, self.seed, periodic=self.periodic, draw=draw)
+
+    def mass_of(self, radius: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Masses of disks, shape (N,), in units of that of the smallest."""
+        power = 3 if self.masses == "spheres" else 0
+        return np.asarray((radius / min(self.radii)) ** power)
 
 
 class StoredPacking(Section):

@@ -33,6 +33,10 @@ KEYS = {"ramp": "step and until", "perturb": "fx and time"}
 """What a section needs at least."""
 
 
+MISSING = {"friction.v_ss": ', and the paper gives no value: give a velocity, or a multiple such as "10 v0"'}
+"""What is said of a key that is missing, where it is more than to add the key."""
+
+
 class SceneError(BadInputError):
     """A scene that cannot be run: one sentence that says what is wrong, where, and what to do."""
 
@@ -65,7 +69,7 @@ def refusal(key: str, says: str) -> PydanticCustomError:
     return PydanticCustomError("refused", "{key} {says}", {"key": key, "says": says})
 
 
-def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[BaseModel], ...]]) -> str:
+def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ...]]) -> str:
     """One error of pydantic as: where, what is wrong, what to do; `sections` has the models of each section."""
     kind, context = error["type"], error.get("ctx", {})
     path = [str(part) for part in error["loc"] if part not in ("generated", "stored")]
@@ -76,7 +80,7 @@ def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[BaseModel], 
         return f"{place} {context['says']}"
     if kind == "missing":
         what = f"{path[1]} to [{path[0]}]" if len(path) > 1 else f"the section [{place}]"
-        return f"{place} is missing: add {what}"
+        return f"{place} is missing{MISSING.get(place, f': add {what}')}"
     if not path:
         return "a scene maps the names of sections to their keys, and this one is no mapping: give a dict"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
@@ -85,7 +89,7 @@ def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[BaseModel], 
     return f"{place} = {reprlib.repr(error['input'])} is refused: {rule}"
 
 
-def _unknown_key(path: list[str], stored: bool, sections: Mapping[str, tuple[type[BaseModel], ...]]) -> str:
+def _unknown_key(path: list[str], stored: bool, sections: Mapping[str, tuple[type[Section], ...]]) -> str:
     *above, key = path
     homes = [name for name, models in sections.items() if any(key in model.model_fields for model in models)]
     if not above:

@@ -24,18 +24,15 @@ docstrings say where it does not.
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
-from pydantic import BaseModel, ValidationError, model_validator
+from pydantic import ValidationError, model_validator
 
 from .estimate import impossible
 from .keys import Keys
-from .packing_section import GeneratedPacking, StoredPacking
-from .refusals import SceneError, refusal, sentence
-from .sections import Damping, Friction, Law, Load, Output, Perturb, Ramp, Relax
-from .study_sections import Eruptions, Modes, Trigger
+from .packing_section import GeneratedPacking
+from .refusals import SceneError, Section, refusal, sentence
 from .units import real_units
-from .units_section import Units
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -142,18 +139,11 @@ class Scene(Keys):
         return self.model_dump(mode="json", exclude_none=True)
 
 
-SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
-    "packing": (GeneratedPacking, StoredPacking),
-    "law": (Law,),
-    "load": (Load,),
-    "relax": (Relax,),
-    "ramp": (Ramp,),
-    "perturb": (Perturb,),
-    "friction": (Friction,),
-    "trigger": (Trigger,),
-    "eruptions": (Eruptions,),
-    "modes": (Modes,),
-    "units": (Units,),
-    "damping": (Damping,),
-    "output": (Output,),
-}
+def _models(annotation: Any) -> tuple[type[Section], ...]:
+    """The sections that an annotation allows."""
+    if isinstance(annotation, type):
+        return (annotation,) if issubclass(annotation, Section) else ()
+    return tuple(model for part in get_args(annotation) for model in _models(part))
+
+
+SECTIONS = {name: models for name, field in Keys.model_fields.items() if (models := _models(field.annotation))}

@@ -26,6 +26,8 @@ stiffer or more loaded: growth rates cannot grow with it for ever.
 **Where b matters.** A tangential force that depends on the overlap, :math:`b = \partial f_t/\partial\delta`, makes K
 non-symmetric. Of packings of up to `SMALL` disks pairs are also counted with b of sticking contacts alone, of sliding
 contacts alone, and of none, at the same equilibria. (The turning of the tangent, which is non-symmetric too, stays.)
+With rescaled slips b is the mean of that of contacts which close and of contacts which part, and the key while has the
+pairs with either (:mod:`~faultgouge.analysis.packing.law`).
 """
 
 from __future__ import annotations
@@ -158,9 +160,17 @@ def switched(packing: Packing) -> dict[str, dict[str, Any]]:
     }
 
 
-def _values(packing: Packing, coupled: NDArray[np.bool_]) -> Complexes:
+def parting(packing: Packing) -> dict[str, dict[str, Any]]:
+    """The complex pairs of a law with rescaled slips while all contacts close, and while all part."""
+    return {
+        name: Counted.of(_values(packing, parting=share)).as_dict()
+        for name, share in (("closing", 0.0), ("parting", 1.0))
+    }
+
+
+def _values(packing: Packing, coupled: NDArray[np.bool_] | None = None, parting: float = 0.5) -> Complexes:
     """Eigenvalues of K in which b counts for some contacts; pairs within the bound of rounding are made real."""
-    matrix = mass_weighted(stiffness_matrix(packing, coupled=coupled), packing)
+    matrix = mass_weighted(stiffness_matrix(packing, coupled=coupled, parting=parting), packing)
     active = active_coordinates(matrix)
     dense = matrix[active][:, active].toarray()
     values = np.asarray(eigvals(dense, check_finite=False), dtype=np.complex128)
@@ -236,5 +246,7 @@ def _load(packing: Packing) -> dict[str, Any]:
         row |= {"participation": float(pair.participation[0]), "rotation": float(pair.rotation[0])}
     if len(packing) <= SMALL:
         row["b_of"] = switched(packing)
+        if packing.law.rescaled:
+            row["while"] = parting(packing)
     digits = [[float(f"{w.real:.{DIGITS}g}"), float(f"{w.imag:.{DIGITS}g}")] for w in found.omega.tolist()]
     return row | {"frequencies": digits}

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from ...figures.film import Film
 from ...figures.style import INK, styled
@@ -16,10 +17,14 @@ from ...figures.style import INK, styled
 ROCK = (50, 300)
 """Quality factors of rock."""
 
+TICKS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4)
+"""F_x/F_y that stand below an axis, where they were looked at."""
+
 LABELS = {
     "share": "share of complex modes",
     "growth_rate": r"largest $2\,|\mathrm{Im}\,\omega|$",
     "least_q": "least Q",
+    "critical_restitution": "critical restitution",
 }
 
 Course = Mapping[str, Any]
@@ -42,7 +47,10 @@ def over_load(courses: Mapping[str, Course], names: Sequence[str] = ("share", "g
         for number, (label, course) in enumerate(courses.items()):
             _band(axes, course["loads"], np.array(course[name], dtype=float), f"C{number}", label)
         axes.set(xscale="log", xlabel=r"$F_x/F_y$", ylabel=LABELS[name])
-        if name != "share":
+        seen = {load for course in courses.values() for load in course["loads"]}
+        axes.set_xticks([load for load in TICKS if load in seen], [f"{load:g}" for load in TICKS if load in seen])
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        if name in ("growth_rate", "least_q"):
             axes.set_yscale("log")
         if name == "least_q":
             axes.axhspan(*ROCK, color="0.9", zorder=0)

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ...analysis.packing.packing import Floats
+from ..statistics import share
+from .loss import GROWS, RESTITUTIONS
 from .tables import Table, median, power
 
 QUANTITIES = ("share", "growth_rate", "least_q")
 
+QUALITIES = (10, 30, 100, 300, 1000)
+"""Quality factors of structural losses."""
+
 LEVELS = (0.1, 0.3)
 """Shares of complex modes whose loads are compared between sizes."""
+
+NOT_COMPARED = ("random", "loss", "runs", "quartz", "thick")
+"""Sets of other tasks than "modes"."""
 
 COMPARED = (0.03, 0.1, 0.2)
 """F_x/F_y at which kinds of packings, checks and switches of b are compared."""
@@ -26,34 +35,97 @@ def numbers(tables: Mapping[str, Table]) -> dict[str, Any]:
     -------
     dict
         sizes : by number of disks, medians of each quantity over the loads, and the load of the last equilibrium;
-        powers : exponents of N; random : shares of random matrices beside those of the packings; sets : medians at
-        `COMPARED` of every set; switches : the same with b of some contacts.
+        powers : exponents of N; random : shares of random matrices beside those of the packings; loss : what stops
+        the pairs, by number of disks; structural : share of packings that grow, for each quality factor; quartz :
+        as loss, of the shipped scenes; runs : growth with dashpots in LAMMPS beside the pencil's; sets : medians
+        at `COMPARED` of every set; switches : the same with b of some contacts; histories : with total slips and
+        with rescaled ones.
     """
-    by_size = {table.disks: table for name, table in sorted(tables.items()) if name.startswith("force ")}
-    by_size = dict(sorted(by_size.items()))
-    randoms = sorted((each for name, each in tables.items() if name.startswith("random ")), key=lambda each: each.disks)
+    by_size, randoms, lossy, runs = (_of_sizes(tables, kind) for kind in ("force", "random", "loss", "runs"))
+    quartz = {name: table for name, table in tables.items() if name.startswith(("quartz", "thick"))}
+    counted = {name: table for name, table in tables.items() if name.split()[0] not in NOT_COMPARED}
     return {
-        "sizes": {disks: along(table) for disks, table in by_size.items()},
+        "sizes": {disks: to_the_end(table) for disks, table in by_size.items()},
         "powers": powers(by_size),
-        "sets": {name: compared(table) for name, table in tables.items()},
-        "random": {table.disks: against_random(table, by_size) for table in randoms},
+        "sets": {name: compared(counted[name]) for name in sorted(counted, key=_place)},
+        "random": {disks: against_random(table, by_size) for disks, table in randoms.items()},
+        "loss": {disks: losses(table) for disks, table in lossy.items()},
+        "structural": {disks: structural(table) for disks, table in by_size.items()},
+        "quartz": {name: losses(quartz[name]) for name in sorted(quartz, key=_place)},
+        "runs": {disks: measured(table) for disks, table in runs.items()},
         "switches": switches(by_size[100]) if 100 in by_size else {},
+        "histories": histories(tables),
         "packings": sum(len(table.rows) for table in tables.values()),
         "cpu_hours": sum(row["cpu_seconds"] for table in tables.values() for row in table.rows) / 3600,
     }
 
 
-def along(table: Table) -> dict[str, Any]:
-    """Medians with intervals at each load, and of F_x/F_y at the last equilibrium."""
+def _of_sizes(tables: Mapping[str, Table], kind: str) -> dict[int, Table]:
+    """The sets of a kind by number of disks, smallest first."""
+    found = {table.disks: table for name, table in tables.items() if name.split()[0] == kind}
+    return dict(sorted(found.items()))
+
+
+def _place(name: str) -> tuple[str, int]:
+    """Sets by name, and by the number in it."""
+    return name.rstrip("0123456789"), int("".join(filter(str.isdecimal, name)) or 0)
+
+
+def along(table: Table, names: Sequence[str] = QUANTITIES) -> dict[str, Any]:
+    """Medians with intervals at each load, and how many packings bear it."""
     found: dict[str, Any] = {"packings": len(table.rows), "loads": table.loads}
-    found["count"] = [len(table.at(load, "share")) for load in table.loads]
-    for name in QUANTITIES:
-        found[name] = [median(table.at(load, name)) for load in table.loads]
+    found["count"] = [len(table.at(load, names[0])) for load in table.loads]
+    return found | {name: [median(table.at(load, name)) for load in table.loads] for name in names}
+
+
+def to_the_end(table: Table) -> dict[str, Any]:
+    """The same, and F_x/F_y at the last equilibrium with the share just before it."""
+    found = along(table, (*QUANTITIES, "omega"))
     ended = [row for row in table.rows if row["ends"] != "until"]
     found["ended"] = len(ended)
     found["end"] = median(ends(table))
     found["last_share"] = median([row["loads"][-1]["share"] for row in ended if row["loads"]])
     return found
+
+
+def losses(table: Table) -> dict[str, Any]:
+    """What stops the pairs: critical losses, and the share of packings in which motion grows for each restitution."""
+    found = along(table, ("critical_restitution", "least_q", "drag_rate", "growth_rate"))
+    if all("slowest" in load for row in table.rows for load in row["loads"]):
+        found |= {name: along(table, (name,))[name] for name in ("omega", "slowest")}
+    grows = {}
+    for each in RESTITUTIONS:
+        grows[f"{each:g}"] = [
+            share(sum(rate > GROWS for e, rate, _ in flat if e == each), found["count"][k])
+            for k, flat in enumerate(_damped(table, load) for load in table.loads)
+        ]
+    returns = sum(
+        any(later[1] > GROWS >= earlier[1] for earlier, later in pairwise(load["damped"]))
+        for row in table.rows
+        for load in row["loads"]
+    )
+    return found | {"grows": grows, "returns": returns}
+
+
+def _damped(table: Table, fx_over_fy: float) -> list[list[float]]:
+    loads = [load for row in table.rows for load in row["loads"] if load["fx_over_fy"] == fx_over_fy]
+    return [each for load in loads for each in load["damped"]]
+
+
+def structural(table: Table) -> dict[str, Any]:
+    """Share of packings in which a pair grows in spite of a structural loss, for each quality factor and load."""
+    least = {load: table.at(load, "least_q") for load in table.loads}
+    return {f"{q}": [share(int(np.sum(each < q)), len(each)) for each in least.values()] for q in QUALITIES}
+
+
+def measured(table: Table) -> list[dict[str, Any]]:
+    """The runs of a set, with seed, load and contacts at the bound."""
+    return [
+        {"seed": row["seed"], "fx_over_fy": load["fx_over_fy"], "sliding": load["sliding"]} | run
+        for row in table.rows
+        for load in row["loads"]
+        for run in load["runs"]
+    ]
 
 
 def ends(table: Table) -> Floats:
@@ -132,6 +204,24 @@ def switches(table: Table) -> dict[str, Any]:
             )
         }
     return found
+
+
+HISTORIES = {"total": "force 100", "rescaled": "rescaled history"}
+"""The set of each history of the slip."""
+
+
+def histories(tables: Mapping[str, Table]) -> dict[str, Any]:
+    """Packings of the same seeds with total and with rescaled slips, at each load; nothing where a set is missing."""
+    if not all(name in tables for name in HISTORIES.values()):
+        return {}
+    rows = {law: {row["seed"]: row for row in tables[name].rows} for law, name in HISTORIES.items()}
+    seeds = sorted(set.intersection(*map(set, rows.values())))
+    matched = {law: Table(HISTORIES[law], tuple(rows[law][seed] for seed in seeds)) for law in HISTORIES}
+    return {
+        law: along(table, ("share", "least_q"))
+        | {"with_pairs": [int(np.sum(table.at(load, "pairs") > 0)) for load in table.loads]}
+        for law, table in matched.items()
+    }
 
 
 def against_random(table: Table, by_size: Mapping[int, Table]) -> dict[str, Any]:

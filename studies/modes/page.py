@@ -11,14 +11,23 @@ import numpy as np
 from ...analysis.files.wholefile import write_text
 from ...figures.pages import render
 from ...figures.style import save_as
+from ...pywrap import Scene
+from ...pywrap.scenes.refusals import needed
+from ...pywrap.scenes.units import real_units
 from .draw import collapse, over_load
-from .numbers import COMPARED, numbers
-from .sets import FEWER, KINDS, SIZES
+from .loss import EVERY, RESTITUTIONS
+from .numbers import COMPARED, QUALITIES, numbers
+from .sets import SIZES, quartz
 from .tables import read_tables
+
+PAGES = ("modes.md", "tables.md")
+
+LOSSES = ("least_q", "critical_restitution")
+"""Quantities of the picture of loss."""
 
 
 def write_page(tables: Path, folder: Path) -> Path:
-    """Write modes.md, modes.json and the pictures from tables.
+    """Write modes.md, tables.md, modes.json and the pictures from tables.
 
     Parameters
     ----------
@@ -30,19 +39,39 @@ def write_page(tables: Path, folder: Path) -> Path:
     Returns
     -------
     Path
-        The page.
+        The first page.
     """
     found = numbers(read_tables(tables))
     save_as(over_load({str(disks): course for disks, course in found["sizes"].items()}), folder / "sizes.png")
     power = found["powers"]["load of share 0.1"]["power"]
     save_as(collapse(found["sizes"], power[0], found["random"]), folder / "collapse.png")
     write_text(folder / "modes.json", json.dumps(finite(found), indent=1) + "\n")
-    page = folder / "modes.md"
-    names = {"planned": SIZES, "fewer": FEWER, "kinds": KINDS, "compared": COMPARED}
-    write_text(
-        page, render(__package__ or "", "modes.md.j2", **found, **names, middle=middle, plain=plain, exponent=exponent)
-    )
-    return page
+    save_as(over_load({str(disks): course for disks, course in found["loss"].items()}, LOSSES), folder / "loss.png")
+    names = {"planned": SIZES, "compared": COMPARED, "qualities": QUALITIES, **told(found)}
+    formats = {"middle": middle, "plain": plain, "exponent": exponent, "part": part, "critical": critical}
+    for name in PAGES:
+        write_text(folder / name, render(__package__ or "", f"{name}.j2", **found, **names, **formats))
+    return folder / PAGES[0]
+
+
+def told(found: dict[str, Any]) -> dict[str, Any]:
+    """What the page says of loss in words: whether growth comes back, and how near LAMMPS is to the pencil."""
+    runs = [run for each in found["runs"].values() for run in each if run["measured"] is not None]
+    off = {
+        kind: [run["measured"] / run["predicted"] - 1 for run in runs if (run["ct_over_cn"] == 0) == (kind == "still")]
+        for kind in ("still", "both")
+    }
+    sizes = {kind: 100 * np.abs(each) for kind, each in off.items()}
+    errors = {kind: f"{np.median(each):.2g}" for kind, each in sizes.items()}
+    errors |= {f"{kind}_most": f"{each.max():.2g}" for kind, each in sizes.items()}
+    returns = sum(course["returns"] for course in found["loss"].values())
+    counted = "no load" if returns == 0 else f"{returns} loads"
+    return {
+        "run_count": len(runs),
+        "run_errors": errors | {"faster": sum(each > 0 for each in off["both"]), "of": len(off["both"])},
+        "returning": f"Growth that a stronger loss brings back was seen at {counted} of packings of {EVERY} disks, for "
+        "which every restitution was looked at.",
+    }
 
 
 def finite(value: Any) -> Any:
@@ -65,6 +94,42 @@ def middle(value: list[float], digits: str = ".2g", factor: float = 1.0) -> str:
 def plain(value: float) -> str:
     """A number, or a word where it is infinite."""
     return "none" if np.isinf(value) else format(value, ".3g")
+
+
+def in_real_units(found: dict[str, Any]) -> list[str]:
+    """Rows of the table of quartz in docs/units.md: growth in microseconds and frequencies in megahertz."""
+    rows = []
+    for name, course in found["quartz"].items():
+        if not name.startswith("quartz"):
+            continue
+        real = needed(real_units(Scene.from_mapping(quartz(name.removeprefix("quartz ")))), "units")
+        for k, load in enumerate(course["loads"]):
+            rate, omega = course["growth_rate"][k][0], course["omega"][k][0]
+            grows = "none" if rate == 0 else f"{1e6 * real.time / rate:.2g}"
+            frequency = "none" if omega is None or np.isinf(omega) else f"{real.frequency(omega) / 1e6:.2g}"
+            least = [np.inf if each is None else each for each in course["least_q"][k]]
+            cells = [
+                name.removeprefix("quartz "),
+                f"{load:g}",
+                f"{course['count'][k]}",
+                grows,
+                frequency,
+                middle(least),
+            ]
+            cells += [critical(course["critical_restitution"][k]), part(course["grows"]["0.9"][k])]
+            rows.append("| " + " | ".join(cells) + " |")
+    return rows
+
+
+def part(value: dict[str, Any]) -> str:
+    """A share of packings with its interval."""
+    return "-" if value["share"] is None else f"{value['count']} ({value['low']:.2f} to {value['high']:.2f})"
+
+
+def critical(value: list[float]) -> str:
+    """A critical restitution with its interval; the strongest loss that was looked at stands for all below."""
+    words = [f"under {each:.2g}" if each <= min(RESTITUTIONS) + 1e-6 else f"{each:.3g}" for each in value]
+    return "-" if np.isnan(value[0]) else f"{words[0]} ({words[1]} to {words[2]})"
 
 
 def exponent(value: list[float] | None) -> str:

@@ -10,12 +10,19 @@ seeds from another range.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
+from importlib.resources import files
 from math import ceil, sqrt
 from typing import Any
 
 from ..sweep.points import Sweep
 from ..sweep.tasks import TASKS
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 SIZES = {50: 100, 100: 100, 200: 50, 400: 30, 1000: 15}
 """Packings by number of disks, with a fixed force on each disk of the layer and mu = 1."""
@@ -27,6 +34,7 @@ KINDS: Mapping[str, tuple[int, Mapping[str, Mapping[str, Any]]]] = {
     "settled with friction": (6, {"packing": {"settle_friction": True}}),
     "harmonic": (40, {"law": {"exponent": 1, "kn": 7e3}}),
     "stiff tangent": (40, {"law": {"kt": "1/2 kn"}}),
+    "rescaled history": (20, {"law": {"history": "rescaled"}}),
 }
 """Packings of 100 disks of other kinds: how many, and what differs. k_n of the harmonic law as in docs/genericity."""
 
@@ -42,6 +50,21 @@ RANDOM = {50: 20, 100: 20, 200: 10, 400: 4}
 
 AT = [0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3]
 """F_x/F_y of these."""
+
+LOSSY = {50: 40, 100: 40, 200: 20, 400: 8}
+"""Packings whose critical losses are found, by number of disks; they are the first ones of `SIZES`."""
+
+LOSSY_AT = [0.02, 0.05, 0.1, 0.2, 0.3]
+"""F_x/F_y of these."""
+
+QUARTZ = {"1 MPa": 20, "10 MPa": 20, "100 MPa": 20}
+"""Packings of the shipped scenes quartz_1MPa.toml and so on, with other seeds."""
+
+THICK = {50: 20, 200: 10, 400: 4}
+"""The same at 10 MPa with other numbers of disks in the same width: other thicknesses of the layer."""
+
+RUNS = {100: 6, 400: 1}
+"""Packings whose growth with dashpots is measured in LAMMPS, at F_x/F_y of 0.1 and 0.2."""
 
 SHARES = (0.2, 0.5, 1.0)
 """Rounds, so that a study that is cut off has something of all."""
@@ -72,6 +95,14 @@ def sets(share: float = 1.0) -> dict[str, Sweep]:
         found[name] = _sweep(100, _first(most, share), changes)
     for disks, most in RANDOM.items():
         found[f"random {disks}"] = _sweep(disks, _first(most, share), {"modes": {"fx_over_fy": AT}}, "random matrices")
+    for disks, most in LOSSY.items():
+        found[f"loss {disks}"] = _sweep(disks, _first(most, share), {"modes": {"fx_over_fy": LOSSY_AT}}, "loss")
+    for disks, most in RUNS.items():
+        found[f"runs {disks}"] = _sweep(disks, _first(most, share), {"modes": {"fx_over_fy": [0.1, 0.2]}}, "lossy runs")
+    for depth, most in QUARTZ.items():
+        found[f"quartz {depth}"] = _shipped(depth, _first(most, share))
+    for disks, most in THICK.items():
+        found[f"thick {disks}"] = _shipped("10 MPa", _first(most, share), disks)
     for name, (seeds, changes) in CHECKS.items():
         found[name] = _sweep(100, seeds, changes)
     return found
@@ -79,6 +110,18 @@ def sets(share: float = 1.0) -> dict[str, Sweep]:
 
 def _first(most: int, share: float) -> str:
     return f"1:{max(1, ceil(most * share))}"
+
+
+def quartz(depth: str, disks: int = 100) -> dict[str, Any]:
+    """The shipped scene of quartz spheres under an overburden, such as "10 MPa", with so many disks."""
+    path = files("faultgouge.scenes") / f"quartz_{depth.replace(' ', '')}.toml"
+    scene = tomllib.loads(path.read_text(encoding="utf-8"))
+    scene["packing"]["disks"] = disks
+    return scene
+
+
+def _shipped(depth: str, seeds: str, disks: int = 100) -> Sweep:
+    return Sweep.from_mapping({"task": "loss", "sweep": {"packing.seed": seeds}, "scene": quartz(depth, disks)}, TASKS)
 
 
 def _sweep(disks: int, seeds: str, changes: Mapping[str, Any], task: str = "modes") -> Sweep:

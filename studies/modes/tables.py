@@ -27,7 +27,7 @@ LEFT_OUT = ("frequencies",)
 
 
 def condense(results: Path, tables: Path) -> None:
-    """Write the tables from the folders that the sweeps have left, one a set.
+    """Add what the sweeps have left, a folder a set, to the tables; a packing that is in both is the new one.
 
     Parameters
     ----------
@@ -38,8 +38,20 @@ def condense(results: Path, tables: Path) -> None:
     """
     tables.mkdir(parents=True, exist_ok=True)
     for folder in sorted(path for path in results.iterdir() if (path / LINES).exists()):
-        rows = sorted(stored(folder / LINES).values(), key=lambda row: row["values"]["packing.seed"])
-        write_text(tables / f"{folder.name}{ENDING}", "".join(json.dumps(_line(row)) + "\n" for row in rows))
+        rows = known(tables, folder.name) | {row["seed"]: row for row in map(_line, stored(folder / LINES).values())}
+        write_text(table_of(tables, folder.name), "".join(json.dumps(rows[seed]) + "\n" for seed in sorted(rows)))
+
+
+def table_of(tables: Path, name: str) -> Path:
+    """The file of a set's table."""
+    return tables / f"{name.replace(' ', '_')}{ENDING}"
+
+
+def known(tables: Path, name: str) -> dict[int, dict[str, Any]]:
+    """The rows of a set's table by seed; none where there is no table."""
+    path = table_of(tables, name)
+    rows = map(json.loads, path.read_text().splitlines()) if path.exists() else ()
+    return {row["seed"]: row for row in rows}
 
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:
@@ -53,6 +65,8 @@ def _rounded(value: Any) -> Any:
     """Numbers to the digits that a table keeps."""
     if isinstance(value, dict):
         return {key: _rounded(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_rounded(each) for each in value]
     return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...analysis.digits import with_uncertainty
 from ...analysis.files.wholefile import write_text
+from ...figures.pages import lines
 from ...figures.style import save
 from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.packing_section import GeneratedPacking
@@ -113,7 +114,7 @@ def ensemble(
     save(
         ensemble_figure([member.ramps for member in found], [member.eruption for member in found]), output / "ensemble"
     )
-    for line in words(result):
+    for line in lines(__package__ or "", "ensemble.j2", result=result):
         say(line)
     return result
 
@@ -184,49 +185,3 @@ def sentence(member: Member) -> str:
     if member.says is not None:
         parts.append(f"failed: {member.says}")
     return f"seed {member.seed}: {'; '.join(parts)} ({member.seconds:.0f} s)"
-
-
-def words(result: dict[str, Any]) -> list[str]:
-    """The summary in plain words."""
-    lines = [f"{len(result['seeds'])} packings, of which {len(result['failed'])} failed"]
-    for onset in result["onsets"]:
-        lines.append(
-            f"mu = {onset['mu']:g}: an onset in {_percent(onset['found'])}, {onset['flows']} flow before, "
-            f"{onset['none_until']} have none up to the end; {_quartile_words(onset['quartiles'])}"
-        )
-    lines.append(
-        f"weakening friction lowers the onset in {_percent(result['lowered'])}; of {result['lowered_unknown']} others "
-        "the ramps do not tell, because neither of the two onsets, or the wrong one, was reached"
-    )
-    if result["grows"]["of"] == 0:
-        return lines
-    lines += [
-        f"rise of D by {decades} decades or more: {_percent(found)} of the packings with a window between the onsets, "
-        f"and {_percent(result['control_rises'][decades])} of their controls below both onsets"
-        for decades, found in result["rises"].items()
-    ]
-    lines.append(
-        f"unstable with the weakened friction, by the spectrum: {_percent(result['unstable_when_weakened'])}; "
-        f"D goes on to grow after its jump: {_percent(result['grows'])}"
-    )
-    return lines
-
-
-def _quartile_words(quartiles: list[float | None]) -> str:
-    low, median, high = quartiles
-    if low is None:
-        return "F_x^c: in three of four packings beyond what the ramps reached"
-    if median is None:
-        return f"F_x^c: lower quartile {low:.4g}, median beyond what the ramps reached"
-    if high is None:
-        return f"F_x^c: median {median:.4g}, lower quartile {low:.4g}, upper one beyond what the ramps reached"
-    return f"F_x^c: median {median:.4g}, quartiles {low:.4g} and {high:.4g}"
-
-
-def _percent(found: dict[str, Any]) -> str:
-    if found["of"] == 0:
-        return "0 of 0"
-    return (
-        f"{found['count']} of {found['of']} ({100 * found['share']:.0f} %, 95 % interval {100 * found['low']:.0f} to "
-        f"{100 * found['high']:.0f} %)"
-    )

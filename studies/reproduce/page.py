@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
-from ...analysis import Packing
 from ...figures.pages import render
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
+from ...pywrap.scenes.units import dashpot, quality_factor, real_units
+from ..triggering import column
 from ..triggering.page import section
 from .compute import GrowthRun, TriggeringRun
-from .si import si_rows
 
 
 def report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, triggered: TriggeringRun | None) -> str:
@@ -41,8 +42,8 @@ def report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, triggered: Tri
         growth=growth,
         triggering=_triggering(triggered),
         another=triggered if triggered is not None and triggered.scene is not scene else None,
-        assumptions=_assumptions(scene, packing),
-        si=si_rows(scene, runs, growth, triggered),
+        settled_with_friction=getattr(scene.packing, "settle_friction", False),
+        **_in_si(scene, growth, triggered),
     )
 
 
@@ -54,25 +55,23 @@ def _triggering(triggered: TriggeringRun | None) -> str:
     return section(triggered.triggering, triggered.sensitive, triggered.scene, triggered.onsets[0].mu)
 
 
-def _assumptions(scene: Scene, packing: Packing) -> list[str]:
-    periodic = packing.box_length is not None
-    return [
-        f"side boundaries: {'periodic in x, width ' + format(packing.box_length, 'g') if periodic else 'open'}",
-        "upper layer: free disks, the constant force on each, no bond between them",
-        f"inertia: I_0 = {packing.inertia_factor:g} in I = I_0 m R^2 (a uniform disk has 1/2)",
-        f"tangential stiffness: k_t = {packing.law.kt:.10g}, k_n = {packing.law.kn:g}",
-        "settling: "
-        + (
-            "with friction, so that the packing carries tangential load at F_x = 0"
-            if getattr(scene.packing, "settle_friction", False)
-            else "without friction, which then begins with zero slips, so that K is symmetric at F_x = 0; every disk "
-            "is pulled down first, so that the upper layer comes to lie on the bed"
-        ),
-        "time step of undamped runs: 0.05 of the stability limit 2/omega_max, if the scene has none; damping in "
-        "relaxation only",
-        "f_min: the force on a disk, with torque over radius, in the units of k_n and F_y; what was reached is said "
-        "above",
-        "stability operator: the exact derivative of the forces, with the turning of the tangent that the paper's "
-        "Eq. 14 leaves out",
-        "units: mass of a disk 1, diameter of a small disk 1, k_n as given",
-    ]
+def _in_si(scene: Scene, growth: GrowthRun, triggered: TriggeringRun | None) -> dict[str, Any]:
+    """What the column in SI needs; `real` is None if the scene has no units."""
+    real, units = real_units(scene), scene.units
+    if real is None or units is None:
+        return {"real": None}
+    fastest = max(growth.spectrum.pairs, key=lambda each: each.growth_rate)
+    found = {
+        "real": real,
+        "scene": scene,
+        "fastest": fastest,
+        "quality": quality_factor(0.5 * fastest.growth_rate + 1j * fastest.frequency),
+        "dashpot": None,
+        "wave": None,
+    }
+    if units.restitution is not None:
+        velocity = units.si("impact_velocity") / real.velocity(1.0)
+        found["dashpot"] = dashpot(scene.law.kn, units.restitution, 1.0, velocity)
+    if triggered is not None and triggered.triggering is not None and triggered.scene is scene:
+        found |= {"wave": triggered, "erupted": float(column(triggered.triggering.erupting, "msd").max())}
+    return found

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from ...pywrap import Scene
 from ..eruptions.compute import erupt
 from ..eruptions.study import starts_of
-from ..trigger.compute import Wave, as_row, bisected, chosen, equilibria, frequencies, predictions, settings, threshold
+from ..trigger.compute import bisected, chosen, equilibria, frequencies, predictions, settings, threshold, waves
 from .onset import Start, onset
 
 
@@ -19,22 +20,20 @@ def trigger(scene: Scene, start: Start) -> dict[str, Any]:
     SceneError
         If the scene has no section [ramp], or no v_0.
     """
-    v0, wave, first = threshold(scene), settings(scene), onset(scene, start)
+    threshold(scene)
+    wave, first = settings(scene), onset(scene, start)
     if first["ends"] != "onset":
         return {"ends": first["ends"], "fx_c": None, "map": [], "measured": []}
     packings = equilibria(scene, [first["fx_c"] * (1 - each) for each in wave.distance])
     by_distance = {each: packings[first["fx_c"] * (1 - each)] for each in sorted(wave.distance, reverse=True)}
     omegas = frequencies(next(iter(by_distance.values())), wave)
     predicted = [row for each, packing in by_distance.items() for row in predictions(scene, packing, each, omegas)]
-    measured = [
-        bisected(Wave(packings[each.fx], each.distance, each.omega, wave.time, wave.on, v0, each.predicted))
-        for each in chosen(predicted, wave.runs)
-    ]
+    measured = [bisected(each) for each in waves(scene, packings, chosen(predicted, wave.runs))]
     return {
         "ends": "onset",
         "fx_c": first["fx_c"],
-        "map": [as_row(each) for each in predicted],
-        "measured": [as_row(each) | {"amplitude": each.amplitude} for each in measured],
+        "map": [asdict(each) for each in predicted],
+        "measured": [asdict(each) | {"amplitude": each.amplitude} for each in measured],
     }
 
 

@@ -16,6 +16,8 @@ from ...pywrap.scenes.study_sections import Modes
 from ..genericity.levels import growth, levels
 from ..genericity.surrogates import surrogates
 from ..modes.compute import modes
+from ..modes.loss import loss
+from ..modes.lossy_runs import lossy_runs
 from ..modes.random_matrices import random_matrices
 from ..yielding.compute import yielding
 from .events import eruptions, trigger
@@ -92,6 +94,12 @@ def modes_seconds(scene: Scene) -> float:
     return 0.02 * loads * (disks_of(scene) / 100) ** 2.7 + 3e-3 * increments(scene) * disks_of(scene) / 100
 
 
+def loss_seconds(scene: Scene) -> float:
+    """CPU seconds of the pencils along a ramp: 8 s for 100 disks and 5 loads, growing as the disks to the power 2.3."""
+    loads = len((scene.modes or Modes()).fx_over_fy)
+    return 1.6 * loads * (disks_of(scene) / 100) ** 2.3
+
+
 def yield_seconds(scene: Scene) -> float:
     """CPU seconds of the path to static yield, fifteen runs from equilibria and four with a load that rises: 60 s for
     100 disks."""
@@ -109,6 +117,8 @@ TASKS: Mapping[str, Task] = {
     "trigger": Task(trigger, trigger_seconds),
     "eruptions": Task(eruptions, eruptions_seconds),
     "modes": Task(modes, modes_seconds),
+    "loss": Task(loss, loss_seconds),
+    "lossy runs": Task(lossy_runs, loss_seconds),
     "random matrices": Task(random_matrices, lambda scene: 3 * modes_seconds(scene)),
     "yield": Task(yielding, yield_seconds),
     "levels": Task(levels, dense_seconds),

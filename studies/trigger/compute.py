@@ -17,8 +17,8 @@ v_0 is the user's. The paper takes the largest velocity of the run that nobody p
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -208,6 +208,14 @@ def chosen(predicted: list[Prediction], runs: int) -> list[Prediction]:
     return picked
 
 
+def waves(scene: Scene, packings: Mapping[float, Packing], wanted: Iterable[Prediction]) -> list[Wave]:
+    """The waves of predictions that are to be bisected, on the packings at their loads."""
+    given, v0 = settings(scene), threshold(scene)
+    return [
+        Wave(packings[each.fx], each.distance, each.omega, given.time, given.on, v0, each.predicted) for each in wanted
+    ]
+
+
 def bisected(wave: Wave) -> Measured:
     """a_c in LAMMPS, on this process alone."""
     with threadpool_limits(1):
@@ -261,8 +269,3 @@ def in_si(real: RealUnits, found: Prediction, on: str) -> dict[str, float]:
         "strain": velocity / real.shear_wave,
         "stress_ratio": found.fx / real.fy,
     }
-
-
-def as_row(found: Prediction | Measured) -> dict[str, float]:
-    """For JSON."""
-    return asdict(found)

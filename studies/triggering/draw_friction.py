@@ -6,61 +6,41 @@ r"""Friction that weakens with the velocity v of the upper layer: the law, and w
 which passes :math:`v_0` without a jump if :math:`B + \mu_{ss} = 1`.
 """
 
-from dataclasses import dataclass
-
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...analysis.packing.packing import Floats
 from ...figures.series import positive
 from ...figures.style import INK, styled
-
-Floats = NDArray[np.float64]
+from ...pywrap.lammps.dynamics import Weakening
 
 WEAKENING = "C0"
 
 
-@dataclass(frozen=True)
-class FrictionLaw:
-    """Friction that weakens with velocity, the paper's Eq. 5.
+PAPERS = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=0.0, v_ss=1.0)
+"""The paper's law; its v_0 is a matter of the packing, and its v_ss is not given."""
 
-    Parameters
-    ----------
-    mu_0 : float
-        Static friction coefficient.
-    B, w, mu_ss : float
-        Numbers of the law; the defaults are those of the paper's simulations.
-    v_0 : float
-        Velocity at which it begins to fall.
-    v_ss : float
-        Velocity over which it falls, positive.
-    """
 
-    mu_0: float = 1.0
-    B: float = 0.2
-    w: float = 0.4
-    mu_ss: float = 0.8
-    v_0: float = 0.0
-    v_ss: float = 1.0
-
-    def __call__(self, velocity: ArrayLike) -> Floats:
-        """mu at these velocities of the upper layer, an array of their shape."""
-        v = np.asarray(velocity, dtype=float)
-        above = np.maximum(v - self.v_0, 0.0) / self.v_ss
-        return self.mu_0 * np.where(v > self.v_0, self.B * np.exp(-self.w * above) + self.mu_ss, 1.0)
+def share(law: Weakening, velocity: ArrayLike) -> Floats:
+    """mu / mu_0 at some velocities of the upper layer, an array of their shape."""
+    v = np.asarray(velocity, dtype=float)
+    above = np.maximum(v - law.v0, 0.0) / law.v_ss
+    return np.where(v > law.v0, law.B * np.exp(-law.w * above) + law.mu_ss, 1.0)
 
 
 @styled
-def friction_law_figure(law: FrictionLaw) -> Figure:
+def friction_law_figure(law: Weakening, mu_0: float) -> Figure:
     """The law mu(v) (the paper's figure 2).
 
     Parameters
     ----------
-    law : FrictionLaw
-        `FrictionLaw()` is the paper's; its v_0 is a matter of the packing and its v_ss is not given, so that the axis
-        counts from the one in units of the other.
+    law : Weakening
+        The axis counts from its v_0, in units of its v_ss.
+    mu_0 : float
+        Static friction coefficient.
 
     Returns
     -------
@@ -70,21 +50,21 @@ def friction_law_figure(law: FrictionLaw) -> Figure:
     axes = figure.add_subplot(xlabel=r"$(v - v_0)/v_{ss}$", ylabel=r"$\mu(v)$")
     fall = 1 / law.w
     reduced = np.linspace(-1.2 * fall, 5.5 * fall, 400)
-    axes.plot(reduced, law(law.v_0 + law.v_ss * reduced), color=WEAKENING)
-    steady = law.mu_0 * law.mu_ss
+    axes.plot(reduced, mu_0 * share(law, law.v0 + law.v_ss * reduced), color=WEAKENING)
+    steady = mu_0 * law.mu_ss
     axes.axhline(steady, color=INK, linewidth=0.6, linestyle=":")
     axes.axvline(0, color=INK, linewidth=0.6, linestyle=":")
-    span = law.mu_0 - steady
-    axes.set(xlim=(reduced[0], reduced[-1]), ylim=(steady - 0.12 * span, law.mu_0 + 0.12 * span))
+    span = mu_0 - steady
+    axes.set(xlim=(reduced[0], reduced[-1]), ylim=(steady - 0.12 * span, mu_0 + 0.12 * span))
     axes.text(-0.15 * fall, steady + 0.04 * span, r"$\mu_0\,\mu_{ss}$", ha="right", va="bottom")
-    axes.text(0.15 * fall, law.mu_0, "$v = v_0$", va="center")
-    equation = rf"$\mu_0 = {law.mu_0:g}$, $\mu_{{ss}} = {law.mu_ss:g}$, $B = {law.B:g}$, $w = {law.w:g}$"
+    axes.text(0.15 * fall, mu_0, "$v = v_0$", va="center")
+    equation = rf"$\mu_0 = {mu_0:g}$, $\mu_{{ss}} = {law.mu_ss:g}$, $B = {law.B:g}$, $w = {law.w:g}$"
     axes.text(0.96, 0.82, equation, transform=axes.transAxes, ha="right", va="top")
     return figure
 
 
 @styled
-def weakening_figure(velocity: ArrayLike, mu: ArrayLike, law: FrictionLaw) -> Figure:
+def weakening_figure(velocity: ArrayLike, mu: ArrayLike, law: Weakening, mu_0: float) -> Figure:
     """The friction coefficient that a run has gone through, over the velocity (the paper's figure 5b).
 
     Parameters
@@ -93,8 +73,10 @@ def weakening_figure(velocity: ArrayLike, mu: ArrayLike, law: FrictionLaw) -> Fi
         Mean velocity of the upper layer, length / time. Where it is not positive, mu is mu_0 and nothing is drawn.
     mu : array_like, shape (n,)
         Friction coefficient of the run at the same times.
-    law : FrictionLaw
+    law : Weakening
         The law with this run's v_0 and v_ss, as a line.
+    mu_0 : float
+        Static friction coefficient.
 
     Returns
     -------
@@ -105,9 +87,9 @@ def weakening_figure(velocity: ArrayLike, mu: ArrayLike, law: FrictionLaw) -> Fi
     figure = Figure(layout="constrained")
     axes = figure.add_subplot(xscale="log", xlabel="mean velocity of the upper layer, $|v|$", ylabel=r"$\mu(v)$")
     smooth = np.geomspace(velocity.min(), velocity.max(), 500)
-    axes.plot(smooth, law(smooth), color=INK, linewidth=0.8, label=r"law $\mu(v)$", zorder=1)
+    axes.plot(smooth, mu_0 * share(law, smooth), color=INK, linewidth=0.8, label=r"law $\mu(v)$", zorder=1)
     axes.plot(velocity, mu, "o", color=WEAKENING, markersize=2.5, alpha=0.5, markeredgewidth=0, label="run")
-    for value, name in ((law.v_0, "$v_0$"), (law.v_ss, "$v_{ss}$")):
+    for value, name in ((law.v0, "$v_0$"), (law.v_ss, "$v_{ss}$")):
         if velocity.min() < value < velocity.max():
             axes.axvline(value, color=INK, linewidth=0.6, linestyle=":")
             axes.annotate(
@@ -117,8 +99,8 @@ def weakening_figure(velocity: ArrayLike, mu: ArrayLike, law: FrictionLaw) -> Fi
                 xytext=(2, 0),
                 textcoords="offset points",
             )
-    steady = law.mu_0 * law.mu_ss
-    axes.set_ylim(steady - 0.12 * (law.mu_0 - steady), law.mu_0 + 0.12 * (law.mu_0 - steady))
+    steady = mu_0 * law.mu_ss
+    axes.set_ylim(steady - 0.12 * (mu_0 - steady), mu_0 + 0.12 * (mu_0 - steady))
     axes.xaxis.set_major_locator(LogLocator(numticks=7))
     axes.legend(loc="upper right", bbox_to_anchor=(1, 0.9))
     return figure
@@ -139,11 +121,11 @@ def measured_friction_figure() -> Figure:
     figure = Figure(layout="constrained")
     axes = figure.add_subplot(xlabel="$v/v_{ss}$", ylabel=r"$\mu/\mu_0$")
     for mu_ss, colour, style in ((0.78, "C1", "-"), (0.74, "C0", "--")):
-        law = FrictionLaw(mu_0=1.0, B=0.22, w=4.0, mu_ss=mu_ss, v_0=0.05)
-        above = np.linspace(np.nextafter(law.v_0, 1), 1, 400)
-        velocity = np.concatenate([[0.0, law.v_0], above])
+        law = Weakening(B=0.22, w=4.0, mu_ss=mu_ss, v0=0.05, v_ss=1.0)
+        above = np.linspace(np.nextafter(law.v0, 1), 1, 400)
+        velocity = np.concatenate([[0.0, law.v0], above])
         name = rf"$\mu_{{ss}} = {mu_ss:g}$"
-        axes.plot(velocity, law(velocity), color=colour, linestyle=style, label=name)
+        axes.plot(velocity, share(law, velocity), color=colour, linestyle=style, label=name)
     axes.set(xlim=(0, 1), ylim=(0.72, 1.02))
     legend = axes.legend(loc="upper right", title="$B = 0.22$, $w = 4$, $v_0 = 0.05\\,v_{ss}$")
     legend.get_title().set_fontsize(matplotlib.rcParams["legend.fontsize"])

@@ -14,7 +14,6 @@ of `BOUNDS`.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -23,8 +22,9 @@ from ...analysis import Packing, mean_square_displacement, nearest_image
 from ...analysis.motion.signals import Signal
 from ...pywrap import Engine, Equilibrium, Scene
 from ...pywrap.runs.undamped import time_step
-from ...pywrap.scenes.units import dashpot, real_units
+from ...pywrap.scenes.units import dashpot
 from ..eruptions.compute import growth_rate
+from ..modes.loss import impact_velocity, with_dashpots
 from ..sweep.onset import Start
 from .static import Branch, FailedError, branch, layer_slip, rest
 
@@ -33,12 +33,6 @@ SHARES = (0.25, 0.5, 0.75, 0.9, 0.97)
 
 LOSSES = (1.0, 0.9, 0.7)
 """Restitutions of the dynamic runs; 1 is undamped."""
-
-TANGENTIAL = 2 / 7
-"""C_T/C_N."""
-
-IMPACT = 0.093
-"""Velocity of the impact with these restitutions where a scene has no units: 1 m/s in the units of quartz.toml."""
 
 NOISE = 1e-12
 """Standard deviation of the random displacement of each coordinate."""
@@ -66,7 +60,7 @@ def yielding(scene: Scene, start: Start) -> dict[str, Any]:
         "jumps": [[fx / fy, moved] for fx, moved in path.jumps],
         "dynamic": [],
     }
-    dashpots = {each: _dashpot(scene, each) for each in LOSSES}
+    dashpots = {each: dashpot(scene.law.kn, each, 1.0, impact_velocity(scene)) for each in LOSSES}
     for share in SHARES:
         try:
             here = path.at(share * last)
@@ -77,12 +71,6 @@ def yielding(scene: Scene, start: Start) -> dict[str, Any]:
             result["dynamic"].append({"share": share, "restitution": loss, "fx_over_fy": here.fx / fy} | run)
     result["loading"] = [{"rate": rate} | loaded(path, dashpots[0.9], rate) for rate in RATES]
     return result
-
-
-def _dashpot(scene: Scene, restitution: float) -> float:
-    real = real_units(scene)
-    velocity = IMPACT if real is None else real.time / real.length  # 1 m/s
-    return dashpot(scene.law.kn, restitution, 1.0, velocity)
 
 
 def dynamic(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
@@ -125,11 +113,6 @@ def _rested(engine: Engine, packing: Packing, slip: float, residual: float) -> d
         "lost": len(first - last),
         "gained": len(last - first),
     }
-
-
-def with_dashpots(packing: Packing, cn: float) -> Packing:
-    """The packing with dashpots C_N and C_T = 2/7 C_N, and without drag."""
-    return replace(packing, law=replace(packing.law, cn=cn, ct=TANGENTIAL * cn), drag_time=None)
 
 
 def loaded(path: Branch, cn: float, rate: float) -> dict[str, Any]:

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...figures.pages import filled
 from ...figures.style import save
+from ..modes.tables import median
 from ..statistics import share
 from .compute import LOSSES, RATES, SHARES
 
@@ -23,11 +25,19 @@ TEXT = """# Yield, static and dynamic
 
 Made by `python docs/yield/make.py` from `tables/quartz_100.jsonl`, which `faultgouge sweep scenes/sweeps/yield.toml`
 writes. 100 disks, mu = 0.6, k_n/F_y as quartz under 10 MPa. The rule of selection is in that file. So far
-{packings} packings have been followed, and {failed} did not settle. Shares have Wilson's 95 % intervals.
+{packings} packings have been followed, and {failed} failed, for which the table has the reason. Shares have Wilson's
+95 % intervals.
+
+**In a sentence.** {main}
+
+![Yield over loss, and share of packings that flow](yield.png)
+
+*Left: static yield (dashed, with its interval) and dynamic yield for each restitution, medians over packings. Right:
+share of packings that flow below their static yield, over the load. Bars are 95 % intervals.*
 
 **Static.** Newton's method first finds no equilibrium beyond F_x/F_y = {newton}. Damped dynamics goes on: the layer
-moves and rests again, and fails at {static} (medians). What Newton's method tells is the end of its branch, and not
-flow. {{mod}}`faultgouge.studies.yielding.static` says what *fails* means.
+moves and rests again, and fails at {static}; both are medians. What Newton's method tells is the end of its
+branch, and not flow. {{mod}}`faultgouge.studies.yielding.static` says what *fails* means.
 
 **Dynamic.** From an equilibrium at a share of the static yield, with noise of 1e-12, for 50 units of time:
 
@@ -36,10 +46,6 @@ flow. {{mod}}`faultgouge.studies.yielding.static` says what *fails* means.
 {dynamic}
 
 *Flow* counts runs that do not come to rest afterwards. *Elsewhere* are those that rest at D above 1e-8.
-
-![Share of packings that flow](yield.png)
-
-*Share of packings that flow below their static yield, over the load, for three restitutions. Bars are intervals.*
 
 **Loads that rise.** With restitution 0.9 and F_x = rate t, the distance from the quasi-static path exceeds 1e-3 and
 1e-2 diameters at these F_x/F_y (medians of the packings in which it does):
@@ -62,10 +68,29 @@ def rows_of(table: Path) -> tuple[list[dict[str, Any]], int]:
 def numbers(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Medians of static yield, shares of the dynamic runs, loads at which the path is left."""
     return {
-        "newton": float(np.median([row["newton"] for row in rows])),
-        "static": float(np.median([row["static"] for row in rows])),
+        "newton": median([row["newton"] for row in rows]),
+        "static": median([row["static"] for row in rows]),
         "dynamic": [_of_runs(rows, load, loss) for load in SHARES for loss in LOSSES],
+        "yields": [yields(rows, loss) for loss in LOSSES],
         "loading": [{"rate": rate, "left": _left(rows, rate)} for rate in RATES],
+    }
+
+
+def yields(rows: list[dict[str, Any]], loss: float) -> dict[str, Any]:
+    """The dynamic yield with a loss, medians with intervals: the least load of `SHARES` at which a packing flows.
+
+    A packing that does not flow at any of them has its static yield. "least" is F_x/F_y, "share" over the static yield.
+    """
+    shares = []
+    for row in rows:
+        flows = [run["share"] for run in row["dynamic"] if run["restitution"] == loss and run["ends"] in FLOWING]
+        shares.append(min(flows, default=1.0))
+    static = np.array([row["static"] for row in rows])
+    return {
+        "restitution": loss,
+        "least": median(shares * static),
+        "share": median(shares),
+        "flow": int(np.sum(np.less(shares, 1))),
     }
 
 
@@ -98,15 +123,29 @@ def text(found: dict[str, Any], packings: int, failed: int) -> str:
         f"| {row['rate']:g} | " + " | ".join("-" if each is None else f"{each:.3g}" for each in row["left"]) + " |"
         for row in found["loading"]
     ]
-    return TEXT.format(
+    undamped, *lossy = (share(each["flow"], packings) for each in found["yields"])
+    below = found["yields"][0]["share"]
+    main = (
+        f"Without loss noise of 1e-12 takes {_percent(undamped)} packings to flow below their static yield, and the "
+        f"median of the least load at which they do is {below[0]:g} of it ({below[1]:g} to {below[2]:g}). With the "
+        f"restitution 0.9 it is {_percent(lossy[0])}, with 0.7 {_percent(lossy[1])}: lossy layers move to another "
+        "equilibrium and rest."
+    )
+    page = TEXT.format(
+        main=main,
         packings=packings,
         failed=failed,
-        newton=f"{found['newton']:.2g}",
-        static=f"{found['static']:.2g}",
+        newton=_interval(found["newton"]),
+        static=_interval(found["static"]),
         dynamic="\n".join(dynamic),
         loading="\n".join(loading),
         slowest=min(RATES),
     )
+    return filled(page)
+
+
+def _interval(value: list[float]) -> str:
+    return f"{value[0]:.2g} ({value[1]:.2g} to {value[2]:.2g})"
 
 
 def _percent(part: dict[str, Any]) -> str:
@@ -116,9 +155,18 @@ def _percent(part: dict[str, Any]) -> str:
 
 
 def figure(found: dict[str, Any]) -> Figure:
-    """Share of packings that flow over the load, for each restitution."""
-    drawn = Figure(figsize=(6, 4), layout="constrained")
-    axes = drawn.subplots()
+    """Static and dynamic yield over loss; share of packings that flow over the load, for each restitution."""
+    drawn = Figure(figsize=(9, 4), layout="constrained")
+    left, axes = drawn.subplots(1, 2)
+    middle, low, high = found["static"]
+    left.axhspan(low, high, color="0.9")
+    left.axhline(middle, color="black", linestyle="--", label="static yield")
+    least = np.array([each["least"] for each in found["yields"]])
+    bars = [least[:, 0] - least[:, 1], least[:, 2] - least[:, 0]]
+    left.errorbar(range(len(LOSSES)), least[:, 0], yerr=bars, fmt="o", capsize=3, label="dynamic yield")
+    left.set(xlabel="restitution", ylabel="F_x/F_y", ylim=(0, None), xlim=(-0.5, len(LOSSES) - 0.5))
+    left.set_xticks(range(len(LOSSES)), ["1 (undamped)", *map(str, LOSSES[1:])])
+    left.legend(loc="lower right")
     for k, loss in enumerate(LOSSES):
         rows = [row for row in found["dynamic"] if row["restitution"] == loss and row["flow"]["of"]]
         middle = np.array([row["flow"]["share"] for row in rows])

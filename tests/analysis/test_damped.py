@@ -10,7 +10,6 @@ from faultgouge.analysis import damping_matrix, find_onset, stiffness_matrix
 from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil
 from faultgouge.analysis.damped_onset.weak import balancing_ratio, drag_onset, weak_limit
 from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating, growing_windows
-from faultgouge.analysis.motion.state_space import StateSpace
 
 RNG = np.random.default_rng(11)
 TURN = np.linalg.qr(RNG.normal(size=(8, 8)))[0]
@@ -22,8 +21,7 @@ def family(block, damping):
     def pencil(fx):
         a = block_diag(block(fx), np.diag([30.0, 40, 50, 60, 70, 80]))
         g = block_diag(np.diag(damping), 0.02 * np.eye(6))
-        parts = (csr_array(TURN @ each @ TURN.T) for each in (a, g))
-        return Pencil.of_system(fx, StateSpace.of_matrices(*parts, np.ones(8)), 8)
+        return Pencil(fx, *(csr_array(TURN @ each @ TURN.T) for each in (a, g)))
 
     return pencil
 
@@ -86,6 +84,16 @@ def test_a_steady_loss_of_stability_is_no_hopf_point():
     assert window.kind == "steady"
     assert window.fx_onset == pytest.approx(0.3, abs=1e-10)
     assert window.fx_end is None
+
+
+def test_what_is_known_is_told_as_it_comes():
+    told = []
+    pencil = family(crossing(0.2), (1e-3, 1e-3))
+    found = growing_windows(pencil, [-1.0, 0.0, 0.4, 1.0, 2.0], known=lambda windows, fx: told.append((windows, fx)))
+    assert [fx for _, fx in told] == [0.0, 0.4, 1.0, 2.0]
+    assert [len(windows) for windows, _ in told] == [0, 1, 1, 1]
+    assert [windows[0].fx_end is None for windows, _ in told[1:]] == [True, False, False]
+    assert told[-1][0] == found
 
 
 def test_what_grows_from_the_beginning_says_so():

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_runfile import assert_identical
 
 from faultgouge.analysis import Contacts, PackingFileError, read_dump, read_packing
 from faultgouge.analysis.files.dumps import dump_frames
@@ -70,19 +69,19 @@ def dumped(tmp_path, cluster):
 
 
 def test_roundtrip_to_the_bit(dumped, cluster):
-    assert_identical(read_dump(dumped), cluster)
+    assert read_dump(dumped) == cluster
 
 
 def test_damping_of_the_sidecar(dumped, cluster):
     with dumped.with_suffix(".params").open("a") as file:
         file.write("cn 1.5\nct 0.25\ntau 30\n")
     law = replace(cluster.law, cn=1.5, ct=0.25)
-    assert_identical(read_dump(dumped), replace(cluster, law=law, drag_time=30.0))
+    assert read_dump(dumped) == replace(cluster, law=law, drag_time=30.0)
 
 
 def test_the_caller_wins_over_the_sidecar(dumped, cluster):
     packing = read_dump(dumped, fx=0.7, inertia_factor=1.0)
-    assert_identical(packing, replace(cluster, fx=0.7, inertia_factor=1.0))
+    assert packing == replace(cluster, fx=0.7, inertia_factor=1.0)
 
 
 def test_open_box(tmp_path, cluster):
@@ -93,7 +92,7 @@ def test_open_box(tmp_path, cluster):
     (tmp_path / "a").write_text(disks)
     (tmp_path / "b").write_text(contacts)
     read = read_dump(tmp_path / "a", tmp_path / "b", law=state.law, fx=0.5, fy=3.0, inertia_factor=0.5)
-    assert_identical(read, state)
+    assert read == state
 
 
 def test_frames_are_matched_by_step(dumped, cluster):
@@ -102,7 +101,7 @@ def test_frames_are_matched_by_step(dumped, cluster):
     dumped.write_text("".join(disks for disks, _ in snapshots))
     dumped.with_suffix(".contacts").write_text("".join(contacts for _, contacts in snapshots[::-1]))
     for frame, state in ((0, 0), (1, 1), (2, 2), (-1, 2), (-3, 0)):
-        assert_identical(read_dump(dumped, frame=frame), states[state])
+        assert read_dump(dumped, frame=frame) == states[state]
     assert [frame.step for frame in dump_frames(dumped)] == [0, 10, 20]
     for frame in (3, -4):
         with pytest.raises(PackingFileError, match=f"no snapshot {frame}"):
@@ -115,7 +114,7 @@ def test_names_as_lammps_has_them(dumped, cluster):
         contacts.read_text().replace(CONTACT_COLUMNS, "c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]")
     )
     dumped.write_text(dumped.read_text().replace("floor_slip", "f_floor[3]"))
-    assert_identical(read_dump(dumped), cluster)
+    assert read_dump(dumped) == cluster
 
 
 def spoil(path, old, new):
@@ -159,7 +158,7 @@ def test_packing_from_json(tmp_path, reference, bed, cluster):
     path = tmp_path / "packing.json"
     path.write_text(json.dumps(reference))
     law = bed(0.8).law
-    assert_identical(read_packing(path, law, fy=3.0), bed(0.8))
+    assert read_packing(path, law, fy=3.0) == bed(0.8)
     plain = {"x": [0.0, 1.0], "y": [1.0, 1.5], "radius": [0.5, 0.7]}
     path.write_text(json.dumps(plain))
     packing = read_packing(path, law)

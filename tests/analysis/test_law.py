@@ -1,5 +1,8 @@
 """The contact law against ten lines of arithmetic, against 30-digit derivatives, and in its properties."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import mpmath
 import numpy as np
 import pytest
@@ -136,6 +139,88 @@ def test_properties(kn, kt, mu, p, overlap, x, y):
     )
     twice = MindlinLaw(2 * kn, 2 * kt, mu, p)
     assert twice.tangential_force(overlap, x * limit) == 2 * force
+
+
+@pytest.mark.parametrize("overlap", OVERLAPS)
+@pytest.mark.parametrize("share", [s for s in SHARES if s not in (-1.0, 0.0, 1.0)])
+def test_derivatives_of_rescaled_slips_have_all_digits(overlap, share):
+    """Of the force that a change of overlap leaves, to either side; the mean is the mean of both."""
+    law = MindlinLaw(2e5, 6e4, 0.8, rescaled=True)
+    slip = share * float(law.slip_limit(overlap))
+    with mpmath.workdps(40):
+        kn, kt, mu, d, s = (mpmath.mpf(v) for v in (law.kn, law.kt, law.mu, overlap, slip))
+        s = min(max(s, -mu * kn / kt * d), mu * kn / kt * d)
+        closing = mpmath.diff(lambda v: plain_force(kn, kt, mu, v, s * mpmath.sqrt(d / v))[1], d)
+        parting = mpmath.diff(lambda v: plain_force(kn, kt, mu, v, s)[1], d)
+        if abs(share) > 1:  # what slides slides on
+            closing = parting = -mpmath.sign(s) * mu * kn * mpmath.diff(lambda v: v ** mpmath.mpf(1.5), d)
+    scale = law.kt * overlap**0.5 * law.mu * law.kn / law.kt
+    for weight, exact in ((0.0, closing), (1.0, parting), (0.5, (closing + parting) / 2)):
+        found = float(law.tangential_overlap_derivative(overlap, slip, weight))
+        assert found == pytest.approx(float(exact), abs=1e-14 * scale)
+        together = law.derivatives(np.array([overlap]), np.array([slip]), np.array([weight]))
+        assert together.overlap_derivative[0] == pytest.approx(found, abs=4e-15 * scale)
+    total = MindlinLaw(2e5, 6e4, 0.8)
+    assert law.tangential_overlap_derivative(overlap, slip, 1.0) == pytest.approx(
+        float(total.tangential_overlap_derivative(overlap, slip)), abs=4e-15 * scale
+    )
+
+
+ROOTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
+"""Exact for polynomials of the fifth degree; the force is one of the third in the slip of one sign."""
+
+
+def work_of_slipping(law, overlap, slip, end):
+    """Work that it takes to slip at constant overlap, and the slip that is remembered."""
+    kept, total = float(law.clamped(overlap, end)), 0.0
+    marks = sorted({slip, kept, *([0.0] if slip * kept < 0 else [])}, reverse=kept < slip)
+    for low, high in pairwise(marks):
+        at = 0.5 * (low + high) + 0.5 * (high - low) * ROOTS
+        total -= 0.5 * (high - low) * float(WEIGHTS @ law.tangential_force(overlap, at))
+    return total - (end - kept) * float(law.tangential_force(overlap, kept)), kept
+
+
+def work_along(law, path):
+    """Work of a path of (overlap, slip increment), from no slip: the tangential force does none while nothing slips."""
+    total, slip, before = 0.0, 0.0, path[0][0]
+    for overlap, increment in path:
+        slip = float(law.remembered(slip, before, overlap))
+        work, slip = work_of_slipping(law, overlap, slip, slip + increment)
+        total, before = total + work, overlap
+    return total
+
+
+legs = st.lists(st.tuples(st.floats(1e-5, 1e-2), st.floats(-3e-2, 3e-2)), min_size=1, max_size=12)
+"""In steps of up to three slip limits of the largest overlap, at overlaps over three decades."""
+
+
+@given(mu=st.floats(1e-2, 10), path=legs)
+def test_rescaled_slips_create_no_energy(mu, path):
+    """Whatever the path, closed or not: from a contact without slip nothing can be had that was not put in."""
+    law = MindlinLaw(2e5, 6e4, mu, rescaled=True)
+    most = sum(abs(increment) for _, increment in path) * mu * float(law.normal_force(1e-2))
+    assert work_along(law, path) >= -1e-14 * most
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
+def test_a_cycle_of_the_total_slip_creates_energy(share):
+    """Slip out, press, slip back, release: the same path dissipates with rescaled slips."""
+    law = MindlinLaw(2e5, 6e4, 0.8)
+    slip = share * float(law.slip_limit(1e-3))
+    path = [(1e-3, slip), (3e-3, -slip), (1e-3, 0.0)]
+    stored = work_of_slipping(law, 1e-3, 0.0, slip)[0]
+    assert work_along(law, path) < -0.5 * stored
+    assert work_along(replace(law, rescaled=True), path) > 0.1 * stored
+
+
+def test_what_is_rescaled():
+    law, slip = MindlinLaw(2e5, 6e4, 0.8, rescaled=True), 1e-4
+    assert law.remembered(slip, 1e-3, 4e-3) == pytest.approx(slip / 2, rel=1e-15)
+    assert law.remembered(slip, 4e-3, 1e-3) == slip
+    assert law.remembered(slip, 4e-3, 1e-6) == law.slip_limit(1e-6)
+    assert MindlinLaw(2e5, 6e4, 0.8).remembered(slip, 1e-3, 4e-3) == slip
+    with pytest.raises(ValueError, match="needs exponent"):
+        MindlinLaw(2e5, 6e4, 0.8, 1.0, rescaled=True)
 
 
 @both_exponents

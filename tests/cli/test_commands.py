@@ -2,25 +2,17 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from reference_layer import LAYER, REFERENCE
 
 from faultgouge.analysis import RunFile, eigenvalues, read_dump, spectrum
 from faultgouge.pywrap import Record, Scene, settle
 from faultgouge.pywrap.lammps.decks import DECKS
 
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
-
-SCENE = f"""
-[packing]
-file = "{REFERENCE}"
-[law]
-kn = 2e5
-[load]
-fy = 3.0
+SCENE = f"""{LAYER}
 [ramp]
 step = 1e-3
 until = 4e-3

@@ -1,22 +1,14 @@
 """Commands on scenes with [damping], and what spectrum says of transient growth."""
 
 import json
-from pathlib import Path
 
 import pytest
+from reference_layer import LAYER, REFERENCE
 
 from faultgouge.analysis import RunFile
 from faultgouge.analysis.motion.transient import transient_gain
 
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
-
-SCENE = f"""
-[packing]
-file = "{REFERENCE}"
-[law]
-kn = 2e5
-[load]
-fy = 3.0
+SCENE = f"""{LAYER}
 [ramp]
 step = 1e-3
 until = 4e-3
@@ -50,9 +42,11 @@ def test_onset_with_dissipation_as_json(faultgouge, tmp_path):
     scene = SCENE.replace("until = 4e-3", "until = 0.022").replace("step = 1e-3", "step = 5.5e-3")
     scene += "[damping]\ncn = 1.0\n"
     (tmp_path / "scene.toml").write_text(scene)
-    done = faultgouge("onset", "scene.toml", "--json")
+    done = faultgouge("onset", "scene.toml", "-o", "onset.json", "--json")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
+    assert json.loads((tmp_path / "onset.json").read_text()) == result
+    assert "searched_to" not in result
     assert result["fx_c"] == pytest.approx(0.0218328368, abs=1e-10)
     assert result["undamped"]["fx_c"] == pytest.approx(0.0218330564080, rel=1e-9)
     window = result["windows"][0]

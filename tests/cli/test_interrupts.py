@@ -9,19 +9,11 @@ import time
 from pathlib import Path
 
 import pytest
+from reference_layer import BIN, LAYER
 
 from faultgouge.analysis import RunFile
 
-BIN = Path(sys.executable).parent
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
-
-SCENE = f"""
-[packing]
-file = "{REFERENCE}"
-[law]
-kn = 2e5
-[load]
-fy = 3.0
+SCENE = f"""{LAYER}
 [ramp]
 step = 1e-5
 until = 0.02

@@ -1,21 +1,12 @@
 """Section [output]: what is written only when it is asked for."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from reference_layer import LAYER
 
 from faultgouge.analysis import RunFile, mean_square_displacement, read_dump
 
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
-
-SCENE = f"""
-[packing]
-file = "{REFERENCE}"
-[law]
-kn = 2e5
-[load]
-fy = 3.0
+SCENE = f"""{LAYER}
 [ramp]
 step = 1e-3
 until = 2e-3

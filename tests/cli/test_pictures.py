@@ -3,10 +3,10 @@
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from PIL import Image
+from reference_layer import BIN, LAYER
 
 from faultgouge.analysis import RunFile
 from faultgouge.notebook import picture
@@ -17,16 +17,8 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-BIN = Path(sys.executable).parent
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
-SCENE = f"""
-[packing]
-file = "{REFERENCE}"
-[law]
-kn = 2e5
-[load]
-fy = 3.0
+SCENE = f"""{LAYER}
 [ramp]
 step = 6e-3
 until = 0.024

@@ -3,19 +3,15 @@
 import json
 import signal
 import subprocess
-import sys
 import time
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from reference_layer import BIN, REFERENCE
 
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.units import real_units
-
-BIN = Path(sys.executable).parent
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
 SCENE = f"""
 [packing]

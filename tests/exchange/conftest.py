@@ -1,6 +1,7 @@
 """A packing under shear with slips, and the command."""
 
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,3 +32,16 @@ def stored(tmp_path, sheared) -> Path:
         file.append(sheared)
         file.complete = True
     return tmp_path / "run.h5"
+
+
+@pytest.fixture
+def refusal(faultgouge_here) -> Callable[..., str]:
+    """Runs a command that is refused in one sentence, and gives the sentence."""
+
+    def run(*words: object, code: int = 2) -> str:
+        done = faultgouge_here(*words)
+        assert done.returncode == code, done.stderr
+        assert len(done.stderr.strip().splitlines()) == 1
+        return done.stderr
+
+    return run

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from comparing import same
+from suffixes import GSD
 
 from faultgouge.analysis import Contacts, RunFile, normal_modes
 from faultgouge.pywrap.exchange import ModeVectors, packing_of, read_disks, upper_layer, write_packing
 
-FORMATS = (".xyz", ".data", ".gsd")
+FORMATS = (".xyz", ".data", GSD)
 
 
 def back(path, packing):
@@ -27,15 +27,9 @@ def back(path, packing):
     )
 
 
-def need(suffix):
-    if suffix == ".gsd":
-        pytest.importorskip("gsd.hoomd", reason="GSD needs the extra export: pip install 'faultgouge[export]'")
-
-
-@pytest.mark.parametrize("kind", ["as it is", "open sides", "compensated", "no contacts", "far image"])
+@pytest.mark.parametrize("kind", ["as it is", "open sides", "compensated", "rescaled", "no contacts", "far image"])
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
-    need(suffix)
     packing, c = sheared, sheared.contacts
     if kind == "open sides":
         inside = np.abs(np.diff(packing.position[np.column_stack([c.i, c.j])][..., 0])[:, 0]) < 5
@@ -44,6 +38,8 @@ def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
     elif kind == "compensated":
         low = 1e-18 * np.arange(len(c))
         packing = replace(packing, position_low=packing.position * 1e-17, contacts=c.slipped(c.slip, low))
+    elif kind == "rescaled":
+        packing = replace(packing, law=replace(packing.law, rescaled=True))
     elif kind == "no contacts":
         packing = replace(packing, contacts=Contacts([], [], []))
     elif kind == "far image":
@@ -51,23 +47,23 @@ def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
     path = tmp_path / f"packing{suffix}"
     write_packing(path, packing)
     disks, found = back(path, packing)
-    assert same(found, packing)
+    assert found == packing
     assert {name: disks.given[name] for name in ("kn", "kt", "mu")} == {
         name: getattr(packing.law, name) for name in ("kn", "kt", "mu")
     }
+    assert disks.given.get("rescaled", 0.0) == packing.law.rescaled
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
 @pytest.mark.slow
 def test_the_commands_there_and_back(faultgouge, tmp_path, stored, sheared, suffix):
-    need(suffix)
     done = faultgouge("export", stored, "-o", f"packing{suffix}")
     assert done.returncode == 0, done.stderr
     done = faultgouge("import", f"packing{suffix}", "-o", "back.h5")
     assert done.returncode == 0, done.stderr
     with RunFile(tmp_path / "back.h5") as file:
         assert file.complete
-        assert same(file.packing(), sheared)
+        assert file.packing() == sheared
 
 
 def test_lammps_reads_its_data(lmp, tmp_path, sheared):
@@ -134,7 +130,6 @@ def test_pyvista_reads_disks_contacts_and_modes(tmp_path, sheared):
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_ovito_reads_it(tmp_path, sheared, suffix):
-    need(suffix)
     ovito = pytest.importorskip("ovito.io", reason="needs ovito, a large library that is no dependency")
     write_packing(tmp_path / f"packing{suffix}", sheared)
     data = ovito.import_file(str(tmp_path / f"packing{suffix}")).compute()
@@ -150,7 +145,7 @@ def test_ovito_reads_it(tmp_path, sheared, suffix):
 
 
 def test_mdanalysis_and_gsd_read_it(tmp_path, sheared):
-    need(".gsd")
+    pytest.importorskip("gsd.hoomd", reason="needs the extra export: pip install 'faultgouge[export]'")
     library = pytest.importorskip("MDAnalysis", reason="needs the extra export: pip install 'faultgouge[export]'")
     import gsd.hoomd
 
@@ -169,17 +164,17 @@ def test_mdanalysis_and_gsd_read_it(tmp_path, sheared):
 
 
 @pytest.mark.slow
-def test_what_an_export_is_refused_for(faultgouge_here, stored):
-    for words, says in (
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
         (("-o", "packing.pdb"), "exports are .vtp, .xyz, .data, .gsd"),
         (("-o", "packing.data", "--mode", "pair"), "has no room for modes"),
         (("--frame", "3"), "there is no frame 3"),
         (("-o", "nowhere/packing.vtp"), "cannot be written"),
-    ):
-        done = faultgouge_here("export", stored, *words)
-        assert done.returncode == (1 if "written" in says else 2)
-        assert says in done.stderr
-        assert len(done.stderr.strip().splitlines()) == 1
+    ],
+)
+def test_what_an_export_is_refused_for(refusal, stored, words, says):
+    assert says in refusal("export", stored, *words, code=1 if "written" in says else 2)
 
 
 def test_a_packing_json_goes_the_same_way(tmp_path, reference, sheared):

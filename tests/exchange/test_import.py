@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from comparing import same
 
 from faultgouge.analysis import BadInputError, RunFile
 from faultgouge.analysis.files.wholefile import MAGIC
@@ -29,6 +28,11 @@ def csv(packing, names="id,x,y,radius,mass,angle,top"):
     return "\n".join([names, *(",".join(map(repr, row)) for row in rows)]) + "\n"
 
 
+def slips(contacts):
+    rows = zip((contacts.i + 1).tolist(), (contacts.j + 1).tolist(), contacts.slip.tolist(), strict=True)
+    return "\n".join(["id1,id2,slip", *(",".join(map(repr, row)) for row in rows)]) + "\n"
+
+
 def dump(packing, step=0, columns="id type x y z radius", count=None, z=0.0):
     n = len(packing) if count is None else count
     place, kind = packing.position.tolist(), (1 + packing.top).tolist()
@@ -41,9 +45,7 @@ def dump(packing, step=0, columns="id type x y z radius", count=None, z=0.0):
 @pytest.mark.slow
 def test_csv_with_slips_is_the_same_packing(tmp_path, faultgouge, sheared):
     (tmp_path / "packing.csv").write_text(csv(sheared))
-    c = sheared.contacts
-    rows = zip((c.i + 1).tolist(), (c.j + 1).tolist(), c.slip.tolist(), strict=True)
-    (tmp_path / "slips.csv").write_text("id1,id2,slip\n" + "\n".join(f"{a},{b},{s!r}" for a, b, s in rows) + "\n")
+    (tmp_path / "slips.csv").write_text(slips(sheared.contacts))
     law = ("--kn", "2e5", "--kt", sheared.law.kt, "--fx", sheared.fx, "--fy", "3", "--inertia", "0.5")
     words = ("packing.csv", "--width", sheared.box_length, "--contacts", "slips.csv", *law)
     done = faultgouge("import", *words, "-o", "packing.h5")
@@ -202,9 +204,7 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packi
 def test_disks_with_slips_come_to_rest_with_friction_on_any_number_of_ranks(tmp_path, faultgouge, sheared):
     rounded = replace(sheared, position=np.round(sheared.position, 6))  # forces of 1e-2 out of balance
     (tmp_path / "packing.csv").write_text(csv(rounded, "x,y,radius,top"))
-    c = sheared.contacts
-    rows = zip((c.i + 1).tolist(), (c.j + 1).tolist(), c.slip.tolist(), strict=True)
-    (tmp_path / "slips.csv").write_text("id1,id2,slip\n" + "\n".join(f"{a},{b},{s!r}" for a, b, s in rows) + "\n")
+    (tmp_path / "slips.csv").write_text(slips(sheared.contacts))
     width, shear = ("--width", sheared.box_length), ("--fx", sheared.fx)
     words = ("import", "packing.csv", *width, "--contacts", "slips.csv", *LAW, *shear)
     found = []
@@ -215,11 +215,11 @@ def test_disks_with_slips_come_to_rest_with_friction_on_any_number_of_ranks(tmp_
         with RunFile(tmp_path / name) as file:
             found.append(file.packing())
     one, two = found
-    assert same(one, two)
+    assert one == two
     assert one.fx == sheared.fx
     assert one.residual < 1e-9
     # friction keeps the slips to within what the disks have moved
-    np.testing.assert_allclose(one.contacts.slip, c.slip, atol=1e-6)
+    np.testing.assert_allclose(one.contacts.slip, sheared.contacts.slip, atol=1e-6)
 
 
 def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
@@ -233,7 +233,7 @@ def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
         return settle(Scene.from_mapping({"packing": section, **rest}, tmp_path)).packing
 
     expected = settled(file="packing.json")
-    assert same(settled(file="packing.dump", top="type:2"), expected)
+    assert settled(file="packing.dump", top="type:2") == expected
     for section, says in (
         ({"file": "packing.dump"}, "does not say which disks are the upper layer"),
         ({"file": "packing.dump", "top": "type:9"}, "holds no disk"),
@@ -278,19 +278,17 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 @pytest.mark.slow
-def test_bad_input_is_refused_in_one_sentence(tmp_path, faultgouge_here, sheared, case):
+def test_bad_input_is_refused_in_one_sentence(tmp_path, refusal, sheared, case):
     name, text, says = BAD[case]
     (tmp_path / name).write_text(text(sheared))
-    done = faultgouge_here("import", name, "--top", 1, *LAW)
-    assert done.returncode == 2, done.stderr
-    assert says in done.stderr
-    assert name in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+    said = refusal("import", name, "--top", 1, *LAW)
+    assert says in said
+    assert name in said
     assert not (tmp_path / "packing.h5").exists()
 
 
 @pytest.mark.slow
-def test_options_that_do_not_fit(tmp_path, faultgouge_here, sheared):
+def test_options_that_do_not_fit(tmp_path, refusal, sheared):
     (tmp_path / "a.dump").write_text(dump(sheared))
     (tmp_path / "scene.toml").write_text("[law]\nkn = 2e5\n[load]\nfy = 3.0\n")
     for words, says in (
@@ -306,7 +304,4 @@ def test_options_that_do_not_fit(tmp_path, faultgouge_here, sheared):
         (("b.dump", "--top", "type:2", *LAW), "does not exist"),
         (("a.dump", "--top", "type:2", *LAW, "-o", "a.dump"), "exists"),
     ):
-        done = faultgouge_here("import", *words)
-        assert done.returncode == 2, done.stderr
-        assert says in done.stderr
-        assert len(done.stderr.strip().splitlines()) == 1
+        assert says in refusal("import", *words)

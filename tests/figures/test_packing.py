@@ -2,19 +2,17 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver
+from reference_layer import REFERENCE
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, touching
 from faultgouge.figures import draw_packing, save
 from faultgouge.figures.style import UPPER
-
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
 
 @pytest.fixture(scope="module")

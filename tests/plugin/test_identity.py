@@ -11,6 +11,7 @@ variable        fx index 3.0
 variable        precision index {precision}
 variable        exponent index {exponent}
 variable        kn index {kn}
+variable        history index {history}
 include         {decks}/system.in
 atom_modify     sort {sort} 0.0
 timestep        2e-3
@@ -33,8 +34,9 @@ run             1000
 write_dump      all custom end id x y {low} vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g
 """
 DEFAULTS = {"newton": "on", "sort": "1000", "extra": "", "middle": "", "decks": DECKS}
-HERTZ = {"exponent": "1.5", "kn": "2e5"}
-HARMONIC = {"exponent": "1", "kn": "1e4"}
+HERTZ = {"exponent": "1.5", "kn": "2e5", "history": "total"}
+RESCALED = {**HERTZ, "history": "rescaled"}
+HARMONIC = {"exponent": "1", "kn": "1e4", "history": "total"}
 DOUBLE = {"precision": "double", "low": ""}
 COMPENSATED = {"precision": "compensated", "low": "f_low[*]"}
 UNDAMPED = {"dashpots": "", "drag": ""}
@@ -44,6 +46,8 @@ KINDS = {
     "compensated": {**COMPENSATED, **HERTZ, **UNDAMPED},
     "damped": {**DOUBLE, **HERTZ, **DAMPED},
     "harmonic, damped, compensated": {**COMPENSATED, **HARMONIC, **DAMPED},
+    "rescaled": {**DOUBLE, **RESCALED, **UNDAMPED},
+    "rescaled, damped, compensated": {**COMPENSATED, **RESCALED, **DAMPED},
 }
 
 

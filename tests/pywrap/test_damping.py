@@ -91,6 +91,24 @@ def test_time_step_stays_below_what_dashpots_allow(runs):
         time_step(packing, 1.01 * longest)
 
 
+@pytest.mark.parametrize("precision", ["double", "compensated"])
+def test_rescaled_slips_climb_with_newtons_method(precision):
+    """Increments of half the length lead to nearly the same slips; those of the total law are others."""
+    law = {"law": {"kn": 2e5, "history": "rescaled"}, "precision": precision}
+    found = []
+    for step in (2e-2, 1e-2):
+        *_, last = ramp(Scene.from_mapping(SCENE | law | {"ramp": {"step": step, "until": 0.12}}))
+        assert last.packing.law.rescaled
+        assert last.residual < 10 * last.floor
+        found.append(last)
+    *_, total = ramp(Scene.from_mapping(SCENE | {"ramp": {"step": 2e-2, "until": 0.12}}))
+    scale = np.abs(total.packing.tangential_force).max()
+    forces = [each.packing.tangential_force for each in (*found, total)]
+    apart, different = (np.abs(force - forces[0]).max() / scale for force in forces[1:])
+    assert apart < 0.1 * different
+    assert different > 1e-3
+
+
 def test_harmonic_disks_settle_and_climb():
     scene = Scene.from_mapping(SCENE | {"law": {"kn": 3e3, "exponent": 1}})
     first = settle(scene)

@@ -43,11 +43,8 @@ def with_key(section, key, value):
         ("friction", "v_ss", "1e400 v0", "friction.v_ss"),
     ],
 )
-def test_what_no_packing_bears_is_refused(section, key, value, says):
-    with pytest.raises(SceneError) as refusal:
-        Scene.from_mapping(with_key(section, key, value))
-    assert says in str(refusal.value)
-    assert "\n" not in str(refusal.value)
+def test_what_no_packing_bears_is_refused(refused_scene, section, key, value, says):
+    assert says in refused_scene(with_key(section, key, value))
 
 
 @pytest.mark.parametrize(
@@ -87,14 +84,13 @@ def test_a_reproduction_counts_what_it_runs():
         foreseen(scene, "reproduce", 10**9)
 
 
-def test_a_loop_of_links_and_deep_brackets_are_refused(tmp_path):
+def test_a_loop_of_links_and_deep_brackets_are_refused(tmp_path, refused_scene):
     (tmp_path / "a.json").symlink_to(tmp_path / "b.json")
     (tmp_path / "b.json").symlink_to(tmp_path / "a.json")
     (tmp_path / "deep.json").write_text("[" * 100_000)
     (tmp_path / "long.json").write_text('{"x": [' + "9" * 400 + '], "y": [1.0], "radius": [0.5]}')
     for name in ("a.json", "deep.json", "long.json"):
-        with pytest.raises(SceneError, match=name):
-            Scene.from_mapping({**SCENE, "packing": {"file": name}}, tmp_path)
+        assert name in refused_scene({**SCENE, "packing": {"file": name}}, tmp_path)
 
 
 @pytest.mark.parametrize(("disks", "measured"), [(3000, 1.7e9), (10_000, 0.9e9), (30_000, 1.7e9), (100_000, 5.2e9)])

@@ -7,18 +7,8 @@ import pytest
 
 from faultgouge.analysis import discrete_frequency, fit_growth, mean_square_displacement, spectrum
 from faultgouge.analysis.onset import Modes, full_operator
-from faultgouge.pywrap import Engine, Equilibrium, equilibrate
-from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+from faultgouge.pywrap import Engine
 from faultgouge.pywrap.runs.undamped import time_step
-
-
-def equilibrium(packing, fx, increment=1e-3):
-    here = Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
-    with Engine(packing) as engine:
-        here = equilibrate(engine, here, 0.0)
-        for k in range(1, round(fx / increment) + 1):
-            here = equilibrate(engine, here, k * increment)
-    return here.packing
 
 
 def pushed_along(packing, eigenvalue, size):
@@ -50,9 +40,9 @@ def frequency(time, signal):
 
 
 @pytest.mark.slow
-def test_growth_rate_and_frequency_are_those_of_the_spectrum(reference_packing):
+def test_growth_rate_and_frequency_are_those_of_the_spectrum(loaded):
     """Over six decades of D, from a small start along the pair that coalesces first."""
-    packing = equilibrium(reference_packing(1.0), 0.024)
+    packing = loaded(0.024)
     pair = max(spectrum(packing).pairs, key=lambda each: each.growth_rate)
     omega = complex(discrete_frequency(pair.eigenvalue, time_step(packing)))
     # from far above the noise of 1e-25 to far below the square of the slip limits
@@ -67,9 +57,9 @@ def test_growth_rate_and_frequency_are_those_of_the_spectrum(reference_packing):
 
 @pytest.mark.slow
 @pytest.mark.long
-def test_rounding_noise_grows_by_fifteen_decades(reference_packing):
+def test_rounding_noise_grows_by_fifteen_decades(loaded):
     """Nothing but noise to begin with: D rises from 1e-25 by fifteen decades, most of them at the spectrum's rate."""
-    packing = equilibrium(reference_packing(1.0), 0.024)
+    packing = loaded(0.024)
     time, msd, _ = run(packing, packing, 1400.0, 7000)
     noise = np.median(msd[time < 100])
     assert msd.max() / noise > 1e15
@@ -80,9 +70,9 @@ def test_rounding_noise_grows_by_fifteen_decades(reference_packing):
 
 
 @pytest.mark.slow
-def test_nothing_grows_below_the_onset(reference_packing):
+def test_nothing_grows_below_the_onset(loaded):
     """A million steps at F_x = 0.0205, F_x^c = 0.0218: the rounding of each step adds to D, which grows as the time."""
-    packing = equilibrium(reference_packing(1.0), 0.0205, increment=5e-4)
+    packing = loaded(0.0205, 5e-4)
     assert spectrum(packing).pairs == ()
     _, msd, _ = run(packing, packing, 456.0, 500)
     early, late = (np.median(part) for part in (msd[50:100], msd[-50:]))
@@ -91,8 +81,8 @@ def test_nothing_grows_below_the_onset(reference_packing):
     assert msd.max() < 1e-23
 
 
-def test_rattlers_are_held_still(reference_packing):
-    packing = equilibrium(reference_packing(1.0), 1e-3)
+def test_rattlers_are_held_still(loaded):
+    packing = loaded(1e-3)
     falling = replace(packing, top=packing.top | np.isin(np.arange(len(packing)), packing.rattlers[:1]))
     dt = time_step(packing)
     with Engine(falling) as engine, engine.undamped(dt) as dynamics:

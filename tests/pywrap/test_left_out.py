@@ -25,7 +25,7 @@ BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 
 MODEL = {"decks", "data", "sides", "kn", "kt", "mu", "fx", "fy", "inertia", "precision", "compensated", "rotation"}
-MODEL |= {"dt", "mobile", "exponent", "stiffness"}
+MODEL |= {"dt", "mobile", "exponent", "history", "stiffness"}
 PUSH = {"amplitude", "omega", "target", "push"}
 WEAKEN = {"B", "w", "mu_ss", "v0", "v_ss", "friction"}
 
@@ -49,83 +49,51 @@ def held(packing, tmp_path, **run):
         return Loaded.of(engine, log)
 
 
+SMOOTH = {
+    "parts": ("system.in", "undamped.in"),
+    "fixes": ["floor", "load", "move"],
+    "computes": (),
+    "dumps": (),
+    "arrays": ["f_floor"],
+    "settings": ("periodic x",),
+    "variables": MODEL,
+}
+ROUGH = SMOOTH | {
+    "parts": ("system.in", "friction.in", "undamped.in"),
+    "fixes": ["angle", "floor", "load", "move", "slips"],
+    "arrays": ["f_floor", "f_slips", "d_theta"],
+    "settings": ("periodic x", "velocities of ghosts"),
+}
+PUSHED = {
+    "parts": (*ROUGH["parts"], "push.in"),
+    "fixes": ["angle", "floor", "load", "move", "push", "slips"],
+    "variables": MODEL | PUSH,
+}
+WEAKENED = {
+    "parts": (*ROUGH["parts"], "weaken.in"),
+    "fixes": ["angle", "floor", "load", "move", "slips", "weaken"],
+    "computes": ("velocity",),
+    "variables": MODEL | WEAKEN,
+}
+
+
 @pytest.mark.parametrize(
-    ("change", "run", "parts", "fixes", "computes", "arrays", "settings", "variables"),
+    ("change", "run", "expected"),
     [
-        (
-            lambda p: p,
-            {},
-            ["system.in", "friction.in", "undamped.in"],
-            ["angle", "floor", "load", "slips", "move"],
-            [],
-            ["f_floor", "f_slips", "d_theta"],
-            ["periodic x", "velocities of ghosts"],
-            MODEL,
-        ),
-        (
-            lambda p: with_law(p, mu=0.0),
-            {},
-            ["system.in", "undamped.in"],
-            ["floor", "load", "move"],
-            [],
-            ["f_floor"],
-            ["periodic x"],
-            MODEL,
-        ),
-        (
-            lambda p: with_law(p, mu=1.0, kt=0.0),
-            {},
-            ["system.in", "undamped.in"],
-            ["floor", "load", "move"],
-            [],
-            ["f_floor"],
-            ["periodic x"],
-            MODEL,
-        ),
-        (
-            lambda p: with_law(opened(p), mu=0.0),
-            {},
-            ["system.in", "undamped.in"],
-            ["floor", "load", "move"],
-            [],
-            ["f_floor"],
-            [],
-            MODEL,
-        ),
-        (
-            lambda p: p,
-            {"amplitude": 1e-9, "omega": 0.01},
-            ["system.in", "friction.in", "undamped.in", "push.in"],
-            ["angle", "floor", "load", "slips", "move", "push"],
-            [],
-            ["f_floor", "f_slips", "d_theta"],
-            ["periodic x", "velocities of ghosts"],
-            MODEL | PUSH,
-        ),
-        (
-            lambda p: p,
-            {"weakening": UNREACHED},
-            ["system.in", "friction.in", "undamped.in", "weaken.in"],
-            ["angle", "floor", "load", "slips", "move", "weaken"],
-            ["velocity"],
-            ["f_floor", "f_slips", "d_theta"],
-            ["periodic x", "velocities of ghosts"],
-            MODEL | WEAKEN,
-        ),
+        (lambda p: p, {}, ROUGH),
+        (lambda p: with_law(p, mu=0.0), {}, SMOOTH),
+        (lambda p: with_law(p, mu=1.0, kt=0.0), {}, SMOOTH),
+        (lambda p: with_law(opened(p), mu=0.0), {}, SMOOTH | {"settings": ()}),
+        (lambda p: p, {"amplitude": 1e-9, "omega": 0.01}, ROUGH | PUSHED),
+        (lambda p: p, {"weakening": UNREACHED}, ROUGH | WEAKENED),
     ],
     ids=["friction", "mu = 0", "kt = 0", "open", "push", "weakening"],
 )
-def test_a_run_holds_what_it_needs_and_nothing_else(
-    reference_packing, tmp_path, change, run, parts, fixes, computes, arrays, settings, variables
-):
+def test_a_run_holds_what_it_needs_and_nothing_else(reference_packing, tmp_path, change, run, expected):
     here = held(change(reference_packing(1.0)), tmp_path, **run)
-    assert here.parts == tuple(parts)
-    assert sorted(here.fixes) == sorted(fixes)
-    assert here.computes == tuple(computes)
-    assert here.dumps == ()
-    assert [array.split()[0] for array in here.arrays] == arrays
-    assert here.settings == tuple(settings)
-    assert set(here.variables) == variables
+    found = {name: getattr(here, name) for name in expected}
+    found["arrays"] = [array.split()[0] for array in here.arrays]
+    assert found | {"fixes": sorted(here.fixes), "variables": set(here.variables)} == expected
 
 
 def test_settling_and_relaxing_take_their_parts_away_again(reference_packing, tmp_path):
@@ -158,49 +126,27 @@ def assert_same_motion(one, other):
         assert np.array_equal(getattr(one, name), getattr(other, name)), name
 
 
+TURNING = ("unfix move", "comm_modify vel yes", "fix move mobile nve/disc 1.0 rotation yes")
+NO_PUSH = ("variable amplitude index 0.0", "variable omega index 1.0", f'include "{DECKS / "push.in"}"')
+LOOKS = ("compute contact all pair/local p1 p2 p3 cutoff radius", "thermo_style custom step pe press", "thermo 7")
+
+
 @pytest.mark.parametrize(
-    ("one", "other"),
+    ("law", "other_law", "options"),
     [
-        ({"packing": lambda p: with_law(p, mu=0.0)}, {"packing": lambda p: with_law(p, mu=1.0, kt=0.0)}),
-        (
-            {"packing": lambda p: with_law(p, mu=0.0)},
-            {
-                "packing": lambda p: with_law(p, mu=0.0),
-                "commands": ("unfix move", "comm_modify vel yes", "fix move mobile nve/disc 1.0 rotation yes"),
-            },
-        ),
-        ({}, {"weakening": UNREACHED}),
-        (
-            {},
-            {
-                "commands": (
-                    "variable amplitude index 0.0",
-                    "variable omega index 1.0",
-                    f'include "{DECKS / "push.in"}"',
-                )
-            },
-        ),
-        (
-            {},
-            {
-                "commands": (
-                    "compute contact all pair/local p1 p2 p3 cutoff radius",
-                    "thermo_style custom step pe press",
-                    "thermo 7",
-                )
-            },
-        ),
+        ({"mu": 0.0}, {"mu": 1.0, "kt": 0.0}, {}),
+        ({"mu": 0.0}, {"mu": 0.0}, {"commands": TURNING}),
+        ({"mu": 1.0}, {"mu": 1.0}, {"weakening": UNREACHED}),
+        ({"mu": 1.0}, {"mu": 1.0}, {"commands": NO_PUSH}),
+        ({"mu": 1.0}, {"mu": 1.0}, {"commands": LOOKS}),
     ],
     ids=["mu = 0, kt = 0", "rotations", "threshold never reached", "amplitude 0", "looking on"],
 )
-def test_the_same_motion_with_and_without(reference_packing, one, other):
-    runs = []
-    for options in (one, other):
-        options = dict(options)
-        packing = options.pop("packing", lambda p: p)(reference_packing(1.0))
-        runs.append(motion_of(packing, **options))
-    assert np.abs(runs[0].position - reference_packing(1.0).position).max() > 0.1
-    assert_same_motion(*runs)
+def test_the_same_motion_with_and_without(reference_packing, law, other_law, options):
+    packing = reference_packing(1.0)
+    one, other = motion_of(with_law(packing, **law)), motion_of(with_law(packing, **other_law), **options)
+    assert np.abs(one.position - packing.position).max() > 0.1
+    assert_same_motion(one, other)
 
 
 def test_open_sides_compute_what_a_wide_period_computes(reference_packing):

@@ -65,6 +65,13 @@ def test_a_seed_is_a_packing():
     assert not np.array_equal(one.radius, other.radius)
 
 
+def test_a_seed_has_loose_starts_of_its_own():
+    draws = [(7, 0), (7, 1), (7, 2), (8, 1), (1 + 2**32, 0), (1, 1)]
+    starts = [loose_start(100, (0.5, 0.7), 10, 11.9, seed, draw=draw).position for seed, draw in draws]
+    assert np.array_equal(starts[0], loose_start(100, (0.5, 0.7), 10, 11.9, 7).position)
+    assert len({start.tobytes() for start in starts}) == len(draws)
+
+
 def test_radii_are_shuffled():
     radius = loose_start(100, (0.5, 0.7), 10, 11.9, 7).radius[:90]
     changes = np.count_nonzero(np.diff(radius))

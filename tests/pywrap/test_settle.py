@@ -57,9 +57,23 @@ def test_rattlers_are_moved_clear_and_nothing_else_is(settled):
     assert len(cleared.contacts) == len(packing.contacts)
 
 
-def test_layer_that_sinks_is_refused():
-    with pytest.raises(NoEquilibriumError, match=r"sank through the bed|does not come to rest"):
+def test_layer_that_always_sinks_is_refused():
+    with pytest.raises(NoEquilibriumError, match="sank through the bed from each of 5 loose starts"):
         settle(scene(disks=60, top=3, width=12.0))
+
+
+@pytest.mark.slow
+def test_a_seed_whose_layer_sinks_is_the_packing_of_its_next_loose_start():
+    # which seed that is depends on the build, since settling is chaotic; of so thin a layer one start in eight sinks
+    for seed in range(100):
+        told = []
+        found = settle(scene(disks=60, top=7, width=12.0, seed=seed), watch=told.append)
+        if told:
+            break
+    assert told[0] == "the upper layer sank through the bed: loose start 2 of 5"
+    assert found.residual < 1.5 * found.floor
+    again = settle(scene(disks=60, top=7, width=12.0, seed=seed)).packing
+    assert np.array_equal(again.position, found.packing.position)
 
 
 @pytest.mark.slow
@@ -67,3 +81,10 @@ def test_settling_with_friction_leaves_slips(settled):
     packing = settle(scene(disks=20, top=4, width=4.9, settle_friction=True)).packing
     assert np.abs(packing.contacts.slip).max() > 0
     assert packing.residual < 1e-9
+
+
+def test_spheres_rest_where_disks_of_equal_masses_do():
+    equal, spheres = (settle(scene(disks=20, top=4, width=4.9, masses=each)).packing for each in ("equal", "spheres"))
+    np.testing.assert_array_equal(spheres.position, equal.position)
+    np.testing.assert_array_equal(equal.mass, 1.0)
+    np.testing.assert_allclose(spheres.mass, (spheres.radius / 0.5) ** 3, rtol=1e-15)

@@ -7,7 +7,7 @@ import pytest
 
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.onset.damped import damped_onset_run, ramped
-from faultgouge.studies.dissipation import RATIOS, over_distance, over_strength, seeded, weak_cases
+from faultgouge.studies.dissipation.compute import RATIOS, over_distance, over_strength, seeded, weak_cases
 
 TABLES = Path(__file__).parents[2] / "docs" / "dissipation"
 

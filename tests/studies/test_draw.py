@@ -1,5 +1,7 @@
 """What the figures of the protocol contain: laws, runs, fits, and names on their axes."""
 
+from dataclasses import replace
+
 import matplotlib
 import numpy as np
 import pytest
@@ -12,19 +14,13 @@ from faultgouge.studies.reproduce.draw import growth_figure
 from faultgouge.studies.triggering.compute import Sensitivity
 from faultgouge.studies.triggering.draw import eruption_figure
 from faultgouge.studies.triggering.draw_friction import (
-    FrictionLaw,
+    PAPERS,
     friction_law_figure,
     measured_friction_figure,
+    share,
     weakening_figure,
 )
-from faultgouge.studies.triggering.draw_response import (
-    AmplitudeCurve,
-    DampingCurve,
-    Displacements,
-    amplitude_figure,
-    damping_figure,
-    response_figure,
-)
+from faultgouge.studies.triggering.draw_response import DAMPING, amplitude_figure, damping_figure, response_figure
 
 
 def texts(figure):
@@ -39,21 +35,20 @@ def texts(figure):
 @pytest.fixture
 def runs():
     time = np.geomspace(0.01, 100, 300)
-    return [Displacements(time, level * (1 + np.sin(time) ** 2)) for level in (1e-25, 1e-22, 1e-10)]
+    return [(time, level * (1 + np.sin(time) ** 2)) for level in (1e-25, 1e-22, 1e-10)]
 
 
 def test_friction_weakens_above_its_threshold():
-    law = FrictionLaw(mu_0=0.5, v_0=2.0, v_ss=10.0)
     velocity = np.array([-100.0, 0.0, 2.0, 12.0, 1e6])
-    expected = 0.5 * np.array([1, 1, 1, 0.2 * np.exp(-0.4) + 0.8, 0.8])
-    np.testing.assert_allclose(law(velocity), expected, rtol=1e-15)
+    expected = [1, 1, 1, 0.2 * np.exp(-0.4) + 0.8, 0.8]
+    np.testing.assert_allclose(share(replace(PAPERS, v0=2.0, v_ss=10.0), velocity), expected, rtol=1e-15)
 
 
 def test_law_is_drawn_from_its_threshold_on():
-    axes = friction_law_figure(FrictionLaw(v_0=3.0, v_ss=7.0)).axes[0]
+    axes = friction_law_figure(replace(PAPERS, v0=3.0, v_ss=7.0), 0.5).axes[0]
     reduced, mu = axes.lines[0].get_data()
-    assert np.all(mu[reduced <= 0] == 1)
-    np.testing.assert_allclose(mu[reduced > 0], 0.2 * np.exp(-0.4 * reduced[reduced > 0]) + 0.8, rtol=1e-12)
+    assert np.all(mu[reduced <= 0] == 0.5)
+    np.testing.assert_allclose(mu[reduced > 0], 0.1 * np.exp(-0.4 * reduced[reduced > 0]) + 0.4, rtol=1e-12)
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("$(v - v_0)/v_{ss}$", r"$\mu(v)$")
     assert "B = 0.2$, $w = 0.4" in texts(axes.figure)
 
@@ -70,7 +65,7 @@ def test_measured_friction_says_what_is_missing():
 
 
 def test_eruption_draws_three_runs_on_logarithmic_axes(runs):
-    runs[0].msd[:5] = 0.0
+    runs[0][1][:5] = 0.0
     figure = eruption_figure(*runs)
     axes, late = figure.axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
@@ -78,7 +73,7 @@ def test_eruption_draws_three_runs_on_logarithmic_axes(runs):
     levels = {line.get_label(): line.get_ydata() for line in axes.lines}
     assert len(levels) == 3
     assert len(levels[r"left alone, $\mu_0$"]) == 295
-    np.testing.assert_array_equal(levels[r"perturbed, friction $\mu(v)$"], runs[2].msd)
+    np.testing.assert_array_equal(levels[r"perturbed, friction $\mu(v)$"], runs[2][1])
     assert len({line.get_color() for line in axes.lines}) == 3
 
 
@@ -89,69 +84,63 @@ def test_eruption_draws_the_control_beside_the_run_with_weakening(runs):
 
 
 def test_weakening_draws_the_run_over_its_law():
-    law = FrictionLaw(v_0=1e-11, v_ss=1e-9)
+    law = replace(PAPERS, v0=1e-11, v_ss=1e-9)
     velocity = np.concatenate([np.geomspace(1e-13, 1e-6, 50), [-1e-9, 0.0]])
-    axes = weakening_figure(velocity, law(velocity), law).axes[0]
+    axes = weakening_figure(velocity, 0.5 * share(law, velocity), law, 0.5).axes[0]
     smooth, run = axes.lines[:2]
     assert len(run.get_xdata()) == 50
-    np.testing.assert_array_equal(run.get_ydata(), law(velocity[:50]))
-    np.testing.assert_array_equal(smooth.get_ydata(), law(smooth.get_xdata()))
+    np.testing.assert_array_equal(run.get_ydata(), 0.5 * share(law, velocity[:50]))
+    np.testing.assert_array_equal(smooth.get_ydata(), 0.5 * share(law, smooth.get_xdata()))
     assert axes.get_xscale() == "log"
     assert "$v_0$ $v_{ss}$" in texts(axes.figure)
 
 
+def normal_pairs(*epsilons):
+    """Pairs of the normal form, whose unit of time is one."""
+    plane = np.eye(3, 2)
+    return tuple(PairForm(0.1, NormalForm(0.2, epsilon), 1.0, plane, plane) for epsilon in epsilons)
+
+
 def test_amplitudes_carry_their_exponent():
-    distance = np.geomspace(1e-7, 1e-1, 13)
-    curve = AmplitudeCurve("pair: ", distance, 1.4 * distance**-0.5, PowerLaw(-0.49989, 3e-5, 1.4), (1e-7, 1e-3))
-    figure = amplitude_figure([curve])
-    whole, fitted, points = figure.axes[0].lines
-    assert fitted.get_xdata().tolist() == [1e-7, 1e-3]
-    np.testing.assert_allclose(fitted.get_ydata(), 1.4 * np.array([1e-7, 1e-3]) ** -0.49989)
-    assert whole.get_xdata().tolist() == [1e-7, 1e-1]
-    np.testing.assert_array_equal(points.get_ydata(), curve.amplitude)
-    assert "pair: slope $-0.49989(3)$" in texts(figure)
+    distance = np.geomspace(1e-7, 1e-1, 3)
+    found = Sensitivity(distance, normal_pairs(*distance), PowerLaw(-0.49989, 3e-5, 1.4))
+    figure = amplitude_figure(found)
+    _, fitted, points = figure.axes[0].lines
+    assert fitted.get_xdata().tolist() == [1e-7, 1e-1]
+    np.testing.assert_allclose(fitted.get_ydata(), 1.4 * np.array([1e-7, 1e-1]) ** -0.49989)
+    np.testing.assert_array_equal(points.get_ydata(), [pair.amplitude() for pair in found.pairs])
+    assert "slope $-0.49989(3)$" in texts(figure)
 
 
 def test_damping_marks_its_crossover():
-    curves = []
-    for epsilon in (1e-3, 1e-5):
-        form, tau = NormalForm(0.2, epsilon), np.geomspace(1, 1e6, 40)
-        curves.append(
-            DampingCurve(
-                epsilon=epsilon,
-                damping_time=tau,
-                amplitude=np.array([form.amplitude(t) for t in tau]),
-                undamped=form.amplitude(),
-                tau_d=form.tau_d,
-                half_time=form.half_gain_time(),
-            )
-        )
-    figure = damping_figure(curves)
+    pairs = normal_pairs(1e-3, 1e-5)
+    figure = damping_figure(pairs)
     (axes,) = figure.axes
-    for number, curve in enumerate(curves):
+    for number, pair in enumerate(pairs):
         line, plateau, dot, ring = axes.lines[4 * number : 4 * number + 4]
-        np.testing.assert_array_equal(line.get_ydata(), curve.amplitude)
-        assert set(plateau.get_ydata()) == {curve.undamped}
-        assert dot.get_xdata()[0] == curve.tau_d
-        # between two of 40 points the curve bends by a few per cent
-        assert dot.get_ydata()[0] == pytest.approx(0.4155 * curve.undamped, rel=0.05)
-        assert (ring.get_xdata()[0], ring.get_ydata()[0]) == (curve.half_time, 0.5 * curve.undamped)
+        np.testing.assert_array_equal(line.get_xdata(), pair.tau_d * DAMPING)
+        np.testing.assert_array_equal(line.get_ydata(), [pair.form.amplitude(tau) for tau in line.get_xdata()])
+        assert set(plateau.get_ydata()) == {pair.form.amplitude()}
+        assert dot.get_xdata()[0] == pair.form.tau_d
+        # between two points the curve bends by a few per cent
+        assert dot.get_ydata()[0] == pytest.approx(0.4155 * pair.form.amplitude(), rel=0.05)
+        half = pair.form.half_gain_time(), 0.5 * pair.form.amplitude()
+        assert (ring.get_xdata()[0], ring.get_ydata()[0]) == half
     assert r"\varepsilon = 1.0 \times 10^{-3}" in texts(figure)
 
 
 def test_response_lies_over_the_run(runs):
-    run = runs[0]
-    response = Displacements(run.time, run.msd * 1.001)
-    upper, lower = response_figure(run, response).axes
+    time, msd = runs[0]
+    upper, lower = response_figure(runs[0], (time, msd * 1.001)).axes
     broad, line = upper.lines
-    np.testing.assert_array_equal(broad.get_ydata(), run.msd)
+    np.testing.assert_array_equal(broad.get_ydata(), msd)
     assert broad.get_linewidth() > 3 * line.get_linewidth()
-    np.testing.assert_array_equal(line.get_ydata(), response.msd)
+    np.testing.assert_array_equal(line.get_ydata(), msd * 1.001)
     deviation = lower.lines[0].get_ydata()
     assert deviation.max() == pytest.approx(1e-3, rel=1e-9)
     assert lower.get_xlabel() == "$t$"
     with pytest.raises(ValueError, match="same times"):
-        response_figure(run, Displacements(run.time[:-1], run.msd[:-1]))
+        response_figure(runs[0], (time[:-1], msd[:-1]))
 
 
 def test_the_layer_passing_its_threshold_is_marked(runs):
@@ -188,8 +177,7 @@ def test_no_settings_leak_out_and_files_repeat(tmp_path, runs):
 
 def test_pairs_far_from_coalescence_have_no_crossover_with_damping():
     """The report leaves out what half of a response of less than four times the start would be."""
-    plane = np.eye(3, 2)
-    pairs = tuple(PairForm(0.1, NormalForm(0.2, epsilon), 1.0, plane, plane) for epsilon in (0.01, 0.5))
+    pairs = normal_pairs(0.01, 0.5)
     found = Sensitivity(np.array([0.01, 0.5]), pairs, fit_power_law([0.01, 0.1, 0.5], [10.0, 3.0, 1.5]))
     assert found.near == pairs[:1]
     assert found.near[0].half_gain_time() > 0

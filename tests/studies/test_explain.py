@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from faultgouge.assessment.left_out.costs import in_turns
 from faultgouge.assessment.left_out.explain import _affordable, _switched, explain
-from faultgouge.assessment.left_out.switches import Feature, Loaded, Push, Run, features
+from faultgouge.assessment.left_out.switches import Feature, Loaded, Run, features
 from faultgouge.pywrap import Scene, settle
 
 SCENES = files("faultgouge") / "scenes"
@@ -146,7 +146,7 @@ def run():
 def test_a_wrong_claim_is_found_out(run, tmp_path):
     """A push that is said to touch nobody, and one that is said to leave the motion."""
     nobody = np.zeros(len(run.packing), dtype=bool)
-    pushed = replace(run, push=Push(1.0, 1.0, None))
+    pushed = replace(run, motion={"amplitude": 1.0, "omega": 1.0})
     with run.started(MPI.COMM_SELF, tmp_path / "log") as (engine, _):
         loaded = Loaded.of(engine, tmp_path / "log")
     for touched, moves in ((nobody, True), (run.packing.top, False)):

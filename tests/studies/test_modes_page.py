@@ -1,12 +1,14 @@
 """The page of the study of complex modes: it comes out of the committed tables, and says what they hold."""
 
 import json
+import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from faultgouge.studies.modes.page import write_page
+from faultgouge.studies.modes.page import PAGES, in_real_units, write_page
 from faultgouge.studies.modes.random_matrices import weak_share
 from faultgouge.studies.modes.tables import median, power
 
@@ -21,7 +23,7 @@ def found():
 @pytest.mark.slow
 def test_the_page_comes_out_of_the_tables(tmp_path):
     write_page(DOCS / "tables", tmp_path)
-    for name in ("modes.md", "modes.json"):
+    for name in (*PAGES, "modes.json"):
         assert (tmp_path / name).read_text() == (DOCS / name).read_text()
 
 
@@ -54,6 +56,44 @@ def test_random_matrices_and_the_formula_are_as_near_as_the_page_says(found):
             if measured[0] > 0.15:
                 assert formula[0] == pytest.approx(measured[0], rel=0.125)
                 assert measured[0] < drawn[0] <= 1.25 * measured[0]
+
+
+def test_stronger_loss_stops_more_and_larger_loads_need_more(found):
+    for course in found["loss"].values():
+        for weak, strong in pairwise(sorted(course["grows"], reverse=True)):
+            for one, other in zip(course["grows"][weak], course["grows"][strong], strict=True):
+                assert other["count"] <= one["count"]
+        assert course["returns"] == 0
+        middles = [each[0] for each in course["critical_restitution"]]
+        assert middles[-1] < middles[0]
+
+
+def test_growth_with_dashpots_is_that_of_the_pencil_unless_contacts_slide(found):
+    """Within 2 % without tangential dashpots, but for a packing in which several motions grow about as fast."""
+    runs = [run for each in found["runs"].values() for run in each if run["ct_over_cn"] == 0]
+    off = np.array([abs(run["measured"] / run["predicted"] - 1) for run in runs])
+    assert len(off) >= 12
+    assert np.median(off) < 2e-3
+    assert {(run["seed"], run["fx_over_fy"]) for run, each in zip(runs, off, strict=True) if each > 0.02} <= {(3, 0.2)}
+
+
+def test_units_says_what_the_table_of_quartz_says(found):
+    page = (DOCS.parent / "units.md").read_text()
+    for row in in_real_units(found):
+        assert row in page
+    place = {name: course["loads"].index(0.2) for name, course in found["quartz"].items()}
+    for depth in ("1 MPa", "10 MPa", "100 MPa"):
+        grows = found["quartz"][f"quartz {depth}"]["grows"]["0.9"][place[f"quartz {depth}"]]
+        assert re.search(rf"{grows['count']} of {grows['of']}( packings)? under {depth}", page)
+        assert grows["count"] > grows["of"] / 2
+    for name, middle in (("quartz 1 MPa", 0.87), ("quartz 10 MPa", 0.95), ("quartz 100 MPa", 0.99)):
+        course = found["quartz"][name]
+        assert course["critical_restitution"][course["loads"].index(0.1)][0] == pytest.approx(middle, abs=0.006)
+        assert all(grows["count"] == 0 for grows in course["grows"]["0.9"][:1])
+        assert course["least_q"][place[name]][0] < 50
+    omega = [course["omega"][course["loads"].index(0.1)][0] for course in found["sizes"].values()]
+    assert min(omega) > 80 / 1.2
+    assert max(omega) < 80 * 1.2
 
 
 def test_checks_agree_with_the_same_packings(found):

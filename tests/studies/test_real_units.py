@@ -2,18 +2,16 @@
 
 import json
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 import tomllib
+from reference_layer import BIN
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.scenes.units import real_units
 from faultgouge.studies.reproduce import reproduce
 
-BIN = Path(sys.executable).parent
 SCENE = """
 [packing]
 disks = 30

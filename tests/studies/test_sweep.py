@@ -5,12 +5,12 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_layer import BIN
 
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
@@ -20,8 +20,6 @@ from faultgouge.studies.sweep.estimate import estimate
 from faultgouge.studies.sweep.merge import merge
 from faultgouge.studies.sweep.points import Sweep, shard
 from faultgouge.studies.sweep.tasks import TASKS
-
-BIN = Path(sys.executable).parent
 
 SMALL = {
     "packing": {"disks": 30, "top": 5, "width": 6.0},

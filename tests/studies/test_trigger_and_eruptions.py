@@ -1,15 +1,14 @@
 """The commands trigger and eruptions on a small scale: what they find, and that they go on where they were cut off."""
 
 import json
-from pathlib import Path
 
 import pytest
+from reference_layer import LAYER, REFERENCE
 
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.studies.eruptions import eruptions
 from faultgouge.studies.trigger import trigger_map
 
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 BASE = {
     "packing": {"file": str(REFERENCE)},
     "law": {"kn": 2e5},
@@ -87,14 +86,7 @@ def test_eruptions_that_were_cut_off_are_those_of_one_run(tmp_path):
 @pytest.mark.long
 def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(faultgouge, tmp_path):
     """Above the onset, 0.0218, D grows, but not to its end in the time that is given; with strong drag nothing does."""
-    text = f"""
-[packing]
-file = "{REFERENCE}"
-[law]
-kn = 2e5
-[load]
-fy = 3.0
-[ramp]
+    text = f"""{LAYER}[ramp]
 step = 1e-3
 until = 0.025
 [eruptions]

@@ -15,3 +15,12 @@ def test_the_page_is_that_of_its_table():
 def test_the_static_yield_lies_beyond_the_end_of_newtons_branch():
     rows, _ = rows_of(FOLDER / "tables" / "quartz_100.jsonl")
     assert all(row["static"] >= row["newton"] for row in rows)
+
+
+def test_layers_without_loss_flow_below_their_static_yield_and_lossy_ones_do_not():
+    rows, _ = rows_of(FOLDER / "tables" / "quartz_100.jsonl")
+    undamped, *lossy = numbers(rows)["yields"]
+    assert undamped["flow"] > len(rows) / 2
+    assert undamped["share"][2] < 1
+    assert all(each["flow"] == 0 for each in lossy)
+    assert all(each["share"] == [1, 1, 1] for each in lossy)

@@ -9,7 +9,7 @@ most of the stiffness of the weakest contacts, and contacts open that were close
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -21,8 +21,8 @@ from ....analysis.packing.contacts import Contacts
 from ....analysis.packing.packing import Floats
 from ....analysis.spectrum.spectrum import Complexes
 from ....pywrap import Engine
-from .study import Point, Settings, Study, Theory
-from .timing import timed
+from .study import Settings, Study, Theory, study_of
+from .timing import Run, timed_points
 
 METHODS = ("text", "HDF5 (run.h5)", "float32 trajectory, slips kept", "positions in doubles, slips lost")
 TEXT, HDF5, SINGLE, NO_SLIPS = METHODS
@@ -88,62 +88,39 @@ def dumps(settings: Settings) -> Study:
         return _study(settings, packing, Path(name))
 
 
-Run = tuple[str, float | None, Callable[[], tuple[Packing, int]]]
-
-
 def _study(settings: Settings, packing: Packing, folder: Path) -> Study:
     exact = eigenvalues(packing)
     digits = (G, 9, 12, 15, 16, 17) if settings.quick else (G, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17)
     runs = _runs(packing, folder, digits)
-    results = timed([run for *_, run in runs], settings.repeats, settings.progress)
-    points = tuple(
-        Point(method, parameter, loss(found, exact), seconds, size)
-        for (method, parameter, _), ((found, size), seconds) in zip(runs, results, strict=True)
-    )
+    points = timed_points(runs, settings, lambda found: loss(found, exact))
     overlap, furthest = packing.geometry.overlap, np.abs(packing.position).max()
     stiffest = float(packing.law.normal_stiffness(overlap).max())
     weakest = float(packing.law.normal_curvature(overlap.min())) / stiffest
     unit = [0.5 * 10.0 ** (np.ceil(np.log10(furthest)) - n) for n in digits]  # of the last digit of the largest
     expected = [each * weakest for each in unit]
     sizes = [float(point.evaluations or 0) for point in points if point.method == TEXT]
-    return Study(
-        name="files",
-        question=f"The eigenvalues of {len(packing)} disks at F_x = {packing.fx:g} after the packing went through a "
-        "file.",
-        error="largest change of an eigenvalue, in units of the largest",
-        parameter="digits of the text",
-        evaluations="bytes",
-        abscissa="evaluations",
-        reference="the packing in memory; eigenvalues have the rounding of their solver",
-        reference_error=float(np.finfo(float).eps),
+    return study_of(
+        "files",
         points=points,
-        advice=_advice(points),
+        reference_error=float(np.finfo(float).eps),
         theory=(Theory("rounding of the coordinates", tuple(expected), tuple(sizes)),),
-        remarks=(
-            f"The smallest overlap is {overlap.min():.1e}, coordinates go up to {furthest:.3g}. Where text has too "
-            "few digits for an overlap, contacts open or close.",
-            "An error of zero, the same eigenvalues to the bit, stands at the lower edge of the figure.",
-        ),
+        disks=len(packing),
+        fx=packing.fx,
+        coarse=next(point.error for point in points if (point.method, point.parameter) == (TEXT, G)),
+        overlap=overlap.min(),
+        furthest=furthest,
     )
 
 
-def _runs(packing: Packing, folder: Path, digits: Sequence[int]) -> list[Run]:
+def _runs(packing: Packing, folder: Path, digits: Sequence[int]) -> list[Run[Packing]]:
     """The ways through a file: method, digits, and what takes the packing through it."""
-    runs: list[Run] = [(TEXT, n, partial(through_text, packing, folder / "packing", n, folder)) for n in digits]
+    runs: list[Run[Packing]] = [
+        (TEXT, n, partial(through_text, packing, folder / "packing", n, folder)) for n in digits
+    ]
     runs.append((HDF5, None, partial(through_hdf5, packing, folder)))
     runs.append((SINGLE, None, partial(through_trajectory, packing)))
     runs.append((NO_SLIPS, None, partial(without_slips, packing)))
     return runs
-
-
-def _advice(points: Sequence[Point]) -> tuple[str, str]:
-    by = {(point.method, point.parameter): point.error for point in points}
-    return (
-        "Take run.h5 or the decks' %.17g: both give the packing back to the bit.",
-        f"Never take eigenvalues from text at %g, which changes them by {by[TEXT, G]:.0e} of the largest, from "
-        f"the float32 of a trajectory ({by[SINGLE, None]:.0e}), or from positions without slips "
-        f"({by[NO_SLIPS, None]:.0e}).",
-    )
 
 
 def _rounded(text: str, digits: int) -> str:

@@ -10,7 +10,6 @@ that is what the onset is solved with.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -22,8 +21,8 @@ from ....analysis.spectrum.spectrum import Complexes
 from ....pywrap import Engine, equilibrate
 from .extended import refined_near
 from .onset import Ways
-from .study import Point, Settings, Study, Theory
-from .timing import timed
+from .study import Settings, Study, Theory, study_of
+from .timing import Run, timed_points
 
 COUNT = 6
 """Eigenvalues that shift-invert is asked for: the pair and its neighbours."""
@@ -118,29 +117,12 @@ def far(settings: Settings) -> Study:
     """The eigenvalues about the pair that will coalesce, at half the load."""
     packing = settings.at(FAR).packing
     _, pair = _near(settings)
-    target = Target.of(packing, 1.001 * pair)
-    return _study(
-        settings,
-        target,
-        "eigenvalues, far from an exceptional point",
-        f"at F_x = {packing.fx:g}, far from it",
-        "Take shift-invert where a few eigenvalues will do ({sparse.seconds:.2g} s, {sparse.error:.0e}), to "
-        "the smallest tolerance, which costs next to nothing, and refine nothing.",
-    )
+    return _study("far", settings, packing, pair)
 
 
 def near(settings: Settings) -> Study:
     """The same just below the onset."""
-    packing, pair = _near(settings)
-    target = Target.of(packing, 1.001 * pair)
-    return _study(
-        settings,
-        target,
-        "eigenvalues, near an exceptional point",
-        f"at a distance of {APART:g} below it",
-        "Take shift-invert for the pair itself ({sparse.error:.0e}), but trust no single eigenvalue of it: rounding "
-        "of the coordinates moves it by {coordinates:.0e}, and the mean of the pair by {mean:.0e}.",
-    )
+    return _study("near", settings, *_near(settings))
 
 
 def _near(settings: Settings) -> tuple[Packing, float]:
@@ -154,43 +136,31 @@ def _near(settings: Settings) -> tuple[Packing, float]:
     return packing, float(values[np.argmin(np.abs(np.sum(left.conj() * right, axis=0)))].real)
 
 
-def _study(settings: Settings, target: Target, name: str, place: str, otherwise: str) -> Study:
-    runs: list[tuple[str, float | None, Callable[[], tuple[Complexes, int | None]]]] = [(DENSE, None, target.dense)]
+def _study(name: str, settings: Settings, packing: Packing, pair: float) -> Study:
+    target = Target.of(packing, 1.001 * pair)
+    runs: list[Run[Complexes]] = [(DENSE, None, target.dense)]
     for tolerance in np.logspace(-1, -15, 5 if settings.quick else 15).tolist():
         runs.append((ARPACK, tolerance, partial(target.shift_invert, tolerance)))
     runs.append((REFINED, None, target.refined))
-    results = timed([run for *_, run in runs], settings.repeats, settings.progress)
-    points = tuple(
-        Point(method, parameter, target.off(found), seconds, evaluations)
-        for (method, parameter, _), ((found, evaluations), seconds) in zip(runs, results, strict=True)
-    )
+    points = timed_points(runs, settings, target.off)
     last = {point.method: point for point in points}  # shift-invert's with the smallest tolerance
-    dense, sparse = last[DENSE], last[ARPACK]
     coordinates, mean = target.coordinates
-    return Study(
-        name=name,
-        question=f"The {COUNT} eigenvalues about the pair that coalesces at the onset, {place}; kappa = "
-        f"{target.condition:.3g}.",
-        error="largest relative error of the eigenvalues",
-        parameter="tolerance of the iteration",
-        evaluations="solves; refined: Newton steps",
-        abscissa="parameter",
-        reference="Newton's method on each eigenpair with residuals in extended precision, K as rounded to doubles "
-        "taken as exact; its error is the last step and the rounding in that precision times kappa, an upper bound",
-        reference_error=target.error,
+    return study_of(
+        name,
+        "a few eigenvalues",
         points=points,
-        advice=(
-            f"Take the dense solver for {len(target.packing)} disks: all eigenvalues in {dense.seconds:.2g} s, "
-            f"these to {dense.error:.0e}.",
-            otherwise.format(sparse=sparse, coordinates=coordinates, mean=mean),
-        ),
+        reference_error=target.error,
         theory=(
             Theory("u |A| kappa", (target.attainable,)),
             Theory("one unit in the last place of the coordinates", (coordinates,)),
         ),
-        remarks=(
-            f"One unit in the last place of the coordinates moves these eigenvalues by {coordinates:.0e}: that much "
-            "they mean. What is more exact gives digits of the rounded K, not of the packing.",
-            f"Shift-invert computes {COUNT} eigenvalues with right and left vectors, the dense solver all without.",
-        ),
+        count=COUNT,
+        apart=APART,
+        target=target,
+        disks=len(packing),
+        fx=packing.fx,
+        dense=last[DENSE],
+        sparse=last[ARPACK],
+        coordinates=coordinates,
+        mean=mean,
     )

@@ -8,8 +8,9 @@ force has a kink in its second derivative, which adds a term of first order for 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -17,8 +18,8 @@ from ....analysis import Packing, stiffness_matrix
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine
 from .forces import central_differences, complex_step
-from .study import Point, Settings, Study, Theory
-from .timing import timed
+from .study import Settings, Study, Theory, best_of, study_of
+from .timing import Run, timed_points
 
 METHODS = (
     "analytic",
@@ -49,70 +50,48 @@ def jacobian(settings: Settings) -> Study:
         return _study(settings, engine, packing)
 
 
-Run = tuple[str, float | None, int, Callable[[], Floats]]
-
-
 def _study(settings: Settings, engine: Engine, packing: Packing) -> Study:
     exact = complex_step(packing, np.clongdouble)
     scale = np.abs(exact).max()
     steps = np.logspace(-11, -5, 5 if settings.quick else 13)
     runs = _runs(engine, packing, steps)
-    size = 3 * len(packing)
-    results = timed([run for *_, run in runs], settings.repeats, settings.progress)
-    points = tuple(
-        Point(method, parameter, float(np.abs(matrix - exact).max() / scale), seconds, evaluations)
-        for (method, parameter, evaluations, _), (matrix, seconds) in zip(runs, results, strict=True)
-    )
-    overlap = packing.geometry.overlap
+    points = timed_points(runs, settings, lambda matrix: float(np.abs(matrix - exact).max() / scale))
     own, analytic = (_rounding(packing, number) / float(scale) for number in (np.longdouble, np.float64))
     fine = np.geomspace(steps[0], steps[-1], 60)
     truncation, rounding = _difference_errors(packing, float(scale), fine)
-    return Study(
-        name="Jacobian",
-        question=f"The stability operator K = -dF/dq of {len(packing)} disks at F_x = {packing.fx:g}, {size} x {size}.",
-        error="largest error of an element, in units of the largest |K|",
-        parameter="step of the difference, length",
-        evaluations="force evaluations",
-        abscissa="parameter",
-        reference="complex steps in extended precision; its error is the rounding of the smallest overlap in that "
-        "precision",
-        reference_error=own,
+    return study_of(
+        "jacobian",
         points=points,
-        advice=_advice(points),
+        reference_error=own,
         theory=(
             Theory("truncation + rounding", tuple((truncation + rounding).tolist()), tuple(fine.tolist())),
             Theory("overlaps as plain differences", (analytic,)),
         ),
-        remarks=(
-            f"The smallest overlap is {overlap.min():.1e}: a step above it opens the contact.",
-            "A sparse K needs fewer differences than columns, if columns that share no row are displaced together; the "
-            "errors are the same.",
-        ),
+        disks=len(packing),
+        fx=packing.fx,
+        size=3 * len(packing),
+        milliseconds=best_of(points)[ANALYTIC].seconds * 1e3,
+        overlap=packing.geometry.overlap.min(),
     )
 
 
-def _runs(engine: Engine, packing: Packing, steps: Floats) -> list[Run]:
-    """Method, step, evaluations, and what computes K."""
+def _runs(engine: Engine, packing: Packing, steps: Floats) -> list[Run[Floats]]:
+    """What computes K, by steps of differences."""
     size = 3 * len(packing)
-    runs: list[Run] = [
-        (ANALYTIC, None, 1, lambda: stiffness_matrix(packing).toarray()),
-        (PAPER, None, 1, lambda: stiffness_matrix(packing, "paper").toarray()),
-        (COMPLEX, None, size, partial(complex_step, packing)),
+    runs: list[Run[Floats]] = [
+        (ANALYTIC, None, partial(_counted, 1, lambda: stiffness_matrix(packing).toarray())),
+        (PAPER, None, partial(_counted, 1, lambda: stiffness_matrix(packing, "paper").toarray())),
+        (COMPLEX, None, partial(_counted, size, complex_step, packing)),
     ]
-    runs += [(DIFFERENCES, step, 2 * size, partial(central_differences, packing, step)) for step in steps]
-    runs += [(LAMMPS, step, 2 * size, partial(in_lammps, engine, packing, step)) for step in steps[::2]]
+    for step in steps:
+        runs.append((DIFFERENCES, step, partial(_counted, 2 * size, central_differences, packing, step)))
+    for step in steps[::2]:
+        runs.append((LAMMPS, step, partial(_counted, 2 * size, in_lammps, engine, packing, step)))
     return runs
 
 
-def _advice(points: Sequence[Point]) -> tuple[str, str]:
-    best = {method: min((p for p in points if p.method == method), key=lambda p: p.error) for method in METHODS}
-    return (
-        f"Take the analytic K: {best[ANALYTIC].seconds * 1e3:.2g} ms and {best[ANALYTIC].error:.0e}; the "
-        f"paper's form, which costs the same, is another operator, off by {best[PAPER].error:.0e}.",
-        f"Take complex steps to check a law that changes, {best[COMPLEX].error:.0e} without a step to choose; "
-        f"central differences, with a step of {best[LAMMPS].parameter:.0e} and at the best "
-        f"{best[LAMMPS].error:.0e}, only for forces that are a black box, such as LAMMPS's.",
-    )
+def _counted(evaluations: int, compute: Callable[..., Floats], *arguments: Any) -> tuple[Floats, int]:
+    return compute(*arguments), evaluations
 
 
 def _rounding(packing: Packing, number: type) -> float:

@@ -12,7 +12,6 @@ product linearly, and the pair is believed from :math:`50\, u |A|_F` on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
@@ -24,8 +23,8 @@ from ....pywrap.onset.path_error import with_path_error
 from ....pywrap.runs.path import EquilibriumPath
 from .coverage import INCREMENTS, coverage
 from .precision import compensated
-from .study import Point, Settings, Study, Theory
-from .timing import timed
+from .study import Settings, Study, Theory, study_of
+from .timing import Run, timed_points
 
 METHODS = ("scan, overdamped", "scan, Newton", "bisection", "root of the discriminant")
 OVERDAMPED, SCAN, BISECTION, ROOT = METHODS
@@ -120,9 +119,6 @@ def onset(settings: Settings) -> Study:
         return _study(settings, Ways(engine, start, settings.scene), exact)
 
 
-Run = tuple[str, float, Callable[[], tuple[float, int]]]
-
-
 def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     quick = settings.quick
     check, finest = (2e-3, 1e-3) if quick else (5e-4, 2.5e-4)
@@ -132,42 +128,29 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     reference_error = found.error + abs(reference.root(check, guess)[0] - exact)
     whole = {"doubles": partial(ways.whole, beyond=guess), "compensated": partial(reference.whole, beyond=guess)}
     runs = _runs(ways, quick, exact)
-    results = timed([run for _, _, run in runs], settings.repeats, settings.progress)
     resolution = float(np.spacing(exact))
-    points = tuple(
-        Point(method, parameter, max(abs(found - exact), resolution), seconds, equilibria)
-        for (method, parameter, _), ((found, equilibria), seconds) in zip(runs, results, strict=True)
-    )
+    points = timed_points(runs, settings, lambda found: max(abs(found - exact), resolution))
     lost, overlap = ways.beyond(exact)
-    residual = max(each.residual for each in settings.ramp)
-    best = {method: min((p for p in points if p.method == method), key=lambda p: p.error) for method in METHODS}
-    return Study(
-        name="onset",
-        question=f"The force F_x^c = {exact:.10g} at which the first pair of eigenvalues of "
-        f"{len(settings.ramp[0].packing)} disks becomes complex, from the settled packing on.",
-        error="error of F_x^c, force",
-        parameter="increment of F_x; bisection: width that is left",
-        evaluations="equilibria, each with its eigenvalues",
-        abscissa="evaluations",
-        reference=f"the root of the discriminant in compensated arithmetic on a ramp with increments of {finest:g}; "
-        f"its error is the one that it states and its difference from increments of {check:g}",
-        reference_error=reference_error,
+    return study_of(
+        "onset",
         points=points,
-        covered=coverage(whole, INCREMENTS[:2] if quick else INCREMENTS),
-        advice=_advice(best),
+        reference_error=reference_error,
         theory=(_half_an_increment(exact), Theory("pair lost in rounding", (lost,))),
-        remarks=(
-            f"At {BEYOND:g} beyond the onset |y^H x| is {overlap:.1e}; an error of the equilibria, of the order of "
-            f"their residual {residual:.0e}, is in all ways alike.",
-            f"The best scan by overdamped dynamics took {best[OVERDAMPED].seconds:.3g} s for an error of "
-            f"{best[OVERDAMPED].error:.0e}. An error below the spacing of doubles, {resolution:.0e}, is shown as that.",
-        ),
+        covered=coverage(whole, INCREMENTS[:2] if quick else INCREMENTS),
+        exact=exact,
+        disks=len(settings.ramp[0].packing),
+        finest=finest,
+        check=check,
+        beyond=BEYOND,
+        overlap=overlap,
+        residual=max(each.residual for each in settings.ramp),
+        resolution=resolution,
     )
 
 
-def _runs(ways: Ways, quick: bool, exact: float) -> list[Run]:
-    """Method, increment, and what finds the onset."""
-    runs: list[Run] = []
+def _runs(ways: Ways, quick: bool, exact: float) -> list[Run[float]]:
+    """What finds the onset, by increments."""
+    runs: list[Run[float]] = []
     for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
         runs.append((OVERDAMPED, increment, partial(ways.scan, increment, "overdamped")))
     for increment in (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4):
@@ -183,14 +166,3 @@ def _half_an_increment(exact: float) -> Theory:
     """The error of a scan over the number of its equilibria."""
     counts = np.array([3.0, 300.0])
     return Theory("half an increment", tuple((0.5 * exact / counts).tolist()), tuple(counts.tolist()))
-
-
-def _advice(best: Mapping[str, Point]) -> tuple[str, str]:
-    return (
-        f"Take the root of the discriminant: {best[ROOT].error:.0e} in {best[ROOT].seconds:.2g} s, with an "
-        "error that it states, and windows of complex eigenvalues that are narrower than an increment are "
-        "found.",
-        f"Take a bisection where one window is known to be there, {best[BISECTION].error:.0e} in "
-        f"{best[BISECTION].seconds:.2g} s and nothing else computed; a scan, which errs by up to half its "
-        "increment, only for a picture of the eigenvalues, and never with overdamped dynamics.",
-    )

@@ -13,7 +13,6 @@ power :math:`F \cdot v`. LAMMPS's own minimizers advance no slips and are refuse
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -25,8 +24,8 @@ from ....pywrap import Engine, Equilibrium, equilibrate
 from ....pywrap.equilibria.quasistatic import rounding_floor
 from .fire import fire
 from .precision import compensated
-from .study import Point, Settings, Study, Theory
-from .timing import timed
+from .study import Settings, Study, Theory, study_of
+from .timing import Run, timed_points
 
 FROM, TO = 0.010, 0.011
 """F_x before and after: an increment far from the onset."""
@@ -119,9 +118,6 @@ def relaxation(settings: Settings) -> Study:
         )
 
 
-Run = tuple[str, float, Increment, Callable[[], tuple[Packing, int]]]
-
-
 def _study(settings: Settings, plain: Increment, careful: Increment, end: Equilibrium) -> Study:
     matrix, _ = dynamical_matrix(end.packing)
     values = np.linalg.eigvals(matrix.toarray()).real
@@ -131,82 +127,47 @@ def _study(settings: Settings, plain: Increment, careful: Increment, end: Equili
     rounding = rounding_floor(plain.start.packing) * softness
     relax_step, verlet_step, drag = STABLE * 2 / fastest, STABLE * 2 / np.sqrt(fastest), 2 * np.sqrt(slowest)
     runs = _runs(plain, careful, (relax_step, verlet_step, drag), settings.quick)
-    results = timed([run for *_, run in runs], settings.repeats, settings.progress)
     reference_error = end.floor * softness
-    points = tuple(
-        Point(method, parameter, increment.distance(packing) or reference_error, seconds, evaluations)
-        for (method, parameter, increment, _), ((packing, evaluations), seconds) in zip(runs, results, strict=True)
-    )
+    # both increments end at the same packing
+    points = timed_points(runs, settings, lambda packing: plain.distance(packing) or reference_error)
     first = plain.distance(plain.start.packing)
     many = np.geomspace(10, 3e4, 100)
     decay = {OVERDAMPED: slowest * relax_step, VERLET: 0.5 * drag * verlet_step}
     theory = [_decay(f"slowest mode, {name}", first, rate, many) for name, rate in decay.items()]
-    best = {name: min((p for p in points if p.method == name), key=lambda p: p.error) for name, *_ in runs}
-    return Study(
-        name="relaxation",
-        question=f"The equilibrium of {len(end.packing)} disks at F_x = {TO:g}, from that at {FROM:g}: how far from "
-        "it the packing still is.",
-        error="largest error of x, y, R theta; length",
-        parameter="largest force on a disk at which it ends; Verlet: number of steps",
-        evaluations="force evaluations",
-        abscissa="evaluations",
-        reference="Newton's equilibrium in compensated arithmetic; its error is estimated from what the rounding "
-        "of the forces makes through K^-1, and it is shown in the figure as that. What the others differ in "
-        "because of their path is in their errors",
-        reference_error=reference_error,
+    return study_of(
+        "relaxation",
         points=points,
-        advice=_advice(best),
+        reference_error=reference_error,
         theory=(*theory, Theory("rounding of doubles", (rounding,))),
-        remarks=_remarks(slowest, fastest),
+        disks=len(end.packing),
+        start=FROM,
+        to=TO,
+        slowest=slowest,
+        fastest=fastest,
     )
 
 
-def _runs(plain: Increment, careful: Increment, dynamics: tuple[float, float, float], quick: bool) -> list[Run]:
-    """Method, parameter, increment, and what finds the equilibrium; steps of dynamics, of Verlet, and its drag."""
+def _runs(
+    plain: Increment, careful: Increment, dynamics: tuple[float, float, float], quick: bool
+) -> list[Run[Packing]]:
+    """What finds the equilibrium; `dynamics` are the steps of dynamics and of Verlet, and its drag."""
     relax_step, verlet_step, drag = dynamics
-    runs: list[Run] = []
+    runs: list[Run[Packing]] = []
     for force in np.logspace(-3, -9, 4 if quick else 7).tolist():
-        runs.append((DECKS, force, plain, partial(plain.overdamped, None, force)))
-        runs.append((OVERDAMPED, force, plain, partial(plain.overdamped, relax_step, force)))
+        runs.append((DECKS, force, partial(plain.overdamped, None, force)))
+        runs.append((OVERDAMPED, force, partial(plain.overdamped, relax_step, force)))
         if force > 1e-6:  # its evaluations are slow, and its convergence steady
-            runs.append((FIRE, force, plain, partial(plain.fire, verlet_step, force)))
+            runs.append((FIRE, force, partial(plain.fire, verlet_step, force)))
     for force in (1e-5, 1e-9, 1e-13):
-        runs.append((OVERDAMPED + COMPENSATED, force, careful, partial(careful.overdamped, relax_step, force)))
+        runs.append((OVERDAMPED + COMPENSATED, force, partial(careful.overdamped, relax_step, force)))
     for steps in (50, 100, 200, 400, 800):
-        runs.append((VERLET, steps, plain, partial(plain.verlet, verlet_step, drag, steps)))
-        runs.append((VERLET + COMPENSATED, steps, careful, partial(careful.verlet, verlet_step, drag, steps)))
+        runs.append((VERLET, steps, partial(plain.verlet, verlet_step, drag, steps)))
+        runs.append((VERLET + COMPENSATED, steps, partial(careful.verlet, verlet_step, drag, steps)))
     for force in (1e-1, 1e-4, 1e-7, 0.0):
-        runs.append((NEWTON, force, plain, partial(plain.newton, force or None)))
+        runs.append((NEWTON, force, partial(plain.newton, force or None)))
     for force in (1e-1, 1e-4, 1e-7, 1e-12, 0.0):
-        runs.append((NEWTON + COMPENSATED, force, careful, partial(careful.newton, force or None)))
+        runs.append((NEWTON + COMPENSATED, force, partial(careful.newton, force or None)))
     return sorted(runs, key=lambda run: run[0])
-
-
-def _advice(best: Mapping[str, Point]) -> tuple[str, str]:
-    newton, careful_newton, verlet = best[NEWTON], best[NEWTON + COMPENSATED], best[VERLET]
-    return (
-        f"Take Newton's method: {newton.error:.0e} after {newton.evaluations} evaluations ({newton.seconds:.2g} "
-        f"s) in doubles, {careful_newton.error:.0e} after {careful_newton.evaluations} in compensated "
-        f"arithmetic ({careful_newton.seconds:.2g} s), and no parameter to choose.",
-        "Take Verlet with drag where the path has to be a motion: with a drag of 2 omega_min, spins included, "
-        f"it errs by {verlet.error:.0e} after {verlet.evaluations} steps ({verlet.seconds:.2g} s), where the "
-        f"paper's overdamped dynamics errs by {best[DECKS].error:.0e} after {best[DECKS].evaluations} "
-        f"({best[DECKS].seconds:.2g} s).",
-    )
-
-
-def _remarks(slowest: float, fastest: float) -> tuple[str, ...]:
-    return (
-        f"The eigenvalues of K/m go from {slowest:.3g} to {fastest:.3g}: overdamped dynamics needs a number of "
-        "steps proportional to their ratio, Verlet with critical drag to its root. Overdamped means with the "
-        "longest stable step, from K, where the step of the decks is not named.",
-        "FIRE is on the displacement from the last equilibrium, with slips advanced along the straight path "
-        "from there in every evaluation, as in Newton's method; run as a motion, its stops and restarts would "
-        "be in the slips. An evaluation of FIRE or Newton goes through Python, one of the dynamics does not.",
-        "The dynamics in compensated arithmetic ends beside Newton's equilibrium, not on it: it has taken another "
-        "path, and slips depend on it.",
-        "Nothing slides in this increment. Where contacts slide, ways that differ may end further apart.",
-    )
 
 
 def _decay(label: str, first: float, rate: float, steps: Floats) -> Theory:

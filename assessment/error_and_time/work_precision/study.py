@@ -6,14 +6,24 @@ squares, with the standard error of the slope from the scatter about the line.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 
 from ....pywrap import Equilibrium, Scene
 from .coverage import Covered
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+WORDS = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
+"""What is said of each study."""
 
 T = TypeVar("T")
 Progress = Callable[[Sequence[T]], Iterable[T]]
@@ -176,6 +186,47 @@ class Study:
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers, strings, lists and dicts, for JSON."""
         return asdict(self)
+
+
+def best_of(points: Iterable[Point]) -> dict[str, Point]:
+    """The point of least error of each method."""
+    return {point.method: point for point in sorted(points, key=lambda each: each.error)[::-1]}
+
+
+def study_of(
+    *sections: str,
+    points: Sequence[Point],
+    reference_error: float,
+    orders: Sequence[Order] = (),
+    theory: Sequence[Theory] = (),
+    covered: Sequence[Covered] = (),
+    **numbers: Any,
+) -> Study:
+    """A study with its words.
+
+    Parameters
+    ----------
+    *sections : str
+        Of words.toml: the study's own, and one that it shares with others.
+    points, reference_error, orders, theory, covered
+        As of `Study`.
+    **numbers
+        What the words name; `points`, `orders` and the `best` of the points are known to them.
+    """
+    known = numbers | {"points": points, "orders": orders, "best": best_of(points)}
+    words = {name: text for section in sections for name, text in WORDS[section].items()}
+    said: dict[str, Any] = {
+        name: text.format(**known) if isinstance(text, str) else tuple(line.format(**known) for line in text)
+        for name, text in words.items()
+    }
+    return Study(
+        **said,
+        points=tuple(points),
+        reference_error=reference_error,
+        orders=tuple(orders),
+        theory=tuple(theory),
+        covered=tuple(covered),
+    )
 
 
 def fit_order(points: Iterable[Point], method: str, expected: float, least: float = 0.0, most: float = np.inf) -> Order:

@@ -13,9 +13,12 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from .study import Progress
+from .study import Point, Progress, Settings
 
 T = TypeVar("T")
+
+Run = tuple[str, float | None, Callable[[], tuple[T, int | None]]]
+"""A method, its parameter, and what it computes: a result, and the evaluations that it took."""
 
 
 def timed(
@@ -45,3 +48,12 @@ def timed(
             results[k] = jobs[k]()
             seconds[k].append(time.perf_counter() - begin)
     return [(results[k], median(seconds[k])) for k in range(len(jobs))]
+
+
+def timed_points(runs: Sequence[Run[T]], settings: Settings, error: Callable[[T], float]) -> tuple[Point, ...]:
+    """The points of runs, each with the error of its result."""
+    results = timed([run for *_, run in runs], settings.repeats, settings.progress)
+    return tuple(
+        Point(method, parameter, error(found), seconds, evaluations)
+        for (method, parameter, _), ((found, evaluations), seconds) in zip(runs, results, strict=True)
+    )

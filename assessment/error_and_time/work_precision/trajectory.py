@@ -11,7 +11,7 @@ that *forms* during the run would: its slip begins with zero at the end of a ste
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -19,7 +19,7 @@ import numpy as np
 from ....analysis import MindlinLaw, Packing, touching
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine
-from .study import Order, Point, Settings, Study, Theory, fit_order
+from .study import Point, Settings, Study, Theory, fit_order, study_of
 from .timing import timed
 from .verlet import Tangent, Verlet
 
@@ -92,39 +92,16 @@ def _study(settings: Settings, engine: Engine, packing: Packing) -> Study:
         fit_order(points, method, expected, least=100 * reference_error)
         for method, expected in ((LAMMPS, 2), (MIDPOINT, 2), (END, 1))
     )
-    return Study(
-        name="time step: trajectory",
-        question="Where three disks are that roll and slide apart under a load, after a time of 2; undamped.",
-        error="largest error of x, y, R theta; length",
-        parameter="time step",
-        evaluations="steps",
-        abscissa="parameter",
-        reference="Richardson's extrapolation of runs in LAMMPS with a time step far below those shown; its error "
-        "is the difference from the extrapolation with twice that step",
-        reference_error=reference_error,
+    same = min(point.error for point in points if point.method == END)
+    return study_of(
+        "trajectory",
         points=points,
-        advice=_advice(points, orders),
+        reference_error=reference_error,
         orders=orders,
         theory=_slopes(fine),
-        remarks=(
-            f"LAMMPS and the NumPy integrator with the same tangent differ by {apart:.1e} at the most: they "
-            "integrate the same equations. NumPy is slow because it interprets; compare methods within one of the "
-            "two.",
-            "No contact forms in this run. One that does begins with zero slip at the end of a step, which is of first "
-            "order in the step.",
-        ),
-    )
-
-
-def _advice(points: Sequence[Point], orders: Sequence[Order]) -> tuple[str, str]:
-    same = min(point.error for point in points if point.method == END)
-    needed = next(p for p in points if p.method == MIDPOINT and p.error < same)
-    finest = max(point.evaluations or 0 for point in points if point.method == END)
-    return (
-        f"Take the tangent at the middle of the step, as the pair style does: order {orders[0].order:.3f} +- "
-        f"{orders[0].error:.1g}, so that halving the step gains a factor of four.",
-        f"The tangent at the end of the step has no use: order {orders[2].order:.3f} +- {orders[2].error:.1g}, and "
-        f"{finest} steps with it err as much as fewer than {needed.evaluations} with the other.",
+        apart=apart,
+        needed=next(p for p in points if p.method == MIDPOINT and p.error < same).evaluations,
+        finest=_steps(coarse)[-1],
     )
 
 

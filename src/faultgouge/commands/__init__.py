@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-FAMILIES = ("beginning", "runs", "eigenvalues", "pictures", "exchange", "studies", "earthquakes", "sweeps")
+FAMILIES = ("runs", "eigenvalues", "pictures", "exchange", "studies", "sweeps")
 """Modules with commands."""
 
 

@@ -13,19 +13,31 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import AsJson, ScenePath, print_json, read_scene, say, status, stored_packing
+from .terminal import (
+    AsJson,
+    Frame,
+    PackingFile,
+    ScenePath,
+    print_json,
+    read_scene,
+    say,
+    show_table,
+    status,
+    stored_packing,
+)
 
 if TYPE_CHECKING:
     from ..analysis import DampedWindow, Packing, Spectrum, Window
     from ..pywrap import Scene
+    from ..pywrap.onset.damped import DampedOnset
 
 app = typer.Typer()
 
 
 @app.command(epilog="Example: faultgouge spectrum run.h5 --json")
 def spectrum(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.")],
-    frame: Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")] = -1,
+    file: PackingFile,
+    frame: Frame = -1,
     values: Annotated[
         bool, typer.Option("--values", help="Eigenvalues alone: of a thousand disks in a third of the time.")
     ] = False,
@@ -147,7 +159,7 @@ def onset(
     With a section [damping]: the windows in which some motion grows in spite of
     the dissipation, or because of it, and beside them the undamped onset.
     """
-    from faultgouge.analysis.files.wholefile import check_folder, write_text
+    from faultgouge.analysis.files.wholefile import check_folder
 
     wanted, part = read_scene(scene, "onset"), None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
@@ -155,15 +167,27 @@ def onset(
     if output:
         check_folder(output)
     folder = _search_folder(output)
-    of_a_mu = _damped_onset if wanted.damping is not None else partial(_undamped_onset, part, folder)
-    found = [of_a_mu(wanted, mu) for mu in wanted.law.mus]
+    found: list[dict[str, Any]] = []
+    for mu in wanted.law.mus:
+        if wanted.damping is not None:
+            found.append(_damped_onset(wanted, mu, output, found))
+        else:
+            found.append(_undamped_onset(part, folder, wanted, mu))
+    result = _written(output, found)
+    if output and is_root() and folder is not None:
+        shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
+    if as_json:
+        print_json(result)
+
+
+def _written(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]:
+    """The JSON of all friction coefficients, written if there is a file for it."""
+    from faultgouge.analysis.files.wholefile import write_text
+
     result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
     if output and is_root():
         write_text(output, json.dumps(result, indent=1) + "\n")
-        if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
-    if as_json:
-        print_json(result)
+    return result
 
 
 def _search_folder(output: Path | None) -> Path | None:
@@ -188,13 +212,22 @@ def _undamped_onset(modes: tuple[int, int] | None, folder: Path | None, scene: S
     return {"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond} | real
 
 
-def _damped_onset(scene: Scene, mu: float) -> dict[str, Any]:
-    """The onset of a scene with dissipation, as its JSON; and what a user reads of it."""
+def _damped_onset(scene: Scene, mu: float, output: Path | None, before: list[dict[str, Any]]) -> dict[str, Any]:
+    """The onset of a scene with dissipation, as its JSON; and what a user reads of it.
+
+    What is known is written as it comes, beside what is known `before` of other friction coefficients, with the load
+    up to which that is all as the key `searched_to`.
+    """
     from faultgouge.analysis.digits import with_uncertainty
     from faultgouge.pywrap.onset.damped import damped_onset_run
 
+    def known(so_far: DampedOnset, fx: float) -> None:
+        if output is not None:
+            _written(output, [*before, {"mu": mu, "searched_to": fx} | so_far.as_dict()])
+            keeps(f"{output} has the windows with dissipation up to F_x = {fx:.6g}, without the errors of the path")
+
     with status(f"mu = {mu:g}") as show:
-        run = damped_onset_run(scene, mu, watch=partial(_under_way, show, f"mu = {mu:g}", tells=True))
+        run = damped_onset_run(scene, mu, partial(_under_way, show, f"mu = {mu:g}", tells=output is None), known)
     first = run.windows[0]
     say(
         f"mu = {mu:g}: with dissipation F_x^c = {with_uncertainty(run.fx_c, run.error)} ({first.kind}, "
@@ -245,21 +278,15 @@ def _say_of_one_path(windows: Sequence[Window] | Sequence[DampedWindow]) -> None
 
 def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]]) -> None:
     """The windows of complex eigenvalues as a table, on standard error; in SI where the scene has units."""
-    if not is_root():
-        return
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     from faultgouge.analysis.digits import with_uncertainty
 
-    more = ("in Pa", "F_x/F_y", "in Hz") if si else ("eigenvalue",)
-    table = Table("from F_x", "to F_x", *more, "begins with", box=box.SIMPLE_HEAD)
+    rows = []
     for k, each in enumerate(windows):
         until = "the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}"
         numbers = _columns(si[k]) if si else [f"{each.eigenvalue:.6g}"]
-        table.add_row(with_uncertainty(each.fx_onset, each.error), until, *numbers, each.kind)
-    Console(stderr=True, highlight=False).print(table)
+        rows.append([with_uncertainty(each.fx_onset, each.error), until, *numbers, each.kind])
+    more = ("in Pa", "F_x/F_y", "in Hz") if si else ("eigenvalue",)
+    show_table(("from F_x", "to F_x", *more, "begins with"), rows)
 
 
 def _under_way(

@@ -9,7 +9,7 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import progress, say, status, stored_packing
+from .terminal import Frame, PackingFile, progress, say, status, stored_packing
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -96,10 +96,8 @@ def import_(
 
 @app.command(epilog="Example: faultgouge export run.h5 --mode pair -o packing.vtp")
 def export(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.", show_default=False)
-    ],
-    frame: Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")] = -1,
+    file: PackingFile,
+    frame: Frame = -1,
     mode: Annotated[
         str | None,
         typer.Option("--mode", metavar="pair|N", help="Also a mode as vectors, as of `faultgouge draw`."),
@@ -124,7 +122,7 @@ def export(
     'faultgouge\\[export]'. With --frames a film of displacements: a .pvd for ParaView
     comes with a folder of .vtp.
     """
-    from faultgouge.pywrap.exchange.writers import check_writer, write_packing
+    from faultgouge.pywrap.exchange.formats import check_writer, write_packing
 
     if frames is not None:
         if mode is not None or frame != -1:
@@ -143,8 +141,8 @@ def export(
 def _export_frames(file: Path, says: str, output: Path) -> None:
     """The frames of a ramp or of an undamped run."""
     from faultgouge.analysis import PackingFileError, RunFile
+    from faultgouge.pywrap.exchange.formats import check_frames_writer, write_frames
     from faultgouge.pywrap.exchange.frames import chosen_frames, frames_of
-    from faultgouge.pywrap.exchange.writers import check_frames_writer, write_frames
 
     check_frames_writer(output)
     if file.suffix == ".disks":
@@ -255,9 +253,12 @@ def _scene(scene: Path | None, disks: Disks, values: dict[str, Any]) -> Scene:
     if scene is not None:
         return Scene.from_toml(scene, packing={})
     damping = {key: values[key] for key in ("cn", "ct", "tau") if key in values}
+    law: dict[str, Any] = {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values}
+    if values.get("rescaled"):
+        law["history"] = "rescaled"
     sections = {
         "packing": {},
-        "law": {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values},
+        "law": law,
         "load": {"fy": values["fy"]},
     }
     return Scene.from_mapping(sections | ({"damping": damping} if damping else {}))

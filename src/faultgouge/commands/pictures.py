@@ -1,4 +1,4 @@
-"""Packings, modes and runs to look at: draw, movie."""
+"""Packings, modes and runs to look at: draw, movie, view."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..ranks import is_root
-from .terminal import progress, say, stored_packing
+from .terminal import Frame, PackingFile, progress, say, stored_packing
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -28,10 +28,6 @@ class Colour(str, Enum):
     NONE = "none"
 
 
-PackingFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.", show_default=False)
-]
-Frame = Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")]
 WhichMode = Annotated[
     str | None,
     typer.Option(
@@ -89,12 +85,12 @@ def movie(
     frame: Frame = -1,
     color: WhichColour = Colour.MOBILISED,
     seconds: Annotated[float, typer.Option(min=0.1, max=600, help="Length of the film.")] = 10.0,
-    rate: Annotated[float, typer.Option(min=1, max=60, help="Frames a second.")] = 20.0,
+    rate: Annotated[float, typer.Option(min=1, max=60, help="Frames a second.")] = 10.0,
     span: Annotated[
         tuple[float, float] | None,
         typer.Option(metavar="T0 T1", help="Times of the run between which it is shown; all by default."),
     ] = None,
-    dots: Annotated[int, typer.Option(min=30, max=400, help="Dots an inch; a film is some five inches wide.")] = 130,
+    dots: Annotated[int, typer.Option(min=30, max=400, help="Dots an inch; a film is some five inches wide.")] = 110,
     output: Annotated[Path, typer.Option("-o", "--output", help="The film: .gif or .mp4.")] = Path("film.gif"),
 ) -> None:
     """Make a film of an undamped run, of a mode, or of a ramp.
@@ -119,6 +115,38 @@ def movie(
     write_film(film, output, rate, lambda frames, total: progress(frames, "frames", total))
     width, height = film.size
     say(f"{count} frames of {width} x {height} dots; written to {output}")
+
+
+@app.command(epilog="Example: faultgouge view run.h5 -o page.html")
+def view(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5 of a ramp, or perturb.h5.", show_default=False)],
+    loads: Annotated[int, typer.Option(min=1, help="Equilibria on the page, equally spaced if there are more.")] = 60,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The page: .html.")] = Path("page.html"),
+) -> None:
+    """Make one page that any browser opens offline: a ramp with its pair, under a slider.
+
+    The page has the packing with its force chains, the plane of eigenvalues, in which
+    two meet, both over F_x, and D(t) if the file has it. The modes of the pair move.
+    It needs pip install 'faultgouge\\[view]'.
+    """
+    if output.suffix.lower() != ".html":
+        raise typer.BadParameter(f"-o {output}: a page is an .html")
+    from faultgouge.analysis import RunFile
+    from faultgouge.analysis.files.wholefile import check_folder
+    from faultgouge.figures.view import check_library, equally_spaced, write_view
+
+    check_library()
+    check_folder(output)
+    if not is_root():
+        return
+    with RunFile(file) as run:
+        packings = [run.packing(k) for k in equally_spaced(len(run), loads)]
+        series = run.series("undamped") if "undamped" in run.names_of_series else None
+    span = " to ".join(f"{fx:g}" for fx in dict.fromkeys((packings[0].fx, packings[-1].fx)))
+    what = "undamped run" if series is not None else "equilibria"
+    title = f"{file.name}: {what} of {len(packings[0])} disks, F_x = {span}"
+    write_view(packings, output, title, series, lambda them: progress(them, "loads"))
+    say(f"{len(packings)} loads, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
 
 
 def _film_of_mode(file: Path, frame: int, mode: str, count: int, seconds: float, dots: int) -> Film:

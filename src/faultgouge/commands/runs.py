@@ -1,14 +1,16 @@
-"""From a scene to run.h5: settle, ramp, perturb."""
+"""A scene, and from it to run.h5: init, settle, ramp, perturb."""
 
 from __future__ import annotations
 
+from importlib.resources import files
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..guard import keeps
+from ..ranks import is_root
 from .terminal import AsJson, Out, ScenePath, print_json, progress, read_scene, say, status
 
 if TYPE_CHECKING:
@@ -16,6 +18,18 @@ if TYPE_CHECKING:
     from faultgouge.pywrap.lammps.dynamics import Weakening
 
 app = typer.Typer()
+
+
+@app.command(epilog="Example: faultgouge init -o scene.toml")
+def init(
+    output: Annotated[Path, typer.Option("-o", "--output", help="The scene to write.")] = Path("scene.toml"),
+) -> None:
+    """Write a scene with every section and key commented, to be changed."""
+    if output.exists():
+        raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
+    if is_root():
+        output.write_text((files("faultgouge") / "scenes" / "commented.toml").read_text())
+        say(f"written to {output}; next: faultgouge onset {output}")
 
 
 @app.command(epilog="Example: faultgouge settle paper.toml -o run.h5")
@@ -70,13 +84,13 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         if record.last is None:
             step = wanted.ramp.step if wanted.ramp else 1e-3  # as in `reach`
             *_, start = progress(reach(wanted, settings.fx), "equilibria", ceil(settings.fx / step * (1 - 1e-9)) + 1)
-            _check_time(wanted, start)
+            _lines(wanted, start)  # refuses what the packing does not allow, before anything is written
             record.append(start)
         assert record.last is not None
         weakening = _weakening(wanted, record)
         run = record.undamped(wanted, record.last, weakening=weakening)
         largest = 0.0
-        for sample in progress(run, "samples", _lines(wanted, record)):
+        for sample in progress(run, "samples", _lines(wanted, record.last)):
             last, largest = sample, max(largest, sample.msd)
         record.finish()
     say(f"D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}; written to {output}")
@@ -91,21 +105,12 @@ def _series(path: Path) -> dict[str, Any]:
         return {name: column.tolist() for name, column in file.series("undamped").items()}
 
 
-def _lines(scene: Scene, record: Record) -> int:
-    """Lines of the series of an undamped run."""
+def _lines(scene: Scene, start: Equilibrium) -> int:
+    """Lines of the series of an undamped run; a time step or a time that the packing does not allow is refused."""
     from faultgouge.pywrap.runs.undamped import sampling
 
     assert scene.perturb is not None
-    assert record.last is not None
-    return len(sampling(scene.perturb, record.last.packing)[1])
-
-
-def _check_time(scene: Scene, start: Equilibrium) -> None:
-    """Refuse a time step or a time that the packing does not allow, before anything is written."""
-    from faultgouge.pywrap.runs.undamped import sampling
-
-    assert scene.perturb is not None
-    sampling(scene.perturb, start.packing)
+    return len(sampling(scene.perturb, start.packing)[1])
 
 
 def _weakening(scene: Scene, record: Record) -> Weakening | None:
@@ -120,7 +125,9 @@ def _weakening(scene: Scene, record: Record) -> Weakening | None:
         threshold = scene.friction.v0
     else:
         run = record.undamped(unforced(scene), record.last, "calibration")
-        threshold = max(abs(sample.layer_velocity) for sample in progress(run, "calibrating v0", _lines(scene, record)))
+        threshold = max(
+            abs(sample.layer_velocity) for sample in progress(run, "calibrating v0", _lines(scene, record.last))
+        )
         why = " (the largest velocity of the upper layer in an unforced run of this length: rounding noise)"
     weakening = weakening_of(scene.friction, threshold)
     say(f"v0 = {threshold:.3g}{why}, v_ss = {weakening.v_ss:.3g}")

@@ -9,7 +9,7 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import Workers, progress, say
+from .terminal import Workers, progress, say, show_table
 
 app = typer.Typer()
 
@@ -155,15 +155,11 @@ def modes(
 
 def _show_modes(rows: list[dict[str, Any]]) -> None:
     """The loads of a packing, or the first of many, as a table on standard error."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q", box=box.SIMPLE_HEAD)
     first = [row for row in rows if (row["disks"], row["seed"]) == (rows[0]["disks"], rows[0]["seed"])]
+    lines = []
     for row in first:
         least = "" if row["least_q"] is None else f"{row['least_q']:.4g}"
         numbers = f"{row['pairs']}", f"{row['share']:.3f}", f"{row['growth_rate']:.4g}", least
-        table.add_row(f"{row['fx_over_fy']:g}", *numbers)
-    if first:
-        Console(stderr=True, highlight=False).print(table)
+        lines.append((f"{row['fx_over_fy']:g}", *numbers))
+    if lines:
+        show_table(("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q"), lines)

@@ -34,6 +34,10 @@ Workers = Annotated[
     int | None,
     typer.Option(min=1, metavar="N", show_default=False, help="Processes that compute; all cores unless given."),
 ]
+PackingFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.", show_default=False)
+]
+Frame = Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
@@ -149,3 +153,17 @@ def progress(items: Iterable[T], what: str, total: int | None = None, done: int 
         for item in items:
             bar.advance(task)
             yield item
+
+
+def show_table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+    """A table on standard error."""
+    if not is_root():
+        return
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(*headings, box=box.SIMPLE_HEAD)
+    for row in rows:
+        table.add_row(*row)
+    Console(stderr=True, highlight=False).print(table)

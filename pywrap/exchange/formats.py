@@ -1,16 +1,17 @@
-"""Which reader takes which file, by its suffix."""
+"""Which module reads and writes which file, by its suffix; modules are imported when such a file is met."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from ...analysis import PackingFileError
+from ...analysis import BadInputError, OutputError, Packing, PackingFileError
 from ...analysis.files.wholefile import BEGINNINGS
 from .disks import Disks
+from .quantities import Frame, ModeVectors
 
 NUMBER = re.compile(rb"[-+.\deE]+")
 
@@ -36,8 +37,8 @@ class Format(NamedTuple):
 
 DATA = Format("LAMMPS data (atom style sphere)", "data", "read_data", False)
 DUMP = Format("LAMMPS dump", "dump", "read_custom_dump", True)
-YADE = Format("YADE's text", "yade", "read_yade", False)
-MERCURY = Format("MercuryDPM's data", "mercury", "read_mercury", True)
+YADE = Format("YADE's text", "grains", "read_yade", False)
+MERCURY = Format("MercuryDPM's data", "grains", "read_mercury", True)
 RESTART = Format("LAMMPS restart", "restart", "read_restart", False)
 OTHER = Format("what MDAnalysis reads with radii", "universe", "read_universe", True)
 
@@ -57,6 +58,21 @@ FORMATS: dict[str, Format] = {
 
 BY_BEGINNING: dict[str, Format] = {"line 1 is #format x_y_z_r": YADE, ".data, line 1 is N time bounds": MERCURY}
 """What the first line tells, whatever the name is; MercuryDPM's files have the suffix of LAMMPS's."""
+
+WRITERS = {
+    ".vtp": ("vtp", "write_vtp"),
+    ".xyz": ("xyz", "write_xyz"),
+    ".data": ("data", "write_data"),
+    ".gsd": ("gsd_file", "write_gsd"),
+}
+"""Module of this package and function, by suffix."""
+
+FRAMES = {
+    ".xyz": ("xyz", "write_xyz_frames"),
+    ".gsd": ("gsd_file", "write_gsd_frames"),
+    ".pvd": ("vtp", "write_pvd"),
+}
+"""The same for files of several frames."""
 
 
 def known_formats() -> str:
@@ -135,9 +151,83 @@ def read_disks(path: Path, frame: int | None = None) -> Disks:
     if not path.is_file():
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
     found = format_of(path)
-    reader: Callable[..., Disks] = getattr(import_module(f".{found.module}", __package__), found.reader)
-    if found.frames:
-        return reader(path, frame)
-    if frame not in (None, 0, -1):
+    if not found.frames and frame not in (None, 0, -1):
         raise PackingFileError(f"{path} has one frame; there is no --frame {frame}.")
-    return reader(path)
+    disks: Disks = _imported(found.module, found.reader)(path, *([frame] if found.frames else []))
+    return disks
+
+
+def _imported(module: str, function: str) -> Any:
+    return getattr(import_module(f".{module}", __package__), function)
+
+
+def check_frames_writer(path: Path) -> None:
+    """Refuse a name that no writer of several frames takes."""
+    if path.suffix not in FRAMES:
+        raise BadInputError(f"-o {path}: several frames go into {', '.join(FRAMES)}; give it one of these suffixes.")
+
+
+def write_frames(path: Path, frames: Iterable[Frame]) -> None:
+    """Write the frames of a ramp or of an undamped run for another code.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its suffix is the format.
+    frames : iterable of Frame
+        See :func:`~faultgouge.pywrap.exchange.frames.frames_of`.
+
+    Raises
+    ------
+    BadInputError
+        If the suffix is none of `FRAMES`.
+    OutputError
+        If the file cannot be written.
+    """
+    check_frames_writer(path)
+    _write(FRAMES, path, frames)
+
+
+def check_writer(path: Path, modes: bool = False) -> None:
+    """Refuse a name that no writer takes, or modes in a format that has no room for them."""
+    if path.suffix == ".pvd":
+        raise BadInputError(f"-o {path}: a .pvd is a list of frames; add --frames all, or export a .vtp.")
+    if path.suffix not in WRITERS:
+        raise BadInputError(f"-o {path}: exports are {', '.join(WRITERS)}; give it one of these suffixes.")
+    if modes and path.suffix == ".data":
+        raise BadInputError(f"-o {path}: LAMMPS data has no room for modes; leave --mode out, or export .vtp or .xyz.")
+
+
+def write_packing(path: Path, packing: Packing, modes: Sequence[ModeVectors] = ()) -> str:
+    """Write a packing for another code.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its suffix is the format.
+    packing : Packing
+        The packing.
+    modes : sequence of ModeVectors
+        To go with it.
+
+    Returns
+    -------
+    str
+        What the file has, and what its format cannot hold.
+
+    Raises
+    ------
+    BadInputError
+        If the suffix is none of `WRITERS`, or the format has no modes.
+    OutputError
+        If the file cannot be written.
+    """
+    check_writer(path, bool(modes))
+    return str(_write(WRITERS, path, packing, list(modes)))
+
+
+def _write(writers: Mapping[str, tuple[str, str]], path: Path, *content: object) -> object:
+    try:
+        return _imported(*writers[path.suffix])(path, *content)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror}.") from error

@@ -3,31 +3,26 @@
 import numpy as np
 import pytest
 
-from faultgouge.figures.dissipation import (
-    GainCurve,
-    OnsetCurve,
-    dissipation_figure,
-    draw_dashpot_onset,
-    draw_drag_shift,
-    draw_gain,
-)
+from faultgouge.studies.dissipation.compute import Gain, Strength
+from faultgouge.studies.dissipation.draw import dissipation_figure, draw_dashpot_onset, draw_drag_shift, draw_gain
 
 STRENGTH = np.geomspace(1e-4, 1e2, 7)
-DASHPOTS = OnsetCurve(STRENGTH, 0.0148 + 1e-5 * STRENGTH, np.full(7, 0.0148), 0.015)
-DRAG = OnsetCurve(STRENGTH, 0.015 + 1e-3 * STRENGTH**2, 0.015 + 1e-3 * STRENGTH**2, 0.015)
+LIMIT, SHIFT = 0.0148, 1e-3 * STRENGTH**2
+DASHPOTS = [Strength("cn", x, LIMIT + 1e-5 * x, 1.0, LIMIT, 0.015) for x in STRENGTH]
+DRAG = [Strength("drag", x, 0.015 + shift, 1.0, 0.015 + shift, 0.015) for x, shift in zip(STRENGTH, SHIFT, strict=True)]
 DISTANCE = np.geomspace(1e-6, 1e-1, 6)
-GAINS = [
-    GainCurve("none", DISTANCE, 2 / DISTANCE),
-    GainCurve("dashpots", DISTANCE, np.where(DISTANCE < 1e-3, np.nan, 1 / DISTANCE)),
-]
+GAINS = {
+    "none": [Gain(x, 0.0, 0.0, 2 / x, 1.0, None) for x in DISTANCE],
+    "dashpots": [Gain(x, 1.0, 0.0, None if x < 1e-3 else 1 / x, 1.0, None) for x in DISTANCE],
+}
 
 
 def test_dashpots_show_onsets_limit_and_undamped_onset():
     axes = draw_dashpot_onset(DASHPOTS).axes[0]
     undamped, limit, measured = axes.lines
     assert set(undamped.get_ydata()) == {0.015}
-    assert np.array_equal(limit.get_ydata(), DASHPOTS.predicted)
-    assert np.array_equal(measured.get_ydata(), DASHPOTS.onset)
+    assert set(limit.get_ydata()) == {LIMIT}
+    assert np.array_equal(measured.get_ydata(), LIMIT + 1e-5 * STRENGTH)
     assert axes.get_xscale() == "log"
 
 

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..analysis import OnsetError, Packing, Window
-from ..analysis.damped_onset.weak import drag_onset, weak_limit
-from ..analysis.damped_onset.windows import damped_windows, dissipating
-from ..analysis.motion.transient import NoGainError, transient_gain
-from ..pywrap import Scene
-from ..pywrap.onset.damped import Ramped
+from ...analysis import OnsetError, Packing, Window
+from ...analysis.damped_onset.weak import drag_onset, weak_limit
+from ...analysis.damped_onset.windows import damped_windows, dissipating
+from ...analysis.motion.transient import NoGainError, transient_gain
+from ...pywrap import Scene
+from ...pywrap.onset.damped import Ramped
 
 RATIOS = ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.1), (0.1, 1.0))
 """C_N : C_T of the study of weak dashpots."""

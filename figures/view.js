@@ -1,0 +1,74 @@
+// Hands the arrays of a load to Bokeh, as the slider moves; moves the disks along a mode.
+const at = (id) => document.getElementById(id)
+const slider = at("load"), choice = at("mode")
+const packing = plots.find((plot) => plot.name == "packing")
+const pair = [...document.querySelectorAll("[data-colour]")].map((each) => each.dataset.colour)
+let frame = frames[slider.value], phase = 0, last = null
+
+function place() {
+  const n = frame.modes.length / 8, chosen = choice.value == "still" ? null : Number(choice.value)
+  const from = (chosen || 0) * 4 * n, reach = chosen == null ? 0 : 0.48 * frame.radius.reduce((a, b) => Math.max(a, b))
+  const c = reach * Math.cos(phase), s = reach * Math.sin(phase), v = frame.modes
+  const dx = (k) => k < 0 ? 0 : c * v[from + k] + s * v[from + 2 * n + k]
+  const dy = (k) => k < 0 ? 0 : c * v[from + n + k] + s * v[from + 3 * n + k]
+  const {disk, i, j} = frame
+  const pixels = packing.inner_width / (packing.x_range.end - packing.x_range.start)
+  disks.data = {x: frame.x.map((x, k) => x + dx(disk[k])), y: frame.y.map((y, k) => y + dy(disk[k])),
+                radius: frame.radius, face: frame.face}
+  chains.data = {
+    x0: frame.x0.map((x, k) => x + dx(i[k])), y0: frame.y0.map((y, k) => y + dy(i[k])),
+    x1: frame.x1.map((x, k) => x + dx(j[k] < 0 ? i[k] : j[k])), y1: frame.y1.map((y, k) => y + dy(j[k])),
+    px: frame.width.map((width) => width * pixels), share: frame.share}
+}
+
+function show() {
+  frame = frames[slider.value]
+  const re = frame.pair.slice(0, 2), im = frame.pair.slice(2), two = frame.known ? pair : [null, null]
+  others.data = {re: frame.re, im: frame.im}
+  members.data = {re, im, colour: two}
+  now.data = {fx: [frame.fx, frame.fx], real: re, imaginary: im, colour: two}
+  const digits = (x) => Number(x.toPrecision(5))
+  at("fx").textContent = digits(frame.fx)
+  at("says").textContent = !frame.known ? "The pair is not recognised at this load."
+    : im[0] > 0 ? `λ = ${digits(re[0])} ± ${digits(im[0])} i: complex. The layer amplifies the faintest motion.`
+    : `λ = ${digits(re[0])} and ${digits(re[1])}: two real eigenvalues. Each mode oscillates.`
+  const names = im[0] > 0 ? ["growing mode", "decaying mode"] : ["mode of the lower λ", "mode of the higher λ"]
+  names.forEach((name, k) => choice.querySelector(`[value="${k}"]`).textContent = name)
+  place()
+}
+
+function paint() {
+  const style = getComputedStyle(document.body), ink = style.color, faint = style.getPropertyValue("--faint")
+  for (const plot of plots) {
+    plot.setv({background_fill_color: null, border_fill_color: null, outline_line_color: null})
+    for (const axis of [...plot.left, ...plot.below]) {
+      if (axis.type == "ColorBar") axis.setv({title_text_color: ink, major_label_text_color: ink})
+      else axis.setv({axis_label_text_color: ink, major_label_text_color: ink, axis_line_color: faint,
+                      major_tick_line_color: faint, minor_tick_line_color: null, axis_label_text_font_style: "normal"})
+    }
+    for (const each of plot.center) if (each.type.endsWith("Grid")) each.setv({grid_line_color: faint})
+  }
+}
+
+function turn(time) {
+  if (choice.value != "still" && frame.known) {
+    phase += last == null ? 0 : (time - last) / 400
+    place()
+  }
+  last = time
+  requestAnimationFrame(turn)
+}
+
+slider.addEventListener("input", show)
+choice.addEventListener("input", place)
+document.addEventListener("keydown", (event) => {
+  const step = slider.hidden ? 0 : {ArrowLeft: -1, ArrowRight: 1}[event.key]
+  if (!step || /INPUT|SELECT/.test(event.target.tagName)) return
+  slider.value = Number(slider.value) + step
+  show()
+})
+new ResizeObserver(place).observe(document.body)
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint)
+paint()
+show()
+requestAnimationFrame(turn)

@@ -1,0 +1,295 @@
+"""A page that shows a ramp or an undamped run in a browser, without a network: `faultgouge view`.
+
+Bokeh draws and its JavaScript is part of the page. Arrays are for drawing: float32, in base64. `view.js` hands them to
+Bokeh as the slider moves. The page follows one pair of eigenvalues: that which is the first of the ramp to be complex,
+or, if none is, the two real modes of the last equilibrium that are closest to meeting.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.colors import to_hex
+from numpy.typing import NDArray
+
+from faultgouge.analysis import BadInputError, Eigenpairs, Packing, closest_to_meeting, eigenvalues, growth_rate
+from faultgouge.analysis.onset.modes import Modes, force_bearing, full_operator
+from faultgouge.analysis.onset.pair import Pair, continued
+
+from .mode import ModeError, displacement
+from .packing import LEAST_SHARE, PackingArtist, View, mobilised
+from .style import EDGE, FLOOR, MOBILIZATION
+
+if TYPE_CHECKING:
+    from bokeh.plotting import figure
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Progress = Callable[[Sequence[Packing]], Iterable[Packing]]
+
+FIRST, SECOND, OTHERS = "#0072b2", "#d55e00", "#8a949c"
+"""The two of the pair, and all other eigenvalues: told apart by the colour-blind, on white and on black."""
+
+MOVED = {
+    "disks": "x y radius face",
+    "chains": "x0 y0 x1 y1 px share",
+    "others": "re im",
+    "members": "re im colour",
+    "now": "fx real imaginary colour",
+}
+"""What `view.js` fills anew at each load: sources of data and their columns."""
+
+
+class ViewError(BadInputError):
+    """A page that cannot be made, in one sentence."""
+
+
+def check_library() -> None:
+    """Refuse before any work if Bokeh is not installed."""
+    try:
+        import bokeh  # noqa: F401
+    except ImportError as error:
+        raise ViewError("view needs Bokeh, which is not installed: pip install 'faultgouge[view]'") from error
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """All eigenvalues of a ramp, and one pair of them.
+
+    Attributes
+    ----------
+    values : list of ndarray of complex, shape (E,)
+        All eigenvalues at each load, 1 / time^2.
+    pair : ndarray of complex, shape (S, 2)
+        The two that are followed; nan where they are not recognised.
+    modes : ndarray of complex, shape (S, 2, 2, N)
+        Their displacements along x and y, the longest one being one.
+    """
+
+    values: list[Complexes]
+    pair: Complexes
+    modes: Complexes
+
+
+def followed(packings: Sequence[Packing], progress: Progress = iter) -> Followed:
+    """Eigenvalues of equilibria in order of their load.
+
+    Raises
+    ------
+    ModeError
+        If the last packing has fewer than two modes.
+    """
+    values = [eigenvalues(force_bearing(packing)) for packing in progress(packings)]
+    start, pair = _anchor(packings, values)
+    pairs = {start: pair}
+    for step, stop in ((-1, -1), (1, len(packings))):
+        last: Pair | None = pair
+        for k in range(start + step, stop, step):
+            last = _next(last, packings[k])
+            if last is None:
+                break
+            pairs[k] = last
+    found = np.full((len(packings), 2), np.nan, dtype=np.complex128)
+    modes = np.zeros((len(packings), 2, 2, len(packings[0])), dtype=np.complex128)
+    for k, each in pairs.items():
+        own, vectors = np.linalg.eig(each.entries)
+        order = np.lexsort((-own.imag, own.real))
+        found[k] = own[order]
+        for member, number in enumerate(order):
+            modes[k, member] = displacement(packings[k], each.right @ vectors[:, number])[:2]
+    return Followed(values, found, modes)
+
+
+def _anchor(packings: Sequence[Packing], values: Sequence[Complexes]) -> tuple[int, Pair]:
+    """The load at which the pair is chosen, and the pair."""
+    for k, packing in enumerate(packings):
+        if np.any(values[k].imag > 0):
+            modes = Modes.of(packing.fx, full_operator(packing))
+            if modes.complex_pairs:
+                return k, modes.pair(max(modes.complex_pairs, key=lambda each: growth_rate(modes.values[each[0]])))
+    modes = Modes.of(packings[-1].fx, full_operator(packings[-1]))
+    if len(modes.values) < 2:
+        raise ModeError(f"the packing at F_x = {packings[-1].fx:g} has fewer than two modes, so that no two can meet")
+    first, second, _ = closest_to_meeting(Eigenpairs(modes.values, modes.right, modes.left, 0))
+    return len(packings) - 1, modes.pair((first, second))
+
+
+def _next(pair: Pair | None, packing: Packing) -> Pair | None:
+    """What the pair is in a neighbouring equilibrium; None if it is not recognised."""
+    assert pair is not None
+    matrix = full_operator(packing)
+    image = continued(pair, packing.fx, matrix)
+    if image is None:
+        modes = Modes.of(packing.fx, matrix)
+        image = modes.pair(modes.nearest(pair))
+    return image if image.same_planes(pair) else None
+
+
+def equally_spaced(count: int, most: int) -> list[int]:
+    """Which of some equilibria a page shows: all, or so many of them, the first and the last among these."""
+    return sorted({round(k) for k in np.linspace(count - 1, 0, min(count, most))})
+
+
+def write_view(
+    packings: Sequence[Packing], path: Path, title: str, series: dict[str, Any] | None = None, progress: Progress = iter
+) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    packings : sequence of Packing
+        Equilibria in order of their load, all with the same disks.
+    path : Path
+        The page to write.
+    title : str
+        What the file is.
+    series : dict, optional
+        Columns time and msd of an undamped run from the last equilibrium.
+    progress : callable
+        Wraps the packings while their eigenvalues are computed.
+
+    Raises
+    ------
+    ViewError
+        If Bokeh is not installed.
+    """
+    check_library()
+    from bokeh.document import Document
+    from bokeh.embed import file_html
+    from bokeh.events import DocumentReady
+    from bokeh.models import ColumnDataSource, CustomJS
+    from bokeh.resources import INLINE
+
+    course = followed(packings, progress)
+    frames = [_frame(packing, course, k) for k, packing in enumerate(packings)]
+    sources = {
+        name: ColumnDataSource({column: [] for column in columns.split()}, name=name) for name, columns in MOVED.items()
+    }
+    plots = [_packing_plot(packings, sources), _plane(course, sources)]
+    if len(packings) > 1:
+        plots += _curves(packings, course, sources)
+    if series is not None:
+        plots.append(_growth(series))
+    document = Document()
+    for plot in plots:
+        document.add_root(plot)
+    folder = files(__package__ or "")
+    script = CustomJS(args={"frames": frames, "plots": plots, **sources}, code=(folder / "view.js").read_text())
+    document.js_on_event(DocumentReady, script)
+    page = file_html(
+        document,
+        INLINE,
+        title=title,
+        template=(folder / "view.html.j2").read_text(),
+        template_variables={"count": len(packings), "colours": (FIRST, SECOND), "size": len(packings[0])},
+    )
+    path.write_text(page, encoding="utf-8")
+
+
+def _frame(packing: Packing, course: Followed, k: int) -> dict[str, Any]:
+    """The arrays of one load, in float32."""
+    view, contacts = View.of(packing, margin=0.5 * packing.radius.max()), packing.contacts
+    force = packing.normal_force
+    modes = course.modes[k]
+    arrays = {
+        "x": view.place[:, 0],
+        "y": view.place[:, 1],
+        "disk": view.disk,
+        "radius": packing.radius[view.disk],
+        "x0": view.start[:, 0],
+        "y0": view.start[:, 1],
+        "x1": view.end[:, 0],
+        "y1": view.end[:, 1],
+        "i": contacts.i[view.contact],
+        "j": contacts.j[view.contact],
+        "width": 0.5 * packing.radius.min() * (force / force.max(initial=np.finfo(float).tiny))[view.contact],
+        "share": np.maximum(mobilised(packing), LEAST_SHARE)[view.contact],
+        "re": course.values[k].real,
+        "im": course.values[k].imag,
+        "pair": np.concatenate([course.pair[k].real, course.pair[k].imag]),
+        "modes": np.stack([modes.real, modes.imag], axis=1).ravel(),
+    }
+    faces = PackingArtist.faces(packing)[view.disk]
+    return {
+        "fx": packing.fx,
+        "face": [{"white": None}.get(str(face), str(face)) for face in faces],
+        "known": bool(np.isfinite(course.pair[k]).all()),
+        **{name: np.asarray(array, dtype=np.float32) for name, array in arrays.items()},
+    }
+
+
+def _plot(name: str, x: str, y: str, **more: Any) -> "figure":
+    from bokeh.plotting import figure
+
+    tools: dict[str, Any] = {"tools": "pan,wheel_zoom,box_zoom,reset", "toolbar_location": "above"}
+    plot = figure(name=name, x_axis_label=x, y_axis_label=y, sizing_mode="stretch_both", **{**tools, **more})
+    plot.toolbar.logo = None
+    plot.toolbar.autohide = True
+    return plot
+
+
+def _packing_plot(packings: Sequence[Packing], sources: dict[str, Any]) -> "figure":
+    """Disks and force chains; the floor."""
+    from bokeh.models import BoxAnnotation, ColorBar, LogColorMapper
+
+    views = [View.of(packing) for packing in packings]
+    left, right = min(view.left for view in views), max(view.right for view in views)
+    bottom = min(view.bottom for view in views)
+    top = max(float((packing.position[:, 1] + packing.radius).max()) for packing in packings) + 0.3
+    more = {"x_range": (left, right), "y_range": (bottom, top), "tools": "", "toolbar_location": None}
+    plot = _plot("packing", "", "", **more)
+    plot.axis.visible = False
+    plot.grid.visible = False
+    plot.min_border = 0
+    plot.aspect_ratio = (right - left) / (top - bottom)
+    plot.sizing_mode = "scale_width"
+    plot.circle("x", "y", radius="radius", source=sources["disks"], fill_color="face", line_color=EDGE, line_width=0.6)
+    colours = LogColorMapper([to_hex(MOBILIZATION(k / 255)) for k in range(256)], low=LEAST_SHARE, high=1)
+    chains = {"line_width": "px", "line_cap": "round", "line_color": {"field": "share", "transform": colours}}
+    plot.segment("x0", "y0", "x1", "y1", source=sources["chains"], **chains)
+    plot.add_layout(BoxAnnotation(top=0, fill_color=FLOOR, fill_alpha=1, line_color=None, level="overlay"))
+    bar = ColorBar(color_mapper=colours, height=8, title="mobilised friction |fₜ| / (μ fₙ)", title_standoff=4)
+    bar.background_fill_color = None
+    plot.add_layout(bar, "below")
+    return plot
+
+
+def _plane(course: Followed, sources: dict[str, Any]) -> "figure":
+    """The plane of eigenvalues about the pair, with the way of the pair."""
+    known = course.pair[np.isfinite(course.pair).all(axis=1)]
+    low, high = float(known.real.min()), float(known.real.max())
+    margin = 0.15 * (high - low) or 0.05 * abs(high)
+    most = 1.3 * float(known.imag.max()) or margin
+    plot = _plot("plane", "Re λ", "Im λ", x_range=(low - margin, high + margin), y_range=(-most, most))
+    for member, colour in enumerate((FIRST, SECOND)):
+        way = course.pair[:, member].astype(np.complex64)
+        plot.line(way.real, way.imag, line_color=colour, line_alpha=0.5, line_width=1.5)
+    plot.scatter("re", "im", source=sources["others"], size=6, fill_color=OTHERS, line_color=None)
+    plot.scatter("re", "im", source=sources["members"], size=13, fill_color="colour", line_color=None)
+    return plot
+
+
+def _curves(packings: Sequence[Packing], course: Followed, sources: dict[str, Any]) -> list["figure"]:
+    """Real and imaginary parts of the pair over the load."""
+    fx = np.array([packing.fx for packing in packings])
+    plots: list[figure] = []
+    for name, label, part in (("real", "Re λ", course.pair.real), ("imaginary", "Im λ", course.pair.imag)):
+        more = {"x_range": plots[0].x_range} if plots else {}
+        plot = _plot(name, "Fₓ", label, **more)
+        for member, colour in enumerate((FIRST, SECOND)):
+            plot.line(fx, part[:, member].astype(np.float32), line_color=colour, line_width=2)
+        plot.scatter("fx", name, source=sources["now"], size=11, fill_color="colour", line_color=None)
+        plots.append(plot)
+    return plots
+
+
+def _growth(series: dict[str, Any]) -> "figure":
+    """D(t) of an undamped run, on a logarithmic axis."""
+    seen = series["msd"] > 0
+    plot = _plot("growth", "t", "D(t)", y_axis_type="log")
+    time, msd = (np.asarray(series[name][seen], dtype=np.float32) for name in ("time", "msd"))
+    plot.line(time, msd, line_color=SECOND, line_width=1.5)
+    return plot

@@ -1,0 +1,44 @@
+"""Scenes that are refused, and the reference packing under load."""
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from faultgouge.analysis import Packing
+
+
+@pytest.fixture(scope="session")
+def refused_scene() -> Callable[..., str]:
+    """Makes a scene that is refused in one sentence, and gives the sentence."""
+    from faultgouge.pywrap import Scene, SceneError
+
+    def make(mapping: Mapping, folder: Path = Path()) -> str:
+        with pytest.raises(SceneError) as refusal:
+            Scene.from_mapping(mapping, folder)
+        sentence = str(refusal.value)
+        assert sentence.endswith(".")
+        assert "\n" not in sentence
+        assert "pydantic" not in sentence
+        return sentence
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def loaded(reference_packing) -> Callable[..., Packing]:
+    """The reference packing in equilibrium under F_x, reached in increments of the size that is given, for mu = 1."""
+    from faultgouge.pywrap import Engine, Equilibrium, equilibrate
+    from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+
+    @cache
+    def make(fx: float, increment: float = 1e-3) -> Packing:
+        packing = reference_packing(1.0)
+        here = Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
+        with Engine(packing) as engine:
+            for k in range(round(fx / increment) + 1):
+                here = equilibrate(engine, here, k * increment)
+        return here.packing
+
+    return make
