@@ -43,4 +43,7 @@ def test_increments_that_meet_a_contact_that_hardly_opens_reach_the_end():
         reached.append(last.packing)
     fine, coarse = reached
     assert fine.fx == coarse.fx == pytest.approx(0.085)
-    assert np.abs((fine.position - coarse.position)[fine.top]).max() < 1e-6  # a rattler lies anywhere in its cage
+    bearing = np.setdiff1d([fine.contacts.i, fine.contacts.j], [-1])  # a rattler lies anywhere in its cage
+    assert len(bearing) > 80
+    # units in the last place of coordinates up to 12
+    assert np.abs((fine.position - coarse.position)[bearing]).max() < 1e-13
