@@ -3,6 +3,8 @@
 Figures have a white ground of their own, also where the page around them is dark.
 """
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 
@@ -32,6 +34,24 @@ def figure_of(axes: Axes) -> Figure:
     figure = axes.get_figure(root=True)
     assert figure is not None
     return figure
+
+
+@contextmanager
+def spared(what: str, say: Callable[[str], None]) -> Iterator[None]:
+    """Pictures whose failure is told in one sentence, and costs nothing of what was computed.
+
+    Parameters
+    ----------
+    what : str
+        What is drawn here, as the sentence begins.
+    say : callable
+        Takes the sentence.
+    """
+    try:
+        yield
+    except Exception as error:  # whatever it is: the numbers are worth more than their picture
+        reason = (str(error).splitlines() or ["no reason given"])[0]
+        say(f"{what} was not drawn ({type(error).__name__}: {reason}); all numbers are there")
 
 
 @styled

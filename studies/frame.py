@@ -14,6 +14,7 @@ from typing import Any
 
 from ..analysis.files.wholefile import make_folder, write_text
 from ..figures.pages import render
+from ..figures.style import spared
 from ..pywrap import Scene
 from ..pywrap.onset.sharing import Progress, Say, Share, shared_out
 from ..pywrap.scenes.units import real_units
@@ -99,7 +100,8 @@ class Study:
         real = real_units(scene)
         result = {"scene": scene.resolved(), "units": None if real is None else real.as_dict()} | found
         write_text(output / f"{self.name}.json", json.dumps(result, indent=1) + "\n")
-        self.draw(result, rows, output)
+        with spared(f"{self.name}: a picture", say):
+            self.draw(result, rows, output)
         page = render(self.package, f"{self.name}.md.j2", result=result, units=result["units"], **self.page(result))
         write_text(output / f"{self.name}.md", page)
         return result

@@ -22,7 +22,7 @@ from threadpoolctl import threadpool_info
 from ...analysis import FaultgougeError
 from ...analysis.files.wholefile import make_folder, write_text
 from ...figures.pages import render
-from ...figures.style import save
+from ...figures.style import save, spared
 from ...pywrap import Scene, ramp
 from .draw import figure_of
 from .draw_coverage import coverage_figure
@@ -101,9 +101,6 @@ def report(
         try:
             found = study(settings)
             json.dumps(found.as_dict(), allow_nan=False)  # a number that is none is a failure of its study
-            save(figure_of(found), output / stem(name))
-            if found.covered:
-                save(coverage_figure(found.covered), output / f"{stem(name)}-coverage")
         except Exception as error:  # whatever it is, it must not take the other studies along
             failed[name] = f"{type(error).__name__}: {(str(error).splitlines() or ['no reason given'])[0]}"
             say(f"{name}: failed: {failed[name]}")
@@ -111,6 +108,11 @@ def report(
             done.append(found)
             say(f"{name}: {found.advice[0]}")
         result = _written(output, quick, done, failed)
+        if name not in failed:
+            with spared(f"{name}: the figure", say):
+                save(figure_of(found), output / stem(name))
+                if found.covered:
+                    save(coverage_figure(found.covered), output / f"{stem(name)}-coverage")
     if failed:
         raise ReportError(
             f"{len(failed)} of {len(studies)} studies failed ({', '.join(failed)}): {output}/report.md says why, "

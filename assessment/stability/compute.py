@@ -20,7 +20,7 @@ from mpi4py import MPI
 from ...analysis import FaultgougeError
 from ...analysis.files.wholefile import make_folder, write_text
 from ...figures.pages import render
-from ...figures.style import save
+from ...figures.style import save, spared
 from .cases import dynamics, eigenvalues, geometry, loads, restarts
 from .cases.case import Case, Outcome
 from .draw import stability_figure
@@ -76,7 +76,8 @@ def stability(
         if root:
             _write(done, output)
     if root:
-        save(stability_figure(done), output / "stability")
+        with spared(f"{output}/stability.png", say):
+            save(stability_figure(done), output / "stability")
     return _as_dict(done)
 
 

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from ...analysis import Packing, nearest_image, touching
 from ..lammps.trial import EPSILON, Trial
-from .newton_matrix import Factors, factored
+from .newton_matrix import IDLE, Factors, factored
 from .rattlers import middle_of_cage
 
 Floats = NDArray[np.float64]
@@ -42,8 +42,12 @@ ITERATIONS = 40
 their contacts open as delta^p -> 0, on which Newton's method gains a factor of 5 an iteration for p = 3/2, and 12 reach
 the floor."""
 
-FRUITLESS = 8
-"""Iterations that gain nothing before an increment is halved."""
+FRUITLESS, FRUITFUL = 8, 0.5
+"""Iterations that gain nothing before an increment is halved, and the factor of the residual that counts as a gain."""
+
+PATIENT = 200, 0.95
+"""Iterations, and the factor of the residual that counts as a gain, where halving leads nowhere. Beside a contact that
+carries next to nothing, or slides nearly, the residual may fall by no more than 0.7 an iteration."""
 
 FREEING = 3
 """Iterations in which a disk that is pushed out, and yet was not moved out of the way, gets p times Newton's step:
@@ -101,6 +105,7 @@ def iterated(
     start: Trial,
     force_tolerance: float | None = None,
     guess: Guess | None = None,
+    patient: bool = False,
 ) -> tuple[Trial | None, int]:
     """Newton's method from one equilibrium.
 
@@ -114,6 +119,8 @@ def iterated(
         Residual to stop at. By default the iteration ends at the floor.
     guess : Guess, optional
         By default it starts without a displacement.
+    patient : bool
+        Whether a residual that falls slowly is good enough to go on, see `PATIENT`.
 
     Returns
     -------
@@ -122,11 +129,12 @@ def iterated(
     int
         Force evaluations.
     """
-    base, since, rattlers = start.packing, start.graph, _Rattlers(start)
+    base, since, rattlers = start.packing, start.graph, _Rattlers(start, IDLE if patient else 0.0)
     displacement, factors, answers = guess or Guess(np.zeros(3 * len(base)))
-    course = _Course(start.floor, answers, force_tolerance)
+    iterations, gain = PATIENT if patient else (ITERATIONS, FRUITFUL)
+    course = _Course(start.floor, answers, force_tolerance, gain)
     evaluations = 0
-    for iteration in range(ITERATIONS):
+    for iteration in range(iterations):
         if _beyond_reach(displacement, base):
             return None, evaluations
         trial, evaluations = displaced(base, displacement), evaluations + 1
@@ -163,10 +171,12 @@ class _Course:
         The force that the first displacement answers.
     force_tolerance : float or None
         Residual to stop at.
+    gain : float
+        Factor of the residual that counts as a gain.
     """
 
-    def __init__(self, floor: float, answers: float, force_tolerance: float | None) -> None:
-        self.floor, self._tolerance = floor, force_tolerance
+    def __init__(self, floor: float, answers: float, force_tolerance: float | None, gain: float) -> None:
+        self.floor, self._tolerance, self._gain = floor, force_tolerance, gain
         self.best: Trial | None = None
         self._worse = 0  # iterations that gained nothing; changes of contacts cost some
         self._earlier, self._last = np.inf, answers  # residuals of the two iterations before
@@ -182,7 +192,7 @@ class _Course:
             Whether it may be the result.
         """
         residual = trial.residual
-        if self.best is not None and residual > 0.5 * self.best.residual:
+        if self.best is not None and residual > self._gain * self.best.residual:
             if self.best.residual < NOISE * self.floor:
                 if residual < self.best.residual and self.floor < self.best.residual:
                     self.best = trial  # below the floor the one that moved less is as good
@@ -213,11 +223,12 @@ class _Course:
 
 
 class _Rattlers:
-    """Which disks carry nothing, and how often each has been moved."""
+    """Which disks carry nothing, or no more than a share of the largest force; how often each has been moved."""
 
-    def __init__(self, start: Trial) -> None:
+    def __init__(self, start: Trial, share: float) -> None:
         # no more than an equilibrium may leave
-        self._loose = (_carrying(start, NOISE * start.floor) == 0) & ~start.still.top
+        nothing = max(NOISE * start.floor, share * float(start.derivatives.normal_force.max(initial=0.0)))
+        self._loose = (_carrying(start, nothing) == 0) & ~start.still.top
         self._moved = np.zeros(len(self._loose), dtype=np.int64)
 
     def hit(self, trial: Trial) -> Indices:

@@ -6,9 +6,11 @@ fast: a small increment takes no others. Between equilibria q is nearly proporti
 is known, its displacement in proportion is a better start. The ramp of an onset takes the equilibrium before the last;
 a ramp that is stored does not, so that it goes on to the bit where it was cut off.
 
-Where Newton fails the increment is halved, since the path matters: friction remembers.
+Where Newton fails the increment is halved, since the path matters: friction remembers. Where that leads nowhere, other
+ways are tried (`TRIED`) before the packing is said to flow.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +25,20 @@ from .newton_matrix import factored
 SMOOTH = "; without friction (mu = 0) nothing holds a layer back on a smooth floor, so give law.mu a value above 0"
 
 SMALLEST_SHARE = 2.0**-10
-"""The share of an increment below which halving ends and the packing is said to flow."""
+"""The share of an increment below which halving ends."""
+
+PARTS = 3, 7
+"""Parts of an increment that are tried where halving has led nowhere: no load is one that halving has met."""
+
+RESTS, FEWEST_STEPS, DISK_STEPS = 1e-9, 20_000, 20_000_000
+"""Force on a disk, in units of F_y, at which dynamics end; their steps at the least, and times the number of disks at
+the most: 3 s of 100 disks."""
+
+TRIED = (
+    "smaller increments, more iterations, increments of other sizes, a larger increment and back, and overdamped "
+    "dynamics from the last equilibria"
+)
+"""What is tried before a packing is said to flow, in words."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +83,7 @@ def equilibrate(
     fx: float,
     force_tolerance: float | None = None,
     beside: Equilibrium | None = None,
+    onward: bool = False,
 ) -> Equilibrium:
     """The equilibrium at fx that follows from the last one.
 
@@ -84,6 +100,9 @@ def equilibrate(
     beside : Equilibrium, optional
         Another one near the last, at another fx: its displacement is a better guess than none. It does not change what
         is found, except for the rounding.
+    onward : bool
+        Whether the ways of `TRIED` are taken where halving the increment leads nowhere. By default the branch of
+        equilibria ends there.
 
     Returns
     -------
@@ -92,10 +111,27 @@ def equilibrate(
     Raises
     ------
     NoEquilibriumError
-        If halving the increment leads nowhere.
+        If no way that may be taken leads there.
     """
-    here, target, evaluations = last, fx, 0
     guess = _response(engine, last, fx) if beside is None else _in_proportion(last, beside, fx)
+    here = _halving(engine, last, fx, force_tolerance, guess)
+    onward = onward and last.fx != fx
+    if here.fx != fx and onward:
+        here = _otherwise(engine, here, last, fx, force_tolerance)
+    if here.fx != fx or here is last:
+        tried = f"; tried were {TRIED}" if onward else ""
+        raise NoEquilibriumError(
+            f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there{tried}"
+            f"{'' if here.packing.law.frictional else SMOOTH}"
+        )
+    return here
+
+
+def _halving(
+    engine: Engine, last: Equilibrium, fx: float, force_tolerance: float | None, guess: Guess | None
+) -> Equilibrium:
+    """The equilibrium at fx, or the furthest one, by Newton's method with increments that are halved where it fails."""
+    here, target, evaluations = last, fx, 0
     while True:
         engine.set_fx(target)
         found, spent = _newton(engine, here.packing, force_tolerance, guess)
@@ -104,15 +140,48 @@ def equilibrate(
             guess = None
         elif found is None:
             if fx == here.fx or abs(target - here.fx) < SMALLEST_SHARE * abs(fx - last.fx):
-                raise NoEquilibriumError(
-                    f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there"
-                    f"{'' if here.packing.law.frictional else SMOOTH}"
-                )
+                return here
             target = 0.5 * (here.fx + target)
         elif target == fx:
             return replace(found, evaluations=evaluations)
         else:
             here, target = found, fx
+
+
+def _otherwise(
+    engine: Engine, here: Equilibrium, last: Equilibrium, fx: float, force_tolerance: float | None
+) -> Equilibrium:
+    """The equilibrium at fx by the ways of `TRIED`, in that order; `here` if none leads there."""
+    routes: list[tuple[Equilibrium, list[float]]] = [(here, [fx])]
+    routes += [(last, np.linspace(last.fx, fx, count + 1)[1:].tolist()) for count in PARTS]
+    for start, loads in (*routes, (last, [2 * fx - last.fx, fx])):
+        found = _through(engine, start, loads, force_tolerance)
+        if found is not None:
+            return found
+    for start in (here, last):
+        engine.restore(start.packing)
+        engine.set_fx(fx)
+        rest = engine.relax(RESTS * start.packing.fy, steps=max(FEWEST_STEPS, DISK_STEPS // len(start.packing)))
+        packing = engine.packing
+        near = Equilibrium(packing, rest.residual, rounding_floor(packing), rest.steps)
+        found = _through(engine, near, [fx], force_tolerance) if rest.status != "no" else None
+        if found is not None:
+            return found
+    return here
+
+
+def _through(
+    engine: Engine, start: Equilibrium, loads: Iterable[float], force_tolerance: float | None
+) -> Equilibrium | None:
+    """The equilibrium at the last of some loads, through the others, with patience; None where one of them has none."""
+    here, evaluations = start, start.evaluations
+    for load in loads:
+        engine.set_fx(float(load))
+        found, spent = _newton(engine, here.packing, force_tolerance, None, patient=True)
+        if found is None:
+            return None
+        here, evaluations = found, evaluations + spent
+    return replace(here, evaluations=evaluations)
 
 
 def _response(engine: Engine, last: Equilibrium, fx: float) -> Guess | None:
@@ -137,10 +206,10 @@ def _in_proportion(last: Equilibrium, beside: Equilibrium, fx: float) -> Guess:
 
 
 def _newton(
-    engine: Engine, base: Packing, force_tolerance: float | None, guess: Guess | None
+    engine: Engine, base: Packing, force_tolerance: float | None, guess: Guess | None, patient: bool = False
 ) -> tuple[Equilibrium | None, int]:
     """Newton's method from one base at the engine's fx; None where it does not converge."""
-    best, evaluations = iterated(engine.displaced, engine.kept(base), force_tolerance, guess)
+    best, evaluations = iterated(engine.displaced, engine.kept(base), force_tolerance, guess, patient)
     if best is None:
         return None, evaluations
     return Equilibrium(engine.keep(best), best.residual, best.floor, evaluations), evaluations

@@ -150,7 +150,12 @@ class Engine:
         self._decks.include("damp.in", force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
 
     def relax(
-        self, force_tolerance: float, damping: float = 1.0, time_step: float | None = None, chunk: int = 1000
+        self,
+        force_tolerance: float,
+        damping: float = 1.0,
+        time_step: float | None = None,
+        chunk: int = 1000,
+        steps: int = 10_000_000,
     ) -> Relaxation:
         """Overdamped relaxation (deck part relax.in).
 
@@ -164,13 +169,17 @@ class Engine:
             By default from the stiffness of a heavily loaded contact.
         chunk : int
             Steps between two looks at the forces.
+        steps : int
+            Time steps at the most.
         """
         self._displacing.end()
         self._decks.command("variable relax_step delete")  # that of an earlier call
         if time_step is not None:
             self._decks.variables(relax_step=time_step)
         start = self._decks.steps
-        self._decks.include("relax.in", force_tolerance=force_tolerance, damping=damping, chunk=chunk)
+        self._decks.include(
+            "relax.in", force_tolerance=force_tolerance, damping=damping, chunk=chunk, chunks=steps // chunk
+        )
         return Relaxation(
             residual=self._decks.number("residual"),
             status=str(self._decks.lammps.extract_variable("relaxed")),

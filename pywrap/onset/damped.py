@@ -139,7 +139,7 @@ def ramped(
             f"disks: take {MOST_DISKS} at the most, or leave [damping] out"
         )
     with Engine(start.packing) as engine:
-        path = EquilibriumPath(engine, start, scene)
+        path = EquilibriumPath(engine, start, scene, onward=True)
         watch(f"ramp up to F_x = {wanted[-1]:g}")
         for _ in path.climb(wanted[1:]):
             pass

@@ -110,7 +110,7 @@ def onset_run(
     reached = reached or (lambda _: None)
     reached(start)
     with Engine(start.packing) as engine:
-        path = EquilibriumPath(engine, start, scene)
+        path = EquilibriumPath(engine, start, scene, onward=True)
         forces = wanted
         if whole:
             watch(f"ramp up to F_x = {wanted[-1]:g}")

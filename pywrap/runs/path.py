@@ -92,12 +92,17 @@ def loads(settings: Ramp) -> NDArray[np.float64]:
 
 
 def next_equilibrium(
-    engine: Engine, last: Equilibrium, fx: float, scene: Scene, beside: Equilibrium | None = None
+    engine: Engine,
+    last: Equilibrium,
+    fx: float,
+    scene: Scene,
+    beside: Equilibrium | None = None,
+    onward: bool = True,
 ) -> Equilibrium:
-    """The equilibrium at fx that follows from the last one, by the scene's method; `beside` as in `equilibrate`."""
+    """The equilibrium at fx that follows from the last one, by the scene's method; the others as in `equilibrate`."""
     settings = needed(scene.ramp, "ramp")
     if settings.method == "newton":
-        return equilibrate(engine, last, fx, settings.force_tolerance, beside)
+        return equilibrate(engine, last, fx, settings.force_tolerance, beside, onward)
     floor = rounding_floor(last.packing)
     engine.restore(last.packing)
     engine.set_fx(fx)
@@ -131,10 +136,19 @@ class EquilibriumPath:
         With a section [ramp], for its method and force tolerance.
     further : sequence of Equilibrium
         Those of the path that are known already, by increasing F_x.
+    onward : bool
+        Whether the ramp is continued by other ways where Newton's branch of equilibria ends, as in `ramp`.
     """
 
-    def __init__(self, engine: Engine, start: Equilibrium, scene: Scene, further: Sequence[Equilibrium] = ()) -> None:
-        self._engine, self._scene = engine, scene
+    def __init__(
+        self,
+        engine: Engine,
+        start: Equilibrium,
+        scene: Scene,
+        further: Sequence[Equilibrium] = (),
+        onward: bool = False,
+    ) -> None:
+        self._engine, self._scene, self._onward = engine, scene, onward
         self.kept = [start, *further]
         # an equilibrium, and another one near it
         self._beside = (self.kept[-1], self.kept[-2]) if further else None
@@ -145,7 +159,8 @@ class EquilibriumPath:
         if below.fx == fx:
             return below.packing
         beside = self._beside[1] if self._beside and self._beside[0] is below else None
-        found = next_equilibrium(self._engine, below, fx, self._scene, beside)
+        onward = self._onward and fx > self.kept[-1].fx
+        found = next_equilibrium(self._engine, below, fx, self._scene, beside, onward)
         if fx > self.kept[-1].fx:
             self.kept.append(found)
             self._beside = found, below

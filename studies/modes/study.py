@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...analysis.files.wholefile import write_text
-from ...figures.style import save
+from ...figures.style import save, spared
 from ...figures.writers import write_film
 from ...pywrap import Scene
 from ..sweep.compute import Progress, Row, Say, run_sweep
@@ -88,7 +88,8 @@ def modes(
     table.writeheader()
     table.writerows(lines)
     write_text(output / "modes.csv", text.getvalue())
-    _draw(rows, lines, output, say)
+    with spared("a picture of the modes", say):
+        _draw(rows, lines, output, say)
     return result
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from ...analysis.digits import with_uncertainty
 from ...analysis.files.wholefile import write_text
 from ...figures.pages import lines
-from ...figures.style import save
+from ...figures.style import save, spared
 from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.refusals import needed
@@ -111,9 +111,9 @@ def ensemble(
     found = [Member.from_row(row) for row in rows]
     result = summary(scene, found)
     write_text(output / "ensemble.json", json.dumps(result, indent=1) + "\n")
-    save(
-        ensemble_figure([member.ramps for member in found], [member.eruption for member in found]), output / "ensemble"
-    )
+    with spared(f"{output}/ensemble.png", say):
+        ramps, eruptions = [member.ramps for member in found], [member.eruption for member in found]
+        save(ensemble_figure(ramps, eruptions), output / "ensemble")
     for line in lines(__package__ or "", "ensemble.j2", result=result):
         say(line)
     return result

@@ -9,6 +9,7 @@ from typing import Any
 
 from ...analysis.digits import with_uncertainty
 from ...analysis.files.wholefile import make_folder, write_text
+from ...figures.style import spared
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
 from .compute import growth_run, onsets_of, pair_curve, recorded_ramp, summary_of, triggering_run
@@ -43,8 +44,10 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     say("undamped run above the onset")
     growth = growth_run(scene, runs[0], output / "run.h5")
     say(f"growth rate of D: {growth.rate} measured, {growth.predicted:.6g} predicted")
-    figures([pair_curve(run) for run in runs], growth, output)
     summary, found = summary_of(scene, runs, growth), None
+    _write(summary, output)  # what follows may fail
+    with spared("a figure of the onset", say):
+        figures([pair_curve(run) for run in runs], growth, output)
     shaken = triggered or scene
     if shaken.perturb is not None and shaken.friction is not None:
         if triggered is not None:
@@ -53,13 +56,18 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
         onsets = runs if triggered is None else _ramps(triggered, path, say)
         say(f"triggering at F_x = {shaken.perturb.fx:g}")
         found = triggering_run(shaken, shaken.perturb, shaken.friction, onsets, path)
-        triggering_figures(found, onsets[0].mu, output)
+        with spared("a figure of the triggering", say):
+            triggering_figures(found, onsets[0].mu, output)
         summary["triggering"] = found.as_dict()
         if triggered is not None:
             summary["triggering"] |= {"scene": triggered.resolved(), "onsets": onsets_of(onsets)}
-    write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
+    _write(summary, output)
     write_text(output / "report.md", report(scene, runs, growth, found))
     return summary
+
+
+def _write(summary: dict[str, Any], output: Path) -> None:
+    write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
 
 
 def _ramps(scene: Scene, path: Path, say: Say) -> list[OnsetRun]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...figures.style import save, styled
+from ...figures.style import save, spared, styled
 from ..statistics import distribution
 from .table import Row
 
@@ -22,14 +22,16 @@ Reach = tuple[float, bool]
 """The largest F_x up to which there is no window, and whether that is the onset."""
 
 
-def draw_sweep(rows: Sequence[Row], folder: Path) -> str:
-    """Save results.png and results.svg, and say so; say nothing where no row has an onset or an eruption."""
+def draw_sweep(rows: Sequence[Row], folder: Path, say: Callable[[str], None]) -> str:
+    """Save results.png and results.svg, and return words for that; none where there is no picture."""
     reaches = [(row, reach) for row in rows if (reach := reach_of(row)) is not None]
     runs = [(row, run) for row in rows for run in row["result"].get("runs", [])]
     if not reaches and not runs:
         return ""
-    save(onsets_figure(reaches) if reaches else eruptions_figure(runs), folder / "results")
-    return f" and {folder}/results.png"
+    with spared(f"{folder}/results.png", say):
+        save(onsets_figure(reaches) if reaches else eruptions_figure(runs), folder / "results")
+        return f" and {folder}/results.png"
+    return ""
 
 
 def reach_of(row: Row) -> Reach | None:

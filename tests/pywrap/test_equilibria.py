@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from faultgouge.pywrap import Scene, ramp, reach
@@ -28,3 +29,21 @@ def test_a_ramp_ends_at_until_with_a_shorter_increment():
     assert [each.fx for each in ramp(scene)] == [0.0, 7e-4, 1.4e-3, 3 * 7e-4, 2.8e-3, 3e-3]
     whole = Scene.from_mapping(SCENE | {"ramp": {"step": 1e-3, "until": 3e-3}})
     assert [each.fx for each in ramp(whole)] == [0.0, 1e-3, 2e-3, 3e-3]
+
+
+@pytest.mark.slow
+def test_increments_that_meet_a_contact_that_hardly_opens_reach_the_end():
+    """Of seed 11, halved increments end at F_x = 0.07846, where Newton's residual falls slowly; others pass."""
+    reached = []
+    for step in (5e-4, 1e-3):
+        mapping = {"precision": "compensated", "packing": {"disks": 100, "seed": 11}, "law": {"kn": 2e5}}
+        scene = Scene.from_mapping(mapping | {"load": {"fy": 3.0}, "ramp": {"step": step, "until": 0.085}})
+        *_, last = ramp(scene)
+        assert last.residual < 10 * last.floor
+        reached.append(last.packing)
+    fine, coarse = reached
+    assert fine.fx == coarse.fx == pytest.approx(0.085)
+    bearing = np.setdiff1d([fine.contacts.i, fine.contacts.j], [-1])  # a rattler lies anywhere in its cage
+    assert len(bearing) > 80
+    # units in the last place of coordinates up to 12
+    assert np.abs((fine.position - coarse.position)[bearing]).max() < 1e-13

@@ -281,7 +281,7 @@ def test_trigger_and_eruptions_as_tasks(tmp_path):
         wanted = Sweep.from_mapping({"task": task, "sweep": {"packing.seed": [2]}, "scene": scene}, TASKS)
         (row,) = run_sweep(wanted, tmp_path / task, say=silent)
         assert row["says"] is None
-        picture = draw_sweep([row], tmp_path / task)
+        picture = draw_sweep([row], tmp_path / task, print)
         assert (tmp_path / task / "results.svg").exists()
         assert picture.endswith("results.png")
         if task == "eruptions":

@@ -54,7 +54,9 @@ def sweep(
     rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count), workers)
     if is_root():
         failed = sum(row["says"] is not None for row in rows)
-        say(f"{len(rows)} scenes, {failed} of them failed; written: {output}/results.csv{draw_sweep(rows, output)}")
+        say(
+            f"{len(rows)} scenes, {failed} of them failed; written: {output}/results.csv{draw_sweep(rows, output, say)}"
+        )
 
 
 @app.command(epilog="Example: faultgouge merge shard1 shard2 shard3 -o whole")
@@ -74,7 +76,7 @@ def merge(
     from faultgouge.studies.sweep.merge import merge as merge_parts
 
     if is_root():
-        draw_sweep(merge_parts(parts, output, say), output)
+        draw_sweep(merge_parts(parts, output, say), output, say)
 
 
 def _shard(text: str) -> tuple[int, int]:

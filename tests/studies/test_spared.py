@@ -1,0 +1,75 @@
+"""A picture that cannot be drawn is told in one sentence, and costs no number and no page."""
+
+import json
+
+import pytest
+
+from faultgouge.assessment.stability.cases.case import Case, Outcome
+from faultgouge.assessment.stability.compute import stability
+from faultgouge.figures.style import spared
+from faultgouge.pywrap import Scene
+from faultgouge.studies.frame import Study
+from faultgouge.studies.sweep.draw import draw_sweep
+
+SCENE = {"packing": {"disks": 100}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+
+
+@pytest.fixture
+def no_pictures(monkeypatch):
+    def fails(*_, **__):
+        raise RuntimeError("no font at all\nand more of it")
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", fails)
+
+
+@pytest.fixture
+def said():
+    return []
+
+
+def test_the_sentence_says_what_and_why(said):
+    with spared("x.png", said.append):
+        raise ValueError("first line\nsecond line")
+    assert said == ["x.png was not drawn (ValueError: first line); all numbers are there"]
+
+
+def test_an_interrupt_is_no_failed_picture(said):
+    with pytest.raises(KeyboardInterrupt), spared("x.png", said.append):
+        raise KeyboardInterrupt
+    assert said == []
+
+
+def test_stability_keeps_its_cases(tmp_path, no_pictures, said):
+    case = Case("one", "group", lambda: Outcome("holds", 0.5, 1.0, "half of the bound"))
+    stability(tmp_path, say=said.append, cases=[case])
+    assert json.loads((tmp_path / "stability.json").read_text())["cases"][0]["figure"] == 0.5
+    assert (tmp_path / "stability.md").exists()
+    assert len(said) == 1
+    assert "stability.png was not drawn (RuntimeError: no font at all)" in said[0]
+
+
+def test_a_sweep_keeps_its_rows(tmp_path, no_pictures, said):
+    row = {"values": {"packing.seed": 1}, "result": {"ramps": [{"mu": 1.0, "reach": 0.01, "ends": "onset"}]}}
+    assert draw_sweep([row], tmp_path, said.append) == ""
+    assert "results.png was not drawn (RuntimeError" in said[0]
+
+
+def test_a_study_keeps_its_numbers_and_its_page(tmp_path, said):
+    def draw(*_):
+        raise RuntimeError("no font at all")
+
+    study = Study(
+        "faultgouge.studies.eruptions", "eruptions", "eruptions", lambda _: None, lambda *_: {"found": 7}, draw, page
+    )
+    with pytest.raises(PageReachedError):
+        study(Scene.from_mapping(SCENE), tmp_path, said.append)
+    assert json.loads((tmp_path / "eruptions.json").read_text())["found"] == 7
+    assert said == ["eruptions: a picture was not drawn (RuntimeError: no font at all); all numbers are there"]
+
+
+class PageReachedError(Exception):
+    """The page comes after the pictures."""
+
+
+def page(_):
+    raise PageReachedError
