@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...figures.pages import filled
-from ...figures.style import save
+from ...figures.style import save, styled
 from ..modes.tables import median
 from ..statistics import share
 from .compute import LOSSES, RATES, SHARES
@@ -154,9 +154,10 @@ def _percent(part: dict[str, Any]) -> str:
     return f"{part['count']} of {part['of']} ({100 * part['low']:.0f} to {100 * part['high']:.0f} %)"
 
 
+@styled
 def figure(found: dict[str, Any]) -> Figure:
     """Static and dynamic yield over loss; share of packings that flow over the load, for each restitution."""
-    drawn = Figure(figsize=(9, 4), layout="constrained")
+    drawn = Figure(figsize=(7, 3), layout="constrained")
     left, axes = drawn.subplots(1, 2)
     middle, low, high = found["static"]
     left.axhspan(low, high, color="0.9")
@@ -164,7 +165,7 @@ def figure(found: dict[str, Any]) -> Figure:
     least = np.array([each["least"] for each in found["yields"]])
     bars = [least[:, 0] - least[:, 1], least[:, 2] - least[:, 0]]
     left.errorbar(range(len(LOSSES)), least[:, 0], yerr=bars, fmt="o", capsize=3, label="dynamic yield")
-    left.set(xlabel="restitution", ylabel="F_x/F_y", ylim=(0, None), xlim=(-0.5, len(LOSSES) - 0.5))
+    left.set(xlabel="restitution", ylabel="$F_x/F_y$", ylim=(0, None), xlim=(-0.5, len(LOSSES) - 0.5))
     left.set_xticks(range(len(LOSSES)), ["1 (undamped)", *map(str, LOSSES[1:])])
     left.legend(loc="lower right")
     for k, loss in enumerate(LOSSES):
@@ -175,7 +176,7 @@ def figure(found: dict[str, Any]) -> Figure:
         label = "undamped" if loss == 1 else f"restitution {loss}"
         axes.errorbar(place, middle, yerr=np.clip(np.array(bars).T, 0, 1), fmt="o-", capsize=3, label=label)
     axes.axvline(1.0, color="black", linestyle="--", label="static yield")
-    axes.set(xlabel="F_x over static yield", ylabel="share of packings that flow", ylim=(-0.02, 1.02))
+    axes.set(xlabel="$F_x$ over static yield", ylabel="share of packings that flow", ylim=(-0.02, 1.02))
     axes.legend(loc="upper left")
     return drawn
 
