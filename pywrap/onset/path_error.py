@@ -32,10 +32,10 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigvals
+from scipy.linalg import LinAlgError, eigvals
 from scipy.sparse.linalg import ArpackError
 
-from ...analysis import NoEquilibriumError, Onset, Packing, Window, dynamical_matrix, eigenpairs
+from ...analysis import FaultgougeError, Onset, Packing, Window, dynamical_matrix, eigenpairs
 from ...analysis.damped_onset.modes import DampedMode, DampedModes, Pencil
 from ...analysis.damped_onset.windows import DampedWindow
 from ...analysis.onset import force_bearing
@@ -55,6 +55,9 @@ CARRIES = 1e-9
 
 AT_THE_BOUND = 1 - 1e-9
 """Slip, in units of its limit, from which on a contact slides: a clamped slip differs from the limit by rounding."""
+
+FAILURES = FaultgougeError, ArpackError, LinAlgError
+"""What another path may end in: an onset that is known is worth more than the error of its path."""
 
 LONGEST_RUN = 2
 """Loads that may be left out one after the other."""
@@ -176,7 +179,7 @@ def _whole(window: W, vanishes: Vanishes, others: OtherPaths) -> W:
         return window
     try:
         part = others.error(window.fx_onset, vanishes, window.error)
-    except NoEquilibriumError:
+    except FAILURES:
         return window
     return replace(
         window,
@@ -235,7 +238,7 @@ class OtherPaths:
             try:
                 there = self._along(through, known)
                 return _root(lambda load: vanishes(there(load)), fx, rounding, 0.5 * increment) - fx
-            except (NoEquilibriumError, ArpackError):
+            except FAILURES:
                 return np.nan
 
         shift = shifted(other, self._coarser)

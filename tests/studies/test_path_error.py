@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import LinAlgError
 
 import faultgouge
-from faultgouge.analysis import NoEquilibriumError, find_onset, spectrum
+from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset, spectrum
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.onset.damped import damped_onset_run
 from faultgouge.pywrap.onset.path_error import OtherPaths, meeting, with_path_error
@@ -125,15 +126,22 @@ def test_an_onset_that_is_not_found_again_is_uncertain_by_the_increment():
 
 
 class OnceOnly(EquilibriumPath):
-    """A path that finds what it knows, and nothing in between."""
+    """A path that finds what it knows, and fails in between."""
+
+    failure: Exception
 
     def __call__(self, fx):
         if all(each.fx != fx for each in self.kept):
-            raise NoEquilibriumError(f"no equilibrium was found beyond F_x = {fx}")
+            raise self.failure
         return super().__call__(fx)
 
 
-def test_an_onset_is_kept_where_no_equilibrium_is_found_again():
+@pytest.mark.parametrize(
+    "failure",
+    [NoEquilibriumError("no equilibrium was found"), LinAlgError("no convergence"), OnsetError("a pair was lost")],
+    ids=lambda failure: type(failure).__name__,
+)
+def test_an_onset_is_kept_where_the_other_path_fails(failure):
     scene = Scene.from_mapping(
         {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 5e-3, "until": 0.02}}
     )
@@ -142,7 +150,9 @@ def test_an_onset_is_kept_where_no_equilibrium_is_found_again():
         path = EquilibriumPath(engine, start, scene)
         found = find_onset(path, np.array([0.0, 5e-3, 1e-2, 1.5e-2, 2e-2]))
         whole = with_path_error(found, engine, path, scene)
-        alone = with_path_error(found, engine, OnceOnly(engine, start, scene, path.kept[1:]), scene)
+        once = OnceOnly(engine, start, scene, path.kept[1:])
+        once.failure = failure
+        alone = with_path_error(found, engine, once, scene)
     assert alone.windows == found.windows
     assert alone.as_dict()["error_of_path"] is None
     assert 0 < whole.as_dict()["error_of_path"] <= whole.error
