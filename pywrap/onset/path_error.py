@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, eigvals
 from scipy.sparse.linalg import ArpackError
 
-from ...analysis import FaultgougeError, Onset, Packing, Window, dynamical_matrix, eigenpairs
+from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, dynamical_matrix, eigenpairs
 from ...analysis.damped_onset.modes import DampedMode, DampedModes, Pencil
 from ...analysis.damped_onset.windows import DampedWindow
 from ...analysis.onset import force_bearing
@@ -56,7 +56,7 @@ CARRIES = 1e-9
 AT_THE_BOUND = 1 - 1e-9
 """Slip, in units of its limit, from which on a contact slides: a clamped slip differs from the limit by rounding."""
 
-FAILURES = FaultgougeError, ArpackError, LinAlgError
+FAILURES = NoEquilibriumError, OnsetError, ArpackError, LinAlgError
 """What another path may end in: an onset that is known is worth more than the error of its path."""
 
 LONGEST_RUN = 2
