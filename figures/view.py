@@ -50,7 +50,7 @@ class ViewError(BadInputError):
 def check_library() -> None:
     """Refuse before any work if Bokeh is not installed."""
     try:
-        import bokeh  # noqa: F401
+        import bokeh  # noqa: F401 - only whether it is there
     except ImportError as error:
         raise ViewError("view needs Bokeh, which is not installed: pip install 'faultgouge[view]'") from error
 
