@@ -38,4 +38,16 @@ class OutputError(FaultgougeError):
 
 
 class NoEquilibriumError(FaultgougeError):
-    """There is no equilibrium at this load, or none that can be found."""
+    """There is no equilibrium at this load, or none that can be found.
+
+    Parameters
+    ----------
+    says : str
+        The sentence.
+    beyond : float, optional
+        The largest F_x that had an equilibrium, where a ramp tells.
+    """
+
+    def __init__(self, says: str, beyond: float | None = None) -> None:
+        super().__init__(says)
+        self.beyond = beyond

@@ -100,6 +100,10 @@ from .arrays import settle
 
 Floats = NDArray[np.float64]
 
+AT_THE_BOUND = 1 - 1e-8
+"""Share of its limit from which on a slip is at Coulomb's bound. A slip that LAMMPS has clamped differs from the limit
+of an overlap that is computed again by rounding: 2e-15 for coordinates of 10, of overlaps from 2e-7 on."""
+
 EXPONENTS = (1.5, 1.0)
 """Exponents of the repulsion that the law, and the plugin, have."""
 
@@ -330,7 +334,7 @@ class MindlinLaw:
         """
         overlap = _closed(overlap)
         power = self._powers(overlap)[0]
-        inside = np.abs(slip) < self.slip_limit(overlap)
+        inside = np.abs(slip) < AT_THE_BOUND * self.slip_limit(overlap)
         return self.cn * power, self.ct * power * inside
 
     def growth(self, overlap: Floats) -> Floats:

@@ -125,7 +125,8 @@ def equilibrate(
         tried = f"; tried were {TRIED}" if onward else ""
         raise NoEquilibriumError(
             f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there{tried}"
-            f"{'' if here.packing.law.frictional else SMOOTH}"
+            f"{'' if here.packing.law.frictional else SMOOTH}",
+            here.fx,
         )
     return here
 

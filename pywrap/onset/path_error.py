@@ -15,9 +15,14 @@ contacts on the way, the error that is left out is
 Richardson's extrapolation, for increments that need not be equal. The onset is given at F, and twice the largest
 difference that rounding of both onsets allows is its uncertainty. Where contacts change, nothing is extrapolated. The
 loads that are left out are then those after an increment with a change: a contact that closes there loses its slip
-over twice the increment. What is lost depends on where in the increment the contact closes, and one other path may
-lose by chance about as much as the ramp. A third path therefore goes through the middles of all increments, and with an
-error of order h the larger of :math:`|F_{2h} - F_h|` and :math:`2 |F_h - F_{h/2}|` is what is stated.
+over twice the increment. What is lost depends on where in its increment the contact closes, and so does where a rattler
+lies that two neighbours are about to seize: it is moved, by convention, when it is met. A path through loads that the
+ramp has may meet both as the ramp does, however small its increments are. Two more paths therefore have the increments
+of the ramp, moved up by a third and by two thirds of an increment. If a change at the share :math:`\varphi` of its
+increment makes an error :math:`c \varphi`, on these it makes :math:`c` times :math:`\varphi - 1/3` and
+:math:`\varphi - 2/3`, modulo 1. One of them differs from the ramp by at least :math:`c/3`, and by :math:`2c/3` where
+:math:`\varphi` is not in the middle third: twice the larger difference is never less than :math:`c \varphi`. What is
+stated is the larger of that and :math:`|F_{2h} - F_h|`.
 
 Of a ramp that has fewer than `FEWEST` increments up to the onset the other path goes through the middles of the
 increments, too; its S is then the smaller one, and the same formula holds.
@@ -39,6 +44,7 @@ from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, 
 from ...analysis.damped_onset.modes import DampedMode, DampedModes, Pencil
 from ...analysis.damped_onset.windows import DampedWindow
 from ...analysis.onset import force_bearing
+from ...analysis.packing.law import AT_THE_BOUND
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
 from ..runs.path import EquilibriumPath
@@ -53,11 +59,11 @@ FEWEST = 4
 CARRIES = 1e-9
 """Normal force, in units of F_y, from which on a contact counts; that of a disk that carries nothing is noise."""
 
-AT_THE_BOUND = 1 - 1e-9
-"""Slip, in units of its limit, from which on a contact slides: a clamped slip differs from the limit by rounding."""
-
 FAILURES = NoEquilibriumError, OnsetError, ArpackError, LinAlgError
 """What another path may end in: an onset that is known is worth more than the error of its path."""
+
+MOVED = 1 / 3, 2 / 3
+"""Shares of an increment by which the loads of two other paths are moved up where contacts change."""
 
 LONGEST_RUN = 2
 """Loads that may be left out one after the other."""
@@ -71,6 +77,9 @@ STEPS = 8
 UNKNOWN = 2.0
 """Uncertainty of an extrapolated onset, in units of the correction. As a rule a correction is good to a tenth.
 Where its coefficient changes sign along the path, the correction is wrong by more than itself."""
+
+WIDENINGS = 20
+"""Factors of two between the half of an increment and the smallest step in which a jump is looked for."""
 
 NOISY = 10
 """Rounding errors about which the last of the secant steps may still jump."""
@@ -87,8 +96,8 @@ class PathError:
     ----------
     shift : float
         F_2h - F_h, force; nan where the pair is not found on the other path.
-    finer : float
-        F_h/2 - F_h, force, where contacts change; nan where they do not, or the pair is not found on that path.
+    moved : tuple of float
+        Onsets on the paths with moved loads less F_h, force, where contacts change; nan as of `shift`.
     weight : float
         S_2h / S_h - 1.
     changes : bool
@@ -100,7 +109,7 @@ class PathError:
     """
 
     shift: float
-    finer: float
+    moved: tuple[float, ...]
     weight: float
     changes: bool
     rounding: float
@@ -116,12 +125,13 @@ class PathError:
     @property
     def error(self) -> float:
         """Uncertainty of the onset from its path, force; rounding may hide two roundings of the shift."""
-        shifts = [part for part in (abs(self.shift), 2 * abs(self.finer)) if not np.isnan(part)]
-        if not shifts:
+        hidden = 2 * self.rounding
+        if np.isnan([self.shift, *self.moved]).any():
             return self.increment
-        largest = max(shifts) + 2 * self.rounding
+        if not self.changes:
+            return UNKNOWN * (abs(self.shift) + hidden) / abs(self.weight)
         part = 1.0 if self.weight > 0 else 2.0  # the ramp is the coarser path of the two
-        return part * largest if self.changes else UNKNOWN * largest / abs(self.weight)
+        return max([part * abs(self.shift), *(2 * abs(each) for each in self.moved)]) + hidden
 
 
 def with_path_error(onset: Onset, engine: Engine, path: EquilibriumPath, scene: Scene) -> Onset:
@@ -205,8 +215,8 @@ class OtherPaths:
     def __init__(self, engine: Engine, path: EquilibriumPath, scene: Scene) -> None:
         self.path = path
         self._engine, self._scene = engine, scene
-        self._states = [_state(each.packing, scene.load.fy) for each in path.kept]
-        self._coarser, self._finer = [path.kept[0]], [path.kept[0]]
+        self._states = [bearing_contacts(each.packing, scene.load.fy) for each in path.kept]
+        self._coarser, self._moved = [path.kept[0]], [[path.kept[0]] for _ in MOVED]
 
     def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
         """What the increments do to the onset at fx, whose rounding error is known.
@@ -225,13 +235,9 @@ class OtherPaths:
         NoEquilibriumError
             If the ramp has no equilibrium at fx.
         """
-        before = [each for each in self.path.kept if each.fx < fx]
-        states = [*self._states[: len(before)], _state(self.path(fx), self._scene.load.fy)]
-        changed = np.array([a != b for a, b in pairwise(states)])
-        ramp = np.array([*(each.fx for each in before), fx])
-        few = len(changed) < FEWEST
-        other = _halved(ramp) if few else _thinned(ramp, changed)
-        third = _halved(other if few else ramp)
+        changed = self.changes(fx)
+        ramp = np.array([*(each.fx for each in self.path.kept if each.fx < fx), fx])
+        other = _halved(ramp) if len(changed) < FEWEST else _thinned(ramp, changed)
         increment = float(np.diff(ramp).max())
 
         def shifted(through: Floats, known: list[Equilibrium]) -> float:
@@ -242,8 +248,21 @@ class OtherPaths:
                 return np.nan
 
         shift = shifted(other, self._coarser)
-        finer = shifted(third, self._finer) if changed.any() else np.nan
-        return PathError(shift, finer, _cubes(other) / _cubes(ramp) - 1, bool(changed.any()), rounding, increment)
+        moved = zip(MOVED, self._moved, strict=True) if changed.any() else ()
+        shifts = tuple(shifted(_moved(ramp, share), known) for share, known in moved)
+        return PathError(shift, shifts, _cubes(other) / _cubes(ramp) - 1, bool(changed.any()), rounding, increment)
+
+    def changes(self, fx: float) -> NDArray[np.bool_]:
+        """In which increments of the ramp up to fx contacts close, open, or reach or leave the Coulomb bound.
+
+        Raises
+        ------
+        NoEquilibriumError
+            If the ramp has no equilibrium at fx.
+        """
+        before = sum(each.fx < fx for each in self.path.kept)
+        states = [*self._states[:before], bearing_contacts(self.path(fx), self._scene.load.fy)]
+        return np.array([a != b for a, b in pairwise(states)])
 
     def _along(self, through: Floats, known: list[Equilibrium]) -> EquilibriumPath:
         """The path through the inner ones of some loads, beginning with what is known of it; what is new is kept."""
@@ -260,13 +279,13 @@ class OtherPaths:
         return path
 
 
-def _state(packing: Packing, fy: float) -> bytes:
-    """Which contacts carry a force, and which of them slide, as something that can be compared."""
+def bearing_contacts(packing: Packing, fy: float) -> frozenset[tuple[int, int, bool]]:
+    """The contacts (i, j, whether it slides) that carry a force; j = -1 for the floor."""
     carrying = packing.loaded(CARRIES * fy)
     contacts = carrying.contacts
     limit = carrying.law.slip_limit(carrying.geometry.overlap)
-    pairs = np.column_stack([contacts.i, contacts.j, np.abs(contacts.slip) > AT_THE_BOUND * limit])
-    return pairs[np.lexsort(pairs.T)].tobytes()
+    slides = np.abs(contacts.slip) > AT_THE_BOUND * limit
+    return frozenset(zip(contacts.i.tolist(), contacts.j.tolist(), slides.tolist(), strict=True))
 
 
 def _thinned(loads: Floats, changed: NDArray[np.bool_]) -> Floats:
@@ -282,6 +301,11 @@ def _thinned(loads: Floats, changed: NDArray[np.bool_]) -> Floats:
 
 def _halved(loads: Floats) -> Floats:
     return np.sort(np.concatenate([loads, 0.5 * (loads[1:] + loads[:-1])]))
+
+
+def _moved(loads: Floats, share: float) -> Floats:
+    """The loads moved up by a share of their increments; the first and the last stay besides."""
+    return np.concatenate([loads[:1], loads[:-1] + share * np.diff(loads), loads[-1:]])
 
 
 def _cubes(loads: Floats) -> float:
@@ -318,8 +342,38 @@ def crossing(frequency: float, dissipation: Callable[[Packing], Packing]) -> Van
     return growth
 
 
-def _root(discriminant: Callable[[float], float], fx: float, rounding: float, reach: float) -> float:
-    """The root of a function near fx by secants, known to a share of its distance from fx; nan beyond the reach."""
+def _root(function: Callable[[float], float], fx: float, rounding: float, reach: float) -> float:
+    """The load nearest to fx, known to a share of its distance, at which a function changes its sign: by secants, or,
+    where it jumps there, by halving; nan beyond the reach."""
+    known: dict[float, float] = {}
+
+    def at(load: float) -> float:
+        if load not in known:
+            known[load] = function(load)
+        return known[load]
+
+    found = _secant(at, fx, rounding, reach)
+    return _bracketed(at, fx, rounding, reach) if np.isnan(found) else found
+
+
+def _bracketed(function: Callable[[float], float], fx: float, rounding: float, reach: float) -> float:
+    """Steps to either side of fx grow until the sign is another one, and the last of them is halved."""
+    sign, near, far = np.sign(function(fx)), 0.0, max(NOISY * rounding, reach * 2.0**-WIDENINGS)
+    while far <= reach:
+        for side in (-1.0, 1.0):
+            if np.sign(function(fx + side * far)) == sign:
+                continue
+            low, high = near, far
+            while high - low > max(SETTLED * high, rounding):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if np.sign(function(fx + side * middle)) == sign else (low, middle)
+            return fx + side * high
+        near, far = far, 4 * far
+    return np.nan
+
+
+def _secant(discriminant: Callable[[float], float], fx: float, rounding: float, reach: float) -> float:
+    """The root of a smooth function near fx; nan where it is not found."""
     step = max(30 * rounding, 1e-9 * fx)
     a, b = fx, fx + step
     at_a, at_b = discriminant(a), discriminant(b)

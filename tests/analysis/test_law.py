@@ -248,6 +248,9 @@ def test_dashpots(exponent):
     grown = 1e-3 ** (exponent - 1)
     np.testing.assert_allclose(normal, 3.0 * grown * np.array([1, 1, 1, 0, 0]), rtol=1e-15)
     np.testing.assert_allclose(tangential, 5.0 * grown * np.array([1, 0, 0, 0, 0]), rtol=1e-15)
+    # the overlap of a contact that slides, computed again from coordinates up to 10
+    clamped = law.slip_limit(1e-3 + 1e-15 * np.arange(-2, 3))
+    assert not law.dashpots(np.full(5, 1e-3), clamped)[1].any()
     assert law.damped
     assert not MindlinLaw(2e5, 6e4, 0.8, exponent).damped
     assert not MindlinLaw(2e5, 6e4, 0.0, exponent, ct=5.0).damped
