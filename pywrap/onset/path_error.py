@@ -20,9 +20,10 @@ lies that two neighbours are about to seize: it is moved, by convention, when it
 ramp has may meet both as the ramp does, however small its increments are. Two more paths therefore have the increments
 of the ramp, moved up by a third and by two thirds of an increment. If a change at the share :math:`\varphi` of its
 increment makes an error :math:`c \varphi`, on these it makes :math:`c` times :math:`\varphi - 1/3` and
-:math:`\varphi - 2/3`, modulo 1. One of them differs from the ramp by at least :math:`c/3`, and by :math:`2c/3` where
-:math:`\varphi` is not in the middle third: twice the larger difference is never less than :math:`c \varphi`. What is
-stated is the larger of that and :math:`|F_{2h} - F_h|`.
+:math:`\varphi - 2/3`, modulo 1. The three onsets then span :math:`2c/3`. Of an error that grows as the root of
+:math:`\varphi`, since a contact that closes becomes stiff at once, they span :math:`0.42 c` at the least. Twice the span
+is therefore no less than about :math:`c`, all that can be lost. What is stated is the larger of that and
+:math:`|F_{2h} - F_h|`.
 
 Of a ramp that has fewer than `FEWEST` increments up to the onset the other path goes through the middles of the
 increments, too; its S is then the smaller one, and the same formula holds.
@@ -131,7 +132,7 @@ class PathError:
         if not self.changes:
             return UNKNOWN * (abs(self.shift) + hidden) / abs(self.weight)
         part = 1.0 if self.weight > 0 else 2.0  # the ramp is the coarser path of the two
-        return max([part * abs(self.shift), *(2 * abs(each) for each in self.moved)]) + hidden
+        return max(part * abs(self.shift), 2 * float(np.ptp([0.0, *self.moved]))) + hidden
 
 
 def with_path_error(onset: Onset, engine: Engine, path: EquilibriumPath, scene: Scene) -> Onset:
