@@ -24,8 +24,8 @@ from ...analysis.files.wholefile import make_folder, write_text
 from ...figures.pages import render
 from ...figures.style import save, spared
 from ...pywrap import Scene, ramp
+from .coverage.draw import changing_figure, coverage_figure
 from .draw import figure_of
-from .draw_coverage import coverage_figure
 from .work_precision.dumps import dumps
 from .work_precision.eigenvalues import far, near
 from .work_precision.frequency import frequency, growth
@@ -113,6 +113,8 @@ def report(
                 save(figure_of(found), output / stem(name))
                 if found.covered:
                     save(coverage_figure(found.covered), output / f"{stem(name)}-coverage")
+                if found.changing:
+                    save(changing_figure(found.changing), output / f"{stem(name)}-changing")
     if failed:
         raise ReportError(
             f"{len(failed)} of {len(studies)} studies failed ({', '.join(failed)}): {output}/report.md says why, "

@@ -20,9 +20,9 @@ lies that two neighbours are about to seize: it is moved, by convention, when it
 ramp has may meet both as the ramp does, however small its increments are. Two more paths therefore have the increments
 of the ramp, moved up by a third and by two thirds of an increment. If a change at the share :math:`\varphi` of its
 increment makes an error :math:`c \varphi`, on these it makes :math:`c` times :math:`\varphi - 1/3` and
-:math:`\varphi - 2/3`, modulo 1. The three onsets then span :math:`2c/3`. Of an error that grows as the root of
-:math:`\varphi`, since a contact that closes becomes stiff at once, they span :math:`0.42 c` at the least. Twice the span
-is therefore no less than about :math:`c`, all that can be lost. What is stated is the larger of that and
+:math:`\varphi - 2/3`, modulo 1, and the three onsets span :math:`2c/3`. A contact that closes becomes stiff soon: of an
+error that grows as the root of :math:`\varphi` they span :math:`0.42 c` at the least. Twice the span is therefore as
+large as :math:`c`, all that can be lost, or nearly so. What is stated is the larger of that and
 :math:`|F_{2h} - F_h|`.
 
 Of a ramp that has fewer than `FEWEST` increments up to the onset the other path goes through the middles of the

@@ -1,6 +1,6 @@
 """Stated and true errors of onsets before which contacts slide, stick, close or open, undamped and damped.
 
-    python -m faultgouge.assessment.error_and_time.coverage.changing [--rows table.jsonl] [--scenes 60]
+    python -m faultgouge.assessment.error_and_time.coverage.changing [--rows table.jsonl] [--scenes 60] [--restate]
 
 Scenes are drawn at random: seeds, numbers of disks, friction, stiffness and exponent of the law, dashpots, increments,
 both arithmetics. Those count that have an onset on their ramp and contacts that change before it. The truth is the
@@ -23,6 +23,7 @@ import numpy as np
 
 from ....analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ....analysis.damped_onset.windows import DampedWindow, damped_windows, dissipative
+from ....analysis.files.wholefile import write_text
 from ....analysis.onset import Window
 from ....pywrap import Engine, Equilibrium, Scene, settle
 from ....pywrap.onset.damped import inside
@@ -101,6 +102,11 @@ class Case:
         assert self.fx_c is not None
         assert self.limit is not None
         return abs(self.fx_c - self.limit)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the stated error covers the true one."""
+        return self.share <= 1
 
     @property
     def share(self) -> float:
@@ -194,7 +200,7 @@ class FirstOnset:
         """The onset of a window, and the error that is stated: rounding and path together."""
         again = self._engine, path, self._scene
         if isinstance(window, Window):
-            first, *_ = with_path_error(Onset((window,), 0), *again).windows
+            first, *_ = with_path_error(Onset((window,), complete=False), *again).windows
             return first.fx_onset, first.error
         damped, *_ = with_damped_path_error([window], self._damped, *again)
         return damped.fx_onset, damped.error
@@ -236,6 +242,20 @@ def _compared(onset: FirstOnset, case: Case) -> Case:
     return replace(case, limit=limit, uncertain=abs(coarser[1].fx_onset - limit))
 
 
+def restated(case: Case) -> Case:
+    """The case with the onset, and the error, that are stated today; the limit stays what it is."""
+    scene = drawn(case.number)
+    if case.kind == "undamped":
+        scene = scene.model_copy(update={"damping": None})
+    start = settle(scene.model_copy(update={"damping": None}))
+    with Engine(start.packing) as engine:
+        onset = FirstOnset(scene, engine, start)
+        found = onset.found()
+        assert found is not None  # it was there when the limit was computed
+        fx_c, stated = onset.whole(*found)
+        return replace(case, changes=onset.changes(found[0], found[1].fx_onset), fx_c=fx_c, stated=stated)
+
+
 def read(path: Path = TABLE) -> list[Case]:
     """The cases of a table, in the order in which they were computed."""
     lines = path.read_text().splitlines() if path.exists() else []
@@ -264,7 +284,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rows", type=Path, default=TABLE, help="the file, which is gone on with")
     parser.add_argument("--scenes", type=int, default=SCENES, help="of either kind")
+    parser.add_argument("--restate", action="store_true", help="only state the errors of the file anew")
     chosen = parser.parse_args()
+    if chosen.restate:
+        anew = [restated(case) if case.counts else case for case in read(chosen.rows)]
+        write_text(chosen.rows, "".join(json.dumps(asdict(case)) + "\n" for case in anew))
     for case in cases(chosen.rows, chosen.scenes):
         if case.counts:
             print(

@@ -12,6 +12,7 @@ product linearly, and the pair is believed from :math:`50\, u |A|_F` on.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -21,7 +22,8 @@ from ....analysis.spectrum.spectrum import SAFETY
 from ....pywrap import Engine, Equilibrium, Scene
 from ....pywrap.onset.path_error import with_path_error
 from ....pywrap.runs.path import EquilibriumPath
-from .coverage import INCREMENTS, coverage
+from ..coverage.changing import read, restated
+from ..coverage.covered import INCREMENTS, coverage
 from .precision import compensated
 from .study import Settings, Study, Theory, study_of
 from .timing import Run, timed_points
@@ -31,6 +33,10 @@ OVERDAMPED, SCAN, BISECTION, ROOT = METHODS
 
 BEYOND = 1e-5
 """Distance beyond the onset, force, at which the pair's imaginary part and overlap are measured for the floor."""
+
+
+SMALL = 20
+"""Disks of the scenes with contacts that change which are computed anew: each takes a second or two."""
 
 
 class Ways:
@@ -131,7 +137,10 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     resolution = float(np.spacing(exact))
     points = timed_points(runs, settings, lambda found: max(abs(found - exact), resolution))
     lost, overlap = ways.beyond(exact)
-    return study_of(
+    changing = [case for case in read() if case.counts]
+    few = [case for case in changing if case.disks <= SMALL][:: len(changing) // (3 if quick else 8)]
+    found_anew = [restated(case) for case in few]
+    study = study_of(
         "onset",
         points=points,
         reference_error=reference_error,
@@ -146,6 +155,7 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
         residual=max(each.residual for each in settings.ramp),
         resolution=resolution,
     )
+    return replace(study, changing=tuple(changing), again=tuple(found_anew))
 
 
 def _runs(ways: Ways, quick: bool, exact: float) -> list[Run[float]]:

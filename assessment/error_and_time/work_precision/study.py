@@ -15,7 +15,8 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from ....pywrap import Equilibrium, Scene
-from .coverage import Covered
+from ..coverage.changing import Case
+from ..coverage.covered import Covered
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -157,6 +158,10 @@ class Study:
         What else the reader has to know, one sentence each.
     covered : tuple of Covered
         Stated against true errors, where the result states one.
+    changing : tuple of Case
+        The same of many scenes in which contacts change before the onset.
+    again : tuple of Case
+        Some of these, computed anew.
     """
 
     name: str
@@ -173,6 +178,8 @@ class Study:
     theory: tuple[Theory, ...] = ()
     remarks: tuple[str, ...] = ()
     covered: tuple[Covered, ...] = ()
+    changing: tuple[Case, ...] = ()
+    again: tuple[Case, ...] = ()
 
     def of(self, method: str) -> list[Point]:
         """The points of one method."""
