@@ -9,7 +9,7 @@ from ...figures.pages import render
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
 from ...pywrap.scenes.units import dashpot, quality_factor, real_units
-from ..triggering import column
+from ..triggering.compute import column
 from ..triggering.page import section
 from .compute import GrowthRun, TriggeringRun
 

@@ -19,9 +19,10 @@ from ..modes.compute import modes
 from ..modes.loss import loss
 from ..modes.lossy_runs import lossy_runs
 from ..modes.random_matrices import random_matrices
+from ..packings import Start
 from ..yielding.compute import yielding
 from .events import eruptions, trigger
-from .onset import Start, onset
+from .onset import onset
 from .triggering import triggering
 
 Run = Callable[[Scene, Start], dict[str, Any]]

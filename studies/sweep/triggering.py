@@ -35,8 +35,9 @@ from ...pywrap.runs.path import EquilibriumPath
 from ...pywrap.runs.undamped import perturb
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction, Perturb
-from ..triggering import GROWTH_FACTOR, calibrated, column, equilibrium_at, jump
-from .onset import Ends, Start, first_window
+from ..packings import Start
+from ..triggering.compute import GROWTH_FACTOR, calibrated, column, equilibrium_at, jump
+from .onset import Ends, first_window
 
 FINEST_STEP = 1e-3
 """Increment of F_x below which a ramp only costs: onsets are solved for, and come out the same."""
