@@ -16,7 +16,6 @@ from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.studies.sweep.compute import run_sweep, stored
 from faultgouge.studies.sweep.draw import draw_sweep
-from faultgouge.studies.sweep.estimate import estimate
 from faultgouge.studies.sweep.merge import merge
 from faultgouge.studies.sweep.points import Sweep, shard
 from faultgouge.studies.sweep.tasks import TASKS
@@ -222,10 +221,11 @@ def test_the_dry_run_counts_and_computes_nothing(faultgouge, tmp_path):
     assert "8 scenes to compute, 4 packings to settle" in done.stderr
     assert "4 points make no scene" in done.stderr
     assert not (tmp_path / "out").exists()
-    ten, hundred = (
-        estimate("onset", sweep_of({"packing.disks": [n], "packing.width": [60.0]}).points) for n in (100, 1000)
+    hundred, thousand = (
+        TASKS["onset"].seconds(Scene.from_mapping(SMALL | {"packing": {"disks": n, "width": 60.0}}))
+        for n in (100, 1000)
     )
-    assert hundred.seconds / ten.seconds == pytest.approx(10**1.6)
+    assert thousand / hundred == pytest.approx(10**1.6)
 
 
 @pytest.mark.ranks
