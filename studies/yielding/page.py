@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from ...figures.pages import render
 from ...figures.style import save, styled
 from ..modes.tables import median
-from ..statistics import share
+from ..statistics import interval, share
 from .compute import LOSSES, RATES, SHARES
 
 FLOWING = ("flows", "fails at rest")
@@ -79,12 +79,8 @@ def _left(rows: list[dict[str, Any]], rate: float) -> list[float | None]:
 def text(found: dict[str, Any], packings: int, failed: int) -> str:
     """The page."""
     flow = [share(each["flow"], packings) for each in found["yields"]]
-    names = {"packings": packings, "failed": failed, "flow": flow, "interval": _interval, "percent": _percent}
+    names = {"packings": packings, "failed": failed, "flow": flow, "interval": interval, "percent": _percent}
     return render(__package__ or "", "yield.md.j2", **found, **names)
-
-
-def _interval(value: list[float]) -> str:
-    return f"{value[0]:.2g} ({value[1]:.2g} to {value[2]:.2g})"
 
 
 def _percent(part: dict[str, Any]) -> str:
