@@ -6,11 +6,10 @@ import os
 import signal
 import subprocess
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
-from reference_layer import BIN
+from reference_layer import BIN, REFERENCE, SMALL
 
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
@@ -19,13 +18,6 @@ from faultgouge.studies.sweep.draw import draw_sweep
 from faultgouge.studies.sweep.merge import merge
 from faultgouge.studies.sweep.points import Sweep, shard
 from faultgouge.studies.sweep.tasks import TASKS
-
-SMALL = {
-    "packing": {"disks": 30, "top": 5, "width": 6.0},
-    "law": {"kn": 2e5},
-    "load": {"fy": 3.0},
-    "ramp": {"step": 5e-3, "until": 0.025},
-}
 
 TOML = """
 task = "onset"
@@ -111,8 +103,7 @@ def test_bad_sweeps_are_refused_in_a_sentence(tmp_path, text, says):
 
 
 def test_a_stored_packing_is_found_from_another_folder(tmp_path):
-    reference = Path(__file__).parents[1] / "reference" / "packing7.json"
-    (tmp_path / "packing.json").write_bytes(reference.read_bytes())
+    (tmp_path / "packing.json").write_bytes(REFERENCE.read_bytes())
     mapping = {"task": "onset", "sweep": {"law.mu": [1.0]}, "scene": SMALL | {"packing": {"file": "packing.json"}}}
     sweep = Sweep.from_mapping(mapping, TASKS, tmp_path)
     assert Sweep.from_mapping(sweep.as_dict(), TASKS).points == sweep.points
