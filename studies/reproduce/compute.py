@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import Growth, RunFile, Spectrum, discrete_frequency, fit_growth, spectrum
 from ...analysis.onset.pair_form import pair_eigenvalues
+from ...analysis.packing.packing import Floats
 from ...figures.pair import PairCurve
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
 from ...pywrap.onset.undamped import OnsetRun, onset_run
@@ -25,8 +25,6 @@ from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Perturb
 from ..triggering.compute import Triggering, equilibrium_at, trigger
 from ..triggering.compute import summary as triggering_summary
-
-Floats = NDArray[np.float64]
 
 EFOLDS = 48.0
 """Length of the undamped run in units of 1/rate: D grows by up to 20 decades in it."""

@@ -23,12 +23,12 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from ...analysis import Growth, RunFile, fit_growth
 from ...analysis.motion.power_law import PowerLaw, fit_power_law
 from ...analysis.motion.response import Response, layer_force, linear_response
 from ...analysis.onset.pair_form import PairForm, pair_forms
+from ...analysis.packing.packing import Floats
 from ...analysis.spectrum.normal_form import LEAST_CROSSOVER
 from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening
@@ -38,8 +38,6 @@ from ...pywrap.runs.undamped import perturb, time_step, weakening_of
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction
 from .forecast import JUMP_SHARE, Forecast, forecast
-
-Floats = NDArray[np.float64]
 
 EARLY = 2000
 """Samples of each run at times that grow geometrically: the layer passes the velocities over which the friction falls
