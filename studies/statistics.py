@@ -60,6 +60,13 @@ def distribution(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:
     return steps.quantiles[rises], steps.probabilities[rises]
 
 
+def course(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:
+    """The same distribution from zero to the largest F_x that was seen, as a curve of steps."""
+    fx, probability = distribution(reach, found)
+    levels = np.concatenate([[0.0], probability])
+    return np.concatenate([[0.0], fx, [np.max(reach)]]), np.append(levels, levels[-1])
+
+
 def quartiles(reach: ArrayLike, found: ArrayLike) -> list[float | None]:
     """Lower quartile, median and upper quartile of F_x^c; None where they lie beyond what the ramps reached."""
     fx, probability = distribution(reach, found)

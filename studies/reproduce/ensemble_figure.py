@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ...figures.style import INK, STYLE
-from ..statistics import distribution
+from ..statistics import course
 from ..sweep.triggering import Row, grows, rise
 
 
@@ -38,13 +38,10 @@ def ensemble_figure(found: Sequence[Row]) -> Figure:
     mus = list(dict.fromkeys(end["mu"] for ramps in ramped for end in ramps))
     for number, mu in enumerate(mus):
         ends = [end for ramps in ramped for end in ramps if end["mu"] == mu]
-        fx, probability = distribution([end["reach"] for end in ends], [end["ends"] == "onset" for end in ends])
-        levels = np.concatenate([[0.0], probability])
-        places = np.concatenate([[0.0], fx, [max(end["reach"] for end in ends)]])
-        curve = np.append(levels, levels[-1])
-        onsets.step(places, curve, where="post", color=f"C{number}", label=rf"$\mu = {mu:g}$")
+        places, levels = course([end["reach"] for end in ends], [end["ends"] == "onset" for end in ends])
+        onsets.step(places, levels, where="post", color=f"C{number}", label=rf"$\mu = {mu:g}$")
         lost = np.array([end["reach"] for end in ends if end["ends"] != "onset"])
-        onsets.plot(lost, levels[np.searchsorted(fx, lost, side="right")], "|", color=f"C{number}")
+        onsets.plot(lost, levels[np.searchsorted(places[1:-1], lost, side="right")], "|", color=f"C{number}")
     onsets.set(xlabel="$F_x^c$", ylabel="share of packings", ylim=(0, 1))
     if mus:
         onsets.legend()
