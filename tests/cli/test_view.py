@@ -1,6 +1,7 @@
 """The page of `faultgouge view`, in a real browser that has no network."""
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
