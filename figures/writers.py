@@ -81,23 +81,25 @@ def _gif(film: Film, path: Path, rate: float, progress: Progress) -> None:
 
     timing: dict[str, Any] = {"duration": round(1000 / rate), "disposal": 1}
     with path.open("wb") as file:
-        shown = None
-        for number in progress(range(film.count), film.count):
-            frame = film.frame(number)
-            picture = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-            now = np.asarray(picture)
-            if shown is None:
-                file.writelines(getheader(picture, info={"loop": 0, "background": 0})[0])
-                file.writelines(getdata(picture, **timing))
-                shown = now.copy()
-            else:
-                # what stays as it was is transparent, which compresses well; one dot at least keeps the time
-                changed = np.abs(frame - colours[shown]).max(axis=2) > UNSEEN
-                box = Image.fromarray(changed).getbbox() or (0, 0, 1, 1)
-                picture.paste(COLOURS - 1, mask=Image.fromarray(~changed))
-                file.writelines(getdata(picture.crop(box), box[:2], transparency=COLOURS - 1, **timing))
-                shown[changed] = now[changed]
-        file.write(b";")
+        try:
+            shown = None
+            for number in progress(range(film.count), film.count):
+                frame = film.frame(number)
+                picture = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+                now = np.asarray(picture)
+                if shown is None:
+                    file.writelines(getheader(picture, info={"loop": 0, "background": 0})[0])
+                    file.writelines(getdata(picture, **timing))
+                    shown = now.copy()
+                else:
+                    # what stays as it was is transparent, which compresses well; one dot at least keeps the time
+                    changed = np.abs(frame - colours[shown]).max(axis=2) > UNSEEN
+                    box = Image.fromarray(changed).getbbox() or (0, 0, 1, 1)
+                    picture.paste(COLOURS - 1, mask=Image.fromarray(~changed))
+                    file.writelines(getdata(picture.crop(box), box[:2], transparency=COLOURS - 1, **timing))
+                    shown[changed] = now[changed]
+        finally:
+            file.write(b";")  # a film that ends early has the frames so far
 
 
 def _mp4(film: Film, path: Path, rate: float, progress: Progress) -> None:

@@ -15,7 +15,6 @@ is what stability.md says of them, ramps.png draws where ramps end.
 """
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -37,7 +36,7 @@ from faultgouge.figures.style import INK, STYLE, save
 from faultgouge.pywrap import Equilibrium, Scene, ramp, settle
 from faultgouge.pywrap.onset.path_error import bearing_contacts
 from faultgouge.pywrap.scenes.refusals import needed
-from faultgouge.studies.rows import complete_lines
+from faultgouge.studies.rows import append, stored
 
 FY = 3.0
 END = 0.1 * FY
@@ -177,15 +176,13 @@ def _found(climb: Climb, reference: Climb) -> Row:
 
 def rows_of(path: Path, packings: int, workers: int) -> Iterator[Row]:
     """The rows of packings as they are known; those that are not in the file are computed, and written."""
-    known = {row["draw"]: row for row in map(json.loads, complete_lines(path))}
+    known = {row["draw"]: row for row in stored(path, "draw", "python -m fuzz.ramps")}
     yield from known.values()
     missing = [number for number in range(packings) if number not in known]
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool, path.open("a") as file:
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         for future in as_completed([pool.submit(packing_row, number) for number in missing]):
-            row = future.result()
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            yield row
+            append(path, future.result())
+            yield future.result()
 
 
 def table(rows: Sequence[Row]) -> str:

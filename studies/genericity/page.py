@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,7 @@ import numpy as np
 
 from ...analysis.files.wholefile import write_text
 from ...figures.pages import render
-from ...figures.style import save_as
+from ...figures.style import save_as, spared
 from ..statistics import interval
 from .draw import mechanism_figure, modes_figure, onsets_figure, size_figure
 from .numbers import LOADS, numbers, read_tables
@@ -18,13 +20,15 @@ from .sets import PACKINGS, SIZES
 from .tables import Table
 
 
-def write_page(folder: Path) -> Path:
+def write_page(folder: Path, say: Callable[[str], None] = print) -> Path:
     """Write genericity.md, genericity.json and the pictures from the tables of a folder.
 
     Parameters
     ----------
     folder : Path
         With a folder for each set, and results.csv in each.
+    say : callable
+        Told of a picture that could not be drawn.
 
     Returns
     -------
@@ -38,13 +42,14 @@ def write_page(folder: Path) -> Path:
         [3.0 * f0 for f0, disks in zip(found["levels"]["f0"], found["levels"]["disks"], strict=True) if disks == 100]
     )
     figures = {
-        "onsets": onsets_figure(onsets, predicted),
-        "modes": modes_figure(onsets),
-        "size": size_figure(found),
-        "mechanism": mechanism_figure(found["surrogates"]),
+        "onsets": partial(onsets_figure, onsets, predicted),
+        "modes": partial(modes_figure, onsets),
+        "size": partial(size_figure, found),
+        "mechanism": partial(mechanism_figure, found["surrogates"]),
     }
     for name, figure in figures.items():
-        save_as(figure, folder / f"{name}.png")
+        with spared(f"{name}.png", say):
+            save_as(figure(), folder / f"{name}.png")
     write_text(folder / "genericity.json", json.dumps(found, indent=1) + "\n")
     made = json.loads((folder / "made.json").read_text()) if (folder / "made.json").exists() else {}
     page = folder / "genericity.md"

@@ -51,6 +51,20 @@ def test_a_part_of_a_run(motion):
 
 
 @pytest.mark.slow
+def test_a_gif_that_ends_early_has_the_frames_so_far(tmp_path, motion):
+    def failing(numbers, count):
+        yield from numbers[:3]
+        raise MemoryError
+
+    with pytest.raises(MemoryError):
+        write_film(RunFilm(motion, 7, dots=60), tmp_path / "run.gif", 10, failing)
+    with Image.open(tmp_path / "run.gif") as gif:
+        assert gif.n_frames == 3
+        gif.seek(2)
+        gif.load()
+
+
+@pytest.mark.slow
 def test_gif_holds_every_frame(tmp_path, motion):
     film = RunFilm(motion, 7, dots=60)
     write_film(film, tmp_path / "run.gif", 10)

@@ -1,14 +1,19 @@
 """A picture that cannot be drawn is told in one sentence, and costs no number and no page."""
 
 import json
+import shutil
+from pathlib import Path
 
 import pytest
+from scipy.linalg import LinAlgError
 
+from faultgouge.analysis import RunFile
 from faultgouge.assessment.stability.cases.case import Case, Outcome
 from faultgouge.assessment.stability.compute import stability
 from faultgouge.figures.style import spared
 from faultgouge.pywrap import Scene
 from faultgouge.studies.frame import Study
+from faultgouge.studies.genericity.page import write_page
 from faultgouge.studies.sweep.draw import draw_sweep
 
 SCENE = {"packing": {"disks": 100}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
@@ -37,6 +42,43 @@ def test_an_interrupt_is_no_failed_picture(said):
     with pytest.raises(KeyboardInterrupt), spared("x.png", said.append):
         raise KeyboardInterrupt
     assert said == []
+
+
+def test_genericity_keeps_its_numbers_and_its_page(tmp_path, no_pictures, said):
+    tables = Path(__file__).parents[2] / "docs" / "genericity"
+    for table in tables.glob("*/results.csv"):
+        (tmp_path / table.parent.name).mkdir()
+        shutil.copy(table, tmp_path / table.parent.name)
+    page = write_page(tmp_path, said.append)
+    assert page.exists()
+    assert json.loads((tmp_path / "genericity.json").read_text())
+    assert len(said) == 4
+    assert all("was not drawn (RuntimeError: no font at all)" in sentence for sentence in said)
+
+
+def test_a_spectrum_keeps_its_eigenvalues(tmp_path, reference_packing, faultgouge_here, monkeypatch):
+    def fails(*_):
+        raise LinAlgError("no convergence")
+
+    monkeypatch.setattr("faultgouge.analysis.motion.transient.transient_gains", fails)
+    packing = reference_packing(1.0)
+    with RunFile.create(tmp_path / "run.h5", packing) as run:
+        run.append(packing, floor=1e-11, evaluations=1)
+    done = faultgouge_here("spectrum", "run.h5", "--json")
+    assert done.returncode == 0
+    result = json.loads(done.stdout)
+    assert len(result["eigenvalues"]) > 200
+    assert result["transient_gain"] is None
+    assert "the transient gain was not found (LinAlgError: no convergence); the eigenvalues are complete" in done.stderr
+
+
+def test_draw_says_its_words_before_the_picture(tmp_path, reference_packing, faultgouge_here, no_pictures):
+    packing = reference_packing(1.0)
+    with RunFile.create(tmp_path / "run.h5", packing) as run:
+        run.append(packing, floor=1e-11, evaluations=1)
+    done = faultgouge_here("draw", "run.h5")
+    assert done.returncode == 1
+    assert "100 disks" in done.stderr
 
 
 def test_stability_keeps_its_cases(tmp_path, no_pictures, said):

@@ -118,7 +118,7 @@ def _print_spectrum(
 
 
 def _gain_of(packing: Packing) -> dict[str, Any] | None:
-    """The transient gains of a stable packing; None of an unstable one, and of one that is too large."""
+    """The transient gains of a stable packing; None if unstable, too large, or where it fails."""
     from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
 
     if len(packing) > MOST_DISKS:
@@ -126,6 +126,10 @@ def _gain_of(packing: Packing) -> dict[str, Any] | None:
     try:
         displacement, energy = transient_gains(packing)
     except NoGainError:
+        return None
+    except Exception as error:  # whatever it is: the eigenvalues are worth more
+        reason = (str(error).splitlines() or ["no reason given"])[0]
+        say(f"the transient gain was not found ({type(error).__name__}: {reason}); the eigenvalues are complete")
         return None
     return {
         "displacement": displacement.gain,

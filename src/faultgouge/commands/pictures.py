@@ -69,13 +69,14 @@ def draw(
     from faultgouge.figures.style import save_as
 
     if mode is None:
-        figure, words = draw_packing(packing, color=color.value, caption=True), in_words(packing)
+        say(in_words(packing))
+        figure = draw_packing(packing, color=color.value, caption=True)
     else:
         modes, what = modes_of(packing, mode)
+        say("\n".join([f"F_x = {packing.fx:g}: {what}", *(each.plain for each in modes)]))
         figure = draw_modes(packing, modes, what)
-        words = "\n".join([f"F_x = {packing.fx:g}: {what}", *(each.plain for each in modes)])
     save_as(figure, output)
-    say(f"{words}\nwritten to {output}")
+    say(f"written to {output}")
 
 
 @app.command(epilog="Example: faultgouge movie perturb.h5 -o eruption.gif")

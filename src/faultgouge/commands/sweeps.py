@@ -112,7 +112,7 @@ def genericity(
         keeps(f"{output} has the scenes that have ended; the same command goes on from there")
         compute(output, say, lambda ended, count: progress(ended, "scenes", count), share, workers)
     if is_root():
-        say(f"written: {write_page(output)}")
+        say(f"written: {write_page(output, say)}")
 
 
 @app.command(epilog="Example: faultgouge modes modes.toml -o modes")
