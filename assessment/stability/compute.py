@@ -93,7 +93,9 @@ def _write(done: Sequence[tuple[Case, Outcome]], output: Path) -> None:
     write_text(output / "stability.json", json.dumps(_as_dict(done), indent=1, allow_nan=False) + "\n")
     statuses = [outcome.status for _, outcome in done]
     groups = [(name, list(members)) for name, members in groupby(done, lambda each: each[0].group)]
-    page = render(__package__ or "", "stability.md.j2", done=done, statuses=statuses, groups=groups)
+    drawn = output / "ramps.txt"  # of `python -m fuzz.ramps`, beside its picture
+    ramps = drawn.read_text() if drawn.exists() else ""
+    page = render(__package__ or "", "stability.md.j2", done=done, statuses=statuses, groups=groups, ramps=ramps)
     write_text(output / "stability.md", page)
 
 

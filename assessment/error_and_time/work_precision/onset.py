@@ -138,7 +138,8 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     points = timed_points(runs, settings, lambda found: max(abs(found - exact), resolution))
     lost, overlap = ways.beyond(exact)
     changing = [case for case in read() if case.counts]
-    few = [case for case in changing if case.disks <= SMALL][:: len(changing) // (3 if quick else 8)]
+    small = [case for case in changing if case.disks <= SMALL]
+    few = small[:: max(1, len(small) // (2 if quick else 6))]
     found_anew = [restated(case) for case in few]
     study = study_of(
         "onset",
