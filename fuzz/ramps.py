@@ -215,10 +215,10 @@ def says(rows: Sequence[Row]) -> str:
     )
     others = sum(bool(each["ways"]) for each in ramps)
     text = (
-        f"Of {len(ramps)} ramps of {len(rows)} packings to F_x/F_y = {END / FY:g}, each with {TRIED} increments in "
-        f"both arithmetics, {len(agree)} agree on whether and, within {NEAR:g} of F_y, where their packing flows "
-        f"({flowing} packings flow), {len(path)} end elsewhere because their path has led to another branch of "
-        f"equilibria, and {len(missed)} have missed an equilibrium that exists; {others} ramps needed other ways than "
+        f"Of {len(ramps)} ramps of {len(rows)} packings to F_x/F_y = {END / FY:g}, {TRIED} increments in both "
+        f"arithmetics of each, {len(agree)} agree on whether their packing flows and, within {NEAR:g} of F_y, where; "
+        f"{len(path)} end elsewhere because their path has led to another branch of equilibria, and {len(missed)} have "
+        f"missed an equilibrium that exists. {flowing} of the packings flow, and {others} ramps needed other ways than "
         "smaller increments."
     )
     if not path:

@@ -22,8 +22,9 @@ of the ramp, moved up by a third and by two thirds of an increment. If a change 
 increment makes an error :math:`c \varphi`, on these it makes :math:`c` times :math:`\varphi - 1/3` and
 :math:`\varphi - 2/3`, modulo 1, and the three onsets span :math:`2c/3`. A contact that closes becomes stiff soon: of an
 error that grows as the root of :math:`\varphi` they span :math:`0.42 c` at the least. Twice the span is therefore as
-large as :math:`c`, all that can be lost, or nearly so. What is stated is the larger of that and
-:math:`|F_{2h} - F_h|`.
+large as :math:`c`, all that can be lost, or nearly so. Increments in which a contact begins to slide are as long on all
+of these. What they add, of order h^2, is seen on a path through the middles of all increments: three quarters of it.
+What is stated is the largest of :math:`|F_{2h} - F_h|`, twice the span, and :math:`2 |F_h - F_{h/2}|`.
 
 Of a ramp that has fewer than `FEWEST` increments up to the onset the other path goes through the middles of the
 increments, too; its S is then the smaller one, and the same formula holds.
@@ -97,6 +98,8 @@ class PathError:
     ----------
     shift : float
         F_2h - F_h, force; nan where the pair is not found on the other path.
+    finer : float
+        F_h/2 - F_h, force, where contacts change and the other path is the coarser one; else 0, or nan as of `shift`.
     moved : tuple of float
         Onsets on the paths with moved loads less F_h, force, where contacts change; nan as of `shift`.
     weight : float
@@ -110,6 +113,7 @@ class PathError:
     """
 
     shift: float
+    finer: float
     moved: tuple[float, ...]
     weight: float
     changes: bool
@@ -127,12 +131,12 @@ class PathError:
     def error(self) -> float:
         """Uncertainty of the onset from its path, force; rounding may hide two roundings of the shift."""
         hidden = 2 * self.rounding
-        if np.isnan([self.shift, *self.moved]).any():
+        if np.isnan([self.shift, self.finer, *self.moved]).any():
             return self.increment
         if not self.changes:
             return UNKNOWN * (abs(self.shift) + hidden) / abs(self.weight)
         part = 1.0 if self.weight > 0 else 2.0  # the ramp is the coarser path of the two
-        return max(part * abs(self.shift), 2 * float(np.ptp([0.0, *self.moved]))) + hidden
+        return max(part * abs(self.shift), 2 * abs(self.finer), 2 * float(np.ptp([0.0, *self.moved]))) + hidden
 
 
 def with_path_error(onset: Onset, engine: Engine, path: EquilibriumPath, scene: Scene) -> Onset:
@@ -217,7 +221,7 @@ class OtherPaths:
         self.path = path
         self._engine, self._scene = engine, scene
         self._states = [bearing_contacts(each.packing, scene.load.fy) for each in path.kept]
-        self._coarser, self._moved = [path.kept[0]], [[path.kept[0]] for _ in MOVED]
+        self._coarser, self._finer, self._moved = [path.kept[0]], [path.kept[0]], [[path.kept[0]] for _ in MOVED]
 
     def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
         """What the increments do to the onset at fx, whose rounding error is known.
@@ -238,7 +242,8 @@ class OtherPaths:
         """
         changed = self.changes(fx)
         ramp = np.array([*(each.fx for each in self.path.kept if each.fx < fx), fx])
-        other = _halved(ramp) if len(changed) < FEWEST else _thinned(ramp, changed)
+        few = len(changed) < FEWEST
+        other = _halved(ramp) if few else _thinned(ramp, changed)
         increment = float(np.diff(ramp).max())
 
         def shifted(through: Floats, known: list[Equilibrium]) -> float:
@@ -249,9 +254,12 @@ class OtherPaths:
                 return np.nan
 
         shift = shifted(other, self._coarser)
-        moved = zip(MOVED, self._moved, strict=True) if changed.any() else ()
-        shifts = tuple(shifted(_moved(ramp, share), known) for share, known in moved)
-        return PathError(shift, shifts, _cubes(other) / _cubes(ramp) - 1, bool(changed.any()), rounding, increment)
+        weight = _cubes(other) / _cubes(ramp) - 1
+        if not changed.any():
+            return PathError(shift, 0.0, (), weight, False, rounding, increment)
+        finer = 0.0 if few else shifted(_halved(ramp), self._finer)
+        moved = (shifted(_moved(ramp, share), known) for share, known in zip(MOVED, self._moved, strict=True))
+        return PathError(shift, finer, tuple(moved), weight, True, rounding, increment)
 
     def changes(self, fx: float) -> NDArray[np.bool_]:
         """In which increments of the ramp up to fx contacts close, open, or reach or leave the Coulomb bound.
