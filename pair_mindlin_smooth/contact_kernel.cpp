@@ -59,6 +59,7 @@ template <class V> struct Batch : std::conditional_t<V::DAMPED, DashpotColumns, 
   int pair[BATCH];
   Column branch_x, branch_y, slip, overlap, normal, normal_x, normal_y, tangential, force_x, force_y;
   double radius_i[BATCH], radius_j[BATCH], moved_x[BATCH], moved_y[BATCH], rolled[BATCH];
+  double dissipated[BATCH];    // in this step, only with energy
 };
 
 // high parts of a contact cannot be farther apart than its reach and this
@@ -188,19 +189,37 @@ template <class V> FAULTGOUGE_INLINE void tangential_forces(Batch<V> &batch, con
   }
 }
 
+// slips as they would be without a bound
+template <class V> FAULTGOUGE_INLINE void unbounded_slips(Batch<V> &batch)
+{
+  for (int k = 0; k < batch.count; k++) batch.dissipated[k] = value(batch.slip.load(k)) + slip_increment(batch, k);
+}
+
+// by sliding, which is what the bound has taken from the slips
+template <class V> FAULTGOUGE_INLINE void add_sliding(Batch<V> &batch)
+{
+  for (int k = 0; k < batch.count; k++)
+    batch.dissipated[k] = (value(batch.slip.load(k)) - batch.dissipated[k]) * value(batch.tangential.load(k));
+}
+
 // after the elastic forces, since friction is bounded by the elastic normal force
-template <class V> FAULTGOUGE_INLINE void add_dashpots(Batch<V> &batch, const MindlinLaw law)
+template <class V, bool ENERGY> FAULTGOUGE_INLINE void add_dashpots(Batch<V> &batch, const MindlinLaw law, double dt)
 {
   using Number = typename V::Number;
   for (int k = 0; k < batch.count; k++) {
     const double nx = value(batch.normal_x.load(k)), ny = value(batch.normal_y.load(k));
     const double overlap = value(batch.overlap.load(k)), rate_x = batch.rate_x[k], rate_y = batch.rate_y[k];
     const Number normal = batch.normal.load(k);
-    batch.normal.store(k, law.damped_normal<V::EXPONENT>(normal, overlap, nx * rate_x + ny * rate_y));
+    const double opening = nx * rate_x + ny * rate_y;
+    batch.normal.store(k, law.damped_normal<V::EXPONENT>(normal, overlap, opening));
     if constexpr (V::FRICTION) {
       const double slip_rate = (nx * rate_y - ny * rate_x) - batch.rolling[k];
-      batch.tangential.store(k,
-                             law.damped_tangential<V::EXPONENT>(batch.tangential.load(k), normal, overlap, slip_rate));
+      const Number elastic = batch.tangential.load(k);
+      const Number sum = law.damped_tangential<V::EXPONENT>(elastic, normal, overlap, slip_rate);
+      batch.tangential.store(k, sum);
+      if constexpr (ENERGY)
+        batch.dissipated[k] +=
+            dt * law.dashpot_power<V::EXPONENT>(overlap, opening, slip_rate, value(elastic), value(sum));
     }
   }
 }
@@ -232,16 +251,28 @@ template <class V> FAULTGOUGE_INLINE void components(Batch<V> &batch, const Grid
   }
 }
 
-template <class V> FAULTGOUGE_INLINE void evaluate(Batch<V> &batch, const MindlinLaw law, const Grids &grids)
+template <class V, bool ENERGY>
+FAULTGOUGE_INLINE void evaluate(Batch<V> &batch, const MindlinLaw law, double dt, const Grids &grids)
 {
   normal_forces(batch, law);
+  if constexpr (ENERGY) unbounded_slips(batch);
   if constexpr (V::FRICTION) tangential_forces(batch, law);
-  if constexpr (V::DAMPED) add_dashpots(batch, law);
+  if constexpr (ENERGY) add_sliding(batch);
+  if constexpr (V::DAMPED) add_dashpots<V, ENERGY>(batch, law, dt);
   components(batch, grids);
 }
 
+template <class V>
+FAULTGOUGE_INLINE void evaluate(Batch<V> &batch, const MindlinLaw law, double dt, const Grids &grids, bool energy)
+{
+  if constexpr (V::ADVANCE)
+    if (energy) return evaluate<V, true>(batch, law, dt, grids);
+  evaluate<V, false>(batch, law, dt, grids);
+}
+
 // puts the results where they belong; returns a pair with one centre inside of the other disk, or else what it is given
-template <class V> FAULTGOUGE_INLINE int empty(Batch<V> &batch, ContactPairs &pairs, int owned, int crushed)
+template <class V>
+FAULTGOUGE_INLINE int empty(Batch<V> &batch, ContactPairs &pairs, int owned, int crushed, bool energy)
 {
   using Number = typename V::Number;
   for (int k = 0; k < batch.count; k++) {
@@ -253,6 +284,8 @@ template <class V> FAULTGOUGE_INLINE int empty(Batch<V> &batch, ContactPairs &pa
     }
     const Number tangential = V::FRICTION ? batch.tangential.load(k) : Number(0.0);
     give_force(pairs, p, owned, batch.force_x.load(k), batch.force_y.load(k), tangential);
+    if constexpr (V::ADVANCE)
+      if (energy) pairs.dissipated[p] = batch.dissipated[k] + (pairs.touching[p] ? pairs.dissipated[p] : 0.0);
     if constexpr (V::FRICTION) {
       pairs.touching[p] = 1;
       pairs.slip[p] = leading(batch.slip.load(k));
@@ -265,7 +298,7 @@ template <class V> FAULTGOUGE_INLINE int empty(Batch<V> &batch, ContactPairs &pa
 
 template <class V>
 FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
-                                 double dt, const Grids &grids)
+                                 double dt, bool energy, const Grids &grids)
 {
   using Number = typename V::Number;
   Batch<V> batch;
@@ -287,11 +320,11 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
     }
     add(batch, pairs, p, r, disks, dt);
     if (batch.count < BATCH) continue;
-    evaluate(batch, law, grids);
-    crushed = empty(batch, pairs, disks.owned, crushed);
+    evaluate(batch, law, dt, grids, energy);
+    crushed = empty(batch, pairs, disks.owned, crushed, energy);
   }
-  evaluate(batch, law, grids);
-  return empty(batch, pairs, disks.owned, crushed);
+  evaluate(batch, law, dt, grids, energy);
+  return empty(batch, pairs, disks.owned, crushed, energy);
 }
 
 template <class Number, Exponent P, bool DAMPED, class... Rest>
@@ -309,14 +342,20 @@ FAULTGOUGE_INLINE FloorContact<Number> on_floor(const MindlinLaw &law, Number ov
                                                 const FloorRates &rates, Features features)
 {
   const Number elastic = law.normal_force<P>(overlap);
-  FloorContact<Number> contact{elastic, 0.0, slip, 0.0};
+  FloorContact<Number> contact{elastic, 0.0, slip, 0.0, 0.0, 0.0};
   if (features.damped) contact.normal = law.damped_normal<P>(elastic, value(overlap), rates.opening);
   if (!features.friction) return contact;
   contact.slip_limit = law.slip_limit_ratio<Number>() * overlap;
   if (features.advance) contact.slip = advanced_slip(slip, increment, contact.slip_limit);
-  contact.tangential = law.tangential_force(elastic, contact.slip, contact.slip_limit);
-  if (features.damped)
-    contact.tangential = law.damped_tangential<P>(contact.tangential, elastic, value(overlap), rates.slip);
+  const Number friction = law.tangential_force(elastic, contact.slip, contact.slip_limit);
+  contact.tangential = friction;
+  if (features.damped) contact.tangential = law.damped_tangential<P>(friction, elastic, value(overlap), rates.slip);
+  if (features.energy) {
+    contact.slid = (value(contact.slip) - (value(slip) + increment)) * value(friction);
+    if (features.damped)
+      contact.dashpot_power =
+          law.dashpot_power<P>(value(overlap), rates.opening, rates.slip, value(friction), value(contact.tangential));
+  }
   return contact;
 }
 
@@ -328,11 +367,14 @@ int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, c
 {
   const Grids none{};
   if (law.exponent == Exponent::HARMONIC)
-    return features.damped
-               ? with_friction<double, Exponent::HARMONIC, true>(features, pairs, disks, box, law, dt, none)
-               : with_friction<double, Exponent::HARMONIC, false>(features, pairs, disks, box, law, dt, none);
-  return features.damped ? with_friction<double, Exponent::HERTZ, true>(features, pairs, disks, box, law, dt, none)
-                         : with_friction<double, Exponent::HERTZ, false>(features, pairs, disks, box, law, dt, none);
+    return features.damped ? with_friction<double, Exponent::HARMONIC, true>(features, pairs, disks, box, law, dt,
+                                                                             features.energy, none)
+                           : with_friction<double, Exponent::HARMONIC, false>(features, pairs, disks, box, law, dt,
+                                                                              features.energy, none);
+  return features.damped
+             ? with_friction<double, Exponent::HERTZ, true>(features, pairs, disks, box, law, dt, features.energy, none)
+             : with_friction<double, Exponent::HERTZ, false>(features, pairs, disks, box, law, dt, features.energy,
+                                                             none);
 }
 
 FAULTGOUGE_DISPATCH
@@ -340,12 +382,14 @@ int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Pe
                                double dt, Features features, const Grids &grids)
 {
   if (law.exponent == Exponent::HARMONIC)
-    return features.damped
-               ? with_friction<Compensated, Exponent::HARMONIC, true>(features, pairs, disks, box, law, dt, grids)
-               : with_friction<Compensated, Exponent::HARMONIC, false>(features, pairs, disks, box, law, dt, grids);
-  return features.damped
-             ? with_friction<Compensated, Exponent::HERTZ, true>(features, pairs, disks, box, law, dt, grids)
-             : with_friction<Compensated, Exponent::HERTZ, false>(features, pairs, disks, box, law, dt, grids);
+    return features.damped ? with_friction<Compensated, Exponent::HARMONIC, true>(features, pairs, disks, box, law, dt,
+                                                                                  features.energy, grids)
+                           : with_friction<Compensated, Exponent::HARMONIC, false>(features, pairs, disks, box, law, dt,
+                                                                                   features.energy, grids);
+  return features.damped ? with_friction<Compensated, Exponent::HERTZ, true>(features, pairs, disks, box, law, dt,
+                                                                             features.energy, grids)
+                         : with_friction<Compensated, Exponent::HERTZ, false>(features, pairs, disks, box, law, dt,
+                                                                              features.energy, grids);
 }
 
 FAULTGOUGE_DISPATCH
