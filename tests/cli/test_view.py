@@ -5,26 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_layer import BEYOND_ITS_ONSET
 
 from faultgouge.analysis import RunFile
 from faultgouge.figures.view import equally_spaced
 from faultgouge.figures.view_pair import followed
-
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
-SCENE = f"""
-[packing]
-file = "{REFERENCE}"
-[law]
-kn = 2e5
-[load]
-fy = 3.0
-[ramp]
-step = 6e-3
-until = 0.024
-[perturb]
-fx = 0.024
-time = 1.0
-"""
 
 
 def test_loads_are_equally_spaced_with_first_and_last():
@@ -55,7 +40,7 @@ def test_few_eigenvalues_show_the_pair_that_all_show(folder):
 def folder(tmp_path_factory, faultgouge_in):
     """A ramp through the onset 0.0218, an undamped run, and their pages."""
     made = tmp_path_factory.mktemp("view")
-    (made / "scene.toml").write_text(SCENE)
+    (made / "scene.toml").write_text(BEYOND_ITS_ONSET)
     for name in ("ramp", "perturb"):
         for words in ((name, "scene.toml", "-o", f"{name}.h5"), ("view", f"{name}.h5", "-o", f"{name}.html")):
             done = faultgouge_in(made, *words)
