@@ -249,7 +249,10 @@ MOVE = "\nfix move all nve/disc 1.0\n"
         (PAIR + "damping 1.0", "damping takes two numbers, CN CT"),
         (PAIR + "damping -1.0 0.0", "damping CN CT must be finite and not negative (got -1.0 0.0)"),
         (PAIR + "damping 1.0 inf", "inf"),
-        (PAIR + "dampin 1.0 1.0", "knows the keywords exponent, history, damping, energy and compensated, but not dampin"),
+        (
+            PAIR + "dampin 1.0 1.0",
+            "knows the keywords exponent, history, damping, energy and compensated, but not dampin",
+        ),
         (FLOOR + "exponent 1.6", "exponent must be 1.5 or 1, not 1.6"),
         (FLOOR + "damping 1.0", "damping takes two numbers, CN CT"),
         (FLOOR + "damping 0.0 -2", "damping CN CT must be finite and not negative (got 0.0 -2)"),
