@@ -5,6 +5,8 @@ python benchmarks/killed_worker.py [--scenes 1000] [--workers 4]
 """
 
 import argparse
+import os
+import signal
 import tempfile
 import threading
 import time
@@ -57,9 +59,9 @@ def _kill_one(cluster: SpecCluster, folder: Path, after: int, killed: list[int])
     stored = folder / "results.jsonl"
     while not stored.exists() or stored.read_bytes().count(b"\n") < after:
         time.sleep(0.02)
-    process = next(iter(cluster.workers.values())).process.process
-    killed.append(process.pid)
-    process.kill()
+    pid = next(iter(cluster.workers.values())).pid
+    os.kill(pid, signal.SIGKILL)
+    killed.append(pid)
 
 
 def main() -> None:
