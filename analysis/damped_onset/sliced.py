@@ -36,6 +36,9 @@ BEFOREHAND = 1.3
 """Where further slices have to be looked at, those that would have to at so many times larger loads are looked at, too:
 bases that are kept are made anew."""
 
+MOST_AHEAD = 8
+"""Increments at the most that are looked at while bases that are not kept pass by."""
+
 SHORTEST = 2.0**-6
 """Shortest steps, in shares of the straight line from one pencil to another, in which a mode is followed."""
 
@@ -79,6 +82,10 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
     """The oracle of growing motion."""
 
     _borne: Floats | None = None  # |A - A^T| up to which each mode of the spectrum is left out
+
+    def ahead(self, done: int) -> int:
+        """More and more of them, as dissipation may put off the onset by much; each costs a tenth of the bases."""
+        return min(done + 1, MOST_AHEAD)
 
     # What clusters announce
 
@@ -145,13 +152,16 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
             mode = below
         return window_of(Crossing(mode.fx, 0.0, mode.rate.imag, "start"), end)
 
-    def _elsewhere(self, candidate: Candidate, window: DampedWindow, reach: float) -> bool:
-        """Whether a window begins much before a cluster announced it.
+    def _beyond(self, candidate: Candidate, first: DampedWindow, start: float) -> bool:
+        """Never: small differences of large couplings tell where weak dashpots begin to feed a mode.
 
-        Small differences of large couplings tell where weak dashpots begin to feed a mode: clusters may be early by
-        much, and the operator has then followed the mode to where it does grow.
+        So clusters, which know that a mode is about to grow, may be off by much in where. All are looked at.
         """
-        return window.fx_onset < candidate.onset - reach
+        return False
+
+    def _elsewhere(self, candidate: Candidate, window: DampedWindow, increment: float) -> bool:
+        """Never: the operator has followed the mode to where it begins to grow."""
+        return False
 
     def _crossing(self, below: DampedMode, above: DampedMode) -> Crossing:
         """Where a mode that is known at two loads crosses the axis."""

@@ -106,9 +106,17 @@ class Sliced(ABC, Generic[P, W]):
         """Whether the first window has been found."""
         return self.first is not None
 
-    def _elsewhere(self, candidate: Candidate, window: W, reach: float) -> bool:
+    def ahead(self, done: int) -> int:
+        """Increments that are looked at while bases that are not kept pass by, after so many others."""
+        return self.limits.ahead
+
+    def _beyond(self, candidate: Candidate, first: W, start: float) -> bool:
+        """Whether a window cannot be first: clusters are off by a share of the way from the increment's start."""
+        return candidate.onset - start > (1 + 2 * self.limits.reach) * (first.fx_onset - start)
+
+    def _elsewhere(self, candidate: Candidate, window: W, increment: float) -> bool:
         """Whether a window begins so far from where a cluster announced it that clusters are not to be trusted."""
-        return abs(window.fx_onset - candidate.onset) > reach
+        return abs(window.fx_onset - candidate.onset) > 2 * self.limits.reach * increment
 
     def record(self, sure: W) -> None:
         """Take down a window; the one with the smaller onset is the first."""
@@ -184,13 +192,12 @@ class Sliced(ABC, Generic[P, W]):
 
         On the finest increments it goes on, and an error is raised if no window has been found beside it.
         """
-        here, reach = self._passed[-1], 2 * self.limits.reach
+        here = self._passed[-1]
         first: W | None = None
         lost: Exception | None = None
         doubt = False
         for candidate in candidates:
-            # Clusters are off by a share of the way from here: one that is far beyond cannot be first.
-            if first is not None and candidate.onset - here.fx > (1 + reach) * (first.fx_onset - here.fx):
+            if first is not None and self._beyond(candidate, first, here.fx):
                 break
             try:
                 window = self._confirmed(candidate, there, first)
@@ -198,7 +205,7 @@ class Sliced(ABC, Generic[P, W]):
                 window, doubt = None, True
                 lost = lost if isinstance(error, DoubtError) else error
             if window is not None:
-                elsewhere = self._elsewhere(candidate, window, reach * (there.fx - here.fx))
+                elsewhere = self._elsewhere(candidate, window, there.fx - here.fx)
                 doubt = doubt or (elsewhere and window.fx_onset > here.fx)
                 if first is None or window.fx_onset < first.fx_onset:
                     first = window
@@ -344,7 +351,7 @@ def first_along(oracle: Sliced[P, W], loads: Floats) -> tuple[W | None, Incremen
     here = oracle.at(float(loads[0]))
     done = 1
     while done < len(loads) and not oracle.finished:
-        ahead = 1 if oracle.bases.keeps(here.matrix) else oracle.limits.ahead
+        ahead = 1 if oracle.bases.keeps(here.matrix) else oracle.ahead(done)
         places = [here, *_reached(oracle.at, loads[done : done + ahead])]
         walk(oracle, places)
         here = places[-1]
