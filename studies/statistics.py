@@ -7,6 +7,7 @@ like the others is an assumption; how many there are is given with each result.)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,14 @@ def share(count: int, of: int) -> dict[str, Any]:
 
     interval = binomtest(count, of).proportion_ci(0.95, method="wilson")
     return {"count": count, "of": of, "share": count / of, "low": float(interval.low), "high": float(interval.high)}
+
+
+def interval(value: Sequence[float | None] | None, digits: str = ".2g", beyond: str = "none") -> str:
+    """A number with its interval, "0.15 (0.14 to 0.18)"; "-" where nothing is known, `beyond` for no bound."""
+    if value is None or (value[0] is not None and np.isnan(value[0])):
+        return "-"
+    middle, low, high = (beyond if each is None or np.isinf(each) else format(each, digits) for each in value)
+    return f"{middle} ({low} to {high})"
 
 
 def distribution(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:

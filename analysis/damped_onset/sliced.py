@@ -18,15 +18,15 @@ import numpy as np
 
 from ..onset.basis import Basis, Levels
 from ..onset.edge import LostPairError, track
-from ..onset.found import Candidate, Found
+from ..onset.found import Border, Candidate, Found
 from ..onset.limits import LIMITS, Limits
 from ..onset.ranks import ALONE, Ranks
 from ..onset.sliced import DoubtError, Increments, Sliced, Watch, first_along
 from ..packing.packing import Floats
-from ..spectrum.spectrum import Complexes, active_coordinates
+from ..spectrum.spectrum import active_coordinates
 from .edge import Crossing, DampedWindow, solved, window_of
 from .growing import LostTrackError, Place, nearly_growing, searched
-from .modes import DampedMode, Pencil, solved_mode
+from .modes import DampedMode, Pencil
 from .screening import Cluster, Reduced, changed, clusters, cores_of, may_grow, reduced
 
 TRUSTED = 0.5
@@ -82,6 +82,9 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
     """The oracle of growing motion."""
 
     _borne: Floats | None = None  # |A - A^T| up to which each mode of the spectrum is left out
+    _borders: Sequence[Border] = ()  # of the slices that were searched last
+    _lost: float | None = None  # frequency of the motion that is in doubt
+    _passing = False  # whether bases are not kept
 
     def ahead(self, done: int) -> int:
         """More and more of them, as dissipation may put off the onset by much; each costs a tenth of the bases."""
@@ -90,7 +93,17 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
     # What clusters announce
 
     def candidates(self, places: Sequence[Place], depth: int) -> list[list[Candidate]]:
-        """The modes that begin to grow in clusters of the slices that are looked at."""
+        """The modes that begin to grow in clusters of the slices that are looked at.
+
+        Of parts of an increment, while bases pass by, these are the slices about the motion that is in doubt.
+        """
+        if depth and self._lost is not None and self._passing:
+            about = [
+                each for each in self._borders if not self._lost**2 < each.first and not self._lost**2 > each.beyond
+            ]
+            if about:
+                self.bases.narrow((about[0].modes[0], about[-1].modes[1]))
+                return super().candidates(places, depth)
         count = len(active_coordinates(places[0].matrix))
         if self._borne is None or len(self._borne) != count:
             self._borne = np.zeros(count)
@@ -102,13 +115,15 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
             feed *= BEFOREHAND
         loud = np.flatnonzero(self._borne <= feed)
         self.bases.narrow((int(loud[0]), int(loud[-1]) + 1))
+        self._passing = not self.bases.keeps(places[0].matrix)
         return super().candidates(places, depth)
 
     def _found_by_all(self, places: Sequence[Place]) -> list[Found]:
         found = super()._found_by_all(places)
-        assert self._borne is not None
-        for each in found:
-            self._borne[slice(*each.border.modes)] = TRUSTED * each.bears
+        self._borders = [each.border for each in found]
+        if self._borne is not None:
+            for each in found:
+                self._borne[slice(*each.border.modes)] = TRUSTED * each.bears
         return found
 
     def _seen(self, basis: Basis, levels: Levels, places: Sequence[Place]) -> Found:
@@ -135,6 +150,7 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
     def _confirmed(self, candidate: Candidate, there: Place, first: DampedWindow | None) -> DampedWindow | None:
         self.watch(f"a motion that grows from about F_x = {candidate.onset:.6g}: its onset")
         place = there if candidate.inside == there.fx else self.at(candidate.inside)
+        self._lost = announced_by(candidate, place.pencil).rate.imag
         mode = mode_of(candidate, place.pencil)
         announced = candidate.onset < there.fx  # else the mode nearly grows
         if mode is None and announced:
@@ -231,18 +247,17 @@ def candidate_of(onset: float, mode: DampedMode) -> Candidate:
     return Candidate(onset, mode.fx, right, left)
 
 
+def announced_by(candidate: Candidate, pencil: Pencil) -> DampedMode:
+    """The mode of a cluster as one of the operator: its s is the root of y^H T(s) x above the axis of real s."""
+    x, y = (np.asarray(each @ np.array([1.0, 1.0j])) for each in (candidate.right, candidate.left))
+    products = [complex(np.vdot(y, each)) for each in (x, pencil.damping @ x, pencil.stiffness @ x)]
+    return DampedMode(pencil, complex(max(np.roots(products), key=lambda s: s.imag)), x, y)
+
+
 def mode_of(candidate: Candidate, pencil: Pencil) -> DampedMode | None:
     """The operator's mode that a cluster has announced; None if there is none of its kind."""
-    x, y = (np.asarray(each @ np.array([1.0, 1.0j])) for each in (candidate.right, candidate.left))
-    guess = DampedMode(pencil, _rate(pencil, x, y), x, y)
-    found = solved_mode(pencil, x, y, guess.rate)
-    return found if found is not None and guess.resembles(found) else None
-
-
-def _rate(pencil: Pencil, x: Complexes, y: Complexes) -> complex:
-    """The root of y^H T(s) x above the axis of real s."""
-    products = [complex(np.vdot(y, each)) for each in (x, pencil.damping @ x, pencil.stiffness @ x)]
-    return complex(max(np.roots(products), key=lambda s: s.imag))
+    guess = announced_by(candidate, pencil)
+    return guess.at(pencil, guess.rate)
 
 
 def followed(mode: DampedMode, pencil: Pencil) -> DampedMode:

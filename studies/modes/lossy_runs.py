@@ -21,7 +21,7 @@ from ...analysis import Packing, mean_square_displacement
 from ...pywrap import Engine, Scene
 from ...pywrap.runs.undamped import time_step
 from ...pywrap.scenes.units import dashpot
-from ..sweep.onset import AT_LIMIT, Start
+from ..packings import Start, sliding
 from .compute import along_ramp
 from .loss import TANGENTIAL, fastest, impact_velocity, with_dashpots
 
@@ -60,9 +60,7 @@ def lossy_runs(scene: Scene, start: Start) -> dict[str, Any]:
                 if rate.real >= LEAST:
                     run: dict[str, Any] = {"restitution": each, "ct_over_cn": ratio, "predicted": 2 * rate.real}
                     runs.append(run | {"measured": grown(damped, rate)})
-        limit = packing.law.slip_limit(packing.geometry.overlap)
-        sliding = np.abs(packing.contacts.slip) >= AT_LIMIT * limit
-        return {"runs": runs, "sliding": int(np.count_nonzero(sliding))}
+        return {"runs": runs, "sliding": int(np.count_nonzero(sliding(packing)))}
 
     return along_ramp(scene, start, look)
 

@@ -30,8 +30,8 @@ from ...pywrap.onset.undamped import OnsetRun, onset_run
 from ...pywrap.runs.undamped import perturb, time_step
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction, Perturb
-from ..triggering import Sensitivity, Triggering, equilibrium_at, sensitivity, trigger
-from ..triggering import summary as triggering_summary
+from ..triggering.compute import Sensitivity, Triggering, equilibrium_at, sensitivity, trigger
+from ..triggering.compute import summary as triggering_summary
 
 Floats = NDArray[np.float64]
 

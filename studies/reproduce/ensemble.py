@@ -7,7 +7,7 @@ shares, intervals and distributions.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -135,15 +135,11 @@ def summary(scene: Scene, members: list[Member]) -> dict[str, Any]:
         "scene": scene.resolved(),
         "seeds": sorted(member.seed for member in members),
         "failed": [{"seed": each.seed, "says": each.says} for each in members if each.says is not None],
-        "onsets": [_onset_summary([member.ramps[k] for member in ramped]) for k in range(len(frictions(scene)))]
-        if ramped
-        else [],
+        "onsets": [_onset_summary(ends) for ends in zip(*(member.ramps for member in ramped), strict=True)],
         "lowered": share(sum(decided), len(decided)),
         "lowered_unknown": len(ramped) - len(decided),
-        "rises": {str(decades): share(sum(rise >= decades for rise in rises), len(rises)) for decades in RISES},
-        "control_rises": {
-            str(decades): share(sum(rise >= decades for rise in controls), len(controls)) for decades in RISES
-        },
+        "rises": _rises(rises),
+        "control_rises": _rises(controls),
         "rise_quartiles": _quartiles(rises),
         "control_rise_quartiles": _quartiles(controls),
         "unstable_when_weakened": share(sum(each.rate > 0 for each in eruptions), len(eruptions)),
@@ -151,11 +147,15 @@ def summary(scene: Scene, members: list[Member]) -> dict[str, Any]:
     }
 
 
+def _rises(values: list[float]) -> dict[str, Any]:
+    return {str(decades): share(sum(each >= decades for each in values), len(values)) for decades in RISES}
+
+
 def _quartiles(values: list[float]) -> list[float] | None:
     return np.quantile(values, [0.25, 0.5, 0.75]).tolist() if values else None
 
 
-def _onset_summary(ends: list[RampEnd]) -> dict[str, Any]:
+def _onset_summary(ends: Sequence[RampEnd]) -> dict[str, Any]:
     return {
         "mu": ends[0].mu,
         "found": share(sum(end.ends == "onset" for end in ends), len(ends)),

@@ -9,7 +9,7 @@ from ...figures.pages import render
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
 from ...pywrap.scenes.units import dashpot, quality_factor, real_units
-from ..triggering import column
+from ..triggering.compute import largest
 from ..triggering.page import section
 from .compute import GrowthRun, TriggeringRun
 
@@ -73,5 +73,5 @@ def _in_si(scene: Scene, growth: GrowthRun, triggered: TriggeringRun | None) -> 
         velocity = units.si("impact_velocity") / real.velocity(1.0)
         found["dashpot"] = dashpot(scene.law.kn, units.restitution, 1.0, velocity)
     if triggered is not None and triggered.triggering is not None and triggered.scene is scene:
-        found |= {"wave": triggered, "erupted": float(column(triggered.triggering.erupting, "msd").max())}
+        found |= {"wave": triggered, "erupted": largest(triggered.triggering.erupting)}
     return found

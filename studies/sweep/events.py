@@ -8,8 +8,9 @@ from typing import Any
 from ...pywrap import Scene
 from ..eruptions.compute import erupt
 from ..eruptions.study import starts_of
+from ..packings import Start
 from ..trigger.compute import bisected, chosen, equilibria, frequencies, predictions, settings, threshold, waves
-from .onset import Start, onset
+from .onset import onset
 
 
 def trigger(scene: Scene, start: Start) -> dict[str, Any]:
@@ -46,5 +47,5 @@ def eruptions(scene: Scene, _: Start) -> dict[str, Any]:
         If the scene has no section [ramp] or [eruptions].
     """
     starts, flows_beyond = starts_of(scene)
-    runs = [erupt(each).as_dict() for each in starts]
+    runs = [erupt(each) for each in starts]
     return {"runs": [{k: v for k, v in run.items() if k != "series"} for run in runs], "flows_beyond": flows_beyond}

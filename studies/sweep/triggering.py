@@ -27,7 +27,6 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError, Packing, spectrum
-from ...analysis.packing.packing import Floats
 from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening
 from ...pywrap.onset.path_error import with_path_error
@@ -35,8 +34,9 @@ from ...pywrap.runs.path import EquilibriumPath
 from ...pywrap.runs.undamped import perturb
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction, Perturb
-from ..triggering import GROWTH_FACTOR, calibrated, column, equilibrium_at, jump
-from .onset import Ends, Start, first_window
+from ..packings import Start
+from ..triggering.compute import GROWTH_FACTOR, calibrated, equilibrium_at, jump, largest
+from .onset import Ends, first_window
 
 FINEST_STEP = 1e-3
 """Increment of F_x below which a ramp only costs: onsets are solved for, and come out the same."""
@@ -205,29 +205,24 @@ def eruption(
     loads = middle, max(0.0, 2 * window[0] - middle)
     start, below = (equilibrium_at(scene, path, fx, MPI.COMM_SELF) for fx in loads)
 
-    def msd(start: Equilibrium, weakening: Weakening | None) -> Floats:
-        return column(_undamped(scene, settings, start, settings.amplitude, weakening), "msd")
+    def run(start: Equilibrium, amplitude: float, weakening: Weakening | None = None) -> tuple[Sample, ...]:
+        changes = {"fx": start.fx, "amplitude": amplitude}
+        one = scene.model_copy(update={"perturb": settings.model_copy(update=changes)})
+        return tuple(perturb(one, start, communicator=MPI.COMM_SELF, weakening=weakening))
 
-    quiet = _undamped(scene, settings, start, 0.0)
+    quiet = run(start, 0.0)
     weakening = calibrated(friction, quiet)
-    weakened = _undamped(scene, settings, start, settings.amplitude, weakening)
+    weakened = run(start, settings.amplitude, weakening)
     return Eruption(
         fx=start.fx,
         fx_control=below.fx,
         rate=weakened_rate(start.packing, friction.mu_ss),
-        unperturbed=float(column(quiet, "msd").max()),
-        perturbed=float(msd(start, None).max()),
-        weakening=float(column(weakened, "msd").max()),
-        control=float(msd(below, weakening).max()),
+        unperturbed=largest(quiet),
+        perturbed=largest(run(start, settings.amplitude)),
+        weakening=largest(weakened),
+        control=largest(run(below, settings.amplitude, weakening)),
         jump=jump(weakened),
     )
-
-
-def _undamped(
-    scene: Scene, settings: Perturb, start: Equilibrium, amplitude: float, weakening: Weakening | None = None
-) -> tuple[Sample, ...]:
-    one = scene.model_copy(update={"perturb": settings.model_copy(update={"fx": start.fx, "amplitude": amplitude})})
-    return tuple(perturb(one, start, communicator=MPI.COMM_SELF, weakening=weakening))
 
 
 def weakened_rate(packing: Packing, mu_ss: float) -> float:

@@ -29,11 +29,12 @@ from ...analysis.motion.forcing import floor_force, impulse_response
 from ...analysis.motion.response import layer_force
 from ...analysis.packing.packing import Floats
 from ...pywrap import Engine, Scene, SceneError
-from ...pywrap.runs.path import EquilibriumPath, loads
+from ...pywrap.runs.path import loads
 from ...pywrap.runs.undamped import time_step
 from ...pywrap.scenes.study_sections import Trigger
 from ...pywrap.scenes.units import RealUnits
 from ...pywrap.settling.bed import settle
+from ..packings import path_from
 
 COUNT = 24
 """Frequencies of a map whose scene names none."""
@@ -49,37 +50,6 @@ MOST = 24
 
 CLOSE = 1e-2
 """Relative width at which the bisection ends: its middle is then within half a percent."""
-
-
-@dataclass(frozen=True, eq=False)
-class Wave:
-    """A wave on a packing, but for its amplitude.
-
-    Attributes
-    ----------
-    packing : Packing
-        The equilibrium.
-    distance : float
-        1 - F_x/F_x^c.
-    omega : float
-        Angular frequency, 1 / time.
-    time : float
-        How long it lasts.
-    on : {"layer", "floor"}
-        What it moves.
-    v0 : float
-        The threshold v_0, velocity.
-    predicted : float
-        a_c from K.
-    """
-
-    packing: Packing
-    distance: float
-    omega: float
-    time: float
-    on: str
-    v0: float
-    predicted: float
 
 
 @dataclass(frozen=True)
@@ -104,6 +74,16 @@ class Prediction:
     predicted: float
     stationary: float
     reached: float
+
+
+@dataclass(frozen=True, eq=False)
+class Wave:
+    """A wave on a packing in equilibrium, but for its amplitude: what K says of it, how long it lasts, and v_0."""
+
+    packing: Packing
+    expected: Prediction
+    given: Trigger
+    v0: float
 
 
 @dataclass(frozen=True)
@@ -165,8 +145,7 @@ def equilibria(scene: Scene, fx: Iterable[float]) -> dict[float, Packing]:
     assert scene.ramp is not None
     wanted = sorted(fx)
     start = settle(scene, communicator=MPI.COMM_SELF)
-    with Engine(start.packing, MPI.COMM_SELF) as engine:
-        path = EquilibriumPath(engine, start, scene)
+    with path_from(start, scene) as path:
         for load in loads(scene.ramp):
             if start.fx < load <= wanted[-1]:
                 path(float(load))
@@ -210,10 +189,7 @@ def chosen(predicted: list[Prediction], runs: int) -> list[Prediction]:
 
 def waves(scene: Scene, packings: Mapping[float, Packing], wanted: Iterable[Prediction]) -> list[Wave]:
     """The waves of predictions that are to be bisected, on the packings at their loads."""
-    given, v0 = settings(scene), threshold(scene)
-    return [
-        Wave(packings[each.fx], each.distance, each.omega, given.time, given.on, v0, each.predicted) for each in wanted
-    ]
+    return [Wave(packings[each.fx], each, settings(scene), threshold(scene)) for each in wanted]
 
 
 def bisected(wave: Wave) -> Measured:
@@ -228,18 +204,19 @@ def bisected(wave: Wave) -> Measured:
                 below = middle
             else:
                 above, reached = middle, time
-    return Measured(wave.packing.fx, wave.distance, wave.omega, below, above, runs, reached)
+    return Measured(wave.packing.fx, wave.expected.distance, wave.expected.omega, below, above, runs, reached)
 
 
 def _bracket(wave: Wave) -> tuple[float, float, int, float]:
     """An amplitude that does not trigger, one that does, runs, and when the latter triggered."""
-    below, above = wave.predicted * (1 - FIRST_BRACKET), wave.predicted * (1 + FIRST_BRACKET)
+    predicted = wave.expected.predicted
+    below, above = predicted * (1 - FIRST_BRACKET), predicted * (1 + FIRST_BRACKET)
     runs = 1
     while (reached := _triggers(wave, above)) is None and runs < MOST:
         below, above, runs = above, above * WIDEN, runs + 1
     if reached is None:
-        raise SceneError(f"no wave up to {above:.3g} triggers at omega = {wave.omega:g}: lower friction.v0")
-    if below < wave.predicted:
+        raise SceneError(f"no wave up to {above:.3g} triggers at omega = {wave.expected.omega:g}: lower friction.v0")
+    if below < predicted:
         runs += 1
         while (time := _triggers(wave, below)) is not None and runs < MOST:
             below, above, reached, runs = below / WIDEN, below, time, runs + 1
@@ -249,11 +226,11 @@ def _bracket(wave: Wave) -> tuple[float, float, int, float]:
 def _triggers(wave: Wave, amplitude: float) -> float | None:
     """When a wave brings the layer above v_0; None if it does not."""
     dt = time_step(wave.packing)
-    steps = int(wave.time / dt)
-    target = None if wave.on == "layer" else range(len(wave.packing))
+    steps = int(wave.given.time / dt)
+    target = None if wave.given.on == "layer" else range(len(wave.packing))
     with (
         Engine(wave.packing, MPI.COMM_SELF) as engine,
-        engine.undamped(dt, amplitude, wave.omega, target) as dynamics,
+        engine.undamped(dt, amplitude, wave.expected.omega, target) as dynamics,
         dynamics.halted(wave.v0),
     ):
         dynamics.advance(steps)

@@ -105,7 +105,7 @@ class Triggering:
     @property
     def rise(self) -> float:
         """Decades between the largest D of the perturbed run and of the one with mu(v)."""
-        return float(np.log10(column(self.erupting, "msd").max() / column(self.perturbed, "msd").max()))
+        return float(np.log10(largest(self.erupting) / largest(self.perturbed)))
 
     @property
     def crossing(self) -> float | None:
@@ -116,7 +116,7 @@ class Triggering:
     @property
     def growth(self) -> float:
         """Decades between the jump and the largest D of the run with mu(v)."""
-        return float(np.log10(column(self.erupting, "msd").max() / jump(self.erupting)))
+        return float(np.log10(largest(self.erupting) / jump(self.erupting)))
 
     @property
     def fitted(self) -> Growth | None:
@@ -165,6 +165,11 @@ class Sensitivity:
 def column(samples: tuple[Sample, ...], name: str) -> Floats:
     """One quantity of a time series, shape (T,)."""
     return np.array([getattr(sample, name) for sample in samples])
+
+
+def largest(samples: tuple[Sample, ...]) -> float:
+    """The largest D of a run, length^2."""
+    return float(column(samples, "msd").max())
 
 
 def calibrated(friction: Friction, unperturbed: tuple[Sample, ...]) -> Weakening:
@@ -260,23 +265,19 @@ def sensitivity(run: OnsetRun) -> Sensitivity:
 
 def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
     """Numbers for summary.json."""
-    largest = {
-        name: float(column(getattr(triggering, name), "msd").max()) for name in ("unperturbed", "perturbed", "erupting")
-    }
+    runs = ("unperturbed", "perturbed", "erupting")
     return {
         "fx": triggering.start.fx,
         "v0": triggering.weakening.v0,
         "v_ss": triggering.weakening.v_ss,
-        "largest_D": largest,
+        "largest_D": {name: largest(getattr(triggering, name)) for name in runs},
         "rise_in_decades": triggering.rise,
         "jump": jump(triggering.erupting),
         "grows_after_the_jump": triggering.grows,
         "growth_in_decades": triggering.growth,
         "growth_after_the_jump": None if triggering.fitted is None else asdict(triggering.fitted),
         "forecast": asdict(triggering.foreseen),
-        "largest_D_of_the_control": None
-        if triggering.control is None
-        else float(column(triggering.control, "msd").max()),
+        "largest_D_of_the_control": None if triggering.control is None else largest(triggering.control),
         "linear_response_deviation": triggering.deviation,
         "smallest_mu": float(column(triggering.erupting, "friction").min()),
         "amplitude_exponent": sensitive.fit.exponent,

@@ -7,7 +7,7 @@ import numpy as np
 from ...figures.pages import render
 from ...pywrap import Scene
 from ...pywrap.scenes.refusals import needed
-from .compute import ABOVE_NOISE, Sensitivity, Triggering, column, jump, summary
+from .compute import ABOVE_NOISE, Sensitivity, Triggering, column, summary
 
 
 def section(triggering: Triggering, sensitive: Sensitivity, scene: Scene, mu: float) -> str:
@@ -22,7 +22,7 @@ def section(triggering: Triggering, sensitive: Sensitivity, scene: Scene, mu: fl
     mu : float
         Static friction coefficient.
     """
-    first = jump(triggering.erupting)
+    numbers = summary(triggering, sensitive)
     return render(
         __package__ or "",
         "triggering.md.j2",
@@ -32,12 +32,12 @@ def section(triggering: Triggering, sensitive: Sensitivity, scene: Scene, mu: fl
         calibrated=isinstance(needed(scene.friction, "friction").v0, str),
         mu=mu,
         weak=triggering.weakening,
-        largest=summary(triggering, sensitive)["largest_D"],
-        lowest_mu=float(column(triggering.erupting, "friction").min()),
+        largest=numbers["largest_D"],
+        lowest_mu=numbers["smallest_mu"],
         highest_speed=float(np.abs(column(triggering.erupting, "layer_velocity")).max()),
-        jump=first,
-        jumped=float(np.log10(first / column(triggering.perturbed, "msd").max())),
-        control=None if triggering.control is None else float(column(triggering.control, "msd").max()),
+        jump=numbers["jump"],
+        jumped=float(np.log10(numbers["jump"] / numbers["largest_D"]["perturbed"])),
+        control=numbers["largest_D_of_the_control"],
         above_noise=ABOVE_NOISE,
-        half_gain=[pair.half_gain_time() / pair.tau_d for pair in sensitive.near],
+        half_gain=numbers["half_gain_time_over_tau_d"],
     )

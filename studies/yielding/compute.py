@@ -25,7 +25,7 @@ from ...pywrap.runs.undamped import time_step
 from ...pywrap.scenes.units import dashpot
 from ..eruptions.compute import growth_rate
 from ..modes.loss import impact_velocity, with_dashpots
-from ..sweep.onset import Start
+from ..packings import Start, pairs
 from .static import Branch, FailedError, branch, layer_slip, rest
 
 SHARES = (0.25, 0.5, 0.75, 0.9, 0.97)
@@ -105,7 +105,7 @@ def _rested(engine: Engine, packing: Packing, slip: float, residual: float) -> d
     except FailedError:
         ends = "fails at rest"
         return {"ends": ends, "slip": slip}
-    first, last = (_pairs(each, residual) for each in (packing, found.packing))
+    first, last = (pairs(each.loaded(residual)) for each in (packing, found.packing))
     return {
         "ends": ends,
         "slip": slip + moved,
@@ -156,8 +156,3 @@ def _distance(first: Packing, now: Packing) -> float:
     kept = np.ones(len(first), dtype=bool)
     kept[first.rattlers] = False
     return float(mean_square_displacement(now.position[kept], first.position[kept], first.box_length))
-
-
-def _pairs(packing: Packing, residual: float) -> set[tuple[int, int]]:
-    contacts = packing.loaded(residual).contacts
-    return set(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True))

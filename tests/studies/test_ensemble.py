@@ -1,10 +1,10 @@
 """Ensembles: what is counted, what is kept, and that nothing is dropped."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_layer import REFERENCE, SMALL
 
 from faultgouge.pywrap import NoEquilibriumError, Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
@@ -15,11 +15,9 @@ from faultgouge.studies.statistics import distribution, median_interval, quartil
 from faultgouge.studies.sweep import triggering
 from faultgouge.studies.sweep.triggering import Eruption, RampEnd
 
-SCENE = {
-    "packing": {"disks": 30, "top": 5, "width": 6.0, "seed": 2},
+SCENE = SMALL | {
+    "packing": SMALL["packing"] | {"seed": 2},
     "law": {"kn": 2e5, "mu": [1.0, 0.8]},
-    "load": {"fy": 3.0},
-    "ramp": {"step": 5e-3, "until": 0.025},
     "perturb": {"fx": 0.0, "time": 0.5, "amplitude": 5e-10, "omega": 0.01},
     "friction": {"v_ss": "10 v0"},
 }
@@ -188,8 +186,7 @@ def test_figure_shows_pairs_and_rises():
 
 
 def test_stored_packings_make_no_ensemble(tmp_path):
-    reference = Path(__file__).parents[1] / "reference" / "packing7.json"
-    stored = Scene.from_mapping(SCENE | {"packing": {"file": str(reference)}})
+    stored = Scene.from_mapping(SCENE | {"packing": {"file": str(REFERENCE)}})
     with pytest.raises(SceneError, match="stored one"):
         study.ensemble(stored, 2, tmp_path, silent)
 
