@@ -195,6 +195,13 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
 
     def _most(self, mode: DampedMode, there: Place) -> DampedMode | None:
         """The mode where it grows on an increment; None if it is seen to lose energy on all of it."""
+        try:
+            return self._climbed(mode, there)
+        except LostPairError as error:  # nothing is lost but what a cluster has announced
+            raise DoubtError from error
+
+    def _climbed(self, mode: DampedMode, there: Place) -> DampedMode | None:
+        """The same, by parabolas through Re s; a LostPairError if the mode cannot be followed."""
         here = self._passed[-1]
         ends = [followed(mode, place.pencil) for place in (here, there)]
         at = self._tracked(mode, *ends)
