@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ..analysis import Packing
+from ..analysis import Packing, mean_square_displacement
 from ..pywrap import Engine, Equilibrium, Scene
 from ..pywrap.runs.path import EquilibriumPath
 
@@ -25,6 +25,20 @@ def path_from(rest: Equilibrium, scene: Scene) -> Iterator[EquilibriumPath]:
     """The equilibria of a scene over F_x from the settled packing on; LAMMPS closes in the end."""
     with Engine(rest.packing, MPI.COMM_SELF) as engine:
         yield EquilibriumPath(engine, rest, scene)
+
+
+def shake(engine: Engine, packing: Packing, size: float, seed: int) -> None:
+    """Put a packing into LAMMPS, x and y of each disk at random about where they are, by this standard deviation."""
+    noise = np.zeros(3 * len(packing))
+    noise[: 2 * len(packing)] = size * np.random.default_rng(seed).standard_normal(2 * len(packing))
+    engine.restore(engine.displace(packing, noise))
+
+
+def distance(first: Packing, now: Packing) -> float:
+    """D of the disks that carry load at the start, length^2."""
+    kept = np.ones(len(first), dtype=bool)
+    kept[first.rattlers] = False
+    return float(mean_square_displacement(now.position[kept], first.position[kept], first.box_length))
 
 
 def pairs(packing: Packing, chosen: NDArray[np.bool_] | slice = slice(None)) -> set[tuple[int, int]]:

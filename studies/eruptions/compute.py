@@ -59,6 +59,9 @@ TENTH = 0.1
 WORK_STEPS = 2000
 """Steps over which work is added up: some thirty periods of the fastest mode."""
 
+Look = dict[str, float]
+"""A packing in the course of a run."""
+
 Ends = Literal["opens", "slides", "law", "flows", "stable", "cut off"]
 
 
@@ -82,27 +85,6 @@ class Start:
     residual: float
     time: float
     damped: bool = False
-
-
-@dataclass(frozen=True)
-class Look:
-    """A packing in the course of a run.
-
-    Attributes
-    ----------
-    time, msd, slip, kinetic_energy : float
-        Time, D, mean displacement of the upper layer along x, kinetic energy of translation and rotation.
-    lost, gained, sliding : int
-        Contacts of the start that are open, contacts that are new, and contacts of the start that slide and did not.
-    """
-
-    time: float
-    msd: float
-    slip: float
-    kinetic_energy: float
-    lost: int
-    gained: int
-    sliding: int
 
 
 def erupt(start: Start) -> dict[str, Any]:
@@ -130,7 +112,7 @@ def erupt(start: Start) -> dict[str, Any]:
                 if _over(looks, rate) or _flows(looks, start.packing):
                     break
             balance = _balance(dynamics, start.packing)
-    columns: dict[str, Floats] = {name: np.array([getattr(each, name) for each in looks]) for name in vars(looks[0])}
+    columns: dict[str, Floats] = {name: np.array([each[name] for each in looks]) for name in looks[0]}
     time, msd = columns["time"], columns["msd"]
     return {
         "fx": start.packing.fx,
@@ -169,18 +151,18 @@ def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[flo
 
 def _over(looks: list[Look], rate: float) -> bool:
     """Whether a run is over, see the module."""
-    t = looks[-1].time
+    t = looks[-1]["time"]
     if rate == 0:
         return t >= QUIET
     if t < DECADES * np.log(10) / rate:
         return False
-    quarter = max((each.msd for each in looks if t / 4 < each.time <= t / 2), default=0.0)
-    half = max(each.msd for each in looks if each.time > t / 2)
+    quarter = max((each["msd"] for each in looks if t / 4 < each["time"] <= t / 2), default=0.0)
+    half = max(each["msd"] for each in looks if each["time"] > t / 2)
     return half <= OVER * quarter
 
 
 def _flows(looks: list[Look], packing: Packing) -> bool:
-    return abs(looks[-1].slip) > 2 * packing.radius.max()
+    return abs(looks[-1]["slip"]) > 2 * packing.radius.max()
 
 
 class _Watch:
@@ -194,28 +176,30 @@ class _Watch:
         self._slid = _sliding(carrying)
 
     def look(self, time: float, motion: Motion, now: Packing) -> Look:
-        """The packing at one time."""
+        """The packing at one time.
+
+        Time, D, mean displacement of the upper layer along x, kinetic energy of translation and rotation; contacts of
+        the start that are open, contacts that are new, and contacts of the start that slide and did not.
+        """
         first = self._start.packing
         step = motion.position - self._position
         step[:, 0] = nearest_image(step[:, 0], first.box_length)
         self._moved, self._position = self._moved + step, motion.position
         there = pairs(now)
-        return Look(
-            time=time,
-            # from step to step, disks move less than half a box; for small D, the difference itself has more digits
-            msd=float(
-                mean_square_displacement(
-                    motion.position, first.position, first.box_length, motion.position_low, first.position_low
-                )
-            )
-            if abs(self._moved).max() < 0.25 * (first.box_length or np.inf)
-            else float(np.mean(np.sum(self._moved**2, axis=1))),
-            slip=float(self._moved[first.top, 0].mean()),
-            kinetic_energy=_kinetic_energy(first, motion),
-            lost=len(self._contacts - there),
-            gained=len(there - pairs(first)),
-            sliding=len((_sliding(now) - self._slid) & self._contacts),
-        )
+        # from step to step, disks move less than half a box; for small D, the difference itself has more digits
+        msd = np.mean(np.sum(self._moved**2, axis=1))
+        if abs(self._moved).max() < 0.25 * (first.box_length or np.inf):
+            low = motion.position_low, first.position_low
+            msd = mean_square_displacement(motion.position, first.position, first.box_length, *low)
+        return {
+            "time": time,
+            "msd": float(msd),
+            "slip": float(self._moved[first.top, 0].mean()),
+            "kinetic_energy": _kinetic_energy(first, motion),
+            "lost": len(self._contacts - there),
+            "gained": len(there - pairs(first)),
+            "sliding": len((_sliding(now) - self._slid) & self._contacts),
+        }
 
 
 def _sliding(packing: Packing) -> set[tuple[int, int]]:

@@ -119,9 +119,9 @@ def counted(packing: Packing) -> Counted:
         In equilibrium.
     """
     if len(packing) > ALL:
-        found = sliced(packing)
-        omega = np.sqrt(found.values)
-        return Counted(omega[np.argsort(-omega.imag)], found.modes, found.error)
+        found, error = sliced(packing)
+        omega = np.sqrt(found)
+        return Counted(omega[np.argsort(-omega.imag)], dynamical_matrix(packing)[0].shape[0], error)
     values = eigenvalues(packing)
     rounding = unit_rounding(dynamical_matrix(packing)[0].data)
     surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))

@@ -47,17 +47,10 @@ def write_page(tables: Path, folder: Path) -> Path:
     write_text(folder / "modes.json", json.dumps(finite(found), indent=1) + "\n")
     save_as(over_load({str(disks): course for disks, course in found["loss"].items()}, LOSSES), folder / "loss.png")
     names = {"planned": SIZES, "compared": COMPARED, "qualities": QUALITIES, **told(found)}
-    formats = {
-        "middle": interval,
-        "plain": plain,
-        "exponent": partial(interval, digits=".2f"),
-        "part": part,
-        "critical": critical,
-    }
+    formats = {"middle": interval, "exponent": partial(interval, digits=".2f"), "plain": plain, "part": part}
+    names |= formats | {"critical": critical}
     for name in PAGES:
-        write_text(
-            folder / name, render(__package__ or "", f"{name}.j2", **found, critical=critical, **names, **formats)
-        )
+        write_text(folder / name, render(__package__ or "", f"{name}.j2", **found, **names))
     return folder / PAGES[0]
 
 

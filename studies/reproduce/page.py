@@ -50,9 +50,9 @@ def report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, triggered: Tri
 def _triggering(triggered: TriggeringRun | None) -> str:
     if triggered is None:
         return ""
-    if triggered.triggering is None or triggered.sensitive is None:
+    if triggered.triggering is None:
         return f"## Triggering\n\n{triggered.says}\n\n"
-    return section(triggered.triggering, triggered.sensitive, triggered.scene, triggered.onsets[0].mu)
+    return section(triggered.triggering)
 
 
 def _in_si(scene: Scene, growth: GrowthRun, triggered: TriggeringRun | None) -> dict[str, Any]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 from ...pywrap import Scene
 from ..eruptions.compute import erupt
 from ..eruptions.study import starts_of
 from ..packings import Start
-from ..trigger.compute import bisected, chosen, equilibria, frequencies, predictions, settings, threshold, waves
+from ..trigger.compute import bisected, chosen, equilibria, frequencies, middle, predictions, settings, threshold, waves
 from .onset import onset
 
 
@@ -33,8 +32,8 @@ def trigger(scene: Scene, start: Start) -> dict[str, Any]:
     return {
         "ends": "onset",
         "fx_c": first["fx_c"],
-        "map": [asdict(each) for each in predicted],
-        "measured": [asdict(each) | {"amplitude": each.amplitude} for each in measured],
+        "map": predicted,
+        "measured": [each | {"amplitude": middle(each["below"], each["above"])} for each in measured],
     }
 
 

@@ -5,32 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from ...figures.pages import render
-from ...pywrap import Scene
 from ...pywrap.scenes.refusals import needed
-from .compute import ABOVE_NOISE, Sensitivity, Triggering, column, summary
+from .compute import ABOVE_NOISE, Triggering, column, summary
 
 
-def section(triggering: Triggering, sensitive: Sensitivity, scene: Scene, mu: float) -> str:
-    """The section, in Markdown.
-
-    Parameters
-    ----------
-    triggering, sensitive
-        What was found.
-    scene : Scene
-        With [perturb] and [friction].
-    mu : float
-        Static friction coefficient.
-    """
-    numbers = summary(triggering, sensitive)
+def section(triggering: Triggering) -> str:
+    """The section, in Markdown."""
+    numbers = summary(triggering)
     return render(
         __package__ or "",
         "triggering.md.j2",
         triggering=triggering,
-        sensitive=sensitive,
-        settings=scene.perturb,
-        calibrated=isinstance(needed(scene.friction, "friction").v0, str),
-        mu=mu,
+        sensitive=triggering.sensitive,
+        settings=triggering.scene.perturb,
+        calibrated=isinstance(needed(triggering.scene.friction, "friction").v0, str),
+        mu=triggering.start.packing.law.mu,
         weak=triggering.weakening,
         largest=numbers["largest_D"],
         lowest_mu=numbers["smallest_mu"],
