@@ -257,6 +257,8 @@ def test_quick_report(faultgouge, tmp_path):
         }
         for study in result["studies"]
     }
+    assert all(case["limit"] is not None for case in onset["changing"])
+    assert onset["again"]
     assert best["onset"]["root of the discriminant"] < 1e-8 < best["onset"]["scan, Newton"]
     # that of an independent code
     question = next(study["question"] for study in result["studies"] if study["name"] == "onset")

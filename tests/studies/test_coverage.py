@@ -1,0 +1,39 @@
+"""Stated errors cover true ones where contacts change before the onset."""
+
+import pytest
+
+from faultgouge.assessment.error_and_time.coverage.changing import FINER, drawn, read, restated
+
+CASES = [case for case in read() if case.counts]
+
+
+@pytest.mark.parametrize("kind", ["undamped", "damped"])
+def test_all_but_a_few_are_covered(kind):
+    shares = sorted(case.share for case in CASES if case.kind == kind)
+    assert len(shares) >= 28
+    assert sum(share > 1 for share in shares) <= 0.05 * len(shares)
+    assert shares[-1] <= 1.5
+    # an error that is stated much too large would cover, too
+    assert shares[len(shares) // 2] > 0.1
+
+
+def test_the_limits_are_known_better_than_the_errors_that_they_judge():
+    assert FINER >= 20
+    assert sum(case.uncertain > 0.5 * case.stated for case in CASES) <= 0.05 * len(CASES)
+
+
+def test_the_limit_of_an_independent_code():
+    named = next(case for case in CASES if case.number == 0)
+    assert named.kind == "damped"
+    assert named.limit == pytest.approx(0.039834, abs=8e-6)
+    assert named.share < 1
+
+
+@pytest.mark.slow
+def test_what_the_table_states_is_stated_today():
+    case = min((case for case in CASES if case.disks == 20 and case.kind == "undamped"), key=lambda case: case.fx_c)
+    again = restated(case)
+    assert drawn(case.number).packing.disks == 20
+    assert again.changes == case.changes
+    assert again.fx_c == pytest.approx(case.fx_c, abs=case.stated)
+    assert again.holds
