@@ -109,13 +109,7 @@ class Sweep:
             If the file cannot be read, is no TOML, or does not describe a sweep.
         """
         path = Path(path)
-        try:
-            mapping = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise SceneError(f"{path}: the sweep cannot be read ({error.strerror}): correct its path.") from None
-        except ValueError as error:
-            raise SceneError(f"{path}: the sweep is not valid TOML: {error}.") from None
-        return cls.from_mapping(mapping, tasks, path.parent, str(path))
+        return cls.from_mapping(read_toml(path), tasks, path.parent, str(path))
 
     @classmethod
     def from_mapping(
@@ -181,6 +175,16 @@ class Sweep:
     def as_dict(self) -> dict[str, Any]:
         """The sweep as JSON holds it."""
         return {"task": self.task, "sweep": self.axes, "scene": self.scene}
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """What a TOML file holds; SceneError if it cannot be read, or is no TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SceneError(f"{path}: the sweep cannot be read ({error.strerror}): correct its path.") from None
+    except ValueError as error:
+        raise SceneError(f"{path}: the sweep is not valid TOML: {error}.") from None
 
 
 def shard(points: tuple[Point, ...], part: tuple[int, int]) -> tuple[Point, ...]:
