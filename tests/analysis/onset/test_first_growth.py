@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 from test_found import PASSING, CutOffError, counting, cut_off_after, files
 from test_slicing import FEW, on_ranks
 
-from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, nearest_mode
+from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, growing_near, nearest_mode
 from faultgouge.analysis.damped_onset.sliced import first_growing
 from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating
 from faultgouge.pywrap import Scene
@@ -98,6 +98,18 @@ def test_the_nearest_mode_is_that_of_all(ramp):
     for k in (3, 100, 200):
         found = nearest_mode(pencil, float(modes.rates[k].imag) * (1 + 1e-6))
         assert found.rate == pytest.approx(modes.rates[k], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_what_grows_near_a_frequency_is_what_grows_of_all(ramp):
+    path = ramp(1.0, 1e-3, 26)
+    damped = dissipating(path, cn=0.1)
+    modes = DampedModes.of(Pencil.of(damped(0.023)))
+    assert len(modes.growing)
+    for rate in modes.rates[modes.growing]:
+        found = [mode.rate for mode in growing_near(modes.pencil, 1.001 * float(rate.imag), 12)]
+        assert min(abs(each - rate) for each in found) < 1e-9 * abs(rate)
+        assert growing_near(Pencil.of(damped(0.02)), float(rate.imag), 12) == []
 
 
 @pytest.mark.long
