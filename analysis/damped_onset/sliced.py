@@ -165,11 +165,11 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
         if mode is None or not mode.growing or (first is not None and self._later(mode, first)):
             return None
         above = followed(mode, there.pencil)
-        end = None if above.growing else self._crossing(mode, above)
+        end = None if above.growing else self._edge(above, mode)
         for passed in reversed(self._passed):
             below = followed(mode, passed.pencil)
             if not below.growing:
-                return window_of(self._crossing(below, mode), end)
+                return window_of(self._edge(below, mode), end)
             mode = below
         return window_of(Crossing(mode.fx, 0.0, mode.rate.imag, "start"), end)
 
@@ -184,9 +184,24 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
         """Never: the operator has followed the mode to where it begins to grow."""
         return False
 
-    def _crossing(self, below: DampedMode, above: DampedMode) -> Crossing:
-        """Where a mode that is known at two loads crosses the axis."""
-        return solved(self._tracked(below, above), below.fx, above.fx)
+    def _edge(self, outside: DampedMode, inside: DampedMode) -> Crossing:
+        """Where a mode begins or ends to grow between a load where it does not and one where it does.
+
+        It is followed from inside, with the increment halved until the mode outside leads back to the one inside. Next
+        to where two modes coalesce either of them may stand for the other one farther out.
+        """
+        width = self.limits.jump * abs(inside.fx - outside.fx)
+        while abs(inside.fx - outside.fx) > width:
+            back = outside.at(inside.pencil)
+            if back is not None and back.same(inside):
+                try:
+                    return solved(self._tracked(outside, inside), *sorted((outside.fx, inside.fx)))
+                except LostPairError:
+                    pass
+            middle = followed(inside, self.at(0.5 * (outside.fx + inside.fx)).pencil)
+            outside, inside = (outside, middle) if middle.growing else (middle, inside)
+        middle_fx, half = 0.5 * (outside.fx + inside.fx), 0.5 * abs(inside.fx - outside.fx)
+        return Crossing(middle_fx, half, inside.rate.imag, "contact change")
 
     def _tracked(self, *known: DampedMode) -> Callable[[float], DampedMode]:
         """A mode at any load, from loads at which it is known."""
