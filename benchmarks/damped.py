@@ -12,7 +12,8 @@ held against all eigenvalues of the companion matrix, from LAPACK. None of them 
 loads of the ramp before the onset, nor just below it, and one of them must have just above it.
 
     nice python benchmarks/damped.py --first --disks 100 --packings 10 --until 0.06 --table first.csv
-    nice python benchmarks/damped.py --first --disks 200 300 400 --packings 3 --seed 4 --until 0.04 --table more.csv
+    nice python benchmarks/damped.py --first --disks 200 --packings 4 --seed 4 --until 0.04 --table 200.csv
+    nice python benchmarks/damped.py --first --disks 300 400 --packings 3 --seed 4 --until 0.04 --table 400.csv
 
 It ends with exit code 1 where windows differ. All of it takes two minutes of one processor for 60 disks, and ten
 for 100.

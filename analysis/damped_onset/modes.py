@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig
 from scipy.sparse import csc_array, csr_array, eye_array
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import LinearOperator, SuperLU, eigs, splu
 
 from ..motion.state_space import StateSpace
 from ..onset import force_bearing
@@ -250,6 +250,44 @@ def nearest_mode(pencil: Pencil, frequency: float) -> DampedMode | None:
     for _ in range(NEARER):
         x, y = _unit(factors.solve(x)), _unit(factors.solve(y, trans="H"))
     return solved_mode(pencil, x, y, shift)
+
+
+def growing_near(pencil: Pencil, frequency: float, count: int) -> list[DampedMode]:
+    """Those of the modes nearest to a point of the imaginary axis that grow, by shift and invert with ARPACK.
+
+    Parameters
+    ----------
+    pencil : Pencil
+        Of any size.
+    frequency : float
+        The point, 1 / time.
+    count : int
+        How many of the nearest modes are looked at.
+
+    Raises
+    ------
+    ArpackError
+        If they do not converge.
+    """
+    size, shift = pencil.stiffness.shape[0], 1j * frequency * (1 + 1e-9)  # no eigenvalue to the last digit
+    factors = _factors(csc_array(pencil.stiffness + shift * pencil.damping + shift**2 * eye_array(size)))
+
+    def inverse(state: Complexes) -> Complexes:
+        """(Z - shift)^(-1) of the state (x, s x)."""
+        place, speed = state[:size], state[size:]
+        x = -factors.solve(speed + pencil.damping @ place + shift * place)
+        return np.concatenate([x, place + shift * x])
+
+    start = np.random.default_rng(0).standard_normal(2 * size).astype(complex)
+    operator = LinearOperator((2 * size, 2 * size), matvec=inverse, dtype=complex)
+    values, states = eigs(operator, k=count, v0=start, tol=1e-9)
+    found: list[DampedMode] = []
+    for s, x in zip(shift + 1 / values, states[:size].T, strict=True):
+        if s.real > -1e-6 * abs(s):  # else it surely loses energy
+            mode = solved_mode(pencil, _unit(x), _unit(x.conj()), s)
+            if mode is not None and mode.growing and mode.rate.imag >= 0:
+                found.append(mode)
+    return found
 
 
 def solved_mode(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> DampedMode | None:

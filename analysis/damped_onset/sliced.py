@@ -15,6 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse.linalg import ArpackError
 
 from ..onset.basis import Basis, Levels
 from ..onset.edge import LostPairError, track
@@ -26,7 +27,7 @@ from ..packing.packing import Floats
 from ..spectrum.spectrum import active_coordinates
 from .edge import Crossing, DampedWindow, solved, window_of
 from .growing import LostTrackError, Place, nearly_growing, searched
-from .modes import DampedMode, Pencil
+from .modes import DampedMode, Pencil, growing_near
 from .screening import Cluster, Reduced, changed, clusters, cores_of, may_grow, reduced
 
 TRUSTED = 0.5
@@ -44,6 +45,9 @@ SHORTEST = 2.0**-6
 
 LOOKS = 6
 """Looks at an announced mode, for a load at which it grows."""
+
+NEAREST = 12
+"""Modes about a frequency among which one that grows is looked for where a cluster does not know its shape."""
 
 SETTLED = 0.02
 """Share of an increment by which the place of the largest growth may still move."""
@@ -150,21 +154,22 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
     def _confirmed(self, candidate: Candidate, there: Place, first: DampedWindow | None) -> DampedWindow | None:
         self.watch(f"a motion that grows from about F_x = {candidate.onset:.6g}: its onset")
         place = there if candidate.inside == there.fx else self.at(candidate.inside)
-        self._lost = announced_by(candidate, place.pencil).rate.imag
-        mode = mode_of(candidate, place.pencil)
+        guess = announced_by(candidate, place.pencil)
+        self._lost = guess.rate.imag
+        mode = guess.at(place.pencil, guess.rate)
         announced = candidate.onset < there.fx  # else the mode nearly grows
         if mode is None and announced:
-            raise DoubtError
+            mode = self._beside(guess, place, there)
         if mode is not None and announced and not mode.growing:
             mode = self._most(mode, there)
         if mode is None or not mode.growing or (first is not None and self._later(mode, first)):
             return None
         above = followed(mode, there.pencil)
-        end = None if above.growing else self._crossing(mode, above)
+        end = None if above.growing else self._edge(above, mode)
         for passed in reversed(self._passed):
             below = followed(mode, passed.pencil)
             if not below.growing:
-                return window_of(self._crossing(below, mode), end)
+                return window_of(self._edge(below, mode), end)
             mode = below
         return window_of(Crossing(mode.fx, 0.0, mode.rate.imag, "start"), end)
 
@@ -179,9 +184,24 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
         """Never: the operator has followed the mode to where it begins to grow."""
         return False
 
-    def _crossing(self, below: DampedMode, above: DampedMode) -> Crossing:
-        """Where a mode that is known at two loads crosses the axis."""
-        return solved(self._tracked(below, above), below.fx, above.fx)
+    def _edge(self, outside: DampedMode, inside: DampedMode) -> Crossing:
+        """Where a mode begins or ends to grow between a load where it does not and one where it does.
+
+        It is followed from inside, with the increment halved until the mode outside leads back to the one inside. Next
+        to where two modes coalesce either of them may stand for the other one farther out.
+        """
+        width = self.limits.jump * abs(inside.fx - outside.fx)
+        while abs(inside.fx - outside.fx) > width:
+            back = outside.at(inside.pencil)
+            if back is not None and back.same(inside):
+                try:
+                    return solved(self._tracked(outside, inside), *sorted((outside.fx, inside.fx)))
+                except LostPairError:
+                    pass
+            middle = followed(inside, self.at(0.5 * (outside.fx + inside.fx)).pencil)
+            outside, inside = (outside, middle) if middle.growing else (middle, inside)
+        middle_fx, half = 0.5 * (outside.fx + inside.fx), 0.5 * abs(inside.fx - outside.fx)
+        return Crossing(middle_fx, half, inside.rate.imag, "contact change")
 
     def _tracked(self, *known: DampedMode) -> Callable[[float], DampedMode]:
         """A mode at any load, from loads at which it is known."""
@@ -199,6 +219,20 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
             return self._climbed(mode, there)
         except LostPairError as error:  # nothing is lost but what a cluster has announced
             raise DoubtError from error
+
+    def _beside(self, guess: DampedMode, *places: Place) -> DampedMode | None:
+        """A motion that grows at one of some loads, about the frequency at which one was announced; None if none does.
+
+        Where contacts change, a cluster does not know the shapes of modes any more, and announces what there is not.
+        """
+        try:
+            for place in places:
+                growing = growing_near(place.pencil, guess.rate.imag, NEAREST)
+                if growing:
+                    return min(growing, key=lambda each: abs(each.rate - guess.rate))
+        except ArpackError as error:
+            raise DoubtError from error
+        return None
 
     def _climbed(self, mode: DampedMode, there: Place) -> DampedMode | None:
         """The same, by parabolas through Re s; a LostPairError if the mode cannot be followed."""
@@ -259,12 +293,6 @@ def announced_by(candidate: Candidate, pencil: Pencil) -> DampedMode:
     x, y = (np.asarray(each @ np.array([1.0, 1.0j])) for each in (candidate.right, candidate.left))
     products = [complex(np.vdot(y, each)) for each in (x, pencil.damping @ x, pencil.stiffness @ x)]
     return DampedMode(pencil, complex(max(np.roots(products), key=lambda s: s.imag)), x, y)
-
-
-def mode_of(candidate: Candidate, pencil: Pencil) -> DampedMode | None:
-    """The operator's mode that a cluster has announced; None if there is none of its kind."""
-    guess = announced_by(candidate, pencil)
-    return guess.at(pencil, guess.rate)
 
 
 def followed(mode: DampedMode, pencil: Pencil) -> DampedMode:

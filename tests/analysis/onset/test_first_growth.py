@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 from test_found import PASSING, CutOffError, counting, cut_off_after, files
 from test_slicing import FEW, on_ranks
 
-from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, nearest_mode
+from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, growing_near, nearest_mode
 from faultgouge.analysis.damped_onset.sliced import first_growing
 from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating
 from faultgouge.pywrap import Scene
@@ -100,10 +100,22 @@ def test_the_nearest_mode_is_that_of_all(ramp):
         assert found.rate == pytest.approx(modes.rates[k], rel=1e-9)
 
 
+@pytest.mark.slow
+def test_what_grows_near_a_frequency_is_what_grows_of_all(ramp):
+    path = ramp(1.0, 1e-3, 26)
+    damped = dissipating(path, cn=0.1)
+    modes = DampedModes.of(Pencil.of(damped(0.023)))
+    assert len(modes.growing)
+    for rate in modes.rates[modes.growing]:
+        found = [mode.rate for mode in growing_near(modes.pencil, 1.001 * float(rate.imag), 12)]
+        assert min(abs(each - rate) for each in found) < 1e-9 * abs(rate)
+        assert growing_near(Pencil.of(damped(0.02)), float(rate.imag), 12) == []
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("disks", "seed", "kind"),
-    [(200, 1, {"cn": 10.0, "ct": 5.0}), (200, 2, {"cn": 1.0}), (300, 3, {"cn": 0.1})],
+    [(200, 1, {"cn": 10.0, "ct": 5.0}), (200, 4, {"drag_time": 100.0}), (300, 3, {"cn": 0.1})],
 )
 def test_packings_against_all_eigenvalues(disks, seed, kind):
     """The companion matrix has no eigenvalue that grows just below the onset, and one just above."""
