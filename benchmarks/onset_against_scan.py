@@ -24,9 +24,8 @@ import platform
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from faultgouge.analysis import spectrum
 from faultgouge.pywrap import Equilibrium, Scene, ramp
@@ -37,40 +36,7 @@ EXACT = 0.021833056408038582
 UNTIL = 0.0225
 REPEATS = 5
 
-
-@dataclass(frozen=True)
-class Result:
-    """An onset and what it took.
-
-    Attributes
-    ----------
-    method : str
-        How it was found.
-    increment : float
-        Of F_x.
-    seconds, processor_seconds : float
-        Wall time, and that of the processor.
-    evaluations : int
-        Force evaluations of the ramp's equilibria, those of the root-finding not counted.
-    fx_c : float
-        The onset.
-    stated_error : float
-        The uncertainty that the method states.
-    difference : float
-        |fx_c - EXACT|.
-    one_path_seconds : float
-        Of the processor's, what the onset took along one path; the rest states what other increments do to the path.
-    """
-
-    method: str
-    increment: float
-    seconds: float
-    processor_seconds: float
-    evaluations: int
-    fx_c: float
-    stated_error: float
-    difference: float
-    one_path_seconds: float
+Row = dict[str, Any]
 
 
 def scene(method: Literal["newton", "overdamped"], increment: float) -> Scene:
@@ -95,7 +61,7 @@ def elapsed(begin: tuple[float, float]) -> tuple[float, float]:
     return time.perf_counter() - begin[0], time.process_time() - begin[1]
 
 
-def solved(progress: Callable[[Equilibrium], None]) -> Result:
+def solved(progress: Callable[[Equilibrium], None]) -> Row:
     """Newton's method and the root of the discriminant."""
     increment = 1e-3
     begin, along_one_path = clocks(), []
@@ -105,14 +71,11 @@ def solved(progress: Callable[[Equilibrium], None]) -> Result:
             along_one_path.append(elapsed(begin)[1])
 
     run = onset_run(scene("newton", increment), 1.0, reached=progress, watch=watch)
-    seconds = elapsed(begin)
-    evaluations = sum(each.evaluations for each in run.equilibria)
-    fx_c = run.onset.fx_c
-    error = abs(fx_c - EXACT)
-    return Result("solved", increment, *seconds, evaluations, fx_c, run.onset.error, error, along_one_path[0])
+    row = found("solved", increment, begin, run.equilibria, run.onset.fx_c, run.onset.error)
+    return row | {"one_path_seconds": along_one_path[0]}
 
 
-def scanned(progress: Callable[[Equilibrium], None]) -> Result:
+def scanned(progress: Callable[[Equilibrium], None]) -> Row:
     """Overdamped dynamics and the spectrum at every increment."""
     increment = 1e-4
     begin = clocks()
@@ -121,12 +84,21 @@ def scanned(progress: Callable[[Equilibrium], None]) -> Result:
         equilibria.append(equilibrium)
         progress(equilibrium)
     loads = [each.fx for each in equilibria if spectrum(each.packing).pairs]
-    seconds = elapsed(begin)
     if not loads:
         sys.exit(f"The scan shows no complex pair up to F_x = {UNTIL}.")
-    evaluations = sum(each.evaluations for each in equilibria)
-    onset, error = loads[0] - 0.5 * increment, 0.5 * increment
-    return Result("scanned", increment, *seconds, evaluations, onset, error, abs(onset - EXACT), seconds[1])
+    return found("scanned", increment, begin, equilibria, loads[0] - 0.5 * increment, 0.5 * increment)
+
+
+def found(
+    method: str, increment: float, begin: tuple[float, float], path: list[Equilibrium], fx_c: float, error: float
+) -> Row:
+    """An onset with the error that its method states, and what the method took since both clocks showed `begin`.
+
+    Force evaluations are those of the path's equilibria; those of the root-finding are not counted.
+    """
+    row: Row = {"method": method, "increment": increment, "evaluations": sum(each.evaluations for each in path)}
+    row |= dict(zip(("seconds", "processor_seconds"), elapsed(begin), strict=True))
+    return row | {"fx_c": fx_c, "stated_error": error, "difference": abs(fx_c - EXACT)}
 
 
 def announce(equilibrium: Equilibrium) -> None:
@@ -134,22 +106,18 @@ def announce(equilibrium: Equilibrium) -> None:
     print(f"\rF_x = {equilibrium.fx:.4f} of {UNTIL}", end="", file=sys.stderr, flush=True)
 
 
-def compared(fast: Result, slow: Result) -> dict[str, float]:
+def compared(fast: Row, slow: Row) -> Row:
     """How many times more the slow way takes and errs."""
     # a difference below the spacing of doubles says nothing
-    return {
-        "seconds": slow.seconds / fast.seconds,
-        "processor_seconds": slow.processor_seconds / fast.processor_seconds,
-        "evaluations": slow.evaluations / fast.evaluations,
-        "stated_error": slow.stated_error / fast.stated_error,
-        "difference": slow.difference / max(fast.difference, sys.float_info.epsilon * EXACT),
-    }
+    fast = fast | {"difference": max(fast["difference"], sys.float_info.epsilon * EXACT)}
+    names = ("seconds", "processor_seconds", "evaluations", "stated_error", "difference")
+    return {name: slow[name] / fast[name] for name in names}
 
 
 def main() -> None:
     """Print the table."""
     cold, *warm = (solved(announce) for _ in range(1 + REPEATS))
-    fast, slow = sorted(warm, key=lambda result: result.processor_seconds)[REPEATS // 2], scanned(announce)
+    fast, slow = sorted(warm, key=lambda row: row["processor_seconds"])[REPEATS // 2], scanned(announce)
     print(file=sys.stderr)
     print(f"{platform.processor() or platform.machine()}; F_x^c of the reference packing, mu = 1, exact {EXACT:.15g}\n")
     print(
@@ -158,20 +126,17 @@ def main() -> None:
     )
     for row in (fast, slow):
         print(
-            f"{row.method:10s}{row.increment:10.0e}{row.seconds:9.2f}{row.processor_seconds:9.2f}{row.evaluations:13d}"
-            f"{row.fx_c:20.15f}{row.stated_error:10.1e}{row.difference:10.1e}"
+            "{method:10s}{increment:10.0e}{seconds:9.2f}{processor_seconds:9.2f}{evaluations:13d}{fx_c:20.15f}"
+            "{stated_error:10.1e}{difference:10.1e}".format(**row)
         )
     ratios = compared(fast, slow)
     print(
         f"{'ratio':20s}{ratios['seconds']:9.1f}{ratios['processor_seconds']:9.1f}{ratios['evaluations']:13.0f}{'':20s}"
         f"{ratios['stated_error']:10.1e}{ratios['difference']:10.1e}"
     )
-    print(
-        f"\nThe onset along one path took {fast.one_path_seconds:.2f} s on the processor; the rest is the path's error."
-    )
-    print(
-        f"\nThe first solution in the process: {cold.seconds:.2f} s, {cold.processor_seconds:.2f} s on the processor."
-    )
+    one_path, wall, processor = fast["one_path_seconds"], cold["seconds"], cold["processor_seconds"]
+    print(f"\nThe onset along one path took {one_path:.2f} s on the processor; the rest is the path's error.")
+    print(f"\nThe first solution in the process: {wall:.2f} s, {processor:.2f} s on the processor.")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,10 @@
 """Sphinx configuration. The package must be installed, or be on the path, with its plugin: the gallery runs LAMMPS."""
 
+import os
 import re
+import subprocess
 import sys
+import tempfile
 from importlib import metadata
 from pathlib import Path
 
@@ -18,7 +21,7 @@ except metadata.PackageNotFoundError:
     release = ""
 
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
@@ -27,8 +30,12 @@ extensions = [
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
 ]
-source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["_build", "README.md", "gallery", "sg_execution_times.rst"]
+source_suffix = {".md": "myst-nb", ".rst": "restructuredtext", ".ipynb": "myst-nb"}
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300  # seconds for one cell
+nb_merge_streams = True
+exclude_patterns = ["_build", "README.md", "gallery", "sg_execution_times.rst", "auto_gallery/*.ipynb"]
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
@@ -92,7 +99,25 @@ def keep_numbers_whole(app, doctree):
             cell["classes"].append("number")
 
 
+def plain_title(app, pagename, templatename, context, doctree):
+    """The title of a browser's tab is text: no formula is set there."""
+    context["title"] = context.get("title", "").replace(r"\(F_x^c\)", "Fₓᶜ")
+
+
+def make_live_page(app, exception):
+    """The page of `faultgouge view` that the first page shows, from a scene that ships with the package."""
+    if exception is not None or app.builder.format != "html":
+        return
+    scene = Path(__file__).parents[1] / "scenes" / "paper.toml"
+    with tempfile.TemporaryDirectory() as folder:
+        for words in (["ramp", str(scene), "-o", "paper.h5"], ["view", "paper.h5", "-o", f"{app.outdir}/live.html"]):
+            command = [sys.executable, "-m", "faultgouge", *words]
+            subprocess.run(command, cwd=folder, env=os.environ | {"OMP_NUM_THREADS": "1"}, check=True)
+
+
 def setup(app):
+    app.connect("html-page-context", plain_title)
+    app.connect("build-finished", make_live_page)
     app.connect("doctree-read", keep_numbers_whole)
     app.connect("autodoc-process-docstring", keep_first_line, priority=90)
     app.connect("autodoc-process-docstring", keep_bars, priority=100)

@@ -5,7 +5,6 @@ python docs/triggered.py [FIRST] > docs/triggered.jsonl
 
 import json
 import sys
-from dataclasses import asdict
 from itertools import count
 from pathlib import Path
 
@@ -17,4 +16,4 @@ SCENE = Path(__file__).parents[1] / "scenes" / "triggered.toml"
 if __name__ == "__main__":
     first = int(sys.argv[1]) if len(sys.argv) > 1 else 1
     for tried in chosen(Scene.from_toml(SCENE), count(first)):
-        print(json.dumps(asdict(tried)), flush=True)
+        print(json.dumps(tried), flush=True)

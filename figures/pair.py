@@ -49,27 +49,21 @@ class PairCurve:
 
 
 @styled
-def draw_pair(curves: Sequence[PairCurve], axes: tuple[Axes, Axes] | None = None) -> Figure:
+def draw_pair(curves: Sequence[PairCurve]) -> Figure:
     """Real parts that coalesce and imaginary parts that bifurcate as F_x grows.
 
     Parameters
     ----------
     curves : sequence of PairCurve
         One for each friction coefficient. The inset shows the first one about its onset, if it has one.
-    axes : tuple of (Axes, Axes), optional
-        Where to draw real and imaginary parts; a figure of its own by default.
 
     Returns
     -------
     Figure
         Panel (a) real, panel (b) imaginary parts, both branches of a pair in one colour, dotted lines at the onsets.
     """
-    if axes is None:
-        figure = Figure(figsize=(3.4, 4.4), layout="constrained")
-        real, imaginary = figure.subplots(2, 1, sharex=True)
-    else:
-        real, imaginary = axes
-        figure = real.get_figure(root=True)  # type: ignore[assignment]  # axes in a figure have one
+    figure = Figure(figsize=(3.4, 4.4), layout="constrained")
+    real, imaginary = figure.subplots(2, 1, sharex=True)
     for number, curve in enumerate(curves):
         colour = to_hex(f"C{number}")
         real.plot(curve.fx, curve.real, color=colour)

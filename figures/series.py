@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike, NDArray
 
-from .style import figure_of, panel, styled
+from .style import figure_of, styled
 
 Floats = NDArray[np.float64]
 
@@ -23,9 +23,7 @@ def draw_series(
     axes: Axes | None = None,
     *,
     label: str | None = None,
-    ylabel: str = "$D(t)$",
     color: str = "C1",
-    linewidth: float = 0.8,
 ) -> Figure:
     """A positive quantity over time, on a logarithmic axis; what is not positive is not drawn.
 
@@ -39,22 +37,18 @@ def draw_series(
         Where to draw; a figure of its own by default.
     label : str, optional
         Name in the legend.
-    ylabel : str
-        Name of the quantity.
     color : str
         Colour of the line.
-    linewidth : float
-        Width of the line, points.
 
     Returns
     -------
     Figure
     """
-    alone, axes = axes is None, panel(axes)
+    alone, axes = axes is None, Figure(layout="constrained").add_subplot() if axes is None else axes
     time, values = positive(time, values, times=False)
     axes.set_yscale("log")
-    axes.plot(time, values, color=to_hex(color), linewidth=linewidth, label=label)
-    axes.set(xlabel="$t$", ylabel=ylabel)
+    axes.plot(time, values, color=to_hex(color), linewidth=0.8, label=label)
+    axes.set(xlabel="$t$", ylabel="$D(t)$")
     axes.margins(x=0)
     if alone:
         begin_at_noise(axes, time, values)

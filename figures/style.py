@@ -24,11 +24,6 @@ styled = matplotlib.rc_context(fname=STYLE)
 the figure is saved if the colour is `to_hex("C0")`: matplotlib looks up "C0" itself only when the line is drawn."""
 
 
-def panel(axes: Axes | None) -> Axes:
-    """The axes that were given, or those of a new figure."""
-    return Figure(layout="constrained").add_subplot() if axes is None else axes
-
-
 def figure_of(axes: Axes) -> Figure:
     """The figure, itself or through subfigures, that holds the axes."""
     figure = axes.get_figure(root=True)

@@ -6,15 +6,19 @@ const pair = [...document.querySelectorAll("[data-colour]")].map((each) => each.
 let frame = frames[slider.value], phase = 0, last = null
 
 function place() {
-  const n = frame.modes.length / 8, chosen = choice.value == "still" ? null : Number(choice.value)
-  const from = (chosen || 0) * 4 * n, reach = chosen == null ? 0 : 0.48 * frame.radius.reduce((a, b) => Math.max(a, b))
+  const n = frame.modes.length / 12, chosen = choice.value == "still" ? null : Number(choice.value)
+  const from = (chosen || 0) * 6 * n, reach = chosen == null ? 0 : 0.48 * frame.radius.reduce((a, b) => Math.max(a, b))
   const c = reach * Math.cos(phase), s = reach * Math.sin(phase), v = frame.modes
-  const dx = (k) => k < 0 ? 0 : c * v[from + k] + s * v[from + 2 * n + k]
-  const dy = (k) => k < 0 ? 0 : c * v[from + n + k] + s * v[from + 3 * n + k]
-  const {disk, i, j} = frame
+  const moved = (row, k) => k < 0 ? 0 : c * v[from + row * n + k] + s * v[from + (3 + row) * n + k]
+  const dx = (k) => moved(0, k), dy = (k) => moved(1, k)
+  const {disk, i, j, radius} = frame
   const pixels = packing.inner_width / (packing.x_range.end - packing.x_range.start)
-  disks.data = {x: frame.x.map((x, k) => x + dx(disk[k])), y: frame.y.map((y, k) => y + dy(disk[k])),
-                radius: frame.radius, face: frame.face}
+  const x = frame.x.map((x, k) => x + dx(disk[k])), y = frame.y.map((y, k) => y + dy(disk[k]))
+  disks.data = {x, y, radius, face: frame.face}
+  const turned = frame.angle.map((angle, k) => angle + moved(2, disk[k]) / radius[k])
+  const along = (share) => x.map((x, k) => x - share * radius[k] * Math.sin(turned[k]))
+  const up = (share) => y.map((y, k) => y + share * radius[k] * Math.cos(turned[k]))
+  marks.data = {x0: along(0.55), y0: up(0.55), x1: along(0.95), y1: up(0.95)}
   chains.data = {
     x0: frame.x0.map((x, k) => x + dx(i[k])), y0: frame.y0.map((y, k) => y + dy(i[k])),
     x1: frame.x1.map((x, k) => x + dx(j[k] < 0 ? i[k] : j[k])), y1: frame.y1.map((y, k) => y + dy(j[k])),
@@ -40,7 +44,6 @@ function show() {
 function paint() {
   const style = getComputedStyle(document.body), ink = style.color, faint = style.getPropertyValue("--faint")
   for (const plot of plots) {
-    plot.setv({background_fill_color: null, border_fill_color: null, outline_line_color: null})
     for (const axis of [...plot.left, ...plot.below]) {
       if (axis.type == "ColorBar") axis.setv({title_text_color: ink, major_label_text_color: ink})
       else axis.setv({axis_label_text_color: ink, major_label_text_color: ink, axis_line_color: faint,

@@ -1,40 +1,32 @@
 """A page that shows a ramp or an undamped run in a browser, without a network: `faultgouge view`.
 
 Bokeh draws and its JavaScript is part of the page. Arrays are for drawing: float32, in base64. `view.js` hands them to
-Bokeh as the slider moves. The page follows one pair of eigenvalues: that which is the first of the ramp to be complex,
-or, if none is, the two real modes of the last equilibrium that are closest to meeting.
+Bokeh as the slider moves. `view_pair` has the pair of eigenvalues that the page follows.
 """
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import to_hex
-from numpy.typing import NDArray
 
-from faultgouge.analysis import BadInputError, Eigenpairs, Packing, closest_to_meeting, eigenvalues, growth_rate
-from faultgouge.analysis.onset.modes import Modes, force_bearing, full_operator
-from faultgouge.analysis.onset.pair import Pair, continued
+from faultgouge.analysis import BadInputError, Packing
 
-from .mode import ModeError, displacement
 from .packing import LEAST_SHARE, PackingArtist, View, mobilised
-from .style import EDGE, FLOOR, MOBILIZATION
+from .style import EDGE, FLOOR, INK, MOBILIZATION
+from .view_pair import LARGE, NEAREST, Followed, Progress, followed
 
 if TYPE_CHECKING:
     from bokeh.plotting import figure
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Progress = Callable[[Sequence[Packing]], Iterable[Packing]]
 
 FIRST, SECOND, OTHERS = "#0072b2", "#d55e00", "#8a949c"
 """The two of the pair, and all other eigenvalues: told apart by the colour-blind, on white and on black."""
 
 MOVED = {
     "disks": "x y radius face",
+    "marks": "x0 y0 x1 y1",
     "chains": "x0 y0 x1 y1 px share",
     "others": "re im",
     "members": "re im colour",
@@ -55,82 +47,14 @@ def check_library() -> None:
         raise ViewError("view needs Bokeh, which is not installed: pip install 'faultgouge[view]'") from error
 
 
-@dataclass(frozen=True, eq=False)
-class Followed:
-    """All eigenvalues of a ramp, and one pair of them.
-
-    Attributes
-    ----------
-    values : list of ndarray of complex, shape (E,)
-        All eigenvalues at each load, 1 / time^2.
-    pair : ndarray of complex, shape (S, 2)
-        The two that are followed; nan where they are not recognised.
-    modes : ndarray of complex, shape (S, 2, 2, N)
-        Their displacements along x and y, the longest one being one.
-    """
-
-    values: list[Complexes]
-    pair: Complexes
-    modes: Complexes
-
-
-def followed(packings: Sequence[Packing], progress: Progress = iter) -> Followed:
-    """Eigenvalues of equilibria in order of their load.
-
-    Raises
-    ------
-    ModeError
-        If the last packing has fewer than two modes.
-    """
-    values = [eigenvalues(force_bearing(packing)) for packing in progress(packings)]
-    start, pair = _anchor(packings, values)
-    pairs = {start: pair}
-    for step, stop in ((-1, -1), (1, len(packings))):
-        last: Pair | None = pair
-        for k in range(start + step, stop, step):
-            last = _next(last, packings[k])
-            if last is None:
-                break
-            pairs[k] = last
-    found = np.full((len(packings), 2), np.nan, dtype=np.complex128)
-    modes = np.zeros((len(packings), 2, 2, len(packings[0])), dtype=np.complex128)
-    for k, each in pairs.items():
-        own, vectors = np.linalg.eig(each.entries)
-        order = np.lexsort((-own.imag, own.real))
-        found[k] = own[order]
-        for member, number in enumerate(order):
-            modes[k, member] = displacement(packings[k], each.right @ vectors[:, number])[:2]
-    return Followed(values, found, modes)
-
-
-def _anchor(packings: Sequence[Packing], values: Sequence[Complexes]) -> tuple[int, Pair]:
-    """The load at which the pair is chosen, and the pair."""
-    for k, packing in enumerate(packings):
-        if np.any(values[k].imag > 0):
-            modes = Modes.of(packing.fx, full_operator(packing))
-            if modes.complex_pairs:
-                return k, modes.pair(max(modes.complex_pairs, key=lambda each: growth_rate(modes.values[each[0]])))
-    modes = Modes.of(packings[-1].fx, full_operator(packings[-1]))
-    if len(modes.values) < 2:
-        raise ModeError(f"the packing at F_x = {packings[-1].fx:g} has fewer than two modes, so that no two can meet")
-    first, second, _ = closest_to_meeting(Eigenpairs(modes.values, modes.right, modes.left, 0))
-    return len(packings) - 1, modes.pair((first, second))
-
-
-def _next(pair: Pair | None, packing: Packing) -> Pair | None:
-    """What the pair is in a neighbouring equilibrium; None if it is not recognised."""
-    assert pair is not None
-    matrix = full_operator(packing)
-    image = continued(pair, packing.fx, matrix)
-    if image is None:
-        modes = Modes.of(packing.fx, matrix)
-        image = modes.pair(modes.nearest(pair))
-    return image if image.same_planes(pair) else None
-
-
 def equally_spaced(count: int, most: int) -> list[int]:
     """Which of some equilibria a page shows: all, or so many of them, the first and the last among these."""
     return sorted({round(k) for k in np.linspace(count - 1, 0, min(count, most))})
+
+
+def loads_shown(disks: int) -> int:
+    """How many loads a page of so many disks has by default: 60, or so many that the page stays below 6 MB."""
+    return max(min(60, 60 * LARGE // disks), 6)
 
 
 def write_view(
@@ -177,6 +101,7 @@ def write_view(
     for plot in plots:
         document.add_root(plot)
     folder = files(__package__ or "")
+    others = f"the {NEAREST} closest others" if len(packings[0]) > LARGE else "all others"
     script = CustomJS(args={"frames": frames, "plots": plots, **sources}, code=(folder / "view.js").read_text())
     document.js_on_event(DocumentReady, script)
     page = file_html(
@@ -184,7 +109,7 @@ def write_view(
         INLINE,
         title=title,
         template=(folder / "view.html.j2").read_text(),
-        template_variables={"count": len(packings), "colours": (FIRST, SECOND), "size": len(packings[0])},
+        template_variables={"count": len(packings), "colours": (FIRST, SECOND), "others": others},
     )
     path.write_text(page, encoding="utf-8")
 
@@ -199,6 +124,7 @@ def _frame(packing: Packing, course: Followed, k: int) -> dict[str, Any]:
         "y": view.place[:, 1],
         "disk": view.disk,
         "radius": packing.radius[view.disk],
+        "angle": packing.angle[view.disk],
         "x0": view.start[:, 0],
         "y0": view.start[:, 1],
         "x1": view.end[:, 0],
@@ -228,6 +154,8 @@ def _plot(name: str, x: str, y: str, **more: Any) -> "figure":
     plot = figure(name=name, x_axis_label=x, y_axis_label=y, sizing_mode="stretch_both", **{**tools, **more})
     plot.toolbar.logo = None
     plot.toolbar.autohide = True
+    # from the start: of what is painted once, half a pixel stays at two edges
+    plot.background_fill_color = plot.border_fill_color = plot.outline_line_color = None
     return plot
 
 
@@ -248,6 +176,7 @@ def _packing_plot(packings: Sequence[Packing], sources: dict[str, Any]) -> "figu
     plot.sizing_mode = "scale_width"
     plot.circle("x", "y", radius="radius", source=sources["disks"], fill_color="face", line_color=EDGE, line_width=0.6)
     colours = LogColorMapper([to_hex(MOBILIZATION(k / 255)) for k in range(256)], low=LEAST_SHARE, high=1)
+    plot.segment("x0", "y0", "x1", "y1", source=sources["marks"], line_color=INK, line_width=1.2)
     chains = {"line_width": "px", "line_cap": "round", "line_color": {"field": "share", "transform": colours}}
     plot.segment("x0", "y0", "x1", "y1", source=sources["chains"], **chains)
     plot.add_layout(BoxAnnotation(top=0, fill_color=FLOOR, fill_alpha=1, line_color=None, level="overlay"))

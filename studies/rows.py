@@ -5,22 +5,44 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from ..pywrap import Scene
+from ..pywrap import Scene, SceneError
 
 
-def complete_lines(path: Path) -> list[bytes]:
-    """The lines of a file, none if there is no file. A last line that a kill has cut short is taken off the file."""
+def stored(path: Path, key: str, what: str) -> list[dict[str, Any]]:
+    """The rows of a file, each with a key; none if there is no file. A last line that a kill has cut is taken off.
+
+    Raises
+    ------
+    SceneError
+        If a line is no such row.
+    """
     if not path.exists():
         return []
     data = path.read_bytes()
     complete = data[: data.rfind(b"\n") + 1]
     if complete != data:
         os.truncate(path, len(complete))
-    return complete.splitlines()
+    rows = []
+    for number, line in enumerate(complete.splitlines(), 1):
+        try:
+            rows.append(json.loads(line))
+            rows[-1][key]
+        except (ValueError, KeyError, TypeError):
+            raise SceneError(
+                f"{path}: line {number} is no result of {what}: take it out, or give another folder"
+            ) from None
+    return rows
+
+
+def append(path: Path, row: Mapping[str, Any]) -> None:
+    """Write a row; it is in the file when this returns."""
+    with path.open("a") as file:
+        file.write(json.dumps(row) + "\n")
 
 
 class Rows:
@@ -40,15 +62,12 @@ class Rows:
         self.path = path
         resolved = {name: keys for name, keys in scene.resolved().items() if name != beside}
         self._scene = hashlib.sha256(json.dumps(resolved, sort_keys=True).encode()).hexdigest()[:12]
-        self.rows: list[dict[str, Any]] = [
-            row for line in complete_lines(path) if (row := json.loads(line))["scene"] == self._scene
-        ]
+        self.rows = [row for row in stored(path, "scene", "a study") if row["scene"] == self._scene]
 
     def append(self, **row: Any) -> dict[str, Any]:
         """Write a line; it is in the file when this returns."""
         row = {"scene": self._scene, "version": version("faultgouge")} | row
-        with self.path.open("a") as file:
-            file.write(json.dumps(row) + "\n")
+        append(self.path, row)
         self.rows.append(row)
         return row
 

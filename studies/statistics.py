@@ -7,6 +7,7 @@ like the others is an assumption; how many there are is given with each result.)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,14 @@ def share(count: int, of: int) -> dict[str, Any]:
 
     interval = binomtest(count, of).proportion_ci(0.95, method="wilson")
     return {"count": count, "of": of, "share": count / of, "low": float(interval.low), "high": float(interval.high)}
+
+
+def interval(value: Sequence[float | None] | None, digits: str = ".2g", beyond: str = "none") -> str:
+    """A number with its interval, "0.15 (0.14 to 0.18)"; "-" where nothing is known, `beyond` for no bound."""
+    if value is None or (value[0] is not None and np.isnan(value[0])):
+        return "-"
+    middle, low, high = (beyond if each is None or np.isinf(each) else format(each, digits) for each in value)
+    return f"{middle} ({low} to {high})"
 
 
 def distribution(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:
@@ -51,17 +60,19 @@ def distribution(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:
     return steps.quantiles[rises], steps.probabilities[rises]
 
 
-def quantile(fx: Floats, probability: Floats, at: float) -> float | None:
-    """A quantile of a distribution; None where it lies beyond what the ramps reached."""
-    # 3/4 from products of shares may miss 3/4 by its rounding
-    place = int(np.searchsorted(probability, at - 1e-12))
-    return float(fx[place]) if place < len(fx) else None
+def course(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:
+    """The same distribution from zero to the largest F_x that was seen, as a curve of steps."""
+    fx, probability = distribution(reach, found)
+    levels = np.concatenate([[0.0], probability])
+    return np.concatenate([[0.0], fx, [np.max(reach)]]), np.append(levels, levels[-1])
 
 
 def quartiles(reach: ArrayLike, found: ArrayLike) -> list[float | None]:
     """Lower quartile, median and upper quartile of F_x^c; None where they lie beyond what the ramps reached."""
-    steps = distribution(reach, found)
-    return [quantile(*steps, at) for at in (0.25, 0.5, 0.75)]
+    fx, probability = distribution(reach, found)
+    # 3/4 from products of shares may miss 3/4 by its rounding
+    places = np.searchsorted(probability, np.array([0.25, 0.5, 0.75]) - 1e-12)
+    return [float(fx[place]) if place < len(fx) else None for place in places]
 
 
 def median_interval(reach: ArrayLike, found: ArrayLike, draws: int = 2000, seed: int = 0) -> list[float | None]:

@@ -16,3 +16,32 @@ kn = 2e5
 fy = 3.0
 """
 """Under its load; sections follow."""
+
+UNITS = """
+[units]
+grain_diameter = "100 um"
+density = "2650 kg/m^3"
+youngs_modulus = "95 GPa"
+poisson_ratio = 0.08
+restitution = 0.9
+impact_velocity = "1 m/s"
+"""
+"""Of quartz spheres."""
+
+BEYOND_ITS_ONSET = f"""{LAYER}
+[ramp]
+step = 6e-3
+until = 0.024
+[perturb]
+fx = 0.024
+time = 1.0
+"""
+"""A ramp in four steps through the onset, 0.0218, and an undamped run from its end."""
+
+SMALL = {
+    "packing": {"disks": 30, "top": 5, "width": 6.0},
+    "law": {"kn": 2e5},
+    "load": {"fy": 3.0},
+    "ramp": {"step": 5e-3, "until": 0.025},
+}
+"""A scene whose onset takes a second."""

@@ -70,6 +70,11 @@ class SealedFile:
         """Attributes of the root: scene, versions, seed, ranks."""
         return {name: getattr(value, "tolist", lambda value=value: value)() for name, value in self._file.attrs.items()}
 
+    def put_attribute(self, name: str, value: str) -> None:
+        """Set an attribute of the root."""
+        with self.change():
+            self._file.attrs[name] = value
+
     @property
     def complete(self) -> bool:
         """Whether the run has come to its end; a file of version 0.1.0 does not say, and counts as complete."""

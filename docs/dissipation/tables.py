@@ -6,7 +6,6 @@ python docs/dissipation/tables.py weak|cn|drag|gain [SEED ..]
 import json
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +52,7 @@ def weak(done: list[dict[str, Any]], only: list[int]) -> Iterator[dict[str, Any]
                 seeds[seed] = len(known)
                 for case in weak_cases(ramp, [ratio for ratio in RATIOS if ratio not in known]):
                     seeds[seed] += 1
-                    yield {"seed": seed} | asdict(case)
+                    yield {"seed": seed} | case
                 if seeds[seed] == 0:
                     yield {"seed": seed, "without": "an undamped window"}
         except NoEquilibriumError as error:
@@ -65,7 +64,7 @@ def strength(kind: str, done: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     known = [each["strength"] for each in done]
     with ramped(SCENE) as ramp:
         wanted = [float(each) for each in STRENGTHS[kind] if not np.any(np.isclose(each, known, atol=0))]
-        yield from map(asdict, over_strength(ramp, kind, wanted, START))
+        yield from over_strength(ramp, kind, wanted, START)
 
 
 def gain(done: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
@@ -74,7 +73,7 @@ def gain(done: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
         for kind in DISSIPATIONS:
             known = [each["distance"] for each in done if (each["cn"], each["drag"]) == kind]
             wanted = [float(each) for each in DISTANCES if not np.any(np.isclose(each, known, atol=0))]
-            yield from map(asdict, over_distance(ramp, wanted, [kind]))
+            yield from over_distance(ramp, wanted, [kind])
 
 
 def main(what: str, seeds: list[int]) -> None:

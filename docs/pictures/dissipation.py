@@ -5,16 +5,13 @@ python docs/pictures/dissipation.py
 
 import json
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 from faultgouge.analysis.motion.power_law import fit_power_law
 from faultgouge.figures.style import save_as
-from faultgouge.studies.dissipation.compute import Gain, Strength
 from faultgouge.studies.dissipation.draw import dissipation_figure
 
 TABLES = Path(__file__).parents[1] / "dissipation"
-
-T = TypeVar("T")
 
 KINDS = {
     (0.0, 0.0): "no dissipation",
@@ -24,17 +21,17 @@ KINDS = {
 }
 
 
-def table(name: str, kind: type[T], by: str) -> list[T]:
+def table(name: str, by: str) -> list[dict[str, Any]]:
     """The records of a table, in the order of one of their numbers."""
     records = [json.loads(line) for line in (TABLES / f"{name}.jsonl").read_text().splitlines()]
-    return [kind(**record) for record in sorted(records, key=lambda record: record[by])]
+    return sorted(records, key=lambda record: record[by])
 
 
 if __name__ == "__main__":
-    gains = table("gain", Gain, "distance")
-    curves = {label: [each for each in gains if (each.cn, each.drag) == kind] for kind, label in KINDS.items()}
-    near = [each for each in curves["no dissipation"] if each.distance <= 1e-2]
-    law = fit_power_law([each.distance for each in near], [each.gain for each in near])
+    gains = table("gain", "distance")
+    curves = {label: [each for each in gains if (each["cn"], each["drag"]) == kind] for kind, label in KINDS.items()}
+    near = [each for each in curves["no dissipation"] if each["distance"] <= 1e-2]
+    law = fit_power_law([each["distance"] for each in near], [each["gain"] for each in near])
     print("gain without dissipation:", law)
-    onsets = (table(name, Strength, "strength") for name in ("cn", "drag"))
+    onsets = (table(name, "strength") for name in ("cn", "drag"))
     save_as(dissipation_figure(*onsets, curves), Path(__file__).with_suffix(".png"))

@@ -55,12 +55,15 @@ class Equilibrium:
         Estimate of the residual that the rounding of coordinates leaves.
     evaluations : int
         Force evaluations that it took from the equilibrium before.
+    way : str or None
+        In words, which of the ways of `TRIED` led here, and from where; None where halving the increment did.
     """
 
     packing: Packing
     residual: float
     floor: float
     evaluations: int
+    way: str | None = None
 
     @property
     def fx(self) -> float:
@@ -152,12 +155,14 @@ def _otherwise(
     engine: Engine, here: Equilibrium, last: Equilibrium, fx: float, force_tolerance: float | None
 ) -> Equilibrium:
     """The equilibrium at fx by the ways of `TRIED`, in that order; `here` if none leads there."""
-    routes: list[tuple[Equilibrium, list[float]]] = [(here, [fx])]
-    routes += [(last, np.linspace(last.fx, fx, count + 1)[1:].tolist()) for count in PARTS]
-    for start, loads in (*routes, (last, [2 * fx - last.fx, fx])):
+    routes: list[tuple[str, Equilibrium, list[float]]] = [("more iterations", here, [fx])]
+    for count in PARTS:
+        routes.append((f"{count} increments", last, np.linspace(last.fx, fx, count + 1)[1:].tolist()))
+    routes.append(("a larger increment and back", last, [2 * fx - last.fx, fx]))
+    for way, start, loads in routes:
         found = _through(engine, start, loads, force_tolerance)
         if found is not None:
-            return found
+            return replace(found, way=f"{way} from F_x = {start.fx:.10g}")
     for start in (here, last):
         engine.restore(start.packing)
         engine.set_fx(fx)
@@ -166,7 +171,7 @@ def _otherwise(
         near = Equilibrium(packing, rest.residual, rounding_floor(packing), rest.steps)
         found = _through(engine, near, [fx], force_tolerance) if rest.status != "no" else None
         if found is not None:
-            return found
+            return replace(found, way=f"overdamped dynamics from F_x = {start.fx:.10g}")
     return here
 
 

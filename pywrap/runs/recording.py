@@ -84,7 +84,8 @@ class Record:
         self._file = file
         self._say_saved()
         row = {name: file.observable(name)[-1] for name in ("residual", "floor", "evaluations")}
-        return Equilibrium(file.packing(), float(row["residual"]), float(row["floor"]), int(row["evaluations"]))
+        way = ways_of(file).get(len(file) - 1)
+        return Equilibrium(file.packing(), float(row["residual"]), float(row["floor"]), int(row["evaluations"]), way)
 
     @property
     def complete(self) -> bool:
@@ -111,6 +112,8 @@ class Record:
                     floor=equilibrium.floor,
                     evaluations=equilibrium.evaluations,
                 )
+                if equilibrium.way is not None:
+                    file.put_attribute("ways", json.dumps(ways_of(file) | {len(file) - 1: equilibrium.way}))
             self._say_saved()
         self.last = equilibrium
 
@@ -231,6 +234,11 @@ class Record:
             self._file.save()
             self._say_saved()
             self._file.close()
+
+
+def ways_of(file: RunFile) -> dict[int, str]:
+    """Of equilibria that were reached by another way than halved increments, their number and that way."""
+    return {int(number): way for number, way in json.loads(file.attributes.get("ways", "{}")).items()}
 
 
 def from_root(communicator: MPI.Comm, work: Callable[[], T]) -> T:

@@ -8,9 +8,9 @@ results on paper; ``faultgouge.assessment`` measures errors, run time and limits
 import sys
 
 if "IPython" in sys.modules:
-    from .notebook import show_packings
+    from .notebook import show_pictures
 
-    show_packings()
+    show_pictures()
 
 
 def __getattr__(name: str) -> str:

@@ -1,26 +1,37 @@
-"""Packings in a notebook: a cell that ends with a packing shows its picture."""
+"""Pictures in a notebook: a cell that ends with a packing or with a figure shows it."""
 
+import sys
 from io import BytesIO
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from faultgouge.analysis import Packing
+
+
+def png(figure: "Figure") -> bytes:
+    """A figure as a PNG."""
+    stream = BytesIO()
+    figure.savefig(stream, format="png", dpi=150)
+    return stream.getvalue()
 
 
 def picture(packing: "Packing") -> bytes:
     """The packing with its force chains, as a PNG."""
     from faultgouge.figures import draw_packing
 
-    stream = BytesIO()
-    draw_packing(packing).savefig(stream, format="png", dpi=150)
-    return stream.getvalue()
+    return png(draw_packing(packing))
 
 
-def show_packings() -> None:
-    """Tell a running IPython how a packing looks. Nothing is imported before a packing is shown."""
+def show_pictures() -> None:
+    """Tell a running IPython how packings and figures look. Nothing is imported before one of them is shown."""
     from IPython import get_ipython
 
     shell = get_ipython()
     if shell is not None:
         pictures = shell.display_formatter.formatters["image/png"]
         pictures.for_type_by_name("faultgouge.analysis.packing.packing", "Packing", picture)
+        # pyplot, where it is in use, shows figures in its own way
+        if "matplotlib.pyplot" not in sys.modules:
+            pictures.for_type_by_name("matplotlib.figure", "Figure", png)

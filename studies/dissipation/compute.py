@@ -11,7 +11,7 @@ Every function yields its records one by one, so that a long study is kept as it
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +23,8 @@ from ...analysis.motion.transient import NoGainError, transient_gain
 from ...pywrap import Scene
 from ...pywrap.onset.damped import Ramped
 
+Row = dict[str, Any]
+
 RATIOS = ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.1), (0.1, 1.0))
 """C_N : C_T of the study of weak dashpots."""
 
@@ -30,36 +32,19 @@ WEAK = 1e-4
 """C_N and C_T of dashpots that count as weak, times their shares: the onset differs from its limit by their square."""
 
 
-@dataclass(frozen=True)
-class WeakCase:
-    """The limit of the damped onset of the first pair of a packing, predicted and measured.
-
-    Attributes
-    ----------
-    cn, ct : float
-        Shares of the two dashpots.
-    undamped : float
-        Onset without dissipation, force per top disk.
-    predicted : float
-        The limit from the undamped pair.
-    measured : float or None
-        Damped onset, among all modes, with dashpots of `WEAK` times these shares; None if nothing grows up to a little
-        beyond the undamped onset.
-    """
-
-    cn: float
-    ct: float
-    undamped: float
-    predicted: float
-    measured: float | None
-
-
-def weak_cases(ramp: Ramped, ratios: Iterable[tuple[float, float]] = RATIOS) -> Iterator[WeakCase]:
+def weak_cases(ramp: Ramped, ratios: Iterable[tuple[float, float]] = RATIOS) -> Iterator[Row]:
     """The limit of weak dashpots for the first undamped pair of a ramp, for several ratios C_N : C_T.
 
     The damped onset is solved for among all modes, from the ramp's last load below the prediction to a little beyond
     the undamped onset. Nothing is yielded for a packing without an undamped window, and for a pair that cannot be
     followed to its limit.
+
+    Yields
+    ------
+    dict
+        cn, ct : shares of the two dashpots; undamped : onset without dissipation, force per top disk; predicted : the
+        limit from the undamped pair; measured : damped onset, among all modes, with dashpots of `WEAK` times these
+        shares, None if nothing grows up to a little beyond the undamped onset.
     """
     window = ramp.first_window()
     if window is None:
@@ -70,7 +55,8 @@ def weak_cases(ramp: Ramped, ratios: Iterable[tuple[float, float]] = RATIOS) -> 
             continue
         weak = dissipating(ramp.path, WEAK * cn, WEAK * ct)
         found = damped_windows(weak, _around(ramp.forces, predicted.fx, window))
-        yield WeakCase(cn, ct, predicted.undamped, predicted.fx, found[0].fx_onset if found else None)
+        onsets = {"undamped": predicted.undamped, "predicted": predicted.fx}
+        yield {"cn": cn, "ct": ct, **onsets, "measured": found[0].fx_onset if found else None}
 
 
 def _around(forces: ArrayLike, predicted: float, window: Window) -> list[float]:
@@ -82,36 +68,7 @@ def _around(forces: ArrayLike, predicted: float, window: Window) -> list[float]:
     return [*below, window.fx_onset + 1e-3 * width]
 
 
-@dataclass(frozen=True)
-class Strength:
-    """The damped onset for one strength of the dissipation.
-
-    Attributes
-    ----------
-    kind : {"cn", "drag"}
-        Normal dashpots, or drag.
-    strength : float
-        C_N, mass / time / length^(1/2) for Hertz's law, or 1/tau, 1 / time.
-    onset : float or None
-        Damped onset among all modes, force per top disk; None if nothing grows on the loads.
-    frequency : float or None
-        Im s there, radian / time.
-    predicted : float or None
-        From the first undamped pair: the limit of weak dashpots, or drag's crossover; None where the drag holds the
-        pair down.
-    undamped : float
-        Onset without dissipation.
-    """
-
-    kind: str
-    strength: float
-    onset: float | None
-    frequency: float | None
-    predicted: float | None
-    undamped: float
-
-
-def over_strength(ramp: Ramped, kind: str, strengths: Iterable[float], start: float = 0.0) -> Iterator[Strength]:
+def over_strength(ramp: Ramped, kind: str, strengths: Iterable[float], start: float = 0.0) -> Iterator[Row]:
     """The damped onset over the strength of normal dashpots, or of drag.
 
     Parameters
@@ -121,9 +78,16 @@ def over_strength(ramp: Ramped, kind: str, strengths: Iterable[float], start: fl
     kind : {"cn", "drag"}
         Which dissipation.
     strengths : iterable of float
-        As `Strength.strength`.
+        C_N, mass / time / length^(1/2) for Hertz's law, or 1/tau, 1 / time.
     start : float
         Smallest load to be searched, force.
+
+    Yields
+    ------
+    dict
+        kind, strength : as given; onset : damped onset among all modes, force per top disk, None if nothing grows on
+        the loads; frequency : Im s there, radian / time; predicted : from the first undamped pair, the limit of weak
+        dashpots, or drag's crossover, None where the drag holds the pair down; undamped : onset without dissipation.
     """
     window = _first_window(ramp)
     forces = ramp.forces[ramp.forces >= start]
@@ -136,53 +100,35 @@ def over_strength(ramp: Ramped, kind: str, strengths: Iterable[float], start: fl
             predicted = drag_onset(dissipating(ramp.path), ramp.forces, window, 1 / strength)
         found = damped_windows(path, forces, look=[window.fx_onset], first=True)
         onset, frequency = (found[0].fx_onset, found[0].frequency) if found else (None, None)
-        yield Strength(kind, strength, onset, frequency, predicted, window.fx_onset)
-
-
-@dataclass(frozen=True)
-class Gain:
-    """The transient gain at one distance from the onset.
-
-    Attributes
-    ----------
-    distance : float
-        (F_x^c - F_x) / F_x^c of the undamped onset.
-    cn, drag : float
-        C_N, and 1/tau.
-    gain : float or None
-        Of |q|^2 from rest; None if some motion grows for ever.
-    time : float or None
-        When.
-    bound : float or None
-        No later time has more.
-    """
-
-    distance: float
-    cn: float
-    drag: float
-    gain: float | None
-    time: float | None
-    bound: float | None
+        row = {"kind": kind, "strength": strength, "onset": onset, "frequency": frequency}
+        yield row | {"predicted": predicted, "undamped": window.fx_onset}
 
 
 def over_distance(
     ramp: Ramped, distances: Iterable[float], dissipations: Iterable[tuple[float, float]]
-) -> Iterator[Gain]:
-    """The transient gain over the distance from the first undamped onset, for several (C_N, 1/tau)."""
+) -> Iterator[Row]:
+    """The transient gain over the distance from the first undamped onset, for several (C_N, 1/tau).
+
+    Yields
+    ------
+    dict
+        distance : (F_x^c - F_x) / F_x^c of the undamped onset; cn, drag : C_N, and 1/tau; gain : of abs(q)^2 from rest,
+        None if some motion grows for ever; time : when; bound : no later time has more.
+    """
     onset, kinds = _first_window(ramp).fx_onset, tuple(dissipations)
     for distance in distances:
         packing = ramp.path(onset * (1 - distance))
         for cn, drag in kinds:
-            yield _gain(packing, distance, cn, drag)
+            yield {"distance": distance, "cn": cn, "drag": drag} | _gain(packing, cn, drag)
 
 
-def _gain(packing: Packing, distance: float, cn: float, drag: float) -> Gain:
+def _gain(packing: Packing, cn: float, drag: float) -> Row:
     damped = dissipating(lambda fx: packing, cn=cn, drag_time=1 / drag if drag else None)
     try:
         found = transient_gain(damped(packing.fx))
     except NoGainError:
-        return Gain(distance, cn, drag, None, None, None)
-    return Gain(distance, cn, drag, found.gain, found.time, found.bound if np.isfinite(found.bound) else None)
+        return {"gain": None, "time": None, "bound": None}
+    return {"gain": found.gain, "time": found.time, "bound": found.bound if np.isfinite(found.bound) else None}
 
 
 def _first_window(ramp: Ramped) -> Window:

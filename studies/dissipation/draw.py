@@ -9,33 +9,41 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...analysis.packing.packing import Floats
-from ...figures.style import INK, figure_of, panel, styled
-from .compute import Gain, Strength
+from ...figures.style import INK, styled
+from .compute import Row
 
 REACH = 4
 """How far beyond the undamped onset onsets are shown, in units of what weak dashpots lower it by."""
 
 
 @styled
-def draw_dashpot_onset(found: Sequence[Strength], axes: Axes | None = None) -> Figure:
-    """The damped onset over C_N, from the limit of weak dashpots on.
+def dissipation_figure(dashpots: Sequence[Row], drag: Sequence[Row], gains: Mapping[str, Sequence[Row]]) -> Figure:
+    """The three panels: dashpots above, drag and gain below.
 
     Parameters
     ----------
-    found : sequence of Strength
-        Of normal dashpots, by increasing strength.
-    axes : Axes, optional
-        Where to draw; a figure of its own by default.
-
-    Returns
-    -------
-    Figure
-        Dots are onsets among all modes, the line is the predicted limit, dotted the undamped onset. Onsets far above
-        both are written at the upper edge.
+    dashpots, drag : sequence of dict
+        Rows of `over_strength`, by increasing strength.
+    gains : dict
+        Rows of `over_distance` by increasing distance, by the name of the dissipation.
     """
-    axes = panel(axes)
+    figure = Figure(figsize=(5.2, 4.4), layout="constrained")
+    axes = figure.subplot_mosaic("aa;bc")
+    _draw_dashpot_onset(dashpots, axes["a"])
+    _draw_drag_shift(drag, axes["b"])
+    _draw_gain(gains, axes["c"])
+    for name, title in (("a", "dashpots lower the onset"), ("b", "drag raises it"), ("c", "transient gain below it")):
+        axes[name].set_title(f"({name}) {title}", loc="left", fontsize=8.5)
+    return figure
+
+
+def _draw_dashpot_onset(found: Sequence[Row], axes: Axes) -> None:
+    """Onsets among all modes as dots, the predicted limit as a line, dotted the undamped onset.
+
+    Onsets far above both are written at the upper edge.
+    """
     strengths, onsets, predicted = _columns(found)
-    undamped = found[0].undamped
+    undamped = found[0]["undamped"]
     axes.axhline(undamped, color=INK, linewidth=0.8, linestyle=":", label="without dissipation")
     axes.plot(strengths, predicted, color="C1", label="limit, from the undamped pair")
     axes.plot(strengths, onsets, "o", color="C0", markersize=4, label="damped onset")
@@ -54,83 +62,30 @@ def draw_dashpot_onset(found: Sequence[Strength], axes: Axes | None = None) -> F
             )
     axes.set(xscale="log", xlabel="$C_N$", ylabel="$F_x$ of the onset", ylim=(undamped - 2 * gap, top))
     axes.legend(loc="upper left", bbox_to_anchor=(0, 0.85))  # below what lies beyond the axes
-    return figure_of(axes)
 
 
-@styled
-def draw_drag_shift(found: Sequence[Strength], axes: Axes | None = None) -> Figure:
-    """How far drag raises the onset, over 1/tau.
-
-    Parameters
-    ----------
-    found : sequence of Strength
-        Of drag, by increasing strength.
-    axes : Axes, optional
-        Where to draw; a figure of its own by default.
-
-    Returns
-    -------
-    Figure
-        Dots are onsets among all modes, the line is where 2 |Im omega| of the undamped pair is 1/tau.
-    """
-    axes = panel(axes)
+def _draw_drag_shift(found: Sequence[Row], axes: Axes) -> None:
+    """How far drag raises the onset, over 1/tau; the line is where 2 |Im omega| of the undamped pair is 1/tau."""
     strengths, onsets, predicted = _columns(found)
-    undamped = found[0].undamped
+    undamped = found[0]["undamped"]
     axes.plot(strengths, predicted - undamped, color="C1", label=r"$2\,|\mathrm{Im}\,\omega| = 1/\tau$")
     axes.plot(strengths, onsets - undamped, "o", color="C0", markersize=4, label="damped onset")
     axes.set(xscale="log", yscale="log", xlabel=r"$1/\tau$", ylabel="onset $-$ undamped onset")
     axes.legend(loc="upper left")
-    return figure_of(axes)
 
 
-@styled
-def draw_gain(curves: Mapping[str, Sequence[Gain]], axes: Axes | None = None) -> Figure:
-    """The transient gain over the distance from the undamped onset, for several kinds of dissipation.
-
-    Parameters
-    ----------
-    curves : dict
-        Gains by increasing distance, by the name of the dissipation; where some motion grows for ever, there is a gap.
-    axes : Axes, optional
-        Where to draw; a figure of its own by default.
-
-    Returns
-    -------
-    Figure
-        Both axes logarithmic; the onset is to the left.
-    """
-    axes = panel(axes)
+def _draw_gain(curves: Mapping[str, Sequence[Row]], axes: Axes) -> None:
+    """The transient gain over the distance from the undamped onset; a gap where some motion grows for ever."""
     for number, (label, found) in enumerate(curves.items()):
-        gains = [np.nan if each.gain is None else each.gain for each in found]
-        axes.plot([each.distance for each in found], gains, "o-", color=f"C{number}", markersize=3.5, label=label)
+        gains = [np.nan if each["gain"] is None else each["gain"] for each in found]
+        axes.plot([each["distance"] for each in found], gains, "o-", color=f"C{number}", markersize=3.5, label=label)
     axes.set(xscale="log", yscale="log", xlabel="$(F_x^c - F_x)\\,/\\,F_x^c$", ylabel=r"gain of $|q|^2$")
-    highest = max(each.gain or 0.0 for found in curves.values() for each in found)
+    highest = max(each["gain"] or 0.0 for found in curves.values() for each in found)
     axes.set_ylim(top=30 * highest)  # room for the legend
     axes.legend(loc="upper right")
-    return figure_of(axes)
 
 
-@styled
-def dissipation_figure(
-    dashpots: Sequence[Strength], drag: Sequence[Strength], gains: Mapping[str, Sequence[Gain]]
-) -> Figure:
-    """The three panels: dashpots above, drag and gain below.
-
-    Parameters
-    ----------
-    dashpots, drag, gains
-        As of `draw_dashpot_onset`, `draw_drag_shift` and `draw_gain`.
-    """
-    figure = Figure(figsize=(5.2, 4.4), layout="constrained")
-    axes = figure.subplot_mosaic("aa;bc")
-    draw_dashpot_onset(dashpots, axes["a"])
-    draw_drag_shift(drag, axes["b"])
-    draw_gain(gains, axes["c"])
-    for name, title in (("a", "dashpots lower the onset"), ("b", "drag raises it"), ("c", "transient gain below it")):
-        axes[name].set_title(f"({name}) {title}", loc="left", fontsize=8.5)
-    return figure
-
-
-def _columns(found: Sequence[Strength]) -> Floats:
+def _columns(found: Sequence[Row]) -> Floats:
     """Strengths, onsets and predictions, shape (3, n); nan where there is none."""
-    return np.array([[each.strength, each.onset, each.predicted] for each in found], dtype=np.float64).T
+    names = ("strength", "onset", "predicted")
+    return np.array([[each[name] for name in names] for each in found], dtype=np.float64).T

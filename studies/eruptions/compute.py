@@ -24,7 +24,7 @@ floor is the largest D of the first time unit, before anything could grow.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -38,6 +38,7 @@ from ...analysis.packing.packing import Floats
 from ...pywrap import Engine
 from ...pywrap.lammps.dynamics import Dynamics, Motion
 from ...pywrap.runs.undamped import time_step
+from ..packings import pairs, sliding
 
 DECADES = 24.0
 """Decades of D between its noise, 1e-27 in the first steps, and the square of a tenth of an overlap."""
@@ -57,6 +58,9 @@ TENTH = 0.1
 
 WORK_STEPS = 2000
 """Steps over which work is added up: some thirty periods of the fastest mode."""
+
+Look = dict[str, float]
+"""A packing in the course of a run."""
 
 Ends = Literal["opens", "slides", "law", "flows", "stable", "cut off"]
 
@@ -83,94 +87,46 @@ class Start:
     damped: bool = False
 
 
-@dataclass(frozen=True)
-class Look:
-    """A packing in the course of a run.
+def erupt(start: Start) -> dict[str, Any]:
+    """A run from rest until it is over, on this process alone.
 
-    Attributes
-    ----------
-    time, msd, slip, kinetic_energy : float
-        Time, D, mean displacement of the upper layer along x, kinetic energy of translation and rotation.
-    lost, gained, sliding : int
-        Contacts of the start that are open, contacts that are new, and contacts of the start that slide and did not.
+    Returns
+    -------
+    dict
+        fx : load, force on each disk of the upper layer; damped : whether with dashpots or drag; rate : growth rate of
+        D from the spectrum, 1 / time, 0 of a stable packing; time : when the run was over; msd, kinetic_energy : the
+        largest D, length^2, and the largest kinetic energy; slip : largest displacement of the upper layer along x,
+        length; lost, gained, sliding : most contacts, in any look, that were open, new, or slid; ended : when D first
+        reached a tenth of its largest value, time, None if it did not grow; ends : what ended the growth, one of
+        `Ends`; noise : largest D of the first time unit; balance : kinetic energy less work, in units of the larger of
+        the two and of the kinetic energy; series : the looks as columns.
     """
-
-    time: float
-    msd: float
-    slip: float
-    kinetic_energy: float
-    lost: int
-    gained: int
-    sliding: int
-
-
-@dataclass(frozen=True)
-class Eruption:
-    """A run until it was over.
-
-    Attributes
-    ----------
-    fx : float
-        Load, force on each disk of the upper layer.
-    damped : bool
-        Whether with dashpots or drag.
-    rate : float
-        Growth rate of D from the spectrum, 1 / time; 0 of a stable packing.
-    time : float
-        When the run was over.
-    msd, kinetic_energy : float
-        The largest D, length^2, and the largest kinetic energy.
-    slip : float
-        Largest displacement of the upper layer along x, length.
-    lost, gained, sliding : int
-        Most contacts, in any look, that were open, new, or slid.
-    ended : float or None
-        When D first reached a tenth of its largest value, time; None if it did not grow.
-    ends : str
-        What ended the growth.
-    noise : float
-        Largest D of the first time unit.
-    balance : float
-        Kinetic energy less work, in units of the larger of the two and of the kinetic energy.
-    series : dict
-        The looks as columns.
-    """
-
-    fx: float
-    damped: bool
-    rate: float
-    time: float
-    msd: float
-    kinetic_energy: float
-    slip: float
-    lost: int
-    gained: int
-    sliding: int
-    ended: float | None
-    ends: Ends
-    noise: float
-    balance: float
-    series: dict[str, list[float]] = field(repr=False)
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)
-
-
-def erupt(start: Start) -> Eruption:
-    """A run from rest until it is over, on this process alone."""
     with threadpool_limits(1):
         rate = growth_rate(start.packing)
         dt = time_step(start.packing)
         looks: list[Look] = []
         with Engine(start.packing, MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
             watch = _Watch(start)
-            for time, motion in _course(dynamics, dt, start.time):
-                looks.append(watch.look(time, motion, engine.packing))
+            for at, motion in _course(dynamics, dt, start.time):
+                looks.append(watch.look(at, motion, engine.packing))
                 if _over(looks, rate) or _flows(looks, start.packing):
                     break
             balance = _balance(dynamics, start.packing)
-    return _eruption(start, looks, rate, balance)
+    columns: dict[str, Floats] = {name: np.array([each[name] for each in looks]) for name in looks[0]}
+    time, msd = columns["time"], columns["msd"]
+    return {
+        "fx": start.packing.fx,
+        "damped": start.damped,
+        "rate": rate,
+        "time": float(time[-1]),
+        **{name: float(columns[name].max()) for name in ("msd", "kinetic_energy")},
+        "slip": float(np.abs(columns["slip"]).max()),
+        **{name: int(columns[name].max()) for name in ("lost", "gained", "sliding")},
+        **_ending(start, looks, columns, rate),
+        "noise": float(msd[time <= 1].max(initial=float(msd[0]))),
+        "balance": balance,
+        "series": {name: column.tolist() for name, column in columns.items()},
+    }
 
 
 def growth_rate(packing: Packing) -> float:
@@ -195,18 +151,18 @@ def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[flo
 
 def _over(looks: list[Look], rate: float) -> bool:
     """Whether a run is over, see the module."""
-    t = looks[-1].time
+    t = looks[-1]["time"]
     if rate == 0:
         return t >= QUIET
     if t < DECADES * np.log(10) / rate:
         return False
-    quarter = max((each.msd for each in looks if t / 4 < each.time <= t / 2), default=0.0)
-    half = max(each.msd for each in looks if each.time > t / 2)
+    quarter = max((each["msd"] for each in looks if t / 4 < each["time"] <= t / 2), default=0.0)
+    half = max(each["msd"] for each in looks if each["time"] > t / 2)
     return half <= OVER * quarter
 
 
 def _flows(looks: list[Look], packing: Packing) -> bool:
-    return abs(looks[-1].slip) > 2 * packing.radius.max()
+    return abs(looks[-1]["slip"]) > 2 * packing.radius.max()
 
 
 class _Watch:
@@ -216,45 +172,38 @@ class _Watch:
         self._start, self._position = start, start.packing.position
         self._moved = np.zeros_like(start.packing.position)
         carrying = start.packing.loaded(start.residual)
-        self._contacts = _pairs(carrying)
+        self._contacts = pairs(carrying)
         self._slid = _sliding(carrying)
 
     def look(self, time: float, motion: Motion, now: Packing) -> Look:
-        """The packing at one time."""
+        """The packing at one time.
+
+        Time, D, mean displacement of the upper layer along x, kinetic energy of translation and rotation; contacts of
+        the start that are open, contacts that are new, and contacts of the start that slide and did not.
+        """
         first = self._start.packing
         step = motion.position - self._position
         step[:, 0] = nearest_image(step[:, 0], first.box_length)
         self._moved, self._position = self._moved + step, motion.position
-        pairs = _pairs(now)
-        return Look(
-            time=time,
-            # from step to step, disks move less than half a box; for small D, the difference itself has more digits
-            msd=float(
-                mean_square_displacement(
-                    motion.position, first.position, first.box_length, motion.position_low, first.position_low
-                )
-            )
-            if abs(self._moved).max() < 0.25 * (first.box_length or np.inf)
-            else float(np.mean(np.sum(self._moved**2, axis=1))),
-            slip=float(self._moved[first.top, 0].mean()),
-            kinetic_energy=_kinetic_energy(first, motion),
-            lost=len(self._contacts - pairs),
-            gained=len(pairs - _pairs(first)),
-            sliding=len((_sliding(now) - self._slid) & self._contacts),
-        )
-
-
-def _pairs(packing: Packing) -> set[tuple[int, int]]:
-    return set(zip(packing.contacts.i.tolist(), packing.contacts.j.tolist(), strict=True))
+        there = pairs(now)
+        # from step to step, disks move less than half a box; for small D, the difference itself has more digits
+        msd = np.mean(np.sum(self._moved**2, axis=1))
+        if abs(self._moved).max() < 0.25 * (first.box_length or np.inf):
+            low = motion.position_low, first.position_low
+            msd = mean_square_displacement(motion.position, first.position, first.box_length, *low)
+        return {
+            "time": time,
+            "msd": float(msd),
+            "slip": float(self._moved[first.top, 0].mean()),
+            "kinetic_energy": _kinetic_energy(first, motion),
+            "lost": len(self._contacts - there),
+            "gained": len(there - pairs(first)),
+            "sliding": len((_sliding(now) - self._slid) & self._contacts),
+        }
 
 
 def _sliding(packing: Packing) -> set[tuple[int, int]]:
-    """Contacts at their Coulomb bound; slips are clamped to it, so that they reach it but for a rounding."""
-    if not packing.law.frictional:
-        return set()
-    contacts = packing.contacts
-    at = np.abs(contacts.slip) >= packing.law.slip_limit(packing.geometry.overlap) * (1 - 1e-9)
-    return set(zip(contacts.i[at].tolist(), contacts.j[at].tolist(), strict=True))
+    return pairs(packing, sliding(packing)) if packing.law.frictional else set()
 
 
 def _kinetic_energy(packing: Packing, motion: Motion) -> float:
@@ -270,34 +219,15 @@ def _balance(dynamics: Dynamics, packing: Packing) -> float:
     return float(abs(after - before - work) / max(abs(work), after, before))
 
 
-def _eruption(start: Start, looks: list[Look], rate: float, balance: float) -> Eruption:
-    columns: dict[str, Floats] = {name: np.array([getattr(each, name) for each in looks]) for name in vars(looks[0])}
-    time, msd = columns["time"], columns["msd"]
+def _ending(start: Start, looks: list[Look], columns: dict[str, Floats], rate: float) -> dict[str, Any]:
+    """When and by what the growth ended, see the module."""
     ended: float | None = None
     ends: Ends = "stable"
     if rate > 0:
-        place = int(np.argmax(msd >= TENTH * msd.max()))
-        ended = float(time[place])
+        place = int(np.argmax(columns["msd"] >= TENTH * columns["msd"].max()))
+        ended = float(columns["time"][place])
         upto = slice(0, place + 1)
         ends = "opens" if columns["lost"][upto].any() else "slides" if columns["sliding"][upto].any() else "law"
         if not _over(looks, rate):
             ends = "cut off"
-    if _flows(looks, start.packing):
-        ends = "flows"
-    return Eruption(
-        fx=start.packing.fx,
-        damped=start.damped,
-        rate=rate,
-        time=float(time[-1]),
-        msd=float(msd.max()),
-        kinetic_energy=float(columns["kinetic_energy"].max()),
-        slip=float(np.abs(columns["slip"]).max()),
-        lost=int(columns["lost"].max()),
-        gained=int(columns["gained"].max()),
-        sliding=int(columns["sliding"].max()),
-        ended=ended,
-        ends=ends,
-        noise=float(msd[time <= 1].max(initial=float(msd[0]))),
-        balance=balance,
-        series={name: column.tolist() for name, column in columns.items()},
-    )
+    return {"ended": ended, "ends": "flows" if _flows(looks, start.packing) else ends}

@@ -10,12 +10,13 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import NoEquilibriumError
-from ...pywrap import Engine, Equilibrium, Scene, SceneError
-from ...pywrap.runs.path import EquilibriumPath, loads
+from ...pywrap import Equilibrium, Scene, SceneError
+from ...pywrap.runs.path import loads
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.study_sections import Eruptions
 from ...pywrap.settling.bed import settle
 from ..frame import Result, Study, Work
+from ..packings import path_from
 from ..rows import Rows
 from . import draw
 from .compute import DECADES, OVER, QUIET, Start, erupt
@@ -36,10 +37,10 @@ def _compute(scene: Scene, work: Work) -> Result:
         if flows_beyond is not None:
             say(f"no equilibrium beyond F_x = {flows_beyond:g}: the loads above are left out")
         for found in work.progress(work.share(erupt, starts), len(starts)):
-            rows.append(longest=time, **found.as_dict())
+            rows.append(longest=time, **found)
             say(
-                f"F_x = {found.fx:g}: D up to {found.msd:.2g}, the layer slips by {found.slip:.2g}, {found.lost} "
-                f"contacts open; {found.ends} after t = {found.time:.4g}"
+                f"F_x = {found['fx']:g}: D up to {found['msd']:.2g}, the layer slips by {found['slip']:.2g}, "
+                f"{found['lost']} contacts open; {found['ends']} after t = {found['time']:.4g}"
             )
     runs = _runs(rows, settings.load, time)
     if not runs:
@@ -107,8 +108,7 @@ def _starts(scene: Scene, wanted: list[float], time: float) -> tuple[list[Start]
     first = settle(scene, communicator=MPI.COMM_SELF)
     starts: list[Start] = []
     steps = loads(scene.ramp)
-    with Engine(first.packing, MPI.COMM_SELF) as engine:
-        path = EquilibriumPath(engine, first, scene)
+    with path_from(first, scene) as path:
         for fx in wanted:
             try:
                 for load in steps[(steps > path.kept[-1].fx) & (steps < fx)]:

@@ -10,7 +10,6 @@ from pathlib import Path
 from mpi4py import MPI
 
 from ...analysis.files.wholefile import write_text
-from ...pywrap.scenes.sections import Law
 from ..sweep.compute import LINES, Progress, Say, run_sweep, stored
 from .sets import SHARES, sets
 
@@ -33,9 +32,8 @@ def compute(
     share : float
         Of the packings of each set.
     """
-    harmonic = "exponent" in Law.model_fields
     for part in [*(each for each in SHARES if each < share), share]:
-        for name, sweep in sets(part, harmonic).items():
+        for name, sweep in sets(part).items():
             say(f"{name}: {100 * part:.3g} % of the packings")
             run_sweep(sweep, output / name.replace(" ", "_"), say=say, progress=progress, workers=workers)
         if MPI.COMM_WORLD.rank == 0:

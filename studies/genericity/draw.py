@@ -11,7 +11,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from ...analysis.packing.packing import Floats
 from ...figures.style import INK, styled
-from ..statistics import distribution
+from ..statistics import course
 from .numbers import STEPS
 from .sets import FRICTION
 from .tables import Table
@@ -142,7 +142,5 @@ def _survival(axes: Axes, reach: Floats, found: Any, label: str, color: str) -> 
     """The share of packings without an onset up to F_x, of Kaplan and Meier."""
     if not len(reach):
         return
-    fx, probability = distribution(reach, found)
-    places = np.concatenate([[0.0], fx, [reach.max()]])
-    left = np.concatenate([[1.0], 1 - probability, [1 - probability[-1] if len(probability) else 1.0]])
-    axes.step(places, left, where="post", color=color, label=label)
+    places, levels = course(reach, found)
+    axes.step(places, 1 - levels, where="post", color=color, label=label)

@@ -40,7 +40,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
@@ -48,10 +47,10 @@ from ...analysis import spectrum
 from ...analysis.onset import force_bearing, full_operator
 from ...analysis.packing.packing import Floats, Indices
 from ...analysis.spectrum.spectrum import active_coordinates
-from ...pywrap import Engine, Scene
-from ...pywrap.runs.path import EquilibriumPath, loads
+from ...pywrap import Scene
+from ...pywrap.runs.path import loads
 from ...pywrap.scenes.refusals import needed
-from ..sweep.onset import Start
+from ..packings import Start, path_from
 
 AVERAGED = 21
 """Levels over which local densities and couplings are averaged: some 5 % of the level's statistics in error, and few
@@ -102,8 +101,8 @@ def pencil_of(scene: Scene, start: Start) -> Pencil:
     """The operator of a scene's packing about rest, from a small load."""
     settings = needed(scene.ramp, "ramp")
     rest = start(scene.law.mus[0])
-    with Engine(rest.packing, MPI.COMM_SELF) as engine:
-        there = EquilibriumPath(engine, rest, scene)(SMALL * settings.step)
+    with path_from(rest, scene) as path:
+        there = path(SMALL * settings.step)
     return Pencil.between(full_operator(rest.packing), full_operator(there), there.fx)
 
 
@@ -171,8 +170,7 @@ def growth(scene: Scene, start: Start) -> dict[str, Any]:
     settings = needed(scene.ramp, "ramp")
     rest = start(scene.law.mus[0])
     row: dict[str, Any] = {"fx": [], "pairs": [], "rate": []}
-    with Engine(rest.packing, MPI.COMM_SELF) as engine:
-        path = EquilibriumPath(engine, rest, scene)
+    with path_from(rest, scene) as path:
         for equilibrium in path.climb(loads(settings)[1:]):
             modes = spectrum(force_bearing(equilibrium.packing))
             row["fx"].append(equilibrium.fx)

@@ -11,6 +11,7 @@ import numpy as np
 from ...analysis.files.wholefile import write_text
 from ...figures.pages import render
 from ...figures.style import save_as
+from ..statistics import interval
 from .draw import mechanism_figure, modes_figure, onsets_figure, size_figure
 from .numbers import LOADS, numbers, read_tables
 from .sets import PACKINGS, SIZES
@@ -79,18 +80,15 @@ def percent(found: dict[str, Any]) -> str:
 
 def median(value: list[float | None], digits: str = ".3g") -> str:
     """A median with its interval."""
-    middle, low, high = ("beyond reach" if each is None else format(each, digits) for each in value)
-    return f"{middle} ({low} to {high})"
+    return interval(value, digits, "beyond reach")
 
 
-def between(value: dict[str, float] | None, digits: str = ".2f") -> str:
+def between(value: dict[str, float] | None) -> str:
     """A fitted number with its interval."""
-    if value is None:
-        return "not known"
-    return f"{value['value']:{digits}} ({value['low']:{digits}} to {value['high']:{digits}})"
+    return "not known" if value is None else interval([*value.values()], ".2f")
 
 
-def mean(value: dict[str, float | None], digits: str = ".3g") -> str:
+def mean(value: dict[str, float | None]) -> str:
     """A mean with half of its interval."""
     error = "" if value["error"] is None else f" ± {value['error']:.1g}"
-    return f"{value['value']:{digits}}{error}"
+    return f"{value['value']:.3g}{error}"

@@ -57,32 +57,22 @@ WIDTH, LAYER = 11.9, 10
 shape."""
 
 
-def sets(share: float, harmonic: bool) -> dict[str, Sweep]:
-    """The sweeps of a round.
-
-    Parameters
-    ----------
-    share : float
-        Of the packings of each set.
-    harmonic : bool
-        Whether the law's exponent can be chosen.
-    """
-    found = {
+def sets(share: float) -> dict[str, Sweep]:
+    """The sweeps of a round, which has this share of the packings of each set."""
+    law = {"kn": HARMONIC_STIFFNESS, "exponent": 1.0}
+    return {
         "onsets": _onsets("onsets", share, {}),
         "surrogates": _onsets("surrogates", share, {}, "surrogates", [1.0]),
         "fixed force": _sizes(SIZES, share, "onset", fixed_pressure=False),
         "fixed pressure": _sizes(SIZES, share, "onset", fixed_pressure=True),
         "levels": _sizes(LEVELS, share, "levels", increments=30),
         "growth": _sizes(GROWTH, share, "growth", increments=20, reach=3.0),
+        "harmonic": _onsets("harmonic", share, {"law": law}, friction=FEW),
+        "halved increments": _onsets("halved increments", share, {"ramp": {"step": 1e-3}}),
+        "settled with friction": _onsets(
+            "settled with friction", share, {"packing": {"settle_friction": True}}, friction=FEW
+        ),
     }
-    if harmonic:
-        law = {"kn": HARMONIC_STIFFNESS, "exponent": 1.0}
-        found["harmonic"] = _onsets("harmonic", share, {"law": law}, friction=FEW)
-    finer = {"ramp": {"step": 1e-3}}
-    found["halved increments"] = _onsets("halved increments", share, finer)
-    settled = {"packing": {"settle_friction": True}}
-    found["settled with friction"] = _onsets("settled with friction", share, settled, friction=FEW)
-    return found
 
 
 def _onsets(

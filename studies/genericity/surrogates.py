@@ -25,7 +25,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from scipy.sparse import coo_array, csr_array
 
 from ...analysis import NoEquilibriumError, Packing
@@ -33,9 +32,9 @@ from ...analysis.onset import complex_windows, force_bearing
 from ...analysis.operators.stiffness import stiffness_matrix
 from ...analysis.packing.packing import Floats
 from ...analysis.spectrum.spectrum import mass_weighted
-from ...pywrap import Engine, Scene
-from ...pywrap.runs.path import EquilibriumPath, loads
-from ..sweep.onset import Start
+from ...pywrap import Scene
+from ...pywrap.runs.path import loads
+from ..packings import Start, path_from
 from .levels import Pencil, pencil_of
 
 BLOCK = 20
@@ -55,8 +54,7 @@ def surrogates(scene: Scene, start: Start) -> dict[str, Any]:
     }
     rest = start(scene.law.mus[0])
     shuffle = Shuffle(rest.packing, np.random.default_rng(seed))
-    with Engine(rest.packing, MPI.COMM_SELF) as engine:
-        path = EquilibriumPath(engine, rest, scene)
+    with path_from(rest, scene) as path:
         return row | {"shuffled": _first(lambda fx: shuffle(path(fx)), steps, narrowest)}
 
 

@@ -37,7 +37,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.linalg import eigvals
 from scipy.sparse import csr_array
@@ -52,11 +51,11 @@ from ...analysis.spectrum.spectrum import (
     mass_weighted,
     unit_rounding,
 )
-from ...pywrap import Engine, Scene
+from ...pywrap import Scene
 from ...pywrap.runs.path import EquilibriumPath
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.study_sections import Modes
-from ..sweep.onset import AT_LIMIT, Start
+from ..packings import Start, path_from, sliding
 from .sliced import sliced
 
 ALL = 1000
@@ -120,9 +119,9 @@ def counted(packing: Packing) -> Counted:
         In equilibrium.
     """
     if len(packing) > ALL:
-        found = sliced(packing)
-        omega = np.sqrt(found.values)
-        return Counted(omega[np.argsort(-omega.imag)], found.modes, found.error)
+        found, error = sliced(packing)
+        omega = np.sqrt(found)
+        return Counted(omega[np.argsort(-omega.imag)], dynamical_matrix(packing)[0].shape[0], error)
     values = eigenvalues(packing)
     rounding = unit_rounding(dynamical_matrix(packing)[0].data)
     surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))
@@ -152,11 +151,10 @@ def antisymmetric_norm(packing: Packing) -> float:
 
 def switched(packing: Packing) -> dict[str, dict[str, Any]]:
     """The complex pairs with b of sticking contacts alone, of sliding contacts alone, and of none."""
-    slip, limit = np.abs(packing.contacts.slip), packing.law.slip_limit(packing.geometry.overlap)
-    sliding = slip >= AT_LIMIT * limit
+    slides = sliding(packing)
     return {
         name: Counted.of(_values(packing, coupled)).as_dict()
-        for name, coupled in (("sticking", ~sliding), ("sliding", sliding), ("none", np.zeros_like(sliding)))
+        for name, coupled in (("sticking", ~slides), ("sliding", slides), ("none", np.zeros_like(slides)))
     }
 
 
@@ -206,8 +204,7 @@ def along_ramp(scene: Scene, start: Start, look: Callable[[Packing], dict[str, A
     step, wanted = needed(scene.ramp, "ramp").step, (scene.modes or Modes()).fx_over_fy
     rest = start(scene.law.mus[0])
     row: dict[str, Any] = {"ends": "until", "loads": []}
-    with Engine(rest.packing, MPI.COMM_SELF) as engine:
-        path = EquilibriumPath(engine, rest, scene)
+    with path_from(rest, scene) as path:
         for share in sorted(wanted):
             try:
                 packing = _climbed(path, share * scene.load.fy, step)
@@ -230,11 +227,10 @@ def _climbed(path: EquilibriumPath, fx: float, step: float) -> Packing:
 def _load(packing: Packing) -> dict[str, Any]:
     """What is told of one load."""
     found = counted(packing)
-    slip, limit = np.abs(packing.contacts.slip), packing.law.slip_limit(packing.geometry.overlap)
     row = found.as_dict() | {
         "modes": found.modes,
         "contacts": len(packing.contacts),
-        "sliding": int(np.count_nonzero(slip >= AT_LIMIT * limit)),
+        "sliding": int(np.count_nonzero(sliding(packing))),
         "rattlers": len(packing.rattlers),
         "bound": antisymmetric_norm(packing),
     }

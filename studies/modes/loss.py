@@ -28,7 +28,7 @@ from ...analysis.operators.damping import damping_matrix
 from ...analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from ...pywrap import Scene
 from ...pywrap.scenes.units import dashpot, real_units, restitution
-from ..sweep.onset import Start
+from ..packings import Start
 from .compute import along_ramp, counted
 
 RESTITUTIONS = (0.99, 0.97, 0.9, 0.8, 0.7, 0.5)

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...analysis import Packing, mean_square_displacement
+from ...analysis import Packing
 from ...pywrap import Engine, Scene
 from ...pywrap.runs.undamped import time_step
 from ...pywrap.scenes.units import dashpot
-from ..sweep.onset import AT_LIMIT, Start
+from ..packings import Start, distance, shake, sliding
 from .compute import along_ramp
 from .loss import TANGENTIAL, fastest, impact_velocity, with_dashpots
 
@@ -60,9 +60,7 @@ def lossy_runs(scene: Scene, start: Start) -> dict[str, Any]:
                 if rate.real >= LEAST:
                     run: dict[str, Any] = {"restitution": each, "ct_over_cn": ratio, "predicted": 2 * rate.real}
                     runs.append(run | {"measured": grown(damped, rate)})
-        limit = packing.law.slip_limit(packing.geometry.overlap)
-        sliding = np.abs(packing.contacts.slip) >= AT_LIMIT * limit
-        return {"runs": runs, "sliding": int(np.count_nonzero(sliding))}
+        return {"runs": runs, "sliding": int(np.count_nonzero(sliding(packing)))}
 
     return along_ramp(scene, start, look)
 
@@ -73,26 +71,19 @@ def grown(packing: Packing, rate: complex) -> float | None:
     Looks that were a multiple of the period of D apart would all see it in the same phase, or drift through its phases
     slowly; the golden section of a period spreads them over all phases.
     """
-    noise = np.zeros(3 * len(packing))
-    noise[: 2 * len(packing)] = SEED * np.random.default_rng(0).standard_normal(2 * len(packing))
     dt = time_step(packing)
     period = np.pi / rate.imag
     periods = GOLDEN + max(0, round(1 / (LOOKS * 2 * rate.real * period)))
     steps = max(1, round(periods * period / dt))
-    held = np.ones(len(packing), dtype=bool)
-    held[packing.rattlers] = False
     times, squares = [], []
     with Engine(packing, MPI.COMM_SELF) as engine:
-        engine.restore(engine.displace(packing, noise))
+        shake(engine, packing, SEED, 0)
         with engine.undamped(dt) as dynamics:
             for _ in range(int(LONGEST / (2 * rate.real * steps * dt))):
                 dynamics.advance(steps)
-                now = mean_square_displacement(
-                    engine.packing.position[held], packing.position[held], packing.box_length
-                )
                 times.append(dynamics.steps * dt)
-                squares.append(float(now))
-                if now > TO:
+                squares.append(distance(packing, engine.packing))
+                if squares[-1] > TO:
                     break
     if not squares or squares[-1] < TO:
         return None

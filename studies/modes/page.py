@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,11 @@ import numpy as np
 from ...analysis.files.wholefile import write_text
 from ...figures.pages import render
 from ...figures.style import save_as
-from ...pywrap import Scene
-from ...pywrap.scenes.refusals import needed
-from ...pywrap.scenes.units import real_units
+from ..statistics import interval
 from .draw import collapse, over_load
 from .loss import EVERY, RESTITUTIONS
 from .numbers import COMPARED, QUALITIES, numbers
-from .sets import SIZES, quartz
+from .sets import SIZES
 from .tables import read_tables
 
 PAGES = ("modes.md", "tables.md")
@@ -48,9 +47,10 @@ def write_page(tables: Path, folder: Path) -> Path:
     write_text(folder / "modes.json", json.dumps(finite(found), indent=1) + "\n")
     save_as(over_load({str(disks): course for disks, course in found["loss"].items()}, LOSSES), folder / "loss.png")
     names = {"planned": SIZES, "compared": COMPARED, "qualities": QUALITIES, **told(found)}
-    formats = {"middle": middle, "plain": plain, "exponent": exponent, "part": part, "critical": critical}
+    formats = {"middle": interval, "exponent": partial(interval, digits=".2f"), "plain": plain, "part": part}
+    names |= formats | {"critical": critical}
     for name in PAGES:
-        write_text(folder / name, render(__package__ or "", f"{name}.j2", **found, **names, **formats))
+        write_text(folder / name, render(__package__ or "", f"{name}.j2", **found, **names))
     return folder / PAGES[0]
 
 
@@ -83,42 +83,9 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-def middle(value: list[float], digits: str = ".2g", factor: float = 1.0) -> str:
-    """A median with its interval: "0.15 (0.14 to 0.18)"; words where it has none."""
-    if np.isnan(value[0]):
-        return "-"
-    words = ["none" if np.isinf(each) else format(each * factor, digits) for each in value]
-    return f"{words[0]} ({words[1]} to {words[2]})"
-
-
 def plain(value: float) -> str:
     """A number, or a word where it is infinite."""
     return "none" if np.isinf(value) else format(value, ".3g")
-
-
-def in_real_units(found: dict[str, Any]) -> list[str]:
-    """Rows of the table of quartz in docs/units.md: growth in microseconds and frequencies in megahertz."""
-    rows = []
-    for name, course in found["quartz"].items():
-        if not name.startswith("quartz"):
-            continue
-        real = needed(real_units(Scene.from_mapping(quartz(name.removeprefix("quartz ")))), "units")
-        for k, load in enumerate(course["loads"]):
-            rate, omega = course["growth_rate"][k][0], course["omega"][k][0]
-            grows = "none" if rate == 0 else f"{1e6 * real.time / rate:.2g}"
-            frequency = "none" if omega is None or np.isinf(omega) else f"{real.frequency(omega) / 1e6:.2g}"
-            least = [np.inf if each is None else each for each in course["least_q"][k]]
-            cells = [
-                name.removeprefix("quartz "),
-                f"{load:g}",
-                f"{course['count'][k]}",
-                grows,
-                frequency,
-                middle(least),
-            ]
-            cells += [critical(course["critical_restitution"][k]), part(course["grows"]["0.9"][k])]
-            rows.append("| " + " | ".join(cells) + " |")
-    return rows
 
 
 def part(value: dict[str, Any]) -> str:
@@ -130,8 +97,3 @@ def critical(value: list[float]) -> str:
     """A critical restitution with its interval; the strongest loss that was looked at stands for all below."""
     words = [f"under {each:.2g}" if each <= min(RESTITUTIONS) + 1e-6 else f"{each:.3g}" for each in value]
     return "-" if np.isnan(value[0]) else f"{words[0]} ({words[1]} to {words[2]})"
-
-
-def exponent(value: list[float] | None) -> str:
-    """An exponent with its interval."""
-    return "-" if value is None else f"{value[0]:.2f} ({value[1]:.2f} to {value[2]:.2f})"

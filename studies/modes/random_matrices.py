@@ -28,7 +28,7 @@ from ...analysis.packing.packing import Floats
 from ...pywrap import Scene
 from ..genericity.levels import Pencil, local_mean
 from ..genericity.surrogates import randomized
-from ..sweep.onset import Start
+from ..packings import Start
 from .compute import Counted, along_ramp
 
 SEED = 35

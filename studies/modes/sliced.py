@@ -38,25 +38,6 @@ STEPS = 2
 """Iterations: with them, counts of 400 disks were off by none, with one less by one of 250."""
 
 
-@dataclass(frozen=True)
-class Sliced:
-    """Complex pairs counted in slices.
-
-    Attributes
-    ----------
-    values : ndarray of complex, shape (P,)
-        lambda of each pair, with positive imaginary part, 1 / time^2.
-    modes : int
-        Number of eigenvalues.
-    error : int
-        Of the number of pairs.
-    """
-
-    values: Complexes
-    modes: int
-    error: int
-
-
 @dataclass(frozen=True, eq=False)
 class _Part:
     """A slice with its neighbours: vectors in columns, and between which levels the slice lies."""
@@ -72,7 +53,7 @@ LARGE = replace(LIMITS, one_basis=9000)
 modes lie close to zero a Krylov space of the largest size may not hold them: beyond, that is an error."""
 
 
-def sliced(packing: Packing, limits: Limits = LARGE) -> Sliced:
+def sliced(packing: Packing, limits: Limits = LARGE) -> tuple[Complexes, int]:
     """The complex pairs of a packing, from slices of the spectrum.
 
     Parameters
@@ -81,6 +62,13 @@ def sliced(packing: Packing, limits: Limits = LARGE) -> Sliced:
         In equilibrium.
     limits : Limits
         The size of a slice, `own`.
+
+    Returns
+    -------
+    values : ndarray of complex, shape (P,)
+        lambda of each pair, with positive imaginary part, 1 / time^2.
+    error : int
+        Of the number of pairs.
 
     Raises
     ------
@@ -94,7 +82,7 @@ def sliced(packing: Packing, limits: Limits = LARGE) -> Sliced:
         before, last = [_within(each, part, noise) for each in _projections(matrix, part)][-2:]
         found.append(last)
         error += abs(len(last) - len(before))
-    return Sliced(np.concatenate(found), matrix.shape[0], error)
+    return np.concatenate(found), error
 
 
 def _parts(matrix: csr_array, limits: Limits) -> Iterator[_Part]:

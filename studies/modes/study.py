@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import sys
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ from ...figures.writers import write_film
 from ...pywrap import Scene
 from ..sweep.compute import Progress, Row, Say, run_sweep
 from ..sweep.points import Sweep
+from ..sweep.table import write_csv
 from ..sweep.tasks import TASKS
 from .draw import PlaneFilm, over_load, plane
 from .numbers import along
@@ -83,11 +82,7 @@ def modes(
     ends = [{"values": row["values"], "says": row["says"], **_end(row)} for row in rows]
     result = {"asked": sweep.as_dict(), "rows": lines, "packings": ends}
     write_text(output / "modes.json", json.dumps(result, indent=1) + "\n")
-    text = StringIO()
-    table = csv.DictWriter(text, COLUMNS, extrasaction="ignore", lineterminator="\n")
-    table.writeheader()
-    table.writerows(lines)
-    write_text(output / "modes.csv", text.getvalue())
+    write_csv(output / "modes.csv", COLUMNS, lines)
     with spared("a picture of the modes", say):
         _draw(rows, lines, output, say)
     return result

@@ -13,27 +13,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...analysis import (
-    Growth,
-    RunFile,
-    Spectrum,
-    discrete_frequency,
-    fit_growth,
-    spectrum,
-)
+from ...analysis import Growth, RunFile, Spectrum, discrete_frequency, fit_growth, spectrum
 from ...analysis.onset.pair_form import pair_eigenvalues
+from ...analysis.packing.packing import Floats
 from ...figures.pair import PairCurve
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
 from ...pywrap.onset.undamped import OnsetRun, onset_run
 from ...pywrap.runs.undamped import perturb, time_step
 from ...pywrap.scenes.refusals import needed
-from ...pywrap.scenes.sections import Friction, Perturb
-from ..triggering import Sensitivity, Triggering, equilibrium_at, sensitivity, trigger
-from ..triggering import summary as triggering_summary
-
-Floats = NDArray[np.float64]
+from ...pywrap.scenes.sections import Perturb
+from ..triggering.compute import Triggering, equilibrium_at, trigger
+from ..triggering.compute import summary as triggering_summary
 
 EFOLDS = 48.0
 """Length of the undamped run in units of 1/rate: D grows by up to 20 decades in it."""
@@ -95,53 +86,42 @@ class TriggeringRun:
     ----------
     scene : Scene
         Of the packing.
-    settings : Perturb
-        The perturbation.
     onsets : list of OnsetRun
         For each friction coefficient.
     triggering : Triggering or None
         The undamped runs; None where there is nothing to trigger.
-    sensitive : Sensitivity or None
-        The response on the way to the onset; None likewise.
     says : str
         Why there is nothing to trigger; empty otherwise.
     """
 
     scene: Scene
-    settings: Perturb
     onsets: list[OnsetRun]
     triggering: Triggering | None = None
-    sensitive: Sensitivity | None = None
     says: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Numbers for summary.json."""
-        if self.triggering is None or self.sensitive is None:
-            return {"says": self.says}
-        return triggering_summary(self.triggering, self.sensitive)
+        return {"says": self.says} if self.triggering is None else triggering_summary(self.triggering)
 
 
-def triggering_run(
-    scene: Scene, settings: Perturb, friction: Friction, runs: list[OnsetRun], path: Path
-) -> TriggeringRun:
+def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> TriggeringRun:
     """A perturbation between the onsets of the weakened and of the static friction; the series go to run.h5."""
-    run = runs[0]
+    run, fx, mu_ss = runs[0], needed(scene.perturb, "perturb").fx, needed(scene.friction, "friction").mu_ss
     # exact but for the product's rounding
-    weakened = [each for each in runs if np.isclose(each.mu, run.mu * friction.mu_ss, rtol=1e-12)]
-    if weakened and settings.fx <= weakened[0].onset.fx_c:
+    weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
+    if weakened and fx <= weakened[0].onset.fx_c:
         says = (
-            f"F_x = {settings.fx:g} is below the onset {weakened[0].onset.fx_c:g} of the weakened friction, too: no "
+            f"F_x = {fx:g} is below the onset {weakened[0].onset.fx_c:g} of the weakened friction, too: no "
             "window between the two, and nothing to erupt."
         )
-        return TriggeringRun(scene, settings, runs, says=says)
-    if settings.fx >= run.onset.fx_c:
-        says = f"F_x = {settings.fx:g} is above the onset {run.onset.fx_c:g}: nothing is stable there to be triggered."
-        return TriggeringRun(scene, settings, runs, says=says)
-    *_, start = reach(scene, settings.fx)  # to the bit the one of `perturb`, and so is v_0
-    lower = max(0.0, 2 * weakened[0].onset.fx_c - settings.fx) if weakened else None
+        return TriggeringRun(scene, runs, says=says)
+    if fx >= run.onset.fx_c:
+        says = f"F_x = {fx:g} is above the onset {run.onset.fx_c:g}: nothing is stable there to be triggered."
+        return TriggeringRun(scene, runs, says=says)
+    *_, start = reach(scene, fx)  # to the bit the one of `perturb`, and so is v_0
+    lower = max(0.0, 2 * weakened[0].onset.fx_c - fx) if weakened else None
     control = None if lower is None else equilibrium_at(scene, run.equilibria, lower)
-    found = trigger(scene, start, control, settings, friction, path)
-    return TriggeringRun(scene, settings, runs, found, sensitivity(run))
+    return TriggeringRun(scene, runs, trigger(scene, start, control, run, path))
 
 
 def recorded_ramp(scene: Scene, mu: float, path: Path) -> OnsetRun:

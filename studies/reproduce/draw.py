@@ -13,8 +13,7 @@ from ...figures.packing import draw_packing
 from ...figures.pair import PairCurve, draw_pair
 from ...figures.series import begin_at_noise, draw_series, few_decades
 from ...figures.style import save, styled
-from ..triggering.draw import figures as draw_triggering
-from .compute import GrowthRun, TriggeringRun
+from .compute import GrowthRun
 
 
 def figures(curves: Sequence[PairCurve], growth: GrowthRun, output: Path) -> None:
@@ -32,12 +31,6 @@ def figures(curves: Sequence[PairCurve], growth: GrowthRun, output: Path) -> Non
         measured_rate=measured.rate,
     )
     save(figure, output / "figure4")
-
-
-def triggering_figures(run: TriggeringRun, mu: float, output: Path) -> None:
-    """The paper's figures 2, 5 and 6, and those of the response, if there was anything to trigger."""
-    if run.triggering is not None and run.sensitive is not None:
-        draw_triggering(run.triggering, run.sensitive, mu, output)
 
 
 @styled

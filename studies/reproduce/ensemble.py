@@ -7,8 +7,7 @@ shares, intervals and distributions.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,47 +21,14 @@ from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.refusals import needed
 from ..statistics import quartiles, share
-from ..sweep.compute import Progress, Say, run_sweep
+from ..sweep.compute import Progress, Row, Say, run_sweep
 from ..sweep.points import Sweep
 from ..sweep.tasks import TASKS
-from ..sweep.triggering import Eruption, RampEnd, economical, frictions
+from ..sweep.triggering import economical, frictions, grows, rise
 from .ensemble_figure import ensemble_figure
 
 RISES = (5, 10)
 """Rises in decades whose shares are given; the paper's figure 5 has 12."""
-
-
-@dataclass(frozen=True)
-class Member:
-    """What was found for one packing: a row of the sweep.
-
-    Attributes
-    ----------
-    seed : int
-        Of its loose start.
-    ramps, lowered, eruption
-        As the task "triggering" has them.
-    says : str or None
-        What went wrong, if something did; what is there then was found before.
-    seconds : float
-        Wall time.
-    """
-
-    seed: int
-    ramps: tuple[RampEnd, ...] = ()
-    lowered: bool | None = None
-    eruption: Eruption | None = None
-    says: str | None = None
-    seconds: float = 0.0
-
-    @classmethod
-    def from_row(cls, row: dict[str, Any]) -> Member:
-        """A member from a row of results.jsonl."""
-        found = row["result"]
-        ramps = tuple(RampEnd(**each) for each in found.get("ramps", ()))
-        eruption = Eruption(**found["eruption"]) if found.get("eruption") else None
-        seed = row["values"]["packing.seed"]
-        return cls(seed, ramps, found.get("lowered"), eruption, row["says"], row["seconds"])
 
 
 def ensemble(
@@ -108,80 +74,83 @@ def ensemble(
     )
     if not rows:
         return {}
-    found = [Member.from_row(row) for row in rows]
-    result = summary(scene, found)
+    result = summary(scene, rows)
     write_text(output / "ensemble.json", json.dumps(result, indent=1) + "\n")
     with spared(f"{output}/ensemble.png", say):
-        ramps, eruptions = [member.ramps for member in found], [member.eruption for member in found]
-        save(ensemble_figure(ramps, eruptions), output / "ensemble")
+        save(ensemble_figure([row["result"] for row in rows]), output / "ensemble")
     for line in lines(__package__ or "", "ensemble.j2", result=result):
         say(line)
     return result
 
 
-def _told(rows: Iterable[dict[str, Any]], say: Say) -> Iterator[dict[str, Any]]:
+def _told(rows: Iterable[Row], say: Say) -> Iterator[Row]:
     for row in rows:
-        say(sentence(Member.from_row(row)))
+        say(sentence(row))
         yield row
 
 
-def summary(scene: Scene, members: list[Member]) -> dict[str, Any]:
-    """Numbers for ensemble.json."""
-    ramped = [member for member in members if len(member.ramps) == len(frictions(scene))]
-    eruptions = [member.eruption for member in ramped if member.eruption is not None]
-    rises, controls = [each.rise for each in eruptions], [each.control_rise for each in eruptions]
-    decided = [member.lowered for member in ramped if member.lowered is not None]
+def summary(scene: Scene, rows: list[Row]) -> dict[str, Any]:
+    """Numbers for ensemble.json, from the rows of the sweep."""
+    count = len(frictions(scene))
+    ramped = [row["result"] for row in rows if len(row["result"].get("ramps", ())) == count]
+    eruptions = [each["eruption"] for each in ramped if each["eruption"]]
+    rises, controls = ([rise(each, of) for each in eruptions] for of in ("weakening", "control"))
+    decided = [each["lowered"] for each in ramped if each["lowered"] is not None]
     return {
         "scene": scene.resolved(),
-        "seeds": sorted(member.seed for member in members),
-        "failed": [{"seed": each.seed, "says": each.says} for each in members if each.says is not None],
-        "onsets": [_onset_summary([member.ramps[k] for member in ramped]) for k in range(len(frictions(scene)))]
-        if ramped
-        else [],
+        "seeds": sorted(map(_seed, rows)),
+        "failed": [{"seed": _seed(row), "says": row["says"]} for row in rows if row["says"] is not None],
+        "onsets": [_onset_summary(ends) for ends in zip(*(each["ramps"] for each in ramped), strict=True)],
         "lowered": share(sum(decided), len(decided)),
         "lowered_unknown": len(ramped) - len(decided),
-        "rises": {str(decades): share(sum(rise >= decades for rise in rises), len(rises)) for decades in RISES},
-        "control_rises": {
-            str(decades): share(sum(rise >= decades for rise in controls), len(controls)) for decades in RISES
-        },
+        "rises": _rises(rises),
+        "control_rises": _rises(controls),
         "rise_quartiles": _quartiles(rises),
         "control_rise_quartiles": _quartiles(controls),
-        "unstable_when_weakened": share(sum(each.rate > 0 for each in eruptions), len(eruptions)),
-        "grows": share(sum(each.grows for each in eruptions), len(eruptions)),
+        "unstable_when_weakened": share(sum(each["rate"] > 0 for each in eruptions), len(eruptions)),
+        "grows": share(sum(map(grows, eruptions)), len(eruptions)),
     }
+
+
+def _seed(row: Row) -> int:
+    return int(row["values"]["packing.seed"])
+
+
+def _rises(values: list[float]) -> dict[str, Any]:
+    return {str(decades): share(sum(each >= decades for each in values), len(values)) for decades in RISES}
 
 
 def _quartiles(values: list[float]) -> list[float] | None:
     return np.quantile(values, [0.25, 0.5, 0.75]).tolist() if values else None
 
 
-def _onset_summary(ends: list[RampEnd]) -> dict[str, Any]:
+def _onset_summary(ramps: Sequence[Row]) -> dict[str, Any]:
+    ends, found = [each["ends"] for each in ramps], [each["ends"] == "onset" for each in ramps]
     return {
-        "mu": ends[0].mu,
-        "found": share(sum(end.ends == "onset" for end in ends), len(ends)),
-        "none_until": sum(end.ends == "until" for end in ends),
-        "flows": sum(end.ends == "flows" for end in ends),
-        "quartiles": quartiles([end.reach for end in ends], [end.ends == "onset" for end in ends]),
+        "mu": ramps[0]["mu"],
+        "found": share(sum(found), len(found)),
+        "none_until": ends.count("until"),
+        "flows": ends.count("flows"),
+        "quartiles": quartiles([each["reach"] for each in ramps], found),
     }
 
 
-def sentence(member: Member) -> str:
+def sentence(row: Row) -> str:
     """What was found for one packing, in one line."""
-    parts = [
-        f"mu = {end.mu:g}: "
-        + {
-            "onset": f"F_x^c = {with_uncertainty(end.reach, end.error or 0.0)}",
-            "until": f"no onset up to {end.reach:g}",
-            "flows": f"no onset, flows beyond {end.reach:g}",
-        }[end.ends]
-        for end in member.ramps
-    ]
-    if member.eruption is not None:
-        found = member.eruption
+    parts = []
+    for end in row["result"].get("ramps", ()):
+        words = {
+            "onset": f"F_x^c = {with_uncertainty(end['reach'], end['error'] or 0.0)}",
+            "until": f"no onset up to {end['reach']:g}",
+            "flows": f"no onset, flows beyond {end['reach']:g}",
+        }
+        parts.append(f"mu = {end['mu']:g}: {words[end['ends']]}")
+    found = row["result"].get("eruption")
+    if found:
         parts.append(
-            f"D rises {found.rise:.1f} decades at {found.fx:.6g} (control: {found.control_rise:.1f}) and "
-            f"{'grows' if found.grows else 'does not grow'} after its jump"
+            f"D rises {rise(found):.1f} decades at {found['fx']:.6g} (control: {rise(found, 'control'):.1f}) and "
+            f"{'grows' if grows(found) else 'does not grow'} after its jump"
         )
-    if member.says is not None:
-        parts.append(f"failed: {member.says}")
-    return f"seed {member.seed}: {'; '.join(parts)} ({member.seconds:.0f} s)"
+    if row["says"] is not None:
+        parts.append(f"failed: {row['says']}")
+    return f"seed {_seed(row)}: {'; '.join(parts)} ({row['seconds']:.0f} s)"

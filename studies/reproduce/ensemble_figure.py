@@ -11,22 +11,18 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ...figures.style import INK, STYLE
-from ..statistics import distribution
-from ..sweep.triggering import Eruption, RampEnd
-
-Ramps = tuple[RampEnd, ...]
+from ..statistics import course
+from ..sweep.triggering import Row, grows, rise
 
 
 @matplotlib.rc_context(fname=STYLE)
-def ensemble_figure(ramped: Sequence[Ramps], erupted: Sequence[Eruption | None]) -> Figure:
+def ensemble_figure(found: Sequence[Row]) -> Figure:
     """Onsets of an ensemble, both friction coefficients against each other, and the rise of D.
 
     Parameters
     ----------
-    ramped : sequence of tuple of RampEnd
-        How the ramps of each packing end; packings without any are not drawn.
-    erupted : sequence of Eruption or None
-        Their undamped runs.
+    found : sequence of dict
+        Results of the task "triggering"; packings without any ramp are not drawn.
 
     Returns
     -------
@@ -38,23 +34,21 @@ def ensemble_figure(ramped: Sequence[Ramps], erupted: Sequence[Eruption | None])
     """
     figure = Figure(figsize=(3.4, 6.0), layout="constrained")
     onsets, pairs, rises = figure.subplots(3, 1, height_ratios=(1, 1.5, 1))
-    mus = list(dict.fromkeys(end.mu for ramps in ramped for end in ramps))
+    ramped = [ramps for each in found if (ramps := each.get("ramps"))]
+    mus = list(dict.fromkeys(end["mu"] for ramps in ramped for end in ramps))
     for number, mu in enumerate(mus):
-        ends = [end for ramps in ramped for end in ramps if end.mu == mu]
-        fx, probability = distribution([end.reach for end in ends], [end.ends == "onset" for end in ends])
-        levels = np.concatenate([[0.0], probability])
-        places = np.concatenate([[0.0], fx, [max(end.reach for end in ends)]])
-        curve = np.append(levels, levels[-1])
-        onsets.step(places, curve, where="post", color=f"C{number}", label=rf"$\mu = {mu:g}$")
-        lost = np.array([end.reach for end in ends if end.ends != "onset"])
-        onsets.plot(lost, levels[np.searchsorted(fx, lost, side="right")], "|", color=f"C{number}")
+        ends = [end for ramps in ramped for end in ramps if end["mu"] == mu]
+        places, levels = course([end["reach"] for end in ends], [end["ends"] == "onset" for end in ends])
+        onsets.step(places, levels, where="post", color=f"C{number}", label=rf"$\mu = {mu:g}$")
+        lost = np.array([end["reach"] for end in ends if end["ends"] != "onset"])
+        onsets.plot(lost, levels[np.searchsorted(places[1:-1], lost, side="right")], "|", color=f"C{number}")
     onsets.set(xlabel="$F_x^c$", ylabel="share of packings", ylim=(0, 1))
     if mus:
         onsets.legend()
-    _draw_pairs(pairs, [each for each in zip(ramped, erupted, strict=True) if len(each[0]) > 1])
-    eruptions = [each for each in erupted if each is not None]
+    _draw_pairs(pairs, [each for each in found if len(each.get("ramps", ())) > 1])
+    eruptions = [each["eruption"] for each in found if each.get("eruption")]
     if eruptions:
-        decades = [[each.rise for each in eruptions], [each.control_rise for each in eruptions]]
+        decades = [[rise(each, of) for each in eruptions] for of in ("weakening", "control")]
         edges = np.arange(np.floor(np.min(decades)), np.max(decades) + 0.5, 0.5)
         # outlines over each other: bars side by side would stand off their values
         for values, label, color in zip(decades, ("in the window", "control"), ("C0", "C1"), strict=True):
@@ -67,19 +61,20 @@ def ensemble_figure(ramped: Sequence[Ramps], erupted: Sequence[Eruption | None])
     return figure
 
 
-def _draw_pairs(axes: Axes, packings: list[tuple[Ramps, Eruption | None]]) -> None:
+def _draw_pairs(axes: Axes, packings: list[Row]) -> None:
     """Onsets with the weakened friction over those with the first; triangles where one is known to lie beyond."""
     most = 0.0
-    for ramps, eruption in packings:
-        strong, weak = ramps[0], ramps[-1]
-        if strong.fx_c is None and weak.fx_c is None:
+    for each in packings:
+        strong, weak = each["ramps"][0], each["ramps"][-1]
+        known = [end["ends"] == "onset" for end in (strong, weak)]
+        if not any(known):
             continue
-        most = max(most, strong.reach, weak.reach)
-        marker = ">" if strong.fx_c is None else "^" if weak.fx_c is None else "o"
-        face = "C0" if eruption is not None and eruption.grows else "none"
-        axes.plot(strong.reach, weak.reach, marker, color="C0", markerfacecolor=face, markeredgewidth=0.7)
+        most = max(most, strong["reach"], weak["reach"])
+        marker = "o" if all(known) else "^" if known[0] else ">"
+        face = "C0" if each["eruption"] and grows(each["eruption"]) else "none"
+        axes.plot(strong["reach"], weak["reach"], marker, color="C0", markerfacecolor=face, markeredgewidth=0.7)
     axes.axline((0, 0), slope=1, color=INK, linewidth=0.6, linestyle=":")
     axes.set(xlim=(0, 1.05 * most or 1), ylim=(0, 1.05 * most or 1), aspect="equal")
     if packings:
-        strong, weak = packings[0][0][0], packings[0][0][-1]
-        axes.set(xlabel=rf"$F_x^c(\mu = {strong.mu:g})$", ylabel=rf"$F_x^c(\mu = {weak.mu:g})$")
+        strong, weak = packings[0]["ramps"][0], packings[0]["ramps"][-1]
+        axes.set(xlabel=rf"$F_x^c(\mu = {strong['mu']:g})$", ylabel=rf"$F_x^c(\mu = {weak['mu']:g})$")

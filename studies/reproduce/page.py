@@ -9,7 +9,7 @@ from ...figures.pages import render
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
 from ...pywrap.scenes.units import dashpot, quality_factor, real_units
-from ..triggering import column
+from ..triggering.compute import largest
 from ..triggering.page import section
 from .compute import GrowthRun, TriggeringRun
 
@@ -50,9 +50,9 @@ def report(scene: Scene, runs: list[OnsetRun], growth: GrowthRun, triggered: Tri
 def _triggering(triggered: TriggeringRun | None) -> str:
     if triggered is None:
         return ""
-    if triggered.triggering is None or triggered.sensitive is None:
+    if triggered.triggering is None:
         return f"## Triggering\n\n{triggered.says}\n\n"
-    return section(triggered.triggering, triggered.sensitive, triggered.scene, triggered.onsets[0].mu)
+    return section(triggered.triggering)
 
 
 def _in_si(scene: Scene, growth: GrowthRun, triggered: TriggeringRun | None) -> dict[str, Any]:
@@ -73,5 +73,5 @@ def _in_si(scene: Scene, growth: GrowthRun, triggered: TriggeringRun | None) -> 
         velocity = units.si("impact_velocity") / real.velocity(1.0)
         found["dashpot"] = dashpot(scene.law.kn, units.restitution, 1.0, velocity)
     if triggered is not None and triggered.triggering is not None and triggered.scene is scene:
-        found |= {"wave": triggered, "erupted": float(column(triggered.triggering.erupting, "msd").max())}
+        found |= {"wave": triggered, "erupted": largest(triggered.triggering.erupting)}
     return found

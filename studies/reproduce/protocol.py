@@ -12,8 +12,9 @@ from ...analysis.files.wholefile import make_folder, write_text
 from ...figures.style import spared
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
+from ..triggering.draw import figures as triggering_figures
 from .compute import growth_run, onsets_of, pair_curve, recorded_ramp, summary_of, triggering_run
-from .draw import figures, triggering_figures
+from .draw import figures
 from .page import report
 
 Say = Callable[[str], None]
@@ -55,9 +56,10 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
         path = output / ("run.h5" if triggered is None else "triggered.h5")
         onsets = runs if triggered is None else _ramps(triggered, path, say)
         say(f"triggering at F_x = {shaken.perturb.fx:g}")
-        found = triggering_run(shaken, shaken.perturb, shaken.friction, onsets, path)
-        with spared("a figure of the triggering", say):
-            triggering_figures(found, onsets[0].mu, output)
+        found = triggering_run(shaken, onsets, path)
+        if found.triggering is not None:
+            with spared("a figure of the triggering", say):
+                triggering_figures(found.triggering, output)
         summary["triggering"] = found.as_dict()
         if triggered is not None:
             summary["triggering"] |= {"scene": triggered.resolved(), "onsets": onsets_of(onsets)}

@@ -15,13 +15,12 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import IO
 
 from mpi4py import MPI
 
 from ...analysis.files.wholefile import make_folder, write_text
 from ...pywrap import SceneError
-from ..rows import complete_lines
+from .. import rows
 from .examine import Row
 from .points import Sweep, shard
 from .table import write_tables
@@ -85,34 +84,24 @@ def run_sweep(
             missing = [point for point in points if point.key not in known]
             if len(missing) < len(points):
                 say(f"{len(points) - len(missing)} of {len(points)} points are in {output / LINES} already")
-            with (output / LINES).open("a") as file, closing(computed(pool, sweep.task, missing)) as rows:
-                for row in progress(_kept(rows, file), len(missing)):
+            with closing(computed(pool, sweep.task, missing)) as ended:
+                for row in progress(_kept(ended, output / LINES), len(missing)):
                     known[row["key"]] = row
             table = [known[point.key] for point in points]
             write_tables(table, sweep.names, output)
     return table
 
 
-def _kept(rows: Iterable[Row], file: IO[str]) -> Iterator[Row]:
+def _kept(ended: Iterable[Row], path: Path) -> Iterator[Row]:
     """The rows, each in the file before it is handed on."""
-    for row in rows:
-        file.write(json.dumps(row) + "\n")
-        file.flush()
+    for row in ended:
+        rows.append(path, row)
         yield row
 
 
 def stored(path: Path) -> dict[str, Row]:
-    """The rows of results.jsonl by key. A last line that a kill has cut short is taken off the file."""
-    rows = {}
-    for number, line in enumerate(complete_lines(path), 1):
-        try:
-            row = json.loads(line)
-            rows[row["key"]] = row
-        except (ValueError, KeyError, TypeError):
-            raise SceneError(
-                f"{path}: line {number} is no result of a sweep: take it out, or give another folder"
-            ) from None
-    return rows
+    """The rows of results.jsonl by key."""
+    return {row["key"]: row for row in rows.stored(path, "key", "a sweep")}
 
 
 @contextmanager

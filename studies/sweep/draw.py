@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...figures.style import save, spared, styled
-from ..statistics import distribution
+from ..statistics import course
 from .table import Row
 
 SEED = "packing.seed"
@@ -60,9 +60,7 @@ def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
     share, *panels = figure.subplots(1 + len(keys), 1, squeeze=False)[:, 0]
     reach = np.array([each for _, (each, _) in found])
     onset = np.array([each for _, (_, each) in found])
-    fx, probability = distribution(reach, onset)
-    levels = [0.0, *probability]
-    share.step([0.0, *fx, reach.max()], [*levels, levels[-1]], where="post")
+    share.step(*course(reach, onset), where="post")
     share.set(xlabel="$F_x$", ylabel="share with an onset", xlim=(0, None), ylim=(0, 1))
     for axes, key in zip(panels, keys, strict=True):
         place = _places(axes, key, [row for row, _ in found])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 from ...pywrap import Scene
 from ..eruptions.compute import erupt
 from ..eruptions.study import starts_of
-from ..trigger.compute import bisected, chosen, equilibria, frequencies, predictions, settings, threshold, waves
-from .onset import Start, onset
+from ..packings import Start
+from ..trigger.compute import bisected, chosen, equilibria, frequencies, middle, predictions, settings, threshold, waves
+from .onset import onset
 
 
 def trigger(scene: Scene, start: Start) -> dict[str, Any]:
@@ -32,8 +32,8 @@ def trigger(scene: Scene, start: Start) -> dict[str, Any]:
     return {
         "ends": "onset",
         "fx_c": first["fx_c"],
-        "map": [asdict(each) for each in predicted],
-        "measured": [asdict(each) | {"amplitude": each.amplitude} for each in measured],
+        "map": predicted,
+        "measured": [each | {"amplitude": middle(each["below"], each["above"])} for each in measured],
     }
 
 
@@ -46,5 +46,5 @@ def eruptions(scene: Scene, _: Start) -> dict[str, Any]:
         If the scene has no section [ramp] or [eruptions].
     """
     starts, flows_beyond = starts_of(scene)
-    runs = [erupt(each).as_dict() for each in starts]
+    runs = [erupt(each) for each in starts]
     return {"runs": [{k: v for k, v in run.items() if k != "series"} for run in runs], "flows_beyond": flows_beyond}

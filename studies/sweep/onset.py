@@ -18,12 +18,10 @@ residual. How F_x^c depends on the increments of the ramp is not in it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
-from mpi4py import MPI
 from scipy.linalg import eigh, eigvals
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
@@ -31,17 +29,12 @@ from ...analysis.onset import force_bearing, full_operator, seeks_all
 from ...analysis.packing.packing import Floats
 from ...analysis.spectrum.eigenpairs import eigenpairs
 from ...analysis.spectrum.spectrum import active_coordinates
-from ...pywrap import Engine, Equilibrium, Scene, SceneError
+from ...pywrap import Scene, SceneError
 from ...pywrap.runs.path import EquilibriumPath, loads
 from ...pywrap.scenes.refusals import needed
+from ..packings import Start, pairs, path_from, sliding
 
 Ends = Literal["onset", "until", "flows"]
-
-Start = Callable[[float], Equilibrium]
-"""mu -> the settled packing of the scene with this friction coefficient."""
-
-AT_LIMIT = 1 - 1e-9
-"""Share of the slip limit from which a contact slides: it is clamped to the limit, to rounding."""
 
 BESIDE = 1e-7
 """Distance below the onset at which the pair is looked at, in units of F_x^c: its eigenvectors have an angle of about
@@ -62,8 +55,7 @@ def onset(scene: Scene, start: Start) -> dict[str, Any]:
     if len(scene.law.mus) > 1:
         raise SceneError('a row has one friction coefficient: give the list as "law.mu" below [sweep]')
     rest = start(scene.law.mus[0])
-    with Engine(rest.packing, MPI.COMM_SELF) as engine:
-        path = EquilibriumPath(engine, rest, scene)
+    with path_from(rest, scene) as path:
         ends, reach, found = first_window(path, scene)
         row: dict[str, Any] = {"ends": ends, "fx_c": None, "reach": reach}
         row |= {"contacts": len(rest.packing.contacts), "rattlers": len(rest.packing.rattlers)}
@@ -111,15 +103,13 @@ def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
     vector = near.right[:, 0].real / np.linalg.norm(near.right[:, 0].real)
     axes = vector.reshape(3, -1) ** 2
     weight = axes.sum(axis=0)
-    before = {(i, j) for i, j in zip(rest.contacts.i.tolist(), rest.contacts.j.tolist(), strict=True)}
-    now = {(i, j) for i, j in zip(packing.contacts.i.tolist(), packing.contacts.j.tolist(), strict=True)}
-    slip, limit = np.abs(packing.contacts.slip), packing.law.slip_limit(packing.geometry.overlap)
+    before, now = pairs(rest), pairs(packing)
     row: dict[str, Any] = {
         "participation": float(1 / np.sum(weight**2)),
         "rotation": float(axes[2].sum()),
         "layer": float(weight[packing.top].sum()),
         "disks": np.argsort(weight)[::-1][:3].tolist(),
-        "sliding": int(np.count_nonzero(slip >= AT_LIMIT * limit)),
+        "sliding": int(np.count_nonzero(sliding(packing))),
         "opened": len(before - now),
         "closed": len(now - before),
     }

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
+from io import StringIO
 from pathlib import Path
 from typing import Any
+
+from ...analysis.files.wholefile import write_text
 
 Row = dict[str, Any]
 
@@ -51,17 +53,21 @@ def write_tables(rows: list[Row], names: list[str], folder: Path) -> None:
     """
     columns = columns_of(rows, names)
     table = [row["values"] | flat(row["result"]) | {"says": row["says"]} for row in rows]
-    unfinished = folder / "results.csv.part"
-    with unfinished.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows([_cell(row.get(column)) for column in columns] for row in table)
-    os.replace(unfinished, folder / "results.csv")
+    write_csv(folder / "results.csv", columns, table)
     if find_spec("pandas") and find_spec("pyarrow"):
         import pandas as pd
 
         frame = pd.DataFrame([{column: _plain(row.get(column)) for column in columns} for row in table])
         frame.to_parquet(folder / "results.parquet")
+
+
+def write_csv(path: Path, columns: Sequence[str], table: Iterable[Row]) -> None:
+    """Write some columns of rows; the file is replaced as a whole."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_cell(row.get(column)) for column in columns] for row in table)
+    write_text(path, text.getvalue())
 
 
 def _cell(value: Any) -> Any:

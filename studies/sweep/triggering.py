@@ -20,14 +20,13 @@ the middle of the window, or grow too slowly for the length of the run; so the r
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError, Packing, spectrum
-from ...analysis.packing.packing import Floats
 from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening
 from ...pywrap.onset.path_error import with_path_error
@@ -35,8 +34,11 @@ from ...pywrap.runs.path import EquilibriumPath
 from ...pywrap.runs.undamped import perturb
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction, Perturb
-from ..triggering import GROWTH_FACTOR, calibrated, column, equilibrium_at, jump
-from .onset import Ends, Start, first_window
+from ..packings import Start
+from ..triggering.compute import GROWTH_FACTOR, calibrated, equilibrium_at, jump, largest
+from .onset import first_window
+
+Row = dict[str, Any]
 
 FINEST_STEP = 1e-3
 """Increment of F_x below which a ramp only costs: onsets are solved for, and come out the same."""
@@ -45,85 +47,27 @@ LONGEST_TIME = 200.0
 """Length of the undamped runs, time, at the most: with 100 disks, four of them take some 30 s."""
 
 
-@dataclass(frozen=True)
-class RampEnd:
-    """What a ramp of one packing met first.
-
-    Attributes
-    ----------
-    mu : float
-        Friction coefficient.
-    ends : {"onset", "until", "flows"}
-        A window of complex eigenvalues; the last F_x of the scene; no equilibrium beyond `reach`.
-    reach : float
-        Largest F_x up to which there is no window, force per disk of the upper layer: the onset, if there is one.
-    error : float or None
-        Uncertainty of the onset.
-    """
-
-    mu: float
-    ends: Ends
-    reach: float
-    error: float | None = None
-
-    @property
-    def fx_c(self) -> float | None:
-        """The onset, if there is one."""
-        return self.reach if self.ends == "onset" else None
+def rise(eruption: Row, of: str = "weakening") -> float:
+    """Decades between the largest D of the perturbed run and of the one with mu(v), or of the "control"."""
+    return float(np.log10(eruption[of] / eruption["perturbed"]))
 
 
-@dataclass(frozen=True)
-class Eruption:
-    """The runs from the middle of the window and the control, in numbers.
-
-    Attributes
-    ----------
-    fx, fx_control : float
-        The middle of the window, and the control below it, force per disk of the upper layer.
-    rate : float
-        Growth rate of D with the weakened friction at fx, from the spectrum, 1 / time; 0 if it is stable.
-    unperturbed, perturbed, weakening, control : float
-        Largest D, length^2: of the three runs at fx, and with mu(v) at fx_control.
-    jump : float
-        Largest D of the run with mu(v) in its first part, `JUMP_SHARE`.
-    """
-
-    fx: float
-    fx_control: float
-    rate: float
-    unperturbed: float
-    perturbed: float
-    weakening: float
-    control: float
-    jump: float
-
-    @property
-    def rise(self) -> float:
-        """Decades between the largest D of the perturbed run and of the one with mu(v)."""
-        return float(np.log10(self.weakening / self.perturbed))
-
-    @property
-    def control_rise(self) -> float:
-        """The same with the control in place of the run with mu(v)."""
-        return float(np.log10(self.control / self.perturbed))
-
-    @property
-    def grows(self) -> bool:
-        """Whether D goes on to grow after the jump."""
-        return self.weakening >= GROWTH_FACTOR * self.jump
+def grows(eruption: Row) -> bool:
+    """Whether D goes on to grow after the jump."""
+    return bool(eruption["weakening"] >= GROWTH_FACTOR * eruption["jump"])
 
 
-def triggering(scene: Scene, start: Start) -> dict[str, Any]:
+def triggering(scene: Scene, start: Start) -> Row:
     """The task itself; what goes wrong is under "says", beside what was found before.
 
     Returns
     -------
     dict
-        ramps : list of `RampEnd` as dicts, one for each friction coefficient, the scene's first one first and what it
-        weakens to last; lowered : whether weakening friction lowers the onset, None if that cannot be known; eruption :
-        `Eruption` as a dict, None without a window between the two onsets, or without [perturb] in the scene.
+        ramps : what `first_onset` finds for each friction coefficient, the scene's first one first and what it weakens
+        to last; lowered : whether weakening friction lowers the onset, None if that cannot be known; eruption : what
+        `eruption` finds, None without a window between the two onsets, or without [perturb] in the scene.
     """
-    row: dict[str, Any] = {"ramps": [], "lowered": None, "eruption": None}
+    row: Row = {"ramps": [], "lowered": None, "eruption": None}
     needed(scene.ramp, "ramp")
     try:
         for found in _examination(scene, start):
@@ -133,23 +77,23 @@ def triggering(scene: Scene, start: Start) -> dict[str, Any]:
     return row
 
 
-def _examination(scene: Scene, start: Start) -> Iterator[dict[str, Any]]:
+def _examination(scene: Scene, start: Start) -> Iterator[Row]:
     """What is found in each stage, so that a stage that fails takes nothing along."""
-    ramps: list[RampEnd] = []
+    ramps: list[Row] = []
     paths: list[tuple[Equilibrium, ...]] = []
     for mu in frictions(scene):
         end, path = first_onset(scene, mu, start)
         paths.append(path)
         ramps.append(end)
-        yield {"ramps": [asdict(each) for each in ramps]}
+        yield {"ramps": [*ramps]}
     if len(ramps) < 2:
         return
     strong, weak = ramps[0], ramps[-1]
     lowered = lowers(strong, weak)
     yield {"lowered": lowered}
-    if lowered and strong.fx_c is not None and scene.perturb is not None and scene.friction is not None:
-        window = weak.reach, strong.fx_c
-        yield {"eruption": asdict(eruption(scene, paths[0], window, scene.perturb, scene.friction))}
+    if lowered and strong["ends"] == "onset" and scene.perturb is not None and scene.friction is not None:
+        window = weak["reach"], strong["reach"]
+        yield {"eruption": eruption(scene, paths[0], window, scene.perturb, scene.friction)}
 
 
 def frictions(scene: Scene) -> tuple[float, ...]:
@@ -161,17 +105,26 @@ def frictions(scene: Scene) -> tuple[float, ...]:
     return (*(mu for mu in scene.law.mus if not np.isclose(mu, weak, rtol=1e-12, atol=0.0)), weak)
 
 
-def first_onset(scene: Scene, mu: float, start: Start) -> tuple[RampEnd, tuple[Equilibrium, ...]]:
-    """Where the ramp of a scene first has a complex pair for one friction coefficient, and its equilibria up to
-    there."""
+def first_onset(scene: Scene, mu: float, start: Start) -> tuple[Row, tuple[Equilibrium, ...]]:
+    """What the ramp of a scene meets first for one friction coefficient, and its equilibria up to there.
+
+    Returns
+    -------
+    row : dict
+        mu; ends : "onset", a window of complex eigenvalues, "until", the last F_x of the scene, or "flows", no
+        equilibrium beyond `reach`; reach : the largest F_x up to which there is no window, force per disk of the upper
+        layer: the onset, if there is one; error : uncertainty of the onset, or None.
+    path : tuple of Equilibrium
+    """
     rest = start(mu)
     with Engine(rest.packing, MPI.COMM_SELF) as engine:
         path = EquilibriumPath(engine, rest, scene)
         ends, reach, found = first_window(path, scene)
-        if found is None:
-            return RampEnd(mu, ends, reach), tuple(path.kept)
-        whole = with_path_error(found, engine, path, scene)
-        return RampEnd(mu, ends, whole.fx_c, whole.error), tuple(path.kept)
+        error = None
+        if found is not None:
+            whole = with_path_error(found, engine, path, scene)
+            reach, error = whole.fx_c, whole.error
+        return {"mu": mu, "ends": ends, "reach": reach, "error": error}, tuple(path.kept)
 
 
 def economical(scene: Scene) -> Scene:
@@ -185,12 +138,12 @@ def economical(scene: Scene) -> Scene:
     return scene.model_copy(update=changes)
 
 
-def lowers(strong: RampEnd, weak: RampEnd) -> bool | None:
+def lowers(strong: Row, weak: Row) -> bool | None:
     """Whether the onset with weakened friction is the lower one; None if both may be."""
-    if weak.fx_c is not None and weak.reach < strong.reach:
+    if weak["ends"] == "onset" and weak["reach"] < strong["reach"]:
         return True
     # the weak one has none up to there, or a later one
-    return False if strong.fx_c is not None and strong.reach <= weak.reach else None
+    return False if strong["ends"] == "onset" and strong["reach"] <= weak["reach"] else None
 
 
 def eruption(
@@ -199,35 +152,39 @@ def eruption(
     window: tuple[float, float],
     settings: Perturb,
     friction: Friction,
-) -> Eruption:
-    """The runs in a window between two onsets, and the control; path leads up to the upper one."""
+) -> Row:
+    """The runs in a window between two onsets, and the control; path leads up to the upper one.
+
+    Returns
+    -------
+    dict
+        fx, fx_control : the middle of the window, and the control below it, force per disk of the upper layer; rate :
+        growth rate of D with the weakened friction at fx, from the spectrum, 1 / time, 0 if it is stable; unperturbed,
+        perturbed, weakening, control : largest D, length^2, of the three runs at fx, and with mu(v) at fx_control;
+        jump : largest D of the run with mu(v) in its first part, `JUMP_SHARE`.
+    """
     middle = 0.5 * (window[0] + window[1])
     loads = middle, max(0.0, 2 * window[0] - middle)
     start, below = (equilibrium_at(scene, path, fx, MPI.COMM_SELF) for fx in loads)
 
-    def msd(start: Equilibrium, weakening: Weakening | None) -> Floats:
-        return column(_undamped(scene, settings, start, settings.amplitude, weakening), "msd")
+    def run(start: Equilibrium, amplitude: float, weakening: Weakening | None = None) -> tuple[Sample, ...]:
+        changes = {"fx": start.fx, "amplitude": amplitude}
+        one = scene.model_copy(update={"perturb": settings.model_copy(update=changes)})
+        return tuple(perturb(one, start, communicator=MPI.COMM_SELF, weakening=weakening))
 
-    quiet = _undamped(scene, settings, start, 0.0)
+    quiet = run(start, 0.0)
     weakening = calibrated(friction, quiet)
-    weakened = _undamped(scene, settings, start, settings.amplitude, weakening)
-    return Eruption(
-        fx=start.fx,
-        fx_control=below.fx,
-        rate=weakened_rate(start.packing, friction.mu_ss),
-        unperturbed=float(column(quiet, "msd").max()),
-        perturbed=float(msd(start, None).max()),
-        weakening=float(column(weakened, "msd").max()),
-        control=float(msd(below, weakening).max()),
-        jump=jump(weakened),
-    )
-
-
-def _undamped(
-    scene: Scene, settings: Perturb, start: Equilibrium, amplitude: float, weakening: Weakening | None = None
-) -> tuple[Sample, ...]:
-    one = scene.model_copy(update={"perturb": settings.model_copy(update={"fx": start.fx, "amplitude": amplitude})})
-    return tuple(perturb(one, start, communicator=MPI.COMM_SELF, weakening=weakening))
+    weakened = run(start, settings.amplitude, weakening)
+    return {
+        "fx": start.fx,
+        "fx_control": below.fx,
+        "rate": weakened_rate(start.packing, friction.mu_ss),
+        "unperturbed": largest(quiet),
+        "perturbed": largest(run(start, settings.amplitude)),
+        "weakening": largest(weakened),
+        "control": largest(run(below, settings.amplitude, weakening)),
+        "jump": jump(weakened),
+    }
 
 
 def weakened_rate(packing: Packing, mu_ss: float) -> float:

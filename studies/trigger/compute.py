@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -29,11 +30,14 @@ from ...analysis.motion.forcing import floor_force, impulse_response
 from ...analysis.motion.response import layer_force
 from ...analysis.packing.packing import Floats
 from ...pywrap import Engine, Scene, SceneError
-from ...pywrap.runs.path import EquilibriumPath, loads
+from ...pywrap.runs.path import loads
 from ...pywrap.runs.undamped import time_step
 from ...pywrap.scenes.study_sections import Trigger
 from ...pywrap.scenes.units import RealUnits
 from ...pywrap.settling.bed import settle
+from ..packings import path_from
+
+Row = dict[str, Any]
 
 COUNT = 24
 """Frequencies of a map whose scene names none."""
@@ -53,87 +57,17 @@ CLOSE = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class Wave:
-    """A wave on a packing, but for its amplitude.
-
-    Attributes
-    ----------
-    packing : Packing
-        The equilibrium.
-    distance : float
-        1 - F_x/F_x^c.
-    omega : float
-        Angular frequency, 1 / time.
-    time : float
-        How long it lasts.
-    on : {"layer", "floor"}
-        What it moves.
-    v0 : float
-        The threshold v_0, velocity.
-    predicted : float
-        a_c from K.
-    """
+    """A wave on a packing in equilibrium, but for its amplitude: what K says of it, how long it lasts, and v_0."""
 
     packing: Packing
-    distance: float
-    omega: float
-    time: float
-    on: str
+    expected: Row
+    given: Trigger
     v0: float
-    predicted: float
 
 
-@dataclass(frozen=True)
-class Prediction:
-    """a_c of one frequency at one distance.
-
-    Attributes
-    ----------
-    fx, distance, omega : float
-        F_x, 1 - F_x/F_x^c, and the angular frequency, 1 / time.
-    predicted : float
-        a_c: a force, or an acceleration of the floor.
-    stationary : float
-        What it were, v_0/|H(omega)|, without a transient.
-    reached : float
-        When the layer is fastest, time.
-    """
-
-    fx: float
-    distance: float
-    omega: float
-    predicted: float
-    stationary: float
-    reached: float
-
-
-@dataclass(frozen=True)
-class Measured:
-    """a_c of one frequency at one distance, bisected in LAMMPS.
-
-    Attributes
-    ----------
-    fx, distance, omega : float
-        As of `Prediction`.
-    below, above : float
-        The strongest wave that did not trigger, and the weakest that did.
-    runs : int
-        Runs of the bisection.
-    reached : float
-        When the weakest one triggered, time.
-    """
-
-    fx: float
-    distance: float
-    omega: float
-    below: float
-    above: float
-    runs: int
-    reached: float
-
-    @property
-    def amplitude(self) -> float:
-        """The middle of the bracket."""
-        return float(np.sqrt(self.below * self.above))
+def middle(below: float, above: float) -> float:
+    """Half way between two amplitudes, on a logarithmic scale."""
+    return float(np.sqrt(below * above))
 
 
 def threshold(scene: Scene) -> float:
@@ -165,8 +99,7 @@ def equilibria(scene: Scene, fx: Iterable[float]) -> dict[float, Packing]:
     assert scene.ramp is not None
     wanted = sorted(fx)
     start = settle(scene, communicator=MPI.COMM_SELF)
-    with Engine(start.packing, MPI.COMM_SELF) as engine:
-        path = EquilibriumPath(engine, start, scene)
+    with path_from(start, scene) as path:
         for load in loads(scene.ramp):
             if start.fx < load <= wanted[-1]:
                 path(float(load))
@@ -182,23 +115,30 @@ def frequencies(packing: Packing, wanted: Trigger) -> Floats:
     return np.geomspace(0.1 * slowest, modes.max(), COUNT)
 
 
-def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats) -> list[Prediction]:
-    """a_c at one distance from K, C and M."""
+def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats) -> list[Row]:
+    """a_c at one distance from K, C and M.
+
+    Returns
+    -------
+    list of dict
+        fx, distance, omega : F_x, 1 - F_x/F_x^c, and the angular frequency, 1 / time; predicted : a_c, a force, or an
+        acceleration of the floor; stationary : what it were, v_0/abs(H(omega)), without a transient; reached : when the
+        layer is fastest, time.
+    """
     wanted, v0 = settings(scene), threshold(scene)
     force = layer_force(packing, 1.0) if wanted.on == "layer" else floor_force(packing)
     response = impulse_response(packing, force)
     velocity, when = response.largest(omegas, wanted.time)
     stationary = np.abs(response.transfer(omegas))
-    return [
-        Prediction(packing.fx, distance, *(float(x) for x in row))
-        for row in zip(omegas, v0 / velocity, v0 / stationary, when, strict=True)
-    ]
+    columns = {"omega": omegas, "predicted": v0 / velocity, "stationary": v0 / stationary, "reached": when}
+    rows = (dict(zip(columns, row, strict=True)) for row in np.column_stack([*columns.values()]).tolist())
+    return [{"fx": packing.fx, "distance": distance} | row for row in rows]
 
 
-def chosen(predicted: list[Prediction], runs: int) -> list[Prediction]:
+def chosen(predicted: list[Row], runs: int) -> list[Row]:
     """So many of the map, spread over its distances and its frequencies."""
-    distances = sorted({each.distance for each in predicted}, reverse=True)
-    rows = [sorted((p for p in predicted if p.distance == d), key=lambda p: p.omega) for d in distances]
+    distances = sorted({each["distance"] for each in predicted}, reverse=True)
+    rows = [sorted((p for p in predicted if p["distance"] == d), key=lambda p: p["omega"]) for d in distances]
     share = [runs // len(rows) + (k < runs % len(rows)) for k in range(len(rows))]
     picked = []
     for k, (row, count) in enumerate(zip(rows, share, strict=True)):
@@ -208,38 +148,44 @@ def chosen(predicted: list[Prediction], runs: int) -> list[Prediction]:
     return picked
 
 
-def waves(scene: Scene, packings: Mapping[float, Packing], wanted: Iterable[Prediction]) -> list[Wave]:
+def waves(scene: Scene, packings: Mapping[float, Packing], wanted: Iterable[Row]) -> list[Wave]:
     """The waves of predictions that are to be bisected, on the packings at their loads."""
-    given, v0 = settings(scene), threshold(scene)
-    return [
-        Wave(packings[each.fx], each.distance, each.omega, given.time, given.on, v0, each.predicted) for each in wanted
-    ]
+    return [Wave(packings[each["fx"]], each, settings(scene), threshold(scene)) for each in wanted]
 
 
-def bisected(wave: Wave) -> Measured:
-    """a_c in LAMMPS, on this process alone."""
+def bisected(wave: Wave) -> Row:
+    """a_c in LAMMPS, on this process alone.
+
+    Returns
+    -------
+    dict
+        fx, distance, omega : of the wave; below, above : the strongest wave that did not trigger, and the weakest that
+        did; runs : of the bisection; reached : when the weakest one triggered, time.
+    """
     with threadpool_limits(1):
         below, above, runs, reached = _bracket(wave)
         while above / below > 1 + CLOSE and runs < MOST:
-            middle = float(np.sqrt(below * above))
-            time = _triggers(wave, middle)
+            between = middle(below, above)
+            time = _triggers(wave, between)
             runs += 1
             if time is None:
-                below = middle
+                below = between
             else:
-                above, reached = middle, time
-    return Measured(wave.packing.fx, wave.distance, wave.omega, below, above, runs, reached)
+                above, reached = between, time
+    known = {key: wave.expected[key] for key in ("fx", "distance", "omega")}
+    return known | {"below": below, "above": above, "runs": runs, "reached": reached}
 
 
 def _bracket(wave: Wave) -> tuple[float, float, int, float]:
     """An amplitude that does not trigger, one that does, runs, and when the latter triggered."""
-    below, above = wave.predicted * (1 - FIRST_BRACKET), wave.predicted * (1 + FIRST_BRACKET)
+    predicted = wave.expected["predicted"]
+    below, above = predicted * (1 - FIRST_BRACKET), predicted * (1 + FIRST_BRACKET)
     runs = 1
     while (reached := _triggers(wave, above)) is None and runs < MOST:
         below, above, runs = above, above * WIDEN, runs + 1
     if reached is None:
-        raise SceneError(f"no wave up to {above:.3g} triggers at omega = {wave.omega:g}: lower friction.v0")
-    if below < wave.predicted:
+        raise SceneError(f"no wave up to {above:.3g} triggers at omega = {wave.expected['omega']:g}: lower friction.v0")
+    if below < predicted:
         runs += 1
         while (time := _triggers(wave, below)) is not None and runs < MOST:
             below, above, reached, runs = below / WIDEN, below, time, runs + 1
@@ -249,23 +195,23 @@ def _bracket(wave: Wave) -> tuple[float, float, int, float]:
 def _triggers(wave: Wave, amplitude: float) -> float | None:
     """When a wave brings the layer above v_0; None if it does not."""
     dt = time_step(wave.packing)
-    steps = int(wave.time / dt)
-    target = None if wave.on == "layer" else range(len(wave.packing))
+    steps = int(wave.given.time / dt)
+    target = None if wave.given.on == "layer" else range(len(wave.packing))
     with (
         Engine(wave.packing, MPI.COMM_SELF) as engine,
-        engine.undamped(dt, amplitude, wave.omega, target) as dynamics,
+        engine.undamped(dt, amplitude, wave.expected["omega"], target) as dynamics,
         dynamics.halted(wave.v0),
     ):
         dynamics.advance(steps)
         return dynamics.steps * dt if dynamics.steps < steps else None
 
 
-def in_si(real: RealUnits, found: Prediction, on: str) -> dict[str, float]:
+def in_si(real: RealUnits, found: Row, on: str) -> dict[str, float]:
     """A prediction in real units: frequency, ground velocity and strain of the wave, and the ratio of stresses."""
-    velocity = real.ground_velocity(found.predicted, found.omega, on)
+    velocity = real.ground_velocity(found["predicted"], found["omega"], on)
     return {
-        "frequency_Hz": real.frequency(found.omega),
+        "frequency_Hz": real.frequency(found["omega"]),
         "ground_velocity_m_per_s": velocity,
         "strain": velocity / real.shear_wave,
-        "stress_ratio": found.fx / real.fy,
+        "stress_ratio": found["fx"] / real.fy,
     }

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
-from typing import Any
-
 from ...analysis.digits import with_uncertainty
 from ...pywrap import Scene
 from ...pywrap.scenes.refusals import needed
@@ -12,13 +9,13 @@ from ...pywrap.scenes.units import real_units
 from ..frame import Result, Study, Work
 from . import draw
 from .compute import (
-    Measured,
-    Prediction,
+    Row,
     bisected,
     chosen,
     equilibria,
     frequencies,
     in_si,
+    middle,
     predictions,
     settings,
     threshold,
@@ -35,22 +32,21 @@ def _compute(scene: Scene, work: Work) -> Result:
     """The onset, the whole map, and the bisections."""
     onset = _onset(scene, work)
     predicted = _predicted(scene, onset["fx_c"], work)
-    return summary(scene, onset, predicted, _measured(scene, predicted, work))
+    return _summary(scene, onset, predicted, _measured(scene, predicted, work))
 
 
-def summary(scene: Scene, onset: dict[str, Any], predicted: list[Prediction], measured: list[Measured]) -> Result:
+def _summary(scene: Scene, onset: Row, predicted: list[Row], measured: list[Row]) -> Result:
     """What trigger.json holds beside the scene."""
-    runs = {(each.fx, each.omega): each for each in measured}
+    runs = {(each["fx"], each["omega"]): each for each in measured}
     real = real_units(scene)
-    rows: list[dict[str, Any]] = []
+    rows: list[Row] = []
     off = []
-    for each in sorted(predicted, key=lambda p: (-p.distance, p.omega)):
-        run = runs.get((each.fx, each.omega))
-        row: dict[str, Any] = {**asdict(each), "measured": None}
+    for each in sorted(predicted, key=lambda p: (-p["distance"], p["omega"])):
+        run, row = runs.get((each["fx"], each["omega"])), each | {"measured": None}
         if run is not None:
-            more = {"below": run.below, "above": run.above, "runs": run.runs, "triggers_at": run.reached}
-            row |= {"measured": run.amplitude, **more}
-            off.append(abs(each.predicted / run.amplitude - 1))
+            row["measured"] = middle(run["below"], run["above"])
+            row |= {key: run[key] for key in ("below", "above", "runs")} | {"triggers_at": run["reached"]}
+            off.append(abs(each["predicted"] / row["measured"] - 1))
         rows.append(row if real is None else row | in_si(real, each, settings(scene).on))
     return {
         **{key: onset[key] for key in ("fx_c", "error", "undamped_fx_c")},
@@ -74,7 +70,7 @@ def _page(result: Result) -> Result:
     }
 
 
-def _onset(scene: Scene, work: Work) -> dict[str, Any]:
+def _onset(scene: Scene, work: Work) -> Row:
     """The onset from which distances count, with the scene's dissipation if it has any, and the undamped one."""
     known = work.rows.find(kind="onset")
     if known is not None:
@@ -95,7 +91,7 @@ def _onset(scene: Scene, work: Work) -> dict[str, Any]:
     return work.rows.append(kind="onset", fx_c=fx_c, error=error, undamped_fx_c=undamped)
 
 
-def _predicted(scene: Scene, fx_c: float, work: Work) -> list[Prediction]:
+def _predicted(scene: Scene, fx_c: float, work: Work) -> list[Row]:
     """The whole map, a distance at a time."""
     distances = sorted(settings(scene).distance, reverse=True)
     missing = [d for d in distances if work.rows.find(kind="predicted", distance=d) is None]
@@ -104,35 +100,32 @@ def _predicted(scene: Scene, fx_c: float, work: Work) -> list[Prediction]:
     for distance in missing:
         assert omegas is not None
         found = predictions(scene, packings[fx_c * (1 - distance)], distance, omegas)
-        work.rows.append(kind="predicted", distance=distance, found=[asdict(each) for each in found])
-        least = min(found, key=lambda each: each.predicted)
-        work.say(f"at 1 - F_x/F_x^c = {distance:g}: a_c is least, {least.predicted:.3g}, at omega = {least.omega:.4g}")
-    return [
-        Prediction(**each)
-        for row in work.rows.rows
-        if row["kind"] == "predicted" and row["distance"] in distances
-        for each in row["found"]
-    ]
+        work.rows.append(kind="predicted", distance=distance, found=found)
+        least = min(found, key=lambda each: each["predicted"])
+        work.say(
+            f"at 1 - F_x/F_x^c = {distance:g}: a_c is least, {least['predicted']:.3g}, at omega = {least['omega']:.4g}"
+        )
+    known = [row for row in work.rows.rows if row["kind"] == "predicted" and row["distance"] in distances]
+    return [each for row in known for each in row["found"]]
 
 
-def _measured(scene: Scene, predicted: list[Prediction], work: Work) -> list[Measured]:
+def _measured(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
     """The bisections, those that are in the file already and those that are not."""
     wanted = chosen(predicted, settings(scene).runs)
 
-    def known(each: Prediction) -> dict[str, Any] | None:
-        return work.rows.find(kind="measured", fx=each.fx, omega=each.omega)
+    def known(each: Row) -> Row | None:
+        return work.rows.find(kind="measured", fx=each["fx"], omega=each["omega"])
 
     missing = [each for each in wanted if known(each) is None]
     if len(missing) < len(wanted):
         work.say(f"{len(wanted) - len(missing)} of {len(wanted)} bisections are in {work.rows.path} already")
     if missing:
-        packings = equilibria(scene, {each.fx for each in wanted})  # all: the path is that of one run of the command
+        packings = equilibria(scene, {each["fx"] for each in wanted})  # all: the path is that of one run of the command
         for found in work.progress(work.share(bisected, waves(scene, packings, missing)), len(missing)):
-            work.rows.append(kind="measured", **asdict(found))
-            at = f"omega = {found.omega:.4g} at {found.distance:g}"
-            work.say(f"{at}: triggers from {found.amplitude:.4g} on in LAMMPS")
-    names = [each.name for each in fields(Measured)]
-    return [Measured(**{key: row[key] for key in names}) for each in wanted if (row := known(each)) is not None]
+            work.rows.append(kind="measured", **found)
+            at = f"omega = {found['omega']:.4g} at {found['distance']:g}"
+            work.say(f"{at}: triggers from {middle(found['below'], found['above']):.4g} on in LAMMPS")
+    return [row for each in wanted if (row := known(each)) is not None]
 
 
 trigger_map = Study(

@@ -23,22 +23,21 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from ...analysis import Growth, RunFile, fit_growth
 from ...analysis.motion.power_law import PowerLaw, fit_power_law
 from ...analysis.motion.response import Response, layer_force, linear_response
 from ...analysis.onset.pair_form import PairForm, pair_forms
+from ...analysis.packing.packing import Floats
 from ...analysis.spectrum.normal_form import LEAST_CROSSOVER
 from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening
 from ...pywrap.onset.undamped import OnsetRun
 from ...pywrap.runs.path import next_equilibrium
 from ...pywrap.runs.undamped import perturb, time_step, weakening_of
-from ...pywrap.scenes.sections import Friction, Perturb
+from ...pywrap.scenes.refusals import needed
+from ...pywrap.scenes.sections import Friction
 from .forecast import JUMP_SHARE, Forecast, forecast
-
-Floats = NDArray[np.float64]
 
 EARLY = 2000
 """Samples of each run at times that grow geometrically: the layer passes the velocities over which the friction falls
@@ -69,6 +68,8 @@ class Triggering:
 
     Attributes
     ----------
+    scene : Scene
+        With [perturb] and [friction].
     start : Equilibrium
         Linearly stable.
     weakening : Weakening
@@ -84,8 +85,11 @@ class Triggering:
         Of the linearised packing to that perturbation, time step included.
     foreseen : Forecast
         Of the run with mu(v), by linear theory.
+    sensitive : Sensitivity
+        The response on the way to the onset.
     """
 
+    scene: Scene
     start: Equilibrium
     weakening: Weakening
     unperturbed: tuple[Sample, ...]
@@ -95,6 +99,7 @@ class Triggering:
     strong: tuple[Sample, ...]
     response: Response
     foreseen: Forecast
+    sensitive: Sensitivity
 
     @property
     def deviation(self) -> float:
@@ -105,7 +110,7 @@ class Triggering:
     @property
     def rise(self) -> float:
         """Decades between the largest D of the perturbed run and of the one with mu(v)."""
-        return float(np.log10(column(self.erupting, "msd").max() / column(self.perturbed, "msd").max()))
+        return float(np.log10(largest(self.erupting) / largest(self.perturbed)))
 
     @property
     def crossing(self) -> float | None:
@@ -116,7 +121,7 @@ class Triggering:
     @property
     def growth(self) -> float:
         """Decades between the jump and the largest D of the run with mu(v)."""
-        return float(np.log10(column(self.erupting, "msd").max() / jump(self.erupting)))
+        return float(np.log10(largest(self.erupting) / jump(self.erupting)))
 
     @property
     def fitted(self) -> Growth | None:
@@ -167,6 +172,11 @@ def column(samples: tuple[Sample, ...], name: str) -> Floats:
     return np.array([getattr(sample, name) for sample in samples])
 
 
+def largest(samples: tuple[Sample, ...]) -> float:
+    """The largest D of a run, length^2."""
+    return float(column(samples, "msd").max())
+
+
 def calibrated(friction: Friction, unperturbed: tuple[Sample, ...]) -> Weakening:
     """mu(v) with the v_0 of the scene, or with the largest velocity of the layer in an unperturbed run."""
     v0 = np.abs(column(unperturbed, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
@@ -179,31 +189,23 @@ def jump(samples: tuple[Sample, ...]) -> float:
     return float(msd[time <= JUMP_SHARE * time[-1]].max())
 
 
-def trigger(
-    scene: Scene,
-    start: Equilibrium,
-    below: Equilibrium | None,
-    settings: Perturb,
-    friction: Friction,
-    path: Path,
-) -> Triggering:
+def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: OnsetRun, path: Path) -> Triggering:
     """The runs, written to run.h5 as they end, and the linear response beside the last.
 
     Parameters
     ----------
     scene : Scene
-        The scene.
+        With [perturb], the perturbation and the length of the runs, and [friction], mu(v).
     start : Equilibrium
-        At settings.fx.
+        At perturb.fx.
     below : Equilibrium or None
         Where the control starts.
-    settings : Perturb
-        The perturbation and the length of the runs.
-    friction : Friction
-        mu(v).
+    ramp : OnsetRun
+        Of the packing, with its first onset.
     path : Path
         run.h5 of the ramp; gets the series unperturbed, perturbed, erupting, control and strong.
     """
+    settings, friction = needed(scene.perturb, "perturb"), needed(scene.friction, "friction")
 
     def run(
         name: str,
@@ -234,7 +236,8 @@ def trigger(
         dt=time_step(packing, settings.time_step),
     )
     foreseen = forecast(start, packing.law.mu * friction.mu_ss, settings.time)
-    return Triggering(start, weakening, unperturbed, perturbed, erupting, control, strong, response, foreseen)
+    runs = unperturbed, perturbed, erupting, control, strong
+    return Triggering(scene, start, weakening, *runs, response, foreseen, sensitivity(ramp))
 
 
 def equilibrium_at(
@@ -258,25 +261,22 @@ def sensitivity(run: OnsetRun) -> Sensitivity:
     return Sensitivity(distance, pairs, fit_power_law(distance, [pair.amplitude() for pair in pairs]))
 
 
-def summary(triggering: Triggering, sensitive: Sensitivity) -> dict[str, Any]:
+def summary(triggering: Triggering) -> dict[str, Any]:
     """Numbers for summary.json."""
-    largest = {
-        name: float(column(getattr(triggering, name), "msd").max()) for name in ("unperturbed", "perturbed", "erupting")
-    }
+    sensitive = triggering.sensitive
+    runs = ("unperturbed", "perturbed", "erupting")
     return {
         "fx": triggering.start.fx,
         "v0": triggering.weakening.v0,
         "v_ss": triggering.weakening.v_ss,
-        "largest_D": largest,
+        "largest_D": {name: largest(getattr(triggering, name)) for name in runs},
         "rise_in_decades": triggering.rise,
         "jump": jump(triggering.erupting),
         "grows_after_the_jump": triggering.grows,
         "growth_in_decades": triggering.growth,
         "growth_after_the_jump": None if triggering.fitted is None else asdict(triggering.fitted),
         "forecast": asdict(triggering.foreseen),
-        "largest_D_of_the_control": None
-        if triggering.control is None
-        else float(column(triggering.control, "msd").max()),
+        "largest_D_of_the_control": None if triggering.control is None else largest(triggering.control),
         "linear_response_deviation": triggering.deviation,
         "smallest_mu": float(column(triggering.erupting, "friction").min()),
         "amplitude_exponent": sensitive.fit.exponent,

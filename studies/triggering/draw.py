@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from ...figures.series import draw_series, few_decades, positive
 from ...figures.style import INK, save, styled
 from . import draw_friction, draw_response
-from .compute import Sensitivity, Triggering, column
+from .compute import Triggering, column
 from .draw_response import Course
 
 UNPERTURBED, PERTURBED, WEAKENING, CONTROL = "C1", "C2", "C0", "C3"
@@ -86,10 +86,10 @@ def _name_line(axes: Axes, place: float, name: str) -> None:
     )
 
 
-def figures(triggering: Triggering, sensitive: Sensitivity, mu: float, output: Path) -> None:
+def figures(triggering: Triggering, output: Path) -> None:
     """The paper's figures 2, 5 and 6, and three of the response: in time, over the distance from the onset, and over
     damping."""
-    weak = triggering.weakening
+    weak, mu, sensitive = triggering.weakening, triggering.start.packing.law.mu, triggering.sensitive
     runs = {name: _course(triggering, name) for name in ("unperturbed", "perturbed", "erupting", "strong")}
     save(draw_friction.friction_law_figure(replace(weak, v0=0.0, v_ss=1.0), mu), output / "figure2")
     control = None if triggering.control is None else _course(triggering, "control")

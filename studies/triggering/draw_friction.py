@@ -20,10 +20,6 @@ from ...pywrap.lammps.dynamics import Weakening
 WEAKENING = "C0"
 
 
-PAPERS = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=0.0, v_ss=1.0)
-"""The paper's law; its v_0 is a matter of the packing, and its v_ss is not given."""
-
-
 def share(law: Weakening, velocity: ArrayLike) -> Floats:
     """mu / mu_0 at some velocities of the upper layer, an array of their shape."""
     v = np.asarray(velocity, dtype=float)

@@ -11,7 +11,8 @@ small against overlaps.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -64,28 +65,6 @@ class Forecast:
     rate: float
 
 
-@dataclass(frozen=True)
-class Tried:
-    """A seed, and what the rule says of it.
-
-    Attributes
-    ----------
-    seed : int
-        Of the packing.
-    says : str
-        Why it is not the one; empty for the one that is.
-    fx : float or None
-        The load, if there is an onset.
-    forecast : Forecast or None
-        There.
-    """
-
-    seed: int
-    says: str
-    fx: float | None = None
-    forecast: Forecast | None = None
-
-
 def forecast(start: Equilibrium, mu: float, time: float) -> Forecast:
     """Jump and growth of an equilibrium whose friction coefficient becomes `mu`, in a run of length `time`."""
     packing = start.packing
@@ -104,7 +83,7 @@ def forecast(start: Equilibrium, mu: float, time: float) -> Forecast:
     )
 
 
-def chosen(scene: Scene, seeds: Iterable[int]) -> Iterator[Tried]:
+def chosen(scene: Scene, seeds: Iterable[int]) -> Iterator[dict[str, Any]]:
     """Try seeds until one is found whose packing erupts, by the rule; the last one that is yielded is it.
 
     The load is a thousandth below the first onset. The rule: with the weakened friction, D grows by `LEAST_GROWTH`
@@ -120,17 +99,19 @@ def chosen(scene: Scene, seeds: Iterable[int]) -> Iterator[Tried]:
 
     Yields
     ------
-    Tried
+    dict
+        seed; says : why it is not the one, empty for the one that is; fx : the load, None if there is no onset;
+        forecast : of a run there, as a dict, or None.
     """
     for seed in seeds:
         packing = scene.packing.model_copy(update={"seed": seed})
         found = _tried(scene.model_copy(update={"packing": packing}), seed)
         yield found
-        if not found.says:
+        if not found["says"]:
             return
 
 
-def _tried(scene: Scene, seed: int) -> Tried:
+def _tried(scene: Scene, seed: int) -> dict[str, Any]:
     friction, time = needed(scene.friction, "friction"), needed(scene.perturb, "perturb").time
     mu = scene.law.mus[0]
     try:
@@ -141,8 +122,8 @@ def _tried(scene: Scene, seed: int) -> Tried:
         if not says and onset_run(scene, mu * friction.mu_ss).onset.fx_c >= fx:
             says = "the onset of the weakened friction is not below it"
     except (OnsetError, NoEquilibriumError, SceneError) as error:
-        return Tried(seed, str(error))
-    return Tried(seed, says, fx, foreseen)
+        return {"seed": seed, "says": str(error), "fx": None, "forecast": None}
+    return {"seed": seed, "says": says, "fx": fx, "forecast": asdict(foreseen)}
 
 
 def _falls_short(foreseen: Forecast) -> str:

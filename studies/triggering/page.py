@@ -5,39 +5,28 @@ from __future__ import annotations
 import numpy as np
 
 from ...figures.pages import render
-from ...pywrap import Scene
 from ...pywrap.scenes.refusals import needed
-from .compute import ABOVE_NOISE, Sensitivity, Triggering, column, jump, summary
+from .compute import ABOVE_NOISE, Triggering, column, summary
 
 
-def section(triggering: Triggering, sensitive: Sensitivity, scene: Scene, mu: float) -> str:
-    """The section, in Markdown.
-
-    Parameters
-    ----------
-    triggering, sensitive
-        What was found.
-    scene : Scene
-        With [perturb] and [friction].
-    mu : float
-        Static friction coefficient.
-    """
-    first = jump(triggering.erupting)
+def section(triggering: Triggering) -> str:
+    """The section, in Markdown."""
+    numbers = summary(triggering)
     return render(
         __package__ or "",
         "triggering.md.j2",
         triggering=triggering,
-        sensitive=sensitive,
-        settings=scene.perturb,
-        calibrated=isinstance(needed(scene.friction, "friction").v0, str),
-        mu=mu,
+        sensitive=triggering.sensitive,
+        settings=triggering.scene.perturb,
+        calibrated=isinstance(needed(triggering.scene.friction, "friction").v0, str),
+        mu=triggering.start.packing.law.mu,
         weak=triggering.weakening,
-        largest=summary(triggering, sensitive)["largest_D"],
-        lowest_mu=float(column(triggering.erupting, "friction").min()),
+        largest=numbers["largest_D"],
+        lowest_mu=numbers["smallest_mu"],
         highest_speed=float(np.abs(column(triggering.erupting, "layer_velocity")).max()),
-        jump=first,
-        jumped=float(np.log10(first / column(triggering.perturbed, "msd").max())),
-        control=None if triggering.control is None else float(column(triggering.control, "msd").max()),
+        jump=numbers["jump"],
+        jumped=float(np.log10(numbers["jump"] / numbers["largest_D"]["perturbed"])),
+        control=numbers["largest_D_of_the_control"],
         above_noise=ABOVE_NOISE,
-        half_gain=[pair.half_gain_time() / pair.tau_d for pair in sensitive.near],
+        half_gain=numbers["half_gain_time_over_tau_d"],
     )

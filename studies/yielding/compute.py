@@ -14,18 +14,18 @@ of `BOUNDS`.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from ...analysis import Packing, mean_square_displacement, nearest_image
+from ...analysis import Packing, nearest_image
 from ...analysis.motion.signals import Signal
 from ...pywrap import Engine, Equilibrium, Scene
 from ...pywrap.runs.undamped import time_step
 from ...pywrap.scenes.units import dashpot
 from ..eruptions.compute import growth_rate
 from ..modes.loss import impact_velocity, with_dashpots
-from ..sweep.onset import Start
+from ..packings import Start, distance, pairs, shake
 from .static import Branch, FailedError, branch, layer_slip, rest
 
 SHARES = (0.25, 0.5, 0.75, 0.9, 0.97)
@@ -76,22 +76,20 @@ def yielding(scene: Scene, start: Start) -> dict[str, Any]:
 def dynamic(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
     """A run from an equilibrium with noise, and where it comes to rest."""
     packing = with_dashpots(start.packing, cn)
-    noise = np.zeros(3 * len(packing))
-    noise[: 2 * len(packing)] = NOISE * np.random.default_rng(seed).standard_normal(2 * len(packing))
     dt = time_step(packing)
     rate = growth_rate(packing)
     if rate == 0:
         return {"rate": rate, "ends": "stable", "largest_D": NOISE**2, "slip": 0.0, "D": NOISE**2}
     slip = largest = 0.0
     with Engine(packing) as engine:
-        engine.restore(engine.displace(packing, noise))
+        shake(engine, packing, NOISE, seed)
         before = engine.packing
         with engine.undamped(dt) as dynamics:
             for _ in range(LOOKS):
                 dynamics.advance(int(TIME / dt / LOOKS))
                 now = engine.packing
                 slip, before = slip + layer_slip(before, now), now
-                largest = max(largest, _distance(packing, now))
+                largest = max(largest, distance(packing, now))
                 if abs(slip) > 2 * packing.radius.max():
                     return {"rate": rate, "ends": "flows", "largest_D": largest, "slip": slip}
         return {"rate": rate, "largest_D": largest} | _rested(engine, packing, slip, start.residual)
@@ -99,17 +97,15 @@ def dynamic(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
 
 def _rested(engine: Engine, packing: Packing, slip: float, residual: float) -> dict[str, Any]:
     """Where the disks come to rest after a run in which the layer has moved by `slip`."""
-    ends: Literal["rests", "fails at rest"] = "rests"
     try:
         found, moved = rest(engine)
     except FailedError:
-        ends = "fails at rest"
-        return {"ends": ends, "slip": slip}
-    first, last = (_pairs(each, residual) for each in (packing, found.packing))
+        return {"ends": "fails at rest", "slip": slip}
+    first, last = (pairs(each.loaded(residual)) for each in (packing, found.packing))
     return {
-        "ends": ends,
+        "ends": "rests",
         "slip": slip + moved,
-        "D": _distance(packing, found.packing),
+        "D": distance(packing, found.packing),
         "lost": len(first - last),
         "gained": len(last - first),
     }
@@ -149,15 +145,3 @@ def _off(path: Branch, fx: float, now: Packing) -> float:
     carrying = np.ones(len(now), dtype=bool)
     carrying[below.rattlers] = carrying[above.rattlers] = False
     return float(np.sqrt(np.mean(np.sum(away[carrying] ** 2, axis=1))))
-
-
-def _distance(first: Packing, now: Packing) -> float:
-    """D of the disks that carry load at the start."""
-    kept = np.ones(len(first), dtype=bool)
-    kept[first.rattlers] = False
-    return float(mean_square_displacement(now.position[kept], first.position[kept], first.box_length))
-
-
-def _pairs(packing: Packing, residual: float) -> set[tuple[int, int]]:
-    contacts = packing.loaded(residual).contacts
-    return set(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True))

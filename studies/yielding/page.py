@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...figures.pages import filled
+from ...figures.pages import render
 from ...figures.style import save, styled
 from ..modes.tables import median
-from ..statistics import share
+from ..statistics import interval, share
 from .compute import LOSSES, RATES, SHARES
 
 FLOWING = ("flows", "fails at rest")
@@ -20,42 +20,6 @@ FLOWING = ("flows", "fails at rest")
 
 ELSEWHERE = 1e-8
 """D beyond which the layer rests in another equilibrium: a ten-thousandth of a small disk's diameter, squared."""
-
-TEXT = """# Yield, static and dynamic
-
-Made by `python docs/yield/make.py` from `tables/quartz_100.jsonl`, which `faultgouge sweep scenes/sweeps/yield.toml`
-writes. 100 disks, mu = 0.6, k_n/F_y as quartz under 10 MPa. The rule of selection is in that file. So far
-{packings} packings have been followed, and {failed} failed, for which the table has the reason. Shares have Wilson's
-95 % intervals.
-
-**In a sentence.** {main}
-
-![Yield over loss, and share of packings that flow](yield.png)
-
-*Left: static yield (dashed, with its interval) and dynamic yield for each restitution, medians over packings. Right:
-share of packings that flow below their static yield, over the load. Bars are 95 % intervals.*
-
-**Static.** Newton's method first finds no equilibrium beyond F_x/F_y = {newton}. Damped dynamics goes on: the layer
-moves and rests again, and fails at {static}; both are medians. What Newton's method tells is the end of its
-branch, and not flow. {{mod}}`faultgouge.studies.yielding.static` says what *fails* means.
-
-**Dynamic.** From an equilibrium at a share of the static yield, with noise of 1e-12, for 50 units of time:
-
-| F_x over static yield | restitution | packings | flow | elsewhere | median slip of those that rest, diameters |
-|---|---|---|---|---|---|
-{dynamic}
-
-*Flow* counts runs that do not come to rest afterwards. *Elsewhere* are those that rest at D above 1e-8.
-
-**Loads that rise.** With restitution 0.9 and F_x = rate t, the distance from the quasi-static path exceeds 1e-3 and
-1e-2 diameters at these F_x/F_y (medians of the packings in which it does):
-
-| rate, F_y per unit of time | 1e-3 | 1e-2 |
-|---|---|---|
-{loading}
-
-What is missing: 400 disks, other depths, runs longer than 50 units of time, and rates below {slowest:g}.
-"""
 
 
 def rows_of(table: Path) -> tuple[list[dict[str, Any]], int]:
@@ -114,38 +78,9 @@ def _left(rows: list[dict[str, Any]], rate: float) -> list[float | None]:
 
 def text(found: dict[str, Any], packings: int, failed: int) -> str:
     """The page."""
-    dynamic = [
-        f"| {row['share']} | {row['restitution']} | {row['flow']['of']} | {_percent(row['flow'])} | "
-        f"{_percent(row['elsewhere'])} | {'-' if row['slip'] is None else format(row['slip'], '.2g')} |"
-        for row in found["dynamic"]
-    ]
-    loading = [
-        f"| {row['rate']:g} | " + " | ".join("-" if each is None else f"{each:.3g}" for each in row["left"]) + " |"
-        for row in found["loading"]
-    ]
-    undamped, *lossy = (share(each["flow"], packings) for each in found["yields"])
-    below = found["yields"][0]["share"]
-    main = (
-        f"Without loss noise of 1e-12 takes {_percent(undamped)} packings to flow below their static yield, and the "
-        f"median of the least load at which they do is {below[0]:g} of it ({below[1]:g} to {below[2]:g}). With the "
-        f"restitution 0.9 it is {_percent(lossy[0])}, with 0.7 {_percent(lossy[1])}: lossy layers move to another "
-        "equilibrium and rest."
-    )
-    page = TEXT.format(
-        main=main,
-        packings=packings,
-        failed=failed,
-        newton=_interval(found["newton"]),
-        static=_interval(found["static"]),
-        dynamic="\n".join(dynamic),
-        loading="\n".join(loading),
-        slowest=min(RATES),
-    )
-    return filled(page)
-
-
-def _interval(value: list[float]) -> str:
-    return f"{value[0]:.2g} ({value[1]:.2g} to {value[2]:.2g})"
+    flow = [share(each["flow"], packings) for each in found["yields"]]
+    names = {"packings": packings, "failed": failed, "flow": flow, "interval": interval, "percent": _percent}
+    return render(__package__ or "", "yield.md.j2", **found, **names)
 
 
 def _percent(part: dict[str, Any]) -> str:

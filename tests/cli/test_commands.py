@@ -55,6 +55,23 @@ def test_ramp_as_json(faultgouge, tmp_path):
         assert json.loads(file.attributes["scene"])["ramp"]["until"] == 4e-3
 
 
+@pytest.mark.slow
+def test_a_ramp_says_which_way_it_took(faultgouge, tmp_path):
+    """Of this packing, halved increments end before 0.0785; the same command again reads the way from the file."""
+    (tmp_path / "scene.toml").write_text(
+        'precision = "compensated"\n[packing]\ndisks = 100\nseed = 11\n[law]\nkn = 2e5\n[load]\nfy = 3.0\n'
+        "[ramp]\nstep = 5e-4\nuntil = 0.0785\n"
+    )
+    way = "3 increments from F_x = 0.078"
+    for says in (f"F_x = 0.0785 was reached by {way}, after", ""):
+        done = faultgouge("ramp", "scene.toml", "--json")
+        assert done.returncode == 0, done.stderr
+        assert says in done.stderr
+        *before, last = json.loads(done.stdout)["equilibria"]
+        assert last["way"] == way
+        assert all(row["way"] is None for row in before)
+
+
 @pytest.mark.ranks
 @pytest.mark.slow
 def test_two_ranks_write_the_same_run(faultgouge, tmp_path):

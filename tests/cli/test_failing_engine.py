@@ -2,11 +2,10 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from reference_layer import BIN
 
-BIN = Path(sys.executable).parent
 SCENE = """
 [packing]
 disks = 16

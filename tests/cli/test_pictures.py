@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from PIL import Image
-from reference_layer import BIN, LAYER
+from reference_layer import BEYOND_ITS_ONSET, BIN
 
 from faultgouge.analysis import RunFile
 from faultgouge.notebook import picture
@@ -18,23 +18,11 @@ else:
     import tomli as tomllib
 
 
-SCENE = f"""{LAYER}
-[ramp]
-step = 6e-3
-until = 0.024
-[perturb]
-fx = 0.024
-time = 1.0
-[output]
-trajectory = true
-"""
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory, faultgouge_in):
     """A ramp beyond the onset 0.0218, and an undamped run from its end."""
     made = tmp_path_factory.mktemp("pictures")
-    (made / "scene.toml").write_text(SCENE)
+    (made / "scene.toml").write_text(BEYOND_ITS_ONSET + "[output]\ntrajectory = true\n")
     for command in ("ramp", "perturb"):
         done = faultgouge_in(made, command, "scene.toml", "-o", f"{command}.h5")
         assert done.returncode == 0, done.stderr

@@ -8,19 +8,14 @@ import time
 import h5py
 import numpy as np
 import pytest
-from reference_layer import BIN, REFERENCE
+from reference_layer import BIN, LAYER, UNITS
 
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.units import real_units
 
-SCENE = f"""
-[packing]
-file = "{REFERENCE}"
-[law]
-kn = 2e5
-mu = [1.0, 0.8]
-[load]
-fy = 3.0
+SCENE = (
+    LAYER.replace("kn = 2e5", "kn = 2e5\nmu = [1.0, 0.8]")
+    + f"""
 [ramp]
 step = 1e-3
 until = 0.024
@@ -31,14 +26,8 @@ amplitude = 1e-9
 omega = 0.01
 [friction]
 v_ss = "10 v0"
-[units]
-grain_diameter = "100 um"
-density = "2650 kg/m^3"
-youngs_modulus = "95 GPa"
-poisson_ratio = 0.08
-restitution = 0.9
-impact_velocity = "1 m/s"
-"""
+{UNITS}"""
+)
 
 FIGURES = ("figure1", "figure2", "figure3", "figure4", "figure5a", "figure5b", "figure6", "amplitude", "damping")
 

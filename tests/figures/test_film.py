@@ -1,28 +1,19 @@
 """Films: magnification in steps of ten, frames, and files that play."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
-from reference_layer import REFERENCE
 
-from faultgouge.analysis import MindlinLaw, Packing, PackingFileError, touching
+from faultgouge.analysis import Packing, PackingFileError
 from faultgouge.figures.film import LARGEST_SHOWN, Motion, RampFilm, RunFilm
 from faultgouge.figures.writers import UNSEEN, FilmError, write_film
 
 
 @pytest.fixture(scope="module")
-def packing() -> Packing:
-    stored = json.loads(REFERENCE.read_text())
-    radius, position = np.array(stored["radius"]), np.column_stack([stored["x"], stored["y"]])
-    contacts = touching(position, radius, stored["box_length"])
-    law = MindlinLaw(stored["kn"], stored["kt"], 1.0)
-    top = np.isin(np.arange(len(radius)), stored["top"])
-    return Packing(
-        position=position, radius=radius, contacts=contacts, law=law, box_length=stored["box_length"], top=top, fy=3.0
-    )
+def packing(reference_packing) -> Packing:
+    return reference_packing(1.0)
 
 
 @pytest.fixture(scope="module")
@@ -65,14 +56,8 @@ def test_gif_holds_every_frame(tmp_path, motion):
     write_film(film, tmp_path / "run.gif", 10)
     with Image.open(tmp_path / "run.gif") as gif:
         assert (gif.n_frames, gif.size, gif.info["loop"], gif.info["duration"]) == (7, film.size, 0, 100)
-        for number in (0, 3, 6):
-            gif.seek(number)
-            shown = np.asarray(gif.convert("RGB")).astype(int)
-            # 63 colours stand for all shades: on the average a few steps of 255 off
-            assert np.abs(shown - film.frame(number)).mean() < 3
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_a_gif_stays_close_to_its_frames(tmp_path, motion):
     film = RunFilm(motion, 12)

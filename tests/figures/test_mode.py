@@ -1,5 +1,7 @@
 """Modes: what takes part in them, which two are about to meet, and how they are drawn."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.collections import EllipseCollection
@@ -20,15 +22,7 @@ def pyramid() -> Packing:
         position=position, radius=radius, contacts=contacts, law=law, fx=0.1, fy=1.0, top=[False, False, True]
     )
     slip = 0.5 * law.slip_limit(bare.geometry.overlap) * np.array([1, -1, 0.3, -0.2])
-    return Packing(
-        position=position,
-        radius=radius,
-        contacts=Contacts(contacts.i, contacts.j, slip),
-        law=law,
-        fx=0.1,
-        fy=1.0,
-        top=[False, False, True],
-    )
+    return replace(bare, contacts=Contacts(contacts.i, contacts.j, slip))
 
 
 def test_participation_and_rotation_of_plain_motions():
@@ -56,12 +50,7 @@ def test_the_two_closest_to_meeting_have_the_largest_cosine(pyramid):
 
 
 def test_a_symmetric_operator_has_no_pair_that_is_about_to_meet(pyramid):
-    still = Packing(
-        position=pyramid.position,
-        radius=pyramid.radius,
-        contacts=touching(pyramid.position, pyramid.radius),
-        law=pyramid.law,
-    )
+    still = replace(pyramid, contacts=touching(pyramid.position, pyramid.radius), fx=0.0, fy=0.0)
     with pytest.raises(ModeError, match="no two of them are about to meet"):
         unstable_pair(still, normal_modes(still), [])
 

@@ -1,14 +1,13 @@
 """What a figure contains: every disk and contact, the curves that it was given, and names on its axes."""
 
-import json
 from dataclasses import replace
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver
-from reference_layer import REFERENCE
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, touching
 from faultgouge.figures import draw_packing, save
@@ -16,26 +15,11 @@ from faultgouge.figures.style import UPPER
 
 
 @pytest.fixture(scope="module")
-def packing() -> Packing:
+def packing(reference_packing) -> Packing:
     """The reference packing, with slips at a thousandth of their limit."""
-    stored = json.loads(REFERENCE.read_text())
-    radius = np.array(stored["radius"])
-    top = np.isin(np.arange(len(radius)), stored["top"])
-    position = np.column_stack([stored["x"], stored["y"]])
-    contacts = touching(position, radius, stored["box_length"])
-    law = MindlinLaw(stored["kn"], stored["kt"], 1.0)
-    frictionless = Packing(
-        position=position,
-        radius=radius,
-        contacts=contacts,
-        law=law,
-        box_length=stored["box_length"],
-        top=top,
-        fx=0.01,
-        fy=3.0,
-    )
-    slip = 1e-3 * law.slip_limit(frictionless.geometry.overlap)
-    return replace(frictionless, contacts=Contacts(contacts.i, contacts.j, slip))
+    bare = replace(reference_packing(1.0), fx=0.01)
+    slip = 1e-3 * bare.law.slip_limit(bare.geometry.overlap)
+    return replace(bare, contacts=Contacts(bare.contacts.i, bare.contacts.j, slip))
 
 
 def labelled(axes, kind, label):
@@ -44,7 +28,9 @@ def labelled(axes, kind, label):
 
 
 def test_every_disk_is_drawn_and_again_where_the_box_cuts_it(packing):
-    disks = labelled(draw_packing(packing).axes[0], EllipseCollection, "disks")
+    axes = draw_packing(packing).axes[0]
+    assert axes.get_aspect() == 1.0  # disks are round
+    disks = labelled(axes, EllipseCollection, "disks")
     x = packing.position[:, 0] % packing.box_length
     cut = np.count_nonzero((x < packing.radius) | (x > packing.box_length - packing.radius))
     assert cut > 0
@@ -157,23 +143,13 @@ def test_arrows_show_the_load_on_the_upper_layer(packing):
     assert len(unsheared.findobj(Quiver)) == 1
 
 
-def test_disks_are_round(packing):
-    assert draw_packing(packing).axes[0].get_aspect() == 1.0
-
-
 @pytest.mark.slow
-def test_saved_twice_gives_the_same_bytes(tmp_path, packing):
+def test_saved_twice_gives_the_same_bytes_and_no_settings_leak_out(tmp_path, packing):
+    before = dict(matplotlib.rcParams)
     first = save(draw_packing(packing), tmp_path / "packing.mu1.0")
     second = save(draw_packing(packing), tmp_path / "again")
     assert [path.name for path in first] == ["packing.mu1.0.png", "packing.mu1.0.svg"]
     assert first[0].read_bytes().startswith(b"\x89PNG")
     assert b"<svg" in first[1].read_bytes()
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
-
-
-def test_no_settings_leak_out(packing):
-    import matplotlib
-
-    before = dict(matplotlib.rcParams)
-    draw_packing(packing)
     assert dict(matplotlib.rcParams) == before

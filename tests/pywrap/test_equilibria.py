@@ -34,13 +34,15 @@ def test_a_ramp_ends_at_until_with_a_shorter_increment():
 @pytest.mark.slow
 def test_increments_that_meet_a_contact_that_hardly_opens_reach_the_end():
     """Of seed 11, halved increments end at F_x = 0.07846, where Newton's residual falls slowly; others pass."""
-    reached = []
+    reached, ways = [], []
     for step in (5e-4, 1e-3):
         mapping = {"precision": "compensated", "packing": {"disks": 100, "seed": 11}, "law": {"kn": 2e5}}
         scene = Scene.from_mapping(mapping | {"load": {"fy": 3.0}, "ramp": {"step": step, "until": 0.085}})
-        *_, last = ramp(scene)
+        *_, last = passed = list(ramp(scene))
+        ways.append({round(each.fx, 10): each.way for each in passed if each.way})
         assert last.residual < 10 * last.floor
         reached.append(last.packing)
+    assert ways == [{0.0785: "3 increments from F_x = 0.078", 0.079: "more iterations from F_x = 0.0785"}, {}]
     fine, coarse = reached
     assert fine.fx == coarse.fx == pytest.approx(0.085)
     bearing = np.setdiff1d([fine.contacts.i, fine.contacts.j], [-1])  # a rattler lies anywhere in its cage

@@ -30,17 +30,17 @@ def ramp():
 def test_weak_normal_dashpots_lower_the_onset(ramp):
     """From 0.0150098 to between 0.0148 and 0.0149, for C_N = 0.1 and 1 alike."""
     weak, stronger = over_strength(ramp, "cn", [0.1, 1.0], start=0.0139)
-    assert weak.undamped == pytest.approx(0.0150098323, abs=1e-10)
-    assert 0.0148 < weak.onset < stronger.onset < 0.0149
-    assert stronger.onset == pytest.approx(0.0148553091558, abs=1e-9)
-    assert weak.onset == pytest.approx(weak.predicted, rel=1e-6)
+    assert weak["undamped"] == pytest.approx(0.0150098323, abs=1e-10)
+    assert 0.0148 < weak["onset"] < stronger["onset"] < 0.0149
+    assert stronger["onset"] == pytest.approx(0.0148553091558, abs=1e-9)
+    assert weak["onset"] == pytest.approx(weak["predicted"], rel=1e-6)
 
 
 @pytest.mark.slow
 def test_drag_raises_the_onset_to_its_crossover(ramp):
     (found,) = over_strength(ramp, "drag", [1e-2], start=0.0149)
-    assert found.onset == pytest.approx(0.0150163, abs=1e-7)
-    assert found.onset == pytest.approx(found.predicted, rel=1e-9)
+    assert found["onset"] == pytest.approx(0.0150163, abs=1e-7)
+    assert found["onset"] == pytest.approx(found["predicted"], rel=1e-9)
 
 
 @pytest.mark.slow
@@ -48,9 +48,9 @@ def test_the_limit_of_weak_dashpots_is_predicted(ramp):
     """One ratio of one packing anew, tangential dashpots alone, and it is that of the table."""
     known = {(each["cn"], each["ct"]): each for each in table("weak") if each["seed"] == 1}
     for case in weak_cases(ramp, [(0.0, 1.0)]):
-        assert case.predicted == pytest.approx(case.measured, rel=1e-3)
-        assert case.predicted < case.undamped
-        assert case.measured == pytest.approx(known[case.cn, case.ct]["measured"], rel=1e-8)
+        assert case["predicted"] == pytest.approx(case["measured"], rel=1e-3)
+        assert case["predicted"] < case["undamped"]
+        assert case["measured"] == pytest.approx(known[case["cn"], case["ct"]]["measured"], rel=1e-8)
 
 
 def test_the_table_of_weak_dashpots():
@@ -70,17 +70,17 @@ def near(ramp):
 @pytest.mark.slow
 def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp, near):
     far, dragged = over_distance(ramp, [1e-2], [(0.0, 0.0), (0.0, 0.1)])
-    assert dragged.gain < 0.5 * far.gain
+    assert dragged["gain"] < 0.5 * far["gain"]
     # the inverse of the distance, where one pair has most of it
-    assert 5 < near[0].gain / far.gain < 20
-    assert far.gain <= far.bound
+    assert 5 < near[0]["gain"] / far["gain"] < 20
+    assert far["gain"] <= far["bound"]
 
 
 @pytest.mark.slow
 def test_above_the_damped_onset_there_is_no_largest_gain(near):
     plain, damped = near
-    assert plain.gain > 100
-    assert damped.gain is None
+    assert plain["gain"] > 100
+    assert damped["gain"] is None
 
 
 def test_a_seed_is_a_packing_and_no_more():

@@ -10,17 +10,19 @@ from faultgouge.analysis.motion.power_law import PowerLaw, fit_power_law
 from faultgouge.analysis.onset.pair_form import PairForm
 from faultgouge.analysis.spectrum.normal_form import NormalForm
 from faultgouge.figures import save
+from faultgouge.pywrap.lammps.dynamics import Weakening
 from faultgouge.studies.reproduce.draw import growth_figure
 from faultgouge.studies.triggering.compute import Sensitivity
 from faultgouge.studies.triggering.draw import eruption_figure
 from faultgouge.studies.triggering.draw_friction import (
-    PAPERS,
     friction_law_figure,
     measured_friction_figure,
     share,
     weakening_figure,
 )
 from faultgouge.studies.triggering.draw_response import DAMPING, amplitude_figure, damping_figure, response_figure
+
+PAPERS = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=0.0, v_ss=1.0)
 
 
 def texts(figure):

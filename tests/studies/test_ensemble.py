@@ -1,25 +1,21 @@
 """Ensembles: what is counted, what is kept, and that nothing is dropped."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_layer import REFERENCE, SMALL
 
 from faultgouge.pywrap import NoEquilibriumError, Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.studies.reproduce import ensemble as study
-from faultgouge.studies.reproduce.ensemble import Member
 from faultgouge.studies.reproduce.ensemble_figure import ensemble_figure
 from faultgouge.studies.statistics import distribution, median_interval, quartiles, share
 from faultgouge.studies.sweep import triggering
-from faultgouge.studies.sweep.triggering import Eruption, RampEnd
 
-SCENE = {
-    "packing": {"disks": 30, "top": 5, "width": 6.0, "seed": 2},
+SCENE = SMALL | {
+    "packing": SMALL["packing"] | {"seed": 2},
     "law": {"kn": 2e5, "mu": [1.0, 0.8]},
-    "load": {"fy": 3.0},
-    "ramp": {"step": 5e-3, "until": 0.025},
     "perturb": {"fx": 0.0, "time": 0.5, "amplitude": 5e-10, "omega": 0.01},
     "friction": {"v_ss": "10 v0"},
 }
@@ -34,22 +30,24 @@ def silent(_):
     pass
 
 
+def end(ends, reach, mu=1.0):
+    return {"mu": mu, "ends": ends, "reach": reach, "error": None}
+
+
 def ramps(strong, weak):
-    return RampEnd(1.0, *strong), RampEnd(0.8, *weak)
+    return end(*strong), end(*weak, mu=0.8)
+
+
+def row(seed, ramps=(), lowered=None, eruption=None, says=None):
+    """A row of the sweep."""
+    result = {"ramps": list(ramps), "lowered": lowered, "eruption": eruption}
+    return {"values": {"packing.seed": seed}, "result": result, "says": says, "seconds": 0.0}
 
 
 def eruption(rise):
     """A rise over 1e-23, after a jump to 1e-14 that the control shows as well."""
-    return Eruption(
-        fx=0.015,
-        fx_control=0.005,
-        rate=1.0,
-        unperturbed=1e-25,
-        perturbed=1e-23,
-        weakening=1e-23 * 10**rise,
-        control=1e-14,
-        jump=1e-14,
-    )
+    largest = {"unperturbed": 1e-25, "perturbed": 1e-23, "weakening": 1e-23 * 10**rise, "control": 1e-14}
+    return {"fx": 0.015, "fx_control": 0.005, "rate": 1.0, **largest, "jump": 1e-14}
 
 
 @pytest.mark.parametrize(
@@ -90,17 +88,17 @@ def test_what_is_known_of_censored_onsets(strong, weak, expected):
 
 
 def of_ends(function, ends):
-    return function([end.reach for end in ends], [end.ends == "onset" for end in ends])
+    return function([each["reach"] for each in ends], [each["ends"] == "onset" for each in ends])
 
 
 def test_quartiles_count_packings_without_onset():
-    found = [RampEnd(1.0, "onset", fx) for fx in (0.04, 0.01, 0.03, 0.02)]
+    found = [end("onset", fx) for fx in (0.04, 0.01, 0.03, 0.02)]
     assert of_ends(quartiles, found) == [0.01, 0.02, 0.03]
-    lost = [RampEnd(1.0, "until", 0.05)] * 3
+    lost = [end("until", 0.05)] * 3
     assert of_ends(quartiles, found + lost) == [0.02, 0.04, None]
     assert of_ends(quartiles, lost) == [None, None, None]
     # of two that are left when one flows at 0.015, the next onset takes half of the share that remains: 1/4 + 3/8
-    early = [RampEnd(1.0, *end) for end in (("onset", 0.01), ("flows", 0.015), ("onset", 0.02), ("until", 0.05))]
+    early = [end(*each) for each in (("onset", 0.01), ("flows", 0.015), ("onset", 0.02), ("until", 0.05))]
     np.testing.assert_allclose(of_ends(distribution, early), [[0.01, 0.02], [0.25, 0.625]])
 
 
@@ -121,11 +119,11 @@ def start_of(scene):
 
 
 def test_first_onset_is_that_of_the_whole_ramp(scene):
-    end, path = triggering.first_onset(scene, 1.0, start_of(scene))
+    found, path = triggering.first_onset(scene, 1.0, start_of(scene))
     whole = onset_run(scene, 1.0)
-    assert (end.ends, end.fx_c) == ("onset", pytest.approx(whole.onset.fx_c, rel=1e-9))
-    assert end.error < 1e-9
-    assert path[-1].fx - scene.ramp.step <= end.reach <= path[-1].fx
+    assert (found["ends"], found["reach"]) == ("onset", pytest.approx(whole.onset.fx_c, rel=1e-9))
+    assert found["error"] < 1e-9
+    assert path[-1].fx - scene.ramp.step <= found["reach"] <= path[-1].fx
 
 
 @pytest.mark.slow
@@ -147,20 +145,20 @@ def test_what_was_found_before_a_failure_is_kept(scene, monkeypatch):
     def fail(*_):
         raise NoEquilibriumError("no eruption today")
 
-    found = {1.0: RampEnd(1.0, "onset", 0.01), 0.8: RampEnd(0.8, "onset", 0.008)}
+    found = {1.0: end("onset", 0.01), 0.8: end("onset", 0.008, 0.8)}
     monkeypatch.setattr(triggering, "first_onset", lambda scene, mu, start: (found[mu], ()))
     monkeypatch.setattr(triggering, "eruption", fail)
-    row = triggering.triggering(scene, start_of(scene))
-    assert [each["reach"] for each in row["ramps"]] == [0.01, 0.008]
-    assert row["lowered"] is True
-    assert row["says"] == "no eruption today"
+    result = triggering.triggering(scene, start_of(scene))
+    assert [each["reach"] for each in result["ramps"]] == [0.01, 0.008]
+    assert result["lowered"] is True
+    assert result["says"] == "no eruption today"
 
 
 def test_eruptions_are_counted(scene):
     eruptions = [eruption(rise) for rise in (0.0, 6.0, 11.0, 12.0)]
     ends = ramps(("onset", 0.02), ("onset", 0.01))
-    members = [Member(seed, ends, True, each) for seed, each in enumerate(eruptions)]
-    members += [Member(8, ramps(("onset", 0.01), ("onset", 0.02)), False), Member(9, says="did not settle")]
+    members = [row(seed, ends, True, each) for seed, each in enumerate(eruptions)]
+    members += [row(8, ramps(("onset", 0.01), ("onset", 0.02)), False), row(9, says="did not settle")]
     result = study.summary(scene, members)
     assert {name: (each["count"], each["of"]) for name, each in result["rises"].items()} == {"5": (3, 4), "10": (2, 4)}
     assert [each["count"] for each in result["control_rises"].values()] == [4, 0]
@@ -172,24 +170,23 @@ def test_eruptions_are_counted(scene):
 
 def test_figure_shows_pairs_and_rises():
     members = [
-        Member(1, ramps(("onset", 0.02), ("onset", 0.01)), True, eruption(11.0)),
-        Member(2, ramps(("onset", 0.01), ("onset", 0.02)), False),
-        Member(3, ramps(("until", 0.03), ("onset", 0.02)), True),
-        Member(4, ramps(("until", 0.03), ("until", 0.03))),
+        row(1, ramps(("onset", 0.02), ("onset", 0.01)), True, eruption(11.0)),
+        row(2, ramps(("onset", 0.01), ("onset", 0.02)), False),
+        row(3, ramps(("until", 0.03), ("onset", 0.02)), True),
+        row(4, ramps(("until", 0.03), ("until", 0.03))),
     ]
-    onsets, pairs, rises = ensemble_figure([each.ramps for each in members], [each.eruption for each in members]).axes
+    onsets, pairs, rises = ensemble_figure([each["result"] for each in members]).axes
     assert [line.get_label() for line in onsets.lines[::2]] == [r"$\mu = 1$", r"$\mu = 0.8$"]
     drawn = [(*line.get_xydata()[0], line.get_marker()) for line in pairs.lines[:3]]
     assert drawn == [(0.02, 0.01, "o"), (0.01, 0.02, "o"), (0.03, 0.02, ">")]
     assert pairs.get_xlabel() == r"$F_x^c(\mu = 1)$"
     assert len(rises.patches) == 2  # the packing and its control
     assert [line.get_markerfacecolor() for line in pairs.lines[:3]] == ["C0", "none", "none"]
-    assert len(ensemble_figure([], []).axes) == 3
+    assert len(ensemble_figure([]).axes) == 3
 
 
 def test_stored_packings_make_no_ensemble(tmp_path):
-    reference = Path(__file__).parents[1] / "reference" / "packing7.json"
-    stored = Scene.from_mapping(SCENE | {"packing": {"file": str(reference)}})
+    stored = Scene.from_mapping(SCENE | {"packing": {"file": str(REFERENCE)}})
     with pytest.raises(SceneError, match="stored one"):
         study.ensemble(stored, 2, tmp_path, silent)
 

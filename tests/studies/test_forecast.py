@@ -37,5 +37,5 @@ def test_the_shipped_packing_is_the_one_of_the_rule():
     """`python docs/triggered.py` begins with seed 1."""
     scene = Scene.from_toml(ROOT / "scenes/triggered.toml")
     (last,) = chosen(scene, [37, 38])
-    assert (last.seed, last.fx, last.says) == (scene.packing.seed, scene.perturb.fx, "")
-    assert last.forecast.growth > 4
+    assert (last["seed"], last["fx"], last["says"]) == (scene.packing.seed, scene.perturb.fx, "")
+    assert last["forecast"]["growth"] > 4

@@ -50,7 +50,7 @@ def test_random_matrices_keep_spacings_and_couplings():
 @pytest.mark.slow
 def test_the_sweep_that_ships_is_that_of_the_study():
     shipped = Sweep.from_toml(ROOT / "scenes" / "sweeps" / "genericity.toml", TASKS)
-    assert [point.key for point in shipped.points] == [point.key for point in sets(1.0, False)["onsets"].points]
+    assert [point.key for point in shipped.points] == [point.key for point in sets(1.0)["onsets"].points]
 
 
 @pytest.mark.slow
@@ -62,7 +62,7 @@ def test_rows_come_out_again():
     seeds = sorted({row["packing.seed"] for row in rows})
     chosen = np.random.default_rng(7).choice(seeds, len(seeds) // 10, replace=False)
     wanted = {(row["packing.seed"], float(row["law.mu"])): row for row in rows if row["packing.seed"] in chosen}
-    named = {(str(p.values["packing.seed"]), p.values["law.mu"]): p for p in sets(1.0, False)["onsets"].points}
+    named = {(str(p.values["packing.seed"]), p.values["law.mu"]): p for p in sets(1.0)["onsets"].points}
     same = 0
     for found in computed(None, "onset", [named[name] for name in wanted]):
         row = wanted[str(found["values"]["packing.seed"]), found["values"]["law.mu"]]

@@ -8,9 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from faultgouge.studies.modes.page import PAGES, in_real_units, write_page
+from faultgouge.pywrap import Scene
+from faultgouge.pywrap.scenes.units import real_units
+from faultgouge.studies.modes.page import PAGES, critical, part, write_page
 from faultgouge.studies.modes.random_matrices import weak_share
+from faultgouge.studies.modes.sets import quartz
 from faultgouge.studies.modes.tables import median, power
+from faultgouge.studies.statistics import interval
 
 DOCS = Path(__file__).parents[2] / "docs" / "modes"
 
@@ -77,12 +81,24 @@ def test_growth_with_dashpots_is_that_of_the_pencil_unless_contacts_slide(found)
     assert {(run["seed"], run["fx_over_fy"]) for run, each in zip(runs, off, strict=True) if each > 0.02} <= {(3, 0.2)}
 
 
+def in_real_units(depth, course):
+    """Rows of the table of quartz in docs/units.md: growth in microseconds and frequencies in megahertz."""
+    real = real_units(Scene.from_mapping(quartz(depth)))
+    for k, load in enumerate(course["loads"]):
+        rate, omega = course["growth_rate"][k][0], course["omega"][k][0]
+        grows = "none" if rate == 0 else f"{1e6 * real.time / rate:.2g}"
+        frequency = "none" if omega is None else f"{real.frequency(omega) / 1e6:.2g}"
+        numbers = (depth, f"{load:g}", f"{course['count'][k]}", grows, frequency, interval(course["least_q"][k]))
+        cells = *numbers, critical(course["critical_restitution"][k]), part(course["grows"]["0.9"][k])
+        yield f"| {' | '.join(cells)} |"
+
+
 def test_units_says_what_the_table_of_quartz_says(found):
     page = (DOCS.parent / "units.md").read_text()
-    for row in in_real_units(found):
-        assert row in page
     place = {name: course["loads"].index(0.2) for name, course in found["quartz"].items()}
     for depth in ("1 MPa", "10 MPa", "100 MPa"):
+        for row in in_real_units(depth, found["quartz"][f"quartz {depth}"]):
+            assert row in page
         grows = found["quartz"][f"quartz {depth}"]["grows"]["0.9"][place[f"quartz {depth}"]]
         assert re.search(rf"{grows['count']} of {grows['of']}( packings)? under {depth}", page)
         assert grows["count"] > grows["of"] / 2

@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 import tomllib
-from reference_layer import BIN
+from reference_layer import BIN, UNITS
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene, SceneError
@@ -30,14 +30,8 @@ amplitude = 5e-10
 omega = 0.01
 [friction]
 v_ss = "10 v0"
-[units]
-grain_diameter = "100 um"
-density = "2650 kg/m^3"
-youngs_modulus = "95 GPa"
-poisson_ratio = 0.08
-restitution = 0.9
-impact_velocity = "1 m/s"
 """
+SCENE += UNITS
 
 
 @pytest.mark.parametrize("damping", ["", "[damping]\ncn = 1.0\n"])

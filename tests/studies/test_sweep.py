@@ -6,27 +6,18 @@ import os
 import signal
 import subprocess
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
-from reference_layer import BIN
+from reference_layer import BIN, REFERENCE, SMALL
 
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.studies.sweep.compute import run_sweep, stored
 from faultgouge.studies.sweep.draw import draw_sweep
-from faultgouge.studies.sweep.estimate import estimate
 from faultgouge.studies.sweep.merge import merge
 from faultgouge.studies.sweep.points import Sweep, shard
 from faultgouge.studies.sweep.tasks import TASKS
-
-SMALL = {
-    "packing": {"disks": 30, "top": 5, "width": 6.0},
-    "law": {"kn": 2e5},
-    "load": {"fy": 3.0},
-    "ramp": {"step": 5e-3, "until": 0.025},
-}
 
 TOML = """
 task = "onset"
@@ -112,8 +103,7 @@ def test_bad_sweeps_are_refused_in_a_sentence(tmp_path, text, says):
 
 
 def test_a_stored_packing_is_found_from_another_folder(tmp_path):
-    reference = Path(__file__).parents[1] / "reference" / "packing7.json"
-    (tmp_path / "packing.json").write_bytes(reference.read_bytes())
+    (tmp_path / "packing.json").write_bytes(REFERENCE.read_bytes())
     mapping = {"task": "onset", "sweep": {"law.mu": [1.0]}, "scene": SMALL | {"packing": {"file": "packing.json"}}}
     sweep = Sweep.from_mapping(mapping, TASKS, tmp_path)
     assert Sweep.from_mapping(sweep.as_dict(), TASKS).points == sweep.points
@@ -222,10 +212,11 @@ def test_the_dry_run_counts_and_computes_nothing(faultgouge, tmp_path):
     assert "8 scenes to compute, 4 packings to settle" in done.stderr
     assert "4 points make no scene" in done.stderr
     assert not (tmp_path / "out").exists()
-    ten, hundred = (
-        estimate("onset", sweep_of({"packing.disks": [n], "packing.width": [60.0]}).points) for n in (100, 1000)
+    hundred, thousand = (
+        TASKS["onset"].seconds(Scene.from_mapping(SMALL | {"packing": {"disks": n, "width": 60.0}}))
+        for n in (100, 1000)
     )
-    assert hundred.seconds / ten.seconds == pytest.approx(10**1.6)
+    assert thousand / hundred == pytest.approx(10**1.6)
 
 
 @pytest.mark.ranks

@@ -5,6 +5,7 @@ import signal
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from reference_layer import SMALL
 
 from faultgouge.studies.sweep.compute import run_sweep
 from faultgouge.studies.sweep.points import Sweep
@@ -13,16 +14,7 @@ from faultgouge.studies.sweep.workers import Processes, WorkerError, computed, h
 
 pytestmark = pytest.mark.slow
 
-SWEEP = {
-    "task": "onset",
-    "sweep": {"packing.seed": "1:3", "law.mu": [1.0, 0.5, -1.0]},
-    "scene": {
-        "packing": {"disks": 30, "top": 5, "width": 6.0},
-        "law": {"kn": 2e5},
-        "load": {"fy": 3.0},
-        "ramp": {"step": 5e-3, "until": 0.025},
-    },
-}
+SWEEP = {"task": "onset", "sweep": {"packing.seed": "1:3", "law.mu": [1.0, 0.5, -1.0]}, "scene": SMALL}
 
 
 @pytest.fixture(scope="module")

@@ -12,14 +12,12 @@ bound as well; the packing need not be in balance.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from ....analysis import Contacts, Packing, stiffness_matrix
+from ....analysis import Packing, stiffness_matrix
 from ....pywrap import Engine, Equilibrium
 from .case import Outcome, measured
-from .packings import with_low_parts
+from .packings import slipped, with_low_parts
 
 FLOORS = 10.0
 """Newton's own limit, in units of the rounding floor."""
@@ -41,16 +39,9 @@ def balance(equilibrium: Equilibrium) -> Outcome:
     )
 
 
-def _slipped(packing: Packing) -> Packing:
-    """The packing with slips in every state: small, large, near the bound and at it."""
-    c = packing.contacts
-    slip = np.resize(SHARES, len(c)) * packing.law.slip_limit(packing.geometry.overlap)
-    return replace(packing, contacts=Contacts(c.i, c.j, slip))
-
-
 def derivative(packing: Packing) -> Outcome:
     """Whether K is the derivative of the forces in LAMMPS."""
-    packing = with_low_parts(_slipped(packing))
+    packing = with_low_parts(slipped(packing, SHARES))
     law, overlap = packing.law, packing.geometry.overlap
     share = min(1.0, law.mu * law.kn / law.kt) if law.frictional else 1.0
     width = 2.0 ** np.floor(np.log2(1e-5 * share * overlap.min()))

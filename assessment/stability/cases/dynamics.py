@@ -20,12 +20,12 @@ import numpy as np
 from mpi4py import MPI
 from scipy.linalg import eigh
 
-from ....analysis import Contacts, Packing, spectrum, stable_timestep, stiffness_matrix, touching
+from ....analysis import Packing, spectrum, stable_timestep, stiffness_matrix, touching
 from ....pywrap import Engine, SceneError
 from ....pywrap.runs.undamped import time_step
 from .alone import refused_by_lammps
 from .case import Case, Outcome, measured, refused
-from .packings import crystal, law, sheared
+from .packings import crystal, law, sheared, slipped
 
 GROUP = "time stepping"
 
@@ -146,12 +146,9 @@ def _drift(steps: int) -> Outcome:
 def _momentum() -> Outcome:
     """Three disks that overlap and have slipped fly apart: nobody else feels their forces."""
     position = np.array([[3.0, 5.0], [3.999, 5.0], [3.5, 5.864]])
-    bare = Packing(
-        position=position, radius=np.full(3, 0.5), contacts=touching(position, np.full(3, 0.5), None), law=law()
-    )
-    c = bare.contacts
-    slip = np.resize([0.5, -0.9, 1.0], len(c)) * bare.law.slip_limit(bare.geometry.overlap)
-    packing = replace(bare, contacts=Contacts(c.i, c.j, slip))
+    radius = np.full(3, 0.5)
+    bare = Packing(position=position, radius=radius, contacts=touching(position, radius, None), law=law())
+    packing = slipped(bare, (0.5, -0.9, 1.0))
     worst = 0.0
     with Engine(packing) as engine, engine.undamped(1e-5) as dynamics:
         for _ in range(100):

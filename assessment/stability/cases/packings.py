@@ -12,6 +12,7 @@ is braced from side to side and stands without friction, too. The overlap of two
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -86,16 +87,23 @@ def arches(ratio: float, law: MindlinLaw = PAPERS, load: float = 1e-6) -> Packin
 
 
 @cache
-def bed(law: MindlinLaw = PAPERS, load: float = LOAD, radii: tuple[float, ...] = (0.5, 0.7), seed: int = 1) -> Packing:
+def bed(law: MindlinLaw = PAPERS, load: float = LOAD, seed: int = 1) -> Packing:
     """24 disks that have settled without friction in a box 5.95 wide, with the friction of the law from then on."""
     scene = Scene.from_mapping(
         {
-            "packing": {"disks": 24, "top": 5, "width": 8.5 * max(radii), "radii": list(radii), "seed": seed},
+            "packing": {"disks": 24, "top": 5, "width": 8.5 * 0.7, "radii": [0.5, 0.7], "seed": seed},
             "law": {"kn": law.kn, "kt": law.kt, "mu": law.mu},
             "load": {"fy": load * law.kn},
         }
     )
     return settle(scene).packing
+
+
+def slipped(packing: Packing, shares: Sequence[float]) -> Packing:
+    """The packing with slips in several states, by their shares of the limit, over and over."""
+    c = packing.contacts
+    slip = np.resize(shares, len(c)) * packing.law.slip_limit(packing.geometry.overlap)
+    return replace(packing, contacts=Contacts(c.i, c.j, slip))
 
 
 def with_low_parts(packing: Packing) -> Packing:

@@ -21,6 +21,7 @@ from .terminal import (
     print_json,
     read_scene,
     say,
+    say_way,
     show_table,
     status,
     stored_packing,
@@ -207,6 +208,8 @@ def _undamped_onset(modes: tuple[int, int] | None, folder: Path | None, scene: S
     among = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
     say(f"mu = {mu:g}: F_x^c = {with_uncertainty(run.onset.fx_c, run.onset.error)}{among}")
     _show_windows(run.onset.windows, real.get("si", []))
+    for equilibrium in run.equilibria:
+        say_way(equilibrium)
     _say_doubtful(run.onset.doubtful)
     _say_of_one_path(run.onset.windows)
     return {"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond} | real

@@ -120,7 +120,15 @@ def movie(
 @app.command(epilog="Example: faultgouge view run.h5 -o page.html")
 def view(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5 of a ramp, or perturb.h5.", show_default=False)],
-    loads: Annotated[int, typer.Option(min=1, help="Equilibria on the page, equally spaced if there are more.")] = 60,
+    loads: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Equilibria on the page, equally spaced if there are more; 60 by default, and fewer of more than 300 "
+            "disks.",
+            show_default=False,
+        ),
+    ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="The page: .html.")] = Path("page.html"),
 ) -> None:
     """Make one page that any browser opens offline: a ramp with its pair, under a slider.
@@ -133,18 +141,22 @@ def view(
         raise typer.BadParameter(f"-o {output}: a page is an .html")
     from faultgouge.analysis import RunFile
     from faultgouge.analysis.files.wholefile import check_folder
-    from faultgouge.figures.view import check_library, equally_spaced, write_view
+    from faultgouge.figures.view import check_library, equally_spaced, loads_shown, write_view
+    from faultgouge.figures.view_pair import seconds
 
     check_library()
     check_folder(output)
     if not is_root():
         return
     with RunFile(file) as run:
-        packings = [run.packing(k) for k in equally_spaced(len(run), loads)]
+        most = loads_shown(len(run.packing(0))) if loads is None else loads
+        packings = [run.packing(k) for k in equally_spaced(len(run), most)]
         series = run.series("undamped") if "undamped" in run.names_of_series else None
     span = " to ".join(f"{fx:g}" for fx in dict.fromkeys((packings[0].fx, packings[-1].fx)))
     what = "undamped run" if series is not None else "equilibria"
-    title = f"{file.name}: {what} of {len(packings[0])} disks, F_x = {span}"
+    title = f"{file.name}: {what} of {len(packings[0])} disks, Fₓ = {span}"
+    if seconds(packings) > 5:
+        say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
     write_view(packings, output, title, series, lambda them: progress(them, "loads"))
     say(f"{len(packings)} loads, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
 

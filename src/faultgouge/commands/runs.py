@@ -11,9 +11,11 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import AsJson, Out, ScenePath, print_json, progress, read_scene, say, status
+from .terminal import AsJson, Out, ScenePath, print_json, progress, read_scene, say, say_way, status
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
     from faultgouge.pywrap import Equilibrium, Record, Scene
     from faultgouge.pywrap.lammps.dynamics import Weakening
 
@@ -63,7 +65,7 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
         start = _settled(wanted, record)
         total, done = len(loads(settings)), round(start.fx / settings.step) + 1
         dumps = output.with_suffix("") if wanted.output is not None and wanted.output.dumps else None
-        for equilibrium in progress(ramp_up(wanted, start, dumps=dumps), "equilibria", total, done):
+        for equilibrium in _told(progress(ramp_up(wanted, start, dumps=dumps), "equilibria", total, done)):
             record.append(equilibrium)
         record.finish()
     assert record.last is not None
@@ -83,7 +85,8 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     with Record(output, wanted, task="perturb", saved=keeps) as record:
         if record.last is None:
             step = wanted.ramp.step if wanted.ramp else 1e-3  # as in `reach`
-            *_, start = progress(reach(wanted, settings.fx), "equilibria", ceil(settings.fx / step * (1 - 1e-9)) + 1)
+            total = ceil(settings.fx / step * (1 - 1e-9)) + 1
+            *_, start = _told(progress(reach(wanted, settings.fx), "equilibria", total))
             _lines(wanted, start)  # refuses what the packing does not allow, before anything is written
             record.append(start)
         assert record.last is not None
@@ -96,6 +99,13 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     say(f"D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}; written to {output}")
     if as_json:
         print_json(_series(output))
+
+
+def _told(equilibria: Iterable[Equilibrium]) -> Iterator[Equilibrium]:
+    """The equilibria, of which those are told that were reached by another way."""
+    for equilibrium in equilibria:
+        say_way(equilibrium)
+        yield equilibrium
 
 
 def _series(path: Path) -> dict[str, Any]:
@@ -136,12 +146,14 @@ def _weakening(scene: Scene, record: Record) -> Weakening | None:
 
 def _equilibria(path: Path) -> list[dict[str, Any]]:
     from faultgouge.analysis import RunFile
+    from faultgouge.pywrap.runs.recording import ways_of
 
     with RunFile(path) as file:
+        ways = ways_of(file)
         names = ("fx", "residual", "floor", "evaluations")
         rows = zip(*(file.observable(name).tolist() for name in names), strict=True)
         return [
-            dict(zip(names, row, strict=True)) | {"contacts": len(file.packing(k).contacts)}
+            dict(zip(names, row, strict=True)) | {"contacts": len(file.packing(k).contacts), "way": ways.get(k)}
             for k, row in enumerate(rows)
         ]
 

@@ -47,7 +47,7 @@ def sweep(
         if is_root():
             known = stored(output / LINES)
             missing = [point for point in part_of(wanted.points, part) if point.key not in known]
-            for line in estimate(wanted.task, missing).words():
+            for line in estimate(wanted.task, missing):
                 say(line)
         return
     keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there")
@@ -141,7 +141,7 @@ def modes(
 
     wanted, part = wanted_of(file), _shard(shard)
     if is_root():
-        for line in estimate(wanted.task, part_of(wanted.points, part)).words():
+        for line in estimate(wanted.task, part_of(wanted.points, part)):
             say(line)
     if dry_run:
         return

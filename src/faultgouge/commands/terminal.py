@@ -20,7 +20,7 @@ from ..ranks import is_root
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
-    from faultgouge.pywrap import Scene
+    from faultgouge.pywrap import Equilibrium, Scene
     from faultgouge.pywrap.scenes.estimate import Task
 
 T = TypeVar("T")
@@ -75,6 +75,15 @@ def say(message: str) -> None:
     """A line on standard error."""
     if is_root():
         print(message, file=sys.stderr)
+
+
+def say_way(equilibrium: Equilibrium) -> None:
+    """Of an equilibrium that was not reached by halved increments, how it was."""
+    if equilibrium.way is not None:
+        say(
+            f"F_x = {equilibrium.fx:.10g} was reached by {equilibrium.way}, after smaller and smaller increments had "
+            "led nowhere: it may lie on another branch of equilibria"
+        )
 
 
 class Minutes:
