@@ -30,6 +30,7 @@ STYLES = {
     "mindlin/smooth": (f"mindlin/smooth {KN} {KT} 1.0", "", "nve/disc 0.5"),
     "mindlin/smooth, compensated": (f"mindlin/smooth {KN} {KT} 1.0 compensated", "", "nve/disc 0.5 compensated"),
     "mindlin/smooth, rescaled": (f"mindlin/smooth {KN} {KT} 1.0 history rescaled", "", "nve/disc 0.5"),
+    "mindlin/smooth, energy": (f"mindlin/smooth {KN} {KT} 1.0 energy yes", "", "nve/disc 0.5"),
     "mindlin/smooth, mu = 0": (f"mindlin/smooth {KN} {KT} 0.0", "", "nve/disc 0.5"),
     "gran/hertz/history": (f"gran/hertz/history {2 * KN} {2 * KT} 0.0 0.0 1.0 1", "", "nve/sphere disc"),
     "granular": ("granular", f"hertz {2 * KN} 0.0 tangential mindlin {2 * KT} 0.0 1.0", "nve/sphere disc"),

@@ -111,6 +111,7 @@ struct Features {
   bool advance;             // slips advance by v dt and omega dt
   bool damped;              // dashpots
   bool rescaled = false;    // slips, while overlaps grow
+  bool energy = false;      // of contacts that sliding and dashpots take
 };
 
 // All pairs: their forces, slips and whether they touch. Returns a pair with one centre inside of the other disk, where
@@ -124,6 +125,7 @@ int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Pe
 // A contact with the floor: n = (0, 1) and tau = (-1, 0)
 template <class Number> struct FloorContact {
   Number normal, tangential, slip, slip_limit;
+  double slid, dashpot_power;    // energy that sliding took in this step, and power of the dashpots; with energy
 };
 
 // how fast a contact with the floor opens and slips

@@ -55,7 +55,7 @@ bool within_reach(const Atom &atom, int i, int j, double skin)
 }    // namespace
 
 void ContactPairs::build(const NeighList &list, double skin, Atom &atom, const Domain &domain,
-                         const std::vector<Vector> &original, bool with_slips, bool compensated)
+                         const std::vector<Vector> &original, bool with_slips, bool compensated, bool with_energy)
 {
   list_pairs(list, skin, atom, domain, original);
   list_rows(atom);
@@ -67,6 +67,7 @@ void ContactPairs::build(const NeighList &list, double skin, Atom &atom, const D
   slip.assign(size(), 0.0);
   if (compensated) slip_low.assign(size(), 0.0);
   touching.assign(size(), 0);
+  if (with_energy) dissipated.assign(size(), 0.0);
 }
 
 void ContactPairs::list_pairs(const NeighList &list, double skin, Atom &atom, const Domain &domain,

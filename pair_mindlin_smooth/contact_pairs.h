@@ -40,7 +40,7 @@ public:
   //   largest disks; pairs farther apart than their own reach and the skin cannot meet before the next list
   // original: coordinates of disks owned elsewhere, before LAMMPS shifted them by box lengths
   void build(const LAMMPS_NS::NeighList &list, double skin, LAMMPS_NS::Atom &atom, const LAMMPS_NS::Domain &domain,
-             const std::vector<Vector> &original, bool with_slips, bool compensated);
+             const std::vector<Vector> &original, bool with_slips, bool compensated, bool with_energy);
 
   int size() const { return static_cast<int>(first.size()); }
 
@@ -56,6 +56,7 @@ public:
   std::vector<CompensatedForce> disk_force;                // of the owned disks, only if compensated
   std::vector<double> slip, slip_low;                      // only with_slips
   std::vector<int> touching;                               // only with_slips
+  std::vector<double> dissipated;                          // energy since the contact closed, only with_energy
 
 private:
   void list_pairs(const LAMMPS_NS::NeighList &list, double skin, LAMMPS_NS::Atom &atom, const LAMMPS_NS::Domain &domain,

@@ -74,7 +74,8 @@ void FixDiskColumns::unpack_restart(int nlocal, int nth)
   double *extra = atom->extra[nlocal];
   int m = 0;
   for (int i = 0; i < nth; i++) m += static_cast<int>(extra[m]);
-  unpack_exchange(nlocal, extra + m + 1);
+  set_arrays(nlocal);
+  std::copy_n(extra + m + 1, std::min(static_cast<int>(extra[m]) - 1, size_peratom_cols), array_atom[nlocal]);
 }
 
 int FixDiskColumns::size_restart(int /*nlocal*/)

@@ -6,6 +6,7 @@
 #include "memory.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 using namespace LAMMPS_NS;
@@ -13,9 +14,13 @@ using namespace FixConst;
 
 FixSlipHistory::FixSlipHistory(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg),
-    width(narg > 3 && strcmp(arg[3], "compensated") == 0 ? 3 : 2),
     capacity(8)    // six equal disks touch one; rows grow where a disk has more
 {
+  for (int k = 3; k < narg; k++) {
+    if (strcmp(arg[k], "compensated") == 0) has_low = true;
+    if (strcmp(arg[k], "energy") == 0) has_energy = true;
+  }
+  width += has_low + has_energy;
   restart_peratom = 1;
   create_attribute = 1;
   peratom_flag = 1;
@@ -84,7 +89,7 @@ int FixSlipHistory::count(int i) const
 }
 
 // partners must come in the order of their IDs
-void FixSlipHistory::append(int i, tagint partner, double slip, double slip_low)
+void FixSlipHistory::append(int i, tagint partner, double slip, double slip_low, double dissipated)
 {
   const int n = count(i);
   if (n == capacity) set_capacity(2 * capacity);
@@ -92,7 +97,8 @@ void FixSlipHistory::append(int i, tagint partner, double slip, double slip_low)
   array_atom[i][0] = static_cast<double>(atom->tag[i]);
   entry[0] = static_cast<double>(partner);
   entry[1] = slip;
-  if (compensated()) entry[2] = slip_low;
+  if (has_low) entry[2] = slip_low;
+  if (has_energy) entry[width - 1] = dissipated;
 }
 
 const double *FixSlipHistory::find(int i, tagint partner) const
@@ -164,18 +170,24 @@ int FixSlipHistory::pack_restart(int i, double *buf)
   const int n = 1 + width * count(i);
   buf[0] = n + 1;
   std::copy(array_atom[i], array_atom[i] + n, buf + 1);
+  if (has_energy) buf[1] = -buf[1];    // says that energies follow
   return n + 1;
 }
 
+// the energies of contacts begin at zero where the file has none, and are left out where nobody wants them
 void FixSlipHistory::unpack_restart(int nlocal, int nth)
 {
   const double *extra = atom->extra[nlocal];
   int m = 0;
   for (int i = 0; i < nth; i++) m += static_cast<int>(extra[m]);
   const int n = static_cast<int>(extra[m++]) - 1;
-  if ((n - 1) / width > capacity) set_capacity((n - 1) / width);
+  const double own = extra[m++];
+  const int stored = width - has_energy + (own < 0.0), contacts = (n - 1) / stored;
+  if (contacts > capacity) set_capacity(contacts);
   clear(nlocal);
-  std::copy(extra + m, extra + m + n, array_atom[nlocal]);
+  array_atom[nlocal][0] = std::fabs(own);
+  for (int k = 0; k < contacts; k++)
+    std::copy_n(extra + m + k * stored, std::min(stored, width), array_atom[nlocal] + 1 + k * width);
 }
 
 int FixSlipHistory::size_restart(int i)

@@ -2,9 +2,9 @@
 //
 // Row i of the per-atom array is [own ID, partner ID, slip, partner ID, slip, ..., 0, 0]: the contacts of
 // disk i in the order of the partners' IDs; both partners keep theirs. In compensated arithmetic each slip is
-// followed by its low part. It is up to date whenever no run is
-// under way, moves with the disks between ranks, and goes through restart files. Written from outside
-// (library scatter) it takes effect in the next run.
+// followed by its low part; with the keyword energy the energy that the contact has dissipated comes last. It is up to
+// date whenever no run is under way, moves with the disks between ranks, and goes through restart files. Written from
+// outside (library scatter) it takes effect in the next run.
 
 #ifndef LMP_FIX_SLIP_HISTORY_H
 #define LMP_FIX_SLIP_HISTORY_H
@@ -38,9 +38,11 @@ public:
   void set_source(SlipSource *s) { source = s; }
   void check_owners() const;
   void clear(int i);
-  bool compensated() const { return width == 3; }
-  void append(int i, tagint partner, double slip, double slip_low);
-  const double *find(int i, tagint partner) const;    // its slip (and low part); nullptr where there is no contact
+  bool compensated() const { return has_low; }
+  bool energy() const { return has_energy; }
+  void append(int i, tagint partner, double slip, double slip_low, double dissipated);
+  const double *find(int i, tagint partner) const;    // what follows the partner; nullptr where there is no contact
+  double dissipated(const double *found) const { return has_energy ? found[width - 2] : 0.0; }
 
   void grow_arrays(int) override;
   void copy_arrays(int, int, int) override;
@@ -55,8 +57,9 @@ public:
 
 private:
   SlipSource *source = nullptr;
-  int width;       // numbers of a contact: partner, slip, and the slip's low part if compensated
-  int capacity;    // contacts that a row holds
+  bool has_low = false, has_energy = false;
+  int width = 2;    // numbers of a contact: partner, slip, the slip's low part if compensated, energy
+  int capacity;     // contacts that a row holds
   int nmax = 0;
 
   void set_capacity(int);

@@ -47,7 +47,7 @@ FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : 
   global_freq = 1;
   extscalar = 1;
   energy_global_flag = 1;
-  make_columns(compensated ? SLIP_LOW + 1 : OVERLAP + 1);
+  make_columns(OVERLAP + 1 + compensated + dissipating);
 }
 
 void FixWallMindlinSmooth::read_keywords(int narg, char **arg)
@@ -66,10 +66,14 @@ void FixWallMindlinSmooth::read_keywords(int narg, char **arg)
       if (k + 2 >= narg) error->all(FLERR, "fix wall/mindlin/smooth: damping takes two numbers, CN CT");
       set_damping(arg[k + 1], arg[k + 2]);
       k += 2;
+    } else if (strcmp(arg[k], "energy") == 0) {
+      if (++k >= narg) error->all(FLERR, "fix wall/mindlin/smooth: energy must be yes or no");
+      dissipating = utils::logical(FLERR, arg[k], false, lmp);
     } else {
-      error->all(FLERR,
-                 "fix wall/mindlin/smooth knows the keywords exponent, history, damping and compensated, but not {}",
-                 arg[k]);
+      error->all(
+          FLERR,
+          "fix wall/mindlin/smooth knows the keywords exponent, history, damping, energy and compensated, but not {}",
+          arg[k]);
     }
   }
   if (!law.valid_history())
@@ -268,8 +272,10 @@ template <class NUMBER, bool FRICTION, bool DAMPED> void FixWallMindlinSmooth::c
     const double *const felt = dashpots->array_atom[i];
     rates = {felt[1], -(felt[0] + radius * felt[2])};
   }
-  const auto [normal, tangential, kept, limit] =
-      faultgouge::floor_contact(law, overlap, slip, increment, rates, {FRICTION, advance, DAMPED});
+  const bool counted = dissipating && advance && FRICTION;
+  const auto [normal, tangential, kept, limit, slid, dashpot_power] =
+      faultgouge::floor_contact(law, overlap, slip, increment, rates, {FRICTION, advance, DAMPED, false, counted});
+  if (counted) contact[size_peratom_cols - 1] += slid + dashpot_power * update->dt;
   if constexpr (FRICTION) {
     contact[TANGENTIAL] = value(tangential);
     contact[SLIP] = leading(kept);

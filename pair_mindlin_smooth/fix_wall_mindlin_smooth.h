@@ -1,10 +1,11 @@
-// fix ID group wall/mindlin/smooth KN KT MU ylo COORD [exponent P] [history KIND] [damping CN CT] [compensated]
+// fix ID group wall/mindlin/smooth KN KT MU ylo COORD [exponent P] [history KIND] [damping CN CT] [energy yes|no]
+//   [compensated]
 //
 // The flat floor at y = COORD below the disks: the law of mindlin_law.h with n = (0, 1), tau = (-1, 0).
 // MU may be v_NAME, an equal-style variable that is evaluated in every step; fix_modify ID mu MU changes it, and
 // fix_modify ID damping CN CT or damping no the dashpots. Each disk has one slip. The per-atom array has the columns of
 // pair mindlin/smooth's single(): f_n, f_t, slip, slip/slip_limit, n_x, n_y, overlap, with compensated the slip's low
-// part, and zeros for a disk that does not touch.
+// part, with energy what sliding and dashpots have taken, and zeros for a disk that does not touch.
 
 #ifndef LMP_FIX_WALL_MINDLIN_SMOOTH_H
 #define LMP_FIX_WALL_MINDLIN_SMOOTH_H
@@ -36,8 +37,9 @@ private:
   double energy = 0.0;    // elastic energy of this rank's contacts
   bool has_friction = false;
   bool compensated = false;
-  bool damping = false;    // the keyword was given
-  bool damped = false;     // as compiled into this run, at init
+  bool dissipating = false;    // the last column has the energy that sliding and dashpots have taken
+  bool damping = false;        // the keyword was given
+  bool damped = false;         // as compiled into this run, at init
   class FixLowParts *low_parts = nullptr;
   class FixDashpotVelocities *dashpots = nullptr;
   std::string mu_variable;    // empty where mu is a number

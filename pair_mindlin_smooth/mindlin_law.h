@@ -118,6 +118,15 @@ struct MindlinLaw {
     return select(fabs(sum) < bound, sum, times_sign(bound, std::copysign(1.0, leading(sum))));
   }
 
+  // power that dashpots take at rates of opening and of slip, with the elastic normal force and both tangential ones:
+  // beyond the bound they take as much as the bound leaves them
+  template <Exponent P>
+  FAULTGOUGE_INLINE double dashpot_power(double overlap, double opening, double slip_rate, double elastic_tangential,
+                                         double tangential) const
+  {
+    return cn * growth<P>(overlap) * opening * opening + (elastic_tangential - tangential) * slip_rate;
+  }
+
   // the same with the exponent looked up, for what is not done in every step
   double growth(double overlap) const
   {

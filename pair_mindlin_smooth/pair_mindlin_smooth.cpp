@@ -27,7 +27,7 @@ void PairMindlinSmooth::rebuild_pairs()
     store_slips();
     history->check_owners();
   }
-  pairs.build(*list, neighbor->skin, *atom, *domain, original, has_friction, compensated);
+  pairs.build(*list, neighbor->skin, *atom, *domain, original, has_friction, compensated, energy);
 }
 
 void PairMindlinSmooth::load_slips()
@@ -39,6 +39,7 @@ void PairMindlinSmooth::load_slips()
     if (!slip) continue;
     pairs.slip[p] = slip[0];
     if (compensated) pairs.slip_low[p] = slip[1];
+    if (energy) pairs.dissipated[p] = history->dissipated(slip);
   }
 }
 
@@ -139,7 +140,7 @@ Period PairMindlinSmooth::period() const
 int PairMindlinSmooth::contact_forces(bool advance)
 {
   const double dt = update->dt;
-  const Features features{has_friction, advance, damped, law.rescaled};
+  const Features features{has_friction, advance, damped, law.rescaled, energy};
   if (!compensated) return faultgouge::contact_forces(pairs, disks(), period(), law, dt, features);
   return faultgouge::compensated_contact_forces(pairs, disks(), period(), law, dt, features,
                                                 {low_parts->grid(), force_grid, tangential_grid});
@@ -182,7 +183,7 @@ void PairMindlinSmooth::store_slips()
       const int p = pairs.row[k] >> 1;
       if (!pairs.touching[p]) continue;
       history->append(i, pairs.row[k] & 1 ? pairs.first_tag[p] : pairs.second_tag[p], pairs.slip[p],
-                      compensated ? pairs.slip_low[p] : 0.0);
+                      compensated ? pairs.slip_low[p] : 0.0, energy ? pairs.dissipated[p] : 0.0);
     }
   }
 }
@@ -230,7 +231,8 @@ template <class NUMBER> double PairMindlinSmooth::measure(int p, int i)
     svector[1] = law.tangential_force(svector[0], slip, limit);
     svector[2] = slip;
     svector[3] = limit > 0.0 ? slip / limit : 0.0;
-    if (stored && compensated) svector[7] = stored[1];
+    if (stored && energy) svector[7] = history->dissipated(stored);
+    if (stored && compensated) svector[8] = stored[1];
   }
   svector[4] = sign * value(contact.direction(r.x));
   svector[5] = sign * value(contact.direction(r.y));
@@ -257,7 +259,7 @@ template <class NUMBER> void PairMindlinSmooth::add_dashpots(int p, const faultg
 double PairMindlinSmooth::memory_usage()
 {
   const double force = compensated ? sizeof(double) : sizeof(PairForce);    // a low part of the slip, or a force
-  const double per_pair = 3 * sizeof(int) + 2 * sizeof(tagint) + 2 + sizeof(double) + force;
+  const double per_pair = 3 * sizeof(int) + 2 * sizeof(tagint) + 2 + (energy ? 2 : 1) * sizeof(double) + force;
   const double per_disk = sizeof(int) + (compensated ? sizeof(faultgouge::CompensatedForce) : 0);
   return Pair::memory_usage() + pairs.size() * per_pair + pairs.row.size() * sizeof(int) +
          pairs.start.size() * per_disk;

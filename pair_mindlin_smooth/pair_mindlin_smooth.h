@@ -1,4 +1,5 @@
-// pair_style mindlin/smooth KN KT MU [exponent P] [history KIND] [damping CN CT] [compensated]
+// pair_style mindlin/smooth KN KT MU [exponent P] [history KIND] [damping CN CT] [energy yes|no]
+//   [compensated]
 //
 // Frictional disks in the plane: the law of mindlin_law.h with a slip history in fix slip/history. With
 // MU = 0 or KT = 0 there is no tangential force, no history and no fix.
@@ -7,6 +8,7 @@
 //   history       total by default, or rescaled: slips are rescaled while overlaps grow (exponent 3/2 alone)
 //   damping       dashpots at the contacts, which feel the velocities of fix dashpot/velocities; none by default, and
 //                 none while fix displace/disc moves the disks
+//   energy        each contact adds up what sliding and dashpots take; not by default
 //   compensated   coordinates, slips and forces with low parts (compensated.h), kept in fix low/parts
 
 #ifndef LMP_PAIR_MINDLIN_SMOOTH_H
@@ -54,6 +56,7 @@ private:
   bool compensated = false;
   bool damping = false;                // the keyword was given
   bool damped = false;                 // as compiled into this run, at init
+  bool energy = false;                 // the keyword says yes
   bool has_friction = false;           // as compiled into this run, at init
   bool slips_in_fix = true;            // false while pairs.slip is newer
   double *largest_radius = nullptr;    // of each type

@@ -35,7 +35,7 @@ PairMindlinSmooth::PairMindlinSmooth(LAMMPS *lmp) : Pair(lmp)
 {
   if (lmp->citeme) lmp->citeme->add(CITATION);
   single_enable = 1;
-  single_extra = 8;
+  single_extra = 9;
   svector = new double[single_extra];
   restartinfo = 1;
   one_coeff = 1;
@@ -86,7 +86,7 @@ void PairMindlinSmooth::settings(int narg, char **arg)
 
 void PairMindlinSmooth::read_keywords(int narg, char **arg)
 {
-  compensated = damping = false;
+  compensated = damping = energy = false;
   for (int k = 3; k < narg; k++) {
     if (strcmp(arg[k], "compensated") == 0) {
       compensated = true;
@@ -106,10 +106,14 @@ void PairMindlinSmooth::read_keywords(int narg, char **arg)
         error->all(FLERR, "pair_style mindlin/smooth: damping CN CT must be finite and not negative (got {} {})",
                    arg[k - 1], arg[k]);
       damping = true;
+    } else if (strcmp(arg[k], "energy") == 0) {
+      if (++k >= narg) error->all(FLERR, "pair_style mindlin/smooth: energy must be yes or no");
+      energy = utils::logical(FLERR, arg[k], false, lmp);
     } else {
-      error->all(FLERR,
-                 "pair_style mindlin/smooth knows the keywords exponent, history, damping and compensated, but not {}",
-                 arg[k]);
+      error->all(
+          FLERR,
+          "pair_style mindlin/smooth knows the keywords exponent, history, damping, energy and compensated, but not {}",
+          arg[k]);
     }
   }
   if (!law.valid_history())
@@ -130,6 +134,9 @@ void PairMindlinSmooth::init_style()
 {
   check_disks();
   has_friction = law.frictional();
+  if (energy && !has_friction)
+    error->all(FLERR, "pair mindlin/smooth: without friction there is no history to keep the energy of contacts in: "
+                      "use energy no, or MU and KT above 0");
   damped = damping && !displaces_disks(*modify);
   if (damped) check_damping();
   check_run();
@@ -204,13 +211,13 @@ void PairMindlinSmooth::set_force_grids()
 void PairMindlinSmooth::make_fixes()
 {
   history = dynamic_cast<FixSlipHistory *>(modify->get_fix_by_id(FixSlipHistory::ID));
-  if (history && (!has_friction || history->compensated() != compensated)) {
+  if (history && (!has_friction || history->compensated() != compensated || history->energy() != energy)) {
     modify->delete_fix(FixSlipHistory::ID);
     history = nullptr;
   }
   if (has_friction && !history)
-    history = dynamic_cast<FixSlipHistory *>(
-        modify->add_fix(fmt::format("{} all slip/history{}", FixSlipHistory::ID, compensated ? " compensated" : "")));
+    history = dynamic_cast<FixSlipHistory *>(modify->add_fix(fmt::format(
+        "{} all slip/history{}{}", FixSlipHistory::ID, compensated ? " compensated" : "", energy ? " energy" : "")));
   if (history) history->set_source(this);
   slips_in_fix = true;
 
@@ -305,17 +312,21 @@ void PairMindlinSmooth::write_restart_settings(FILE *fp)
 {
   fwrite(&law, sizeof(MindlinLaw), 1, fp);
   fwrite(&compensated, sizeof(bool), 1, fp);
-  fwrite(&damping, sizeof(bool), 1, fp);
+  const unsigned char keywords = (damping ? 1 : 0) + (energy ? 2 : 0);
+  fwrite(&keywords, sizeof(keywords), 1, fp);
 }
 
 void PairMindlinSmooth::read_restart_settings(FILE *fp)
 {
+  unsigned char keywords = 0;
   if (comm->me == 0) {
     utils::sfread(FLERR, &law, sizeof(MindlinLaw), 1, fp, nullptr, error);
     utils::sfread(FLERR, &compensated, sizeof(bool), 1, fp, nullptr, error);
-    utils::sfread(FLERR, &damping, sizeof(bool), 1, fp, nullptr, error);
+    utils::sfread(FLERR, &keywords, sizeof(keywords), 1, fp, nullptr, error);
   }
   MPI_Bcast(&law, sizeof(MindlinLaw), MPI_BYTE, 0, world);
   MPI_Bcast(&compensated, sizeof(bool), MPI_BYTE, 0, world);
-  MPI_Bcast(&damping, sizeof(bool), MPI_BYTE, 0, world);
+  MPI_Bcast(&keywords, sizeof(keywords), MPI_BYTE, 0, world);
+  damping = keywords & 1;
+  energy = keywords & 2;
 }

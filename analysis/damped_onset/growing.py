@@ -16,6 +16,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..onset.edge import LostPairError, track
@@ -53,6 +54,16 @@ class Place:
     @property
     def fx(self) -> float:
         return self.pencil.fx
+
+    @property
+    def matrix(self) -> csr_array:
+        """A."""
+        return self.pencil.stiffness
+
+    @property
+    def matrices(self) -> tuple[csr_array, csr_array]:
+        """A and G."""
+        return self.pencil.stiffness, self.pencil.damping
 
     @cached_property
     def modes(self) -> DampedModes:
@@ -284,20 +295,25 @@ def announcement(cluster: Cluster, below: float, above: float) -> list[DampedMod
 
     The modes are on all coordinates. Their pencil is the cluster's: they are where to begin with the operator.
     """
-    oracle = Growing(cluster.pencil, CLUSTER * (above - below), None)
-    here, there = oracle.at(below), oracle.at(above)
-    oracle.over(here, there)
+    oracle, there = searched(cluster, below, above)
     for each in oracle.closed:
         if each.kind != "start" and each.fx_end is not None and cluster.owns(each.frequency):
             return 0.5 * (each.fx_onset + each.fx_end)
-    modes = there.modes
-    nearly = modes.rates.real > NEARLY * np.median(modes.rates.real)
-    found = []
-    for k in (int(each) for each in np.flatnonzero(nearly)):
-        if cluster.owns(modes.rates[k].imag):
-            right, left = cluster.lifted(modes.right[:, k], modes.left[:, k])
-            found.append(DampedMode(modes.pencil, complex(modes.rates[k]), right, left))
-    return found
+    return [cluster.lifted(mode) for mode in nearly_growing(cluster, there.modes)]
+
+
+def searched(cluster: Cluster, below: float, above: float) -> tuple[Growing, Place]:
+    """The oracle of a cluster after its walk from one load to another, and the place there."""
+    oracle = Growing(cluster.pencil, CLUSTER * (above - below), None)
+    here, there = oracle.at(below), oracle.at(above)
+    oracle.over(here, there)
+    return oracle, there
+
+
+def nearly_growing(cluster: Cluster, modes: DampedModes) -> list[DampedMode]:
+    """Those modes of a cluster that grow, or nearly do so."""
+    near = np.flatnonzero(modes.rates.real > NEARLY * np.median(modes.rates.real))
+    return [modes.mode(int(k)) for k in near if cluster.owns(modes.rates[k].imag)]
 
 
 def distinct(modes: Sequence[DampedMode]) -> list[DampedMode]:

@@ -36,13 +36,16 @@ from ..onset.modes import matched
 from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
-from ..spectrum.spectrum import SAFETY, Complexes, mass_weighted, unit_rounding
+from ..spectrum.spectrum import SAFETY, Complexes, active_coordinates, mass_weighted, unit_rounding
 
 STEADY = 1e-3
 """Digits of an eigenvalue smaller than this share of |Z|_F are not asked for."""
 
 STEPS = 12
 """Factorisations: one or two are enough."""
+
+NEARER = 6
+"""Inverse iterations from random vectors: each takes others away by the ratio of their distances."""
 
 CORRECTIONS = 8
 """Corrections with the same factors, as long as each brings a digit at least."""
@@ -73,6 +76,12 @@ class Pencil:
         bearing = force_bearing(packing)
         a, g = (mass_weighted(each(bearing), bearing) for each in (stiffness_matrix, damping_matrix))
         return cls(packing.fx, a, g, load_error(packing))
+
+    def towards(self, other: "Pencil", share: float) -> "Pencil":
+        """The pencil at a share of the straight line to another one."""
+        pairs = (self.stiffness, other.stiffness), (self.damping, other.damping)
+        a, g = (csr_array((1 - share) * one + share * another) for one, another in pairs)
+        return Pencil((1 - share) * self.fx + share * other.fx, a, g, max(self.balance, other.balance))
 
     @cached_property
     def system(self) -> StateSpace:
@@ -139,7 +148,7 @@ class DampedMode:
         guess : complex, optional
             Where to begin; the first-order change by default.
         """
-        found = _solved(pencil, self.right, self.left, self.rate + self.change(pencil) if guess is None else guess)
+        found = solved_mode(pencil, self.right, self.left, self.rate + self.change(pencil) if guess is None else guess)
         return found if found is not None and self.resembles(found) else None
 
     def same(self, other: "DampedMode") -> bool:
@@ -223,7 +232,27 @@ class DampedModes:
         return matched(weight * (1 - np.abs(a - b) / (np.abs(a) + np.abs(b) + np.finfo(float).tiny)))
 
 
-def _solved(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> DampedMode | None:
+def nearest_mode(pencil: Pencil, frequency: float) -> DampedMode | None:
+    """The mode whose s is nearest to a point of the imaginary axis, by inverse iteration; None if none is near enough.
+
+    Parameters
+    ----------
+    pencil : Pencil
+        Of any size.
+    frequency : float
+        The point, 1 / time. The mode should be closer to it than others by far, as at a crossing that is known.
+    """
+    size, shift = pencil.stiffness.shape[0], 1j * frequency * (1 + 1e-9)  # no eigenvalue to the last digit
+    factors = _factors(csc_array(pencil.stiffness + shift * pencil.damping + shift**2 * eye_array(size)))
+    active = active_coordinates(pencil.stiffness)
+    x, y = np.zeros((2, size), complex)
+    x[active] = y[active] = np.random.default_rng(0).standard_normal(len(active))
+    for _ in range(NEARER):
+        x, y = _unit(factors.solve(x)), _unit(factors.solve(y, trans="H"))
+    return solved_mode(pencil, x, y, shift)
+
+
+def solved_mode(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> DampedMode | None:
     """The mode nearest to some vectors and an eigenvalue, by the two-sided iteration; None if it does not converge."""
     a, g, unit = pencil.stiffness, pencil.damping, eye_array(len(x))
     mirror = a.T, g.T

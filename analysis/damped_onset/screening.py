@@ -27,17 +27,16 @@ its windows are found as those of a small system. The operator has the last word
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import eigvalsh
+from scipy.linalg import eigh, eigvalsh
 from scipy.sparse import csr_array
 
 from ..onset.basis import Basis, Levels
 from ..packing.packing import Floats, Indices
-from ..spectrum.spectrum import Complexes
-from .modes import Pencil
+from .modes import DampedMode, Pencil
 
 SAFE = 5.0
 """Third order, in roots of its sum of squares: its terms have random signs."""
@@ -87,7 +86,7 @@ class Reduced:
         """d_k in second order, shape (E,), 1 / time."""
         h, gamma = self.stiffness.diagonal, self.damping.diagonal
         real = (-0.5 * gamma).astype(np.float32)[:, None]  # s, in two parts: complex numbers take three times as long
-        imag = np.sqrt(h - 0.25 * gamma**2).astype(np.float32)[:, None]
+        imag = np.sqrt(np.maximum(h - 0.25 * gamma**2, 0.0)).astype(np.float32)[:, None]
         apart = -self.stiffness.distance - real * self.damping.distance
         across = -imag * self.damping.distance
         loss = real * self.damping.coupling
@@ -96,8 +95,25 @@ class Reduced:
         shift = (forward + backward) * loss * apart - (forward * backward - loss * loss) * across
         size = apart * apart + across * across
         np.fill_diagonal(size, 1.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):  # of modes that hardly oscillate
             return np.asarray(gamma - np.sum(shift / size, axis=1, dtype=np.float64) / np.sqrt(h))
+
+    @cached_property
+    def bears(self) -> float:
+        """Factor by which the antisymmetric part may surely grow before it feeds any motion of these modes.
+
+        Form of `Cluster.quiet`, of all modes of the basis.
+        """
+        feed = self.stiffness.coupling.astype(np.float64)
+        loss = self.damping.coupling + np.diag(self.damping.diagonal)
+        softest = float(self.stiffness.diagonal.min())
+        if not (softest > 0 and np.any(feed)):
+            return 0.0 if softest <= 0 else np.inf
+        try:
+            taken = TAKEN * np.sqrt(softest) * (loss + loss.T)
+            return 1 / float(eigh(1j * (feed - feed.T), taken, eigvals_only=True)[-1])
+        except np.linalg.LinAlgError:
+            return 0.0
 
     def between(self, left: Floats, right: Floats) -> tuple[Floats, Floats]:
         """The blocks of both between some left and right vectors, shape (m, m)."""
@@ -153,10 +169,10 @@ class Cluster:
         """Whether a motion of this frequency is its own, and no other cluster's."""
         return self.owned[0] <= frequency <= self.owned[1]
 
-    def lifted(self, right: Complexes, left: Complexes) -> tuple[Complexes, Complexes]:
-        """Vectors of the small pencil on all coordinates."""
-        x, y = self.right @ right, self.left @ left
-        return x / np.linalg.norm(x), y / np.linalg.norm(y)
+    def lifted(self, mode: DampedMode) -> DampedMode:
+        """A mode of the small pencil with its vectors on all coordinates."""
+        x, y = self.right @ mode.right, self.left @ mode.left
+        return replace(mode, right=x / np.linalg.norm(x), left=y / np.linalg.norm(y))
 
 
 class Screen:
@@ -179,23 +195,26 @@ class Screen:
         if not (basis.covers(here.stiffness) and basis.covers(there.stiffness)):
             return None
         if self._seen is None:
-            nothing = Levels(np.zeros(len(basis.values)), np.zeros((len(basis.values),) * 2, np.float32))
-            before = Reduced(basis.levels(here.stiffness), basis.change(nothing, here.damping))
+            before = reduced(basis, basis.levels(here.stiffness), here)
         else:
-            before = _changed(basis, *self._seen, here)
-        after = _changed(basis, here, before, there)
+            before = changed(basis, *self._seen, here)
+        after = changed(basis, here, before, there)
         self._seen = there, after
         suspects = may_grow(before, after)
-        if suspects is None:
-            return None
-        cores = np.split(suspects, np.flatnonzero(np.diff(suspects) > APART) + 1) if len(suspects) else []
+        cores = cores_of(suspects)
         largest = max(LARGEST[0], LARGEST[1] * len(basis.active))
         if any(core[-1] - core[0] + 2 * MARGIN > largest for core in cores):
             return None
-        return [each for each in _clusters(basis, (here, before), (there, after), cores) if not each.quiet]
+        return [each for each in clusters(basis, (here, before), (there, after), cores) if not each.quiet]
 
 
-def _changed(basis: Basis, here: Pencil, reduced: Reduced, there: Pencil) -> Reduced:
+def reduced(basis: Basis, levels: Levels, pencil: Pencil) -> Reduced:
+    """What a pencil is in a basis in which the levels of its stiffness are known."""
+    nothing = Levels(np.zeros(len(basis.values)), np.zeros((len(basis.values),) * 2, np.float32))
+    return Reduced(levels, basis.change(nothing, pencil.damping))
+
+
+def changed(basis: Basis, here: Pencil, reduced: Reduced, there: Pencil) -> Reduced:
     """What is reduced at one load, at another."""
     if here is there:
         return reduced
@@ -205,14 +224,19 @@ def _changed(basis: Basis, here: Pencil, reduced: Reduced, there: Pencil) -> Red
     )
 
 
-def _clusters(
+def cores_of(suspects: Indices) -> list[Indices]:
+    """Suspects that are close to each other."""
+    return np.split(suspects, np.flatnonzero(np.diff(suspects) > APART) + 1) if len(suspects) else []
+
+
+def clusters(
     basis: Basis, here: tuple[Pencil, Reduced], there: tuple[Pencil, Reduced], cores: list[Indices]
 ) -> Iterator[Cluster]:
     """The small pencils about some modes each."""
     if not cores:
         return
     middle = here[1].mean(there[1])
-    level, size = middle.stiffness.diagonal, len(basis.active)
+    level, size = middle.stiffness.diagonal, len(basis.values)
     ordered = np.sort(middle.frequencies)
     for core in cores:
         modes = np.arange(max(0, core[0] - MARGIN), min(size, core[-1] + 1 + MARGIN))
@@ -226,8 +250,8 @@ def _clusters(
         yield Cluster((here[0].fx, there[0].fx), ends, spread[0], spread[1], owned)
 
 
-def may_grow(here: Reduced, there: Reduced) -> Indices | None:
-    """Modes that may grow at two loads or between them, in increasing order; None if perturbation theory is of no use.
+def may_grow(here: Reduced, there: Reduced) -> Indices:
+    """Modes that may grow at two loads or between them, in increasing order; those that hardly oscillate among them.
 
     Parameters
     ----------
@@ -237,17 +261,17 @@ def may_grow(here: Reduced, there: Reduced) -> Indices | None:
     points = here, here.mean(there), there
     frequency = np.min([each.frequencies for each in points], axis=0)
     gamma = np.max([each.damping.diagonal for each in points], axis=0)
-    if not np.all(gamma < WEAK * frequency):
-        return None
+    strong = ~(gamma < WEAK * frequency)
     mixing, third = _mixing_and_third_order(here, there, np.max([each.frequencies for each in points], axis=0))
     least = np.min([each.damping_of_modes for each in points], axis=0)
     own = np.min([each.damping.diagonal for each in points], axis=0)
-    return np.flatnonzero((least - SAFE * third / frequency <= SPARE * own) | (mixing > CLOSE))
+    lost = ~(least - SAFE * third / frequency > SPARE * own)
+    return np.flatnonzero(strong | lost | (mixing > CLOSE))
 
 
 def _mixing_and_third_order(here: Reduced, there: Reduced, frequency: Floats) -> tuple[Floats, Floats]:
     """The largest |V/g| of each mode with another, and the scale of the third order of Im sigma, 1 / time^2."""
-    frequency = frequency.astype(np.float32)
+    frequency = np.nan_to_num(frequency).astype(np.float32)
     h = np.maximum(here.stiffness.largest, there.stiffness.largest)
     p = np.maximum(here.damping.largest, there.damping.largest) * np.maximum(frequency, frequency[:, None])
     apart = here.stiffness.distance, there.stiffness.distance

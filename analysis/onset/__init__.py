@@ -15,10 +15,12 @@ from .modes import Modes, Place, force_bearing, full_operator
 from .pair import Pair
 from .ranks import Ranks
 from .search import Onset, OnsetError, complex_windows, find_onset, seeks_all
+from .sliced import Increments
 
 __all__ = [
     "LIMITS",
     "Family",
+    "Increments",
     "Limits",
     "LostPairError",
     "Modes",

@@ -189,6 +189,15 @@ class Bases:
         self.modes, self.ranks, self.limits = modes, ranks, limits
         self._kept: list[Basis] = []
 
+    def narrow(self, modes: tuple[int, int]) -> None:
+        """Look at these modes from here on; the same on all ranks."""
+        if self.modes is None or not self.modes[0] <= modes[0] < modes[1] <= self.modes[1]:
+            self._kept = []
+        self._kept = [
+            each for each in self._kept if each.border.modes[0] < modes[1] and each.border.modes[1] > modes[0]
+        ]
+        self.modes = modes
+
     def range(self, matrix: csr_array) -> tuple[int, int]:
         """Numbers of the first mode that is looked at and of the first that is not; ValueError if there are none."""
         count = len(active_coordinates(matrix))

@@ -15,17 +15,17 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from ..errors import BadInputError
 from ..files.wholefile import make_folder, write_whole
 from ..packing.packing import Floats
 from .limits import Limits
-from .modes import Place
 
 Shift = tuple[float, tuple[int, int]]
 """The shift of a slice, and the numbers of the first eigenvalue that belongs to it and of the first that does not."""
@@ -65,16 +65,33 @@ class Border(NamedTuple):
         return cls(modes, float(values[own.start]), beyond, float(np.ptp(near)) / len(near))
 
 
+class Looked(Protocol):
+    """A load that was looked at, and the operator there."""
+
+    @property
+    def fx(self) -> float:
+        """The load, force per top disk."""
+
+    @property
+    def matrix(self) -> csr_array:
+        """The operator, 1 / time^2."""
+
+    @property
+    def matrices(self) -> tuple[csr_array, ...]:
+        """All matrices on which the result depends."""
+
+
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A pair that turns complex in its cluster.
+    """A pair that turns complex in its cluster, or a mode that begins to grow.
 
     Attributes
     ----------
     onset, inside : float
-        The load from which on the pair is complex, and one at which it still is; force per top disk.
+        The load from which on the pair is complex, or the mode grows, and one at which it still does; force per top
+        disk.
     right, left : ndarray, shape (n, 2)
-        Its planes, in the n coordinates of the operator.
+        Its planes, in the n coordinates of the operator; real and imaginary parts of the vectors of a mode.
     """
 
     onset: float
@@ -92,11 +109,14 @@ class Found:
     border : Border
         Which slice it is.
     candidates : sequence of sequence of Candidate
-        The pairs that turn complex in its clusters, increment by increment.
+        The pairs that turn complex in its clusters, or the modes that begin to grow, increment by increment.
+    bears : float
+        |A - A^T| of the operator up to which dissipation surely holds all modes of the slice, 1 / time^2.
     """
 
     border: Border
     candidates: Sequence[Sequence[Candidate]]
+    bears: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -137,6 +157,7 @@ class Pass:
             f"{first}-{stop}.npz",
             modes=found.border.modes,
             border=found.border[1:],
+            bears=found.bears,
             increments=len(found.candidates),
             increment=[k for k, _ in flat],
             loads=[(each.onset, each.inside) for _, each in flat],
@@ -159,13 +180,14 @@ NEW_PASS = Pass()
 """Of which nothing is known, nor kept."""
 
 
-def pass_folder(parent: Path, places: Sequence[Place], modes: tuple[int, int], limits: Limits) -> Path:
+def pass_folder(parent: Path, places: Sequence[Looked], modes: tuple[int, int], limits: Limits) -> Path:
     """Where what is found on the increments between some loads is kept."""
     digest = hashlib.sha256(repr((version("faultgouge"), modes, limits)).encode())
     for place in places:
         digest.update(repr(place.fx).encode())
-        for array in (place.matrix.data, place.matrix.indices, place.matrix.indptr):
-            digest.update(np.ascontiguousarray(array).data)
+        for matrix in place.matrices:
+            for array in (matrix.data, matrix.indices, matrix.indptr):
+                digest.update(np.ascontiguousarray(array).data)
     return parent / digest.hexdigest()[:16]
 
 
@@ -175,7 +197,8 @@ def _found(path: Path) -> Found:
         candidates: list[list[Candidate]] = [[] for _ in range(int(data["increments"]))]
         for k, loads, planes in zip(data["increment"], data["loads"], data["planes"], strict=True):
             candidates[int(k)].append(Candidate(float(loads[0]), float(loads[1]), *planes))
-        return Found(Border((first, stop), *(float(each) for each in data["border"])), candidates)
+        border = Border((first, stop), *(float(each) for each in data["border"]))
+        return Found(border, candidates, float(data["bears"]))
 
 
 def _shifts(path: Path) -> list[Shift]:

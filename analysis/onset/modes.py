@@ -122,6 +122,11 @@ class Place:
     fx: float
     matrix: csr_array
 
+    @property
+    def matrices(self) -> tuple[csr_array, ...]:
+        """All that describes the operator."""
+        return (self.matrix,)
+
     @cached_property
     def modes(self) -> Modes:
         """All modes, by LAPACK."""

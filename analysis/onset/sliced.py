@@ -1,4 +1,4 @@
-"""The search for the first window of a large packing: the oracle that looks at slices of the spectrum.
+"""The search for the first window of a large packing: the oracles that look at slices of the spectrum.
 
 Modes mix with their neighbours in the spectrum only. In the eigenbasis of one load, slice by slice
 (:mod:`~faultgouge.analysis.onset.basis`), perturbation theory names the pairs that may meet, few of thousands. The
@@ -16,19 +16,21 @@ confirmed ones (packings of 1,000 disks, increments of 1e-3).
 its kind, so a pair is followed from inside of its window to the edge.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, pairwise
 from pathlib import Path
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing.packing import Floats
 from .basis import Bases, Basis, Cluster, Levels, width_and_mixing
 from .dense import all_windows
 from .edge import DoubtError, Edge, Family, LostPairError, Window, edge_from_inside, leads_back, other_sign
-from .found import NEW_PASS, Candidate, Found, Pass, pass_folder
+from .found import NEW_PASS, Candidate, Found, Looked, Pass, pass_folder
+from .limits import LIMITS, Limits
 from .modes import Place
 from .pair import Pair, continued
 from .ranks import ALONE, Ranks
@@ -44,40 +46,93 @@ Increments = tuple[tuple[float, float], ...]
 """From load to load."""
 
 
-class Sliced:
-    """The oracle; its places are operators, and what it is sure of is a window."""
+class Begun(Protocol):
+    """A window: it begins at a load."""
+
+    @property
+    def fx_onset(self) -> float:
+        """The load, force per top disk."""
+
+
+P = TypeVar("P", bound=Looked)
+W = TypeVar("W", bound=Begun)
+
+
+class Sliced(ABC, Generic[P, W]):
+    """An oracle; its places are operators, and what it is sure of is a window.
+
+    Parameters
+    ----------
+    at : callable
+        Load -> the operator there.
+    modes, watch, ranks, folder, limits
+        As of :func:`~faultgouge.analysis.find_onset`.
+    """
 
     def __init__(
-        self, family: Family, modes: tuple[int, int] | None, watch: Watch, ranks: Ranks, folder: Path | None
+        self,
+        at: Callable[[float], P],
+        modes: tuple[int, int] | None = None,
+        watch: Watch = lambda says: None,
+        ranks: Ranks = ALONE,
+        folder: Path | None = None,
+        limits: Limits = LIMITS,
     ) -> None:
-        self.family, self.limits, self.watch, self.ranks = family, family.limits, watch, ranks
+        self.at, self.limits, self.watch, self.ranks = at, limits, watch, ranks
         self.folder = folder
-        self.bases = Bases(modes, ranks, family.limits)
-        self.first: Window | None = None
+        self.bases = Bases(modes, ranks, limits)
+        self.first: W | None = None
         self.doubtful: list[tuple[float, float]] = []
-        self._passed: list[Place] = []
+        self._passed: list[P] = []
+
+    @abstractmethod
+    def _seen(self, basis: Basis, levels: Levels, places: Sequence[P]) -> Found:
+        """What a basis announces between some places; the operator at the first of them is given in the basis."""
+
+    @abstractmethod
+    def _confirmed(self, candidate: Candidate, there: P, first: W | None) -> W | None:
+        """The window of the operator itself in place of that of a cluster; None if it is none, or not the first.
+
+        `there` is the end of the increment. A DoubtError, a LostPairError or a NoEquilibriumError says that one cannot
+        tell.
+        """
 
     @property
     def finished(self) -> bool:
         """Whether the first window has been found."""
         return self.first is not None
 
-    def record(self, sure: Window) -> None:
+    def ahead(self, done: int) -> int:
+        """Increments that are looked at while bases that are not kept pass by, after so many others."""
+        return self.limits.ahead
+
+    def _beyond(self, candidate: Candidate, first: W, start: float) -> bool:
+        """Whether a window cannot be first: clusters are off by a share of the way from the increment's start."""
+        return candidate.onset - start > (1 + 2 * self.limits.reach) * (first.fx_onset - start)
+
+    def _elsewhere(self, candidate: Candidate, window: W, increment: float) -> bool:
+        """Whether a window begins so far from where a cluster announced it that clusters are not to be trusted."""
+        return abs(window.fx_onset - candidate.onset) > 2 * self.limits.reach * increment
+
+    def record(self, sure: W) -> None:
         """Take down a window; the one with the smaller onset is the first."""
         if self.first is None or sure.fx_onset < self.first.fx_onset:
             self.first = sure
 
     # What clusters announce
 
-    def candidates(self, places: Sequence[Place], depth: int) -> list[list[Candidate]]:
-        """The pairs that turn complex in their clusters on each increment, by increasing onset: those of all ranks."""
-        known = self._known(places)
-        fresh = self.ranks.together(lambda: self._found(places, known))
-        found = sorted(chain(known.found, *fresh), key=lambda each: each.border.modes)
-        increments = zip(*(each.candidates for each in found), strict=True)
+    def candidates(self, places: Sequence[P], depth: int) -> list[list[Candidate]]:
+        """What the clusters of all ranks announce on each increment, by increasing onset."""
+        increments = zip(*(each.candidates for each in self._found_by_all(places)), strict=True)
         return [sorted(chain(*each), key=lambda candidate: candidate.onset) for each in increments]
 
-    def _known(self, places: Sequence[Place]) -> Pass:
+    def _found_by_all(self, places: Sequence[P]) -> list[Found]:
+        """What the slices of all ranks have, by the order of the spectrum."""
+        known = self._known(places)
+        fresh = self.ranks.together(lambda: self._found(places, known))
+        return sorted(chain(known.found, *fresh), key=lambda each: each.border.modes)
+
+    def _known(self, places: Sequence[P]) -> Pass:
         """What an earlier search has left; nothing if bases are kept, as the increments beyond need these."""
         matrix = places[0].matrix
         if self.folder is None or self.bases.keeps(matrix):
@@ -85,21 +140,20 @@ class Sliced:
         folder = pass_folder(self.folder, places, self.bases.range(matrix), self.limits)
         return self.ranks.together(lambda: Pass.read(folder) if self.ranks.rank == 0 else NEW_PASS)[0]
 
-    def _found(self, places: Sequence[Place], known: Pass) -> list[Found]:
+    def _found(self, places: Sequence[P], known: Pass) -> list[Found]:
         """What this rank's slices have, without those that are known."""
         found: list[Found] = []
         first, stop = self.bases.range(places[0].matrix)
         before = sum(each.modes[1] - each.modes[0] for each in known.borders)
         done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
         failure: FaultgougeError | None = None
-        increments = [(here.fx, there.fx, there.matrix - here.matrix) for here, there in pairwise(places)]
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
         self.watch(f"{where}: {f'{before} of {stop - first} modes are known' if known.shifts else 'modes are counted'}")
         for basis, levels in self.bases.at(places[0].matrix, known):
             done += basis.own.stop - basis.own.start
             self.watch(f"{where}: {min(done, wanted)} of {wanted} modes")
             try:
-                found.append(Found(basis.border, list(self._along(basis, levels, increments))))
+                found.append(self._seen(basis, levels, places))
             except FaultgougeError as error:
                 failure = failure or error  # it waits: the ranks meet at the end of their bases
                 continue
@@ -108,13 +162,72 @@ class Sliced:
             raise failure
         return found
 
-    def _along(
-        self, basis: Basis, levels: Levels, increments: Sequence[tuple[float, float, csr_array]]
-    ) -> Iterator[list[Candidate]]:
-        """The pairs of a basis that turn complex in their clusters, increment by increment."""
-        for here, there, change in increments:
-            before, levels = levels, basis.change(levels, change)
-            yield list(self._announced(basis, (here, before), (there, levels)))
+    # What the operator has
+
+    def confirm(self, candidates: list[Candidate], here: P, there: P, depth: int) -> tuple[W | None, list[P]]:
+        """The first window that one of the candidates has become; parts of the increment where that is in doubt."""
+        if not self._passed or self._passed[-1].fx != here.fx:
+            self._passed.append(here)
+        finest = depth == self.limits.depth
+        window, doubt = self._earliest(candidates, there, finest)
+        between = self._parts(here, there) if doubt and not finest else []
+        if doubt and not between:
+            self.doubtful.append((here.fx, there.fx))
+        return window, between
+
+    def _parts(self, here: P, there: P) -> list[P]:
+        """Where an increment is divided; nowhere if one of the parts has no equilibrium at its end."""
+        loads = here.fx + (there.fx - here.fx) * np.arange(1, self.limits.parts) / self.limits.parts
+        try:
+            return [self.at(load) for load in loads]
+        except NoEquilibriumError:
+            return []
+
+    def _earliest(self, candidates: list[Candidate], there: P, finest: bool) -> tuple[W | None, bool]:
+        """The first window of the operator itself, and whether that is in doubt, at which the search ends.
+
+        On the finest increments it goes on, and an error is raised if no window has been found beside it.
+        """
+        here = self._passed[-1]
+        first: W | None = None
+        lost: Exception | None = None
+        doubt = False
+        for candidate in candidates:
+            if first is not None and self._beyond(candidate, first, here.fx):
+                break
+            try:
+                window = self._confirmed(candidate, there, first)
+            except (NoEquilibriumError, LostPairError, DoubtError) as error:
+                window, doubt = None, True
+                lost = lost if isinstance(error, DoubtError) else error
+            if window is not None:
+                elsewhere = self._elsewhere(candidate, window, there.fx - here.fx)
+                doubt = doubt or (elsewhere and window.fx_onset > here.fx)
+                if first is None or window.fx_onset < first.fx_onset:
+                    first = window
+            if doubt and not finest:
+                break
+        if finest and first is None and lost is not None:
+            raise lost
+        return first, doubt
+
+
+class SlicedPairs(Sliced[Place, Window]):
+    """The oracle of complex pairs of a family of matrices."""
+
+    def __init__(
+        self, family: Family, modes: tuple[int, int] | None, watch: Watch, ranks: Ranks, folder: Path | None
+    ) -> None:
+        super().__init__(family.at, modes, watch, ranks, folder, family.limits)
+        self.family = family
+
+    def _seen(self, basis: Basis, levels: Levels, places: Sequence[Place]) -> Found:
+        """The pairs of a basis that turn complex in their clusters."""
+        found = []
+        for here, there in pairwise(places):
+            before, levels = levels, basis.change(levels, there.matrix - here.matrix)
+            found.append(list(self._announced(basis, (here.fx, before), (there.fx, levels))))
+        return Found(basis.border, found)
 
     def _announced(self, basis: Basis, here: At, there: At) -> Iterator[Candidate]:
         """The pairs of a basis that turn complex in their clusters."""
@@ -149,58 +262,6 @@ class Sliced:
     def _narrowest(self, increment: float) -> float:
         """The narrowest windows that are looked for on an increment, force."""
         return max(self.family.narrowest, self.limits.finest * increment)
-
-    # What the operator has
-
-    def confirm(
-        self, candidates: list[Candidate], here: Place, there: Place, depth: int
-    ) -> tuple[Window | None, list[Place]]:
-        """The first window that one of the candidates has become; parts of the increment where that is in doubt."""
-        if not self._passed or self._passed[-1].fx != here.fx:
-            self._passed.append(here)
-        finest = depth == self.limits.depth
-        window, doubt = self._earliest(candidates, there, finest)
-        between = self._parts(here, there) if doubt and not finest else []
-        if doubt and not between:
-            self.doubtful.append((here.fx, there.fx))
-        return window, between
-
-    def _parts(self, here: Place, there: Place) -> list[Place]:
-        """Where an increment is divided; nowhere if one of the parts has no equilibrium at its end."""
-        loads = here.fx + (there.fx - here.fx) * np.arange(1, self.limits.parts) / self.limits.parts
-        try:
-            return [self.family.at(load) for load in loads]
-        except NoEquilibriumError:
-            return []
-
-    def _earliest(self, candidates: list[Candidate], there: Place, finest: bool) -> tuple[Window | None, bool]:
-        """The first window of the operator itself, and whether that is in doubt, at which the search ends.
-
-        On the finest increments it goes on, and an error is raised if no window has been found beside it.
-        """
-        here, reach = self._passed[-1], 2 * self.limits.reach
-        first: Window | None = None
-        lost: Exception | None = None
-        doubt = False
-        for candidate in candidates:
-            # Clusters are off by a share of the way from here: one that is far beyond cannot be first.
-            if first is not None and candidate.onset - here.fx > (1 + reach) * (first.fx_onset - here.fx):
-                break
-            try:
-                window = self._confirmed(candidate, there, first)
-            except (NoEquilibriumError, LostPairError, DoubtError) as error:
-                window, doubt = None, True
-                lost = lost if isinstance(error, DoubtError) else error
-            if window is not None:
-                late = abs(window.fx_onset - candidate.onset) > reach * (there.fx - here.fx)
-                doubt = doubt or (late and window.fx_onset > here.fx)
-                if first is None or window.fx_onset < first.fx_onset:
-                    first = window
-            if doubt and not finest:
-                break
-        if finest and first is None and lost is not None:
-            raise lost
-        return first, doubt
 
     def _confirmed(self, candidate: Candidate, there: Place, first: Window | None) -> Window | None:
         """The window of the operator itself in place of that of a cluster; None if it is none, or not the first."""
@@ -258,16 +319,22 @@ def first_window(
     """The first window of a family of large matrices, if there is one, and the increments before it that are in doubt.
 
     Its end is None where the pair is complex at the next load. On increments in doubt clusters announce a pair that the
-    operator was not seen to have. Arguments and errors are those of `find_onset`. Loads beyond the one above the onset
-    are not asked for, except those of `Limits.ahead` increments; a NoEquilibriumError of the operator at one of them is
-    raised if no window has been found before.
+    operator was not seen to have. Arguments and errors are those of `find_onset`; of loads those of `first_along`.
     """
-    oracle = Sliced(family, modes, watch, ranks, folder)
-    here = family.at(loads[0])
-    ahead = 1 if oracle.bases.keeps(here.matrix) else family.limits.ahead
+    return first_along(SlicedPairs(family, modes, watch, ranks, folder), loads)
+
+
+def first_along(oracle: Sliced[P, W], loads: Floats) -> tuple[W | None, Increments]:
+    """The first window that an oracle finds along a ramp, and the increments before it that are in doubt.
+
+    Loads beyond the one above the onset are not asked for, except those of `Limits.ahead` increments; a
+    NoEquilibriumError of the operator at one of them is raised if no window has been found before.
+    """
+    here = oracle.at(float(loads[0]))
     done = 1
     while done < len(loads) and not oracle.finished:
-        places = [here, *_reached(family, loads[done : done + ahead])]
+        ahead = 1 if oracle.bases.keeps(here.matrix) else oracle.ahead(done)
+        places = [here, *_reached(oracle.at, loads[done : done + ahead])]
         walk(oracle, places)
         here = places[-1]
         done += len(places) - 1
@@ -276,12 +343,12 @@ def first_window(
     return first, tuple(doubtful)
 
 
-def _reached(family: Family, loads: Floats) -> list[Place]:
+def _reached(at: Callable[[float], P], loads: Floats) -> list[P]:
     """The operator at loads as far as there are equilibria; the error if there is none at the first."""
-    places: list[Place] = []
+    places: list[P] = []
     for load in loads:
         try:
-            places.append(family.at(load))
+            places.append(at(float(load)))
         except NoEquilibriumError:
             if not places:
                 raise

@@ -1,4 +1,4 @@
-"""What one way of doing a thing costs beside another: times of the two, taken in turns.
+"""What one way of doing a thing costs beside another, times of the two taken in turns; and the line that says so.
 
 The ratio is taken within a turn, and every other turn begins with the other of the two, so that what else the machine
 does falls on both alike. Work of one thread is timed by the processor time of this process, which leaves out the pauses
@@ -9,11 +9,14 @@ would tell of the slowest.
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter, process_time
+from typing import Any
 
 import numpy as np
 
-TURNS = 11
-"""Turns of a comparison: quartiles of fewer jump."""
+from ...pywrap.lammps.dynamics import Motion
+
+TURNS, FEW = 11, 5
+"""Turns of a comparison: quartiles of fewer jump; and turns of what may take long."""
 
 SHARE = 10e-3
 """Seconds that one of the two takes in a turn, if it can be chosen: far above the clock and the call."""
@@ -86,3 +89,43 @@ def in_turns(
             if turn:
                 record.append((clock() - start) / count)
     return Cost(per, tuple(times[0]), tuple(times[1]))
+
+
+@dataclass(frozen=True)
+class Part:
+    """One line of the explanation.
+
+    Attributes
+    ----------
+    name : str
+        The feature.
+    included : bool
+        Whether the scene has it, as LAMMPS says.
+    reason : str
+        Why, in a clause.
+    adds : tuple of str
+        What it loads, or would load.
+    cost : Cost or None
+        Times without and with it; None where it cannot be measured here.
+    same : str
+        What both compute.
+    identical : bool or None
+        Whether that agrees to the bit; None where it cannot be measured here.
+    """
+
+    name: str
+    included: bool
+    reason: str
+    adds: tuple[str, ...]
+    cost: Cost | None
+    same: str
+    identical: bool | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return vars(self) | {"cost": self.cost.as_dict() if self.cost else None}
+
+
+def same_motion(one: Motion, other: Motion) -> bool:
+    """Whether positions and velocities are the same to the bit."""
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in one._fields)

@@ -32,8 +32,7 @@ from ...pywrap.runs.path import next_equilibrium
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.sections import Ramp
 from ...pywrap.settling.bed import settle
-from .costs import SHARE, TURNS, in_turns
-from .parts import FEW, Part, same_motion
+from .costs import FEW, SHARE, TURNS, Part, in_turns, same_motion
 from .processors import ranks, threads
 from .switches import UNREACHED, Feature, Loaded, Run, features, where
 

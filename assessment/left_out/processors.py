@@ -11,8 +11,7 @@ from mpi4py import MPI
 
 from ...analysis import Packing, dynamical_matrix
 from ...analysis.packing.packing import Floats
-from .costs import in_turns
-from .parts import FEW, Part, same_motion
+from .costs import FEW, Part, in_turns, same_motion
 from .switches import Run
 
 DENSE = 400

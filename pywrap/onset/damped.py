@@ -4,25 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import NoEquilibriumError, Onset, OnsetError, Window, find_onset
+from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, find_onset
+from ...analysis.damped_onset.modes import Pencil
+from ...analysis.damped_onset.sliced import first_growing
 from ...analysis.damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows, dissipating, dissipative
+from ...analysis.onset import Increments, seeks_all
 from ..lammps.engine import Engine
 from ..runs.path import EquilibriumPath, loads
 from ..scenes.refusals import SceneError
 from ..scenes.scene import Scene
 from ..settling.bed import settle
+from ..settling.settling import Watch
 from .path_error import with_damped_path_error, with_path_error
-
-MOST_DISKS = 300
-"""Disks up to which all damped modes are computed at a load: 15 s there, and it grows with the cube."""
-
+from .sharing import searching
 
 FEW = 3
 """Increments that are searched at once where the first window alone is asked for."""
@@ -42,12 +44,15 @@ class DampedOnset:
         Without dissipation; None if no pair becomes complex on the same loads.
     flows_beyond : float or None
         The last F_x that had an equilibrium, where the packing flows before the ramp's end.
+    doubtful : tuple of (float, float)
+        Of a large packing, increments before the onset in which motion was expected to grow and was not seen to.
     """
 
     mu: float
     windows: tuple[DampedWindow, ...]
     undamped: Onset | None
     flows_beyond: float | None
+    doubtful: Increments = ()
 
     @property
     def fx_c(self) -> float:
@@ -68,6 +73,7 @@ class DampedOnset:
             "error_of_path": self.windows[0].path_error,
             "windows": [window.as_dict() for window in self.windows],
             "undamped": None if undamped is None else {"fx_c": undamped.fx_c, "error": undamped.error},
+            "doubtful": [list(increment) for increment in self.doubtful],
             "flows_beyond": self.flows_beyond,
         }
 
@@ -85,22 +91,25 @@ class Ramped:
     path : EquilibriumPath
         fx -> Packing.
     forces : ndarray
-        The loads of the ramp that have an equilibrium.
+        The loads of the ramp, of a packing whose windows are all sought those that have an equilibrium.
+    whole : bool
+        Whether these are solved for; else they are as they are asked for.
     flows : bool
-        Whether the packing flows before the ramp's end.
+        Whether the packing flows before the ramp's end, as far as that is known.
     """
 
     engine: Engine
     scene: Scene
     path: EquilibriumPath
     forces: NDArray[np.float64]
+    whole: bool
     flows: bool
 
-    def undamped(self) -> Onset | None:
-        """All windows without dissipation; None if there is none."""
+    def undamped(self, watch: Watch = lambda says: None, folder: Path | None = None) -> Onset | None:
+        """All windows without dissipation, or of a large packing the first one; None if there is none."""
         try:
-            return find_onset(dissipating(self.path), self.forces)
-        except OnsetError:
+            return find_onset(dissipating(self.path), self.forces, watch=watch, ranks=searching(), folder=folder)
+        except (OnsetError, NoEquilibriumError):
             return None
 
     def first_window(self) -> Window | None:
@@ -114,17 +123,15 @@ class Ramped:
 
 
 @contextmanager
-def ramped(
-    scene: Scene,
-    mu: float | None = None,
-    watch: Callable[[str], None] = lambda says: None,
-) -> Iterator[Ramped]:
+def ramped(scene: Scene, mu: float | None = None, watch: Watch = lambda says: None) -> Iterator[Ramped]:
     """Ramp a scene to its end, or to where the packing flows; its equilibria have no dissipation.
+
+    The ramp of a packing of which the first window alone is sought goes as far as somebody asks for equilibria.
 
     Raises
     ------
     SceneError
-        If the scene has no section [ramp], or more disks than `MOST_DISKS`.
+        If the scene has no section [ramp].
     NoEquilibriumError
         If the packing flows from the first increment on.
     """
@@ -133,27 +140,34 @@ def ramped(
     wanted = loads(scene.ramp)
     scene = scene.model_copy(update={"damping": None})
     start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"))
-    if len(start.packing) > MOST_DISKS:
-        raise SceneError(
-            f"the onset with dissipation takes all modes at every load, which is too much for {len(start.packing)} "
-            f"disks: take {MOST_DISKS} at the most, or leave [damping] out"
-        )
     with Engine(start.packing) as engine:
         path = EquilibriumPath(engine, start, scene, onward=True)
-        watch(f"ramp up to F_x = {wanted[-1]:g}")
-        for _ in path.climb(wanted[1:]):
-            pass
-        forces = np.array([each.fx for each in path.kept])
-        yield Ramped(engine, scene, path, forces, len(forces) < len(wanted))
+        forces, whole = wanted, seeks_all(start.packing)
+        if whole:
+            watch(f"ramp up to F_x = {wanted[-1]:g}")
+            for _ in path.climb(wanted[1:]):
+                pass
+            forces = np.array([each.fx for each in path.kept])
+        yield Ramped(engine, scene, path, forces, whole, len(forces) < len(wanted))
+
+
+Dissipation = Callable[[Packing], Packing]
+"""A packing -> the same with its dashpots and drag."""
+
+Known = Callable[[DampedOnset, float], None]
+"""As of `damped_onset_run`."""
 
 
 def damped_onset_run(
     scene: Scene,
     mu: float,
-    watch: Callable[[str], None] = lambda says: None,
-    known: Callable[[DampedOnset, float], None] = lambda found, fx: None,
+    watch: Watch = lambda says: None,
+    known: Known = lambda found, fx: None,
+    folder: Path | None = None,
 ) -> DampedOnset:
     """The windows of growing motion of a scene for one friction coefficient, and its undamped onset.
+
+    Of a packing of more than `Limits.all_windows` disks these are the first window of either kind.
 
     Parameters
     ----------
@@ -166,6 +180,9 @@ def damped_onset_run(
     known : callable, optional
         Given what is known, without the errors of the path, and the load up to which that is all, as soon as there is a
         window and after each increment from there on.
+    folder : Path, optional
+        Where the search of a large packing leaves what it finds, and goes on from, see
+        :func:`~faultgouge.analysis.find_onset`.
 
     Raises
     ------
@@ -177,37 +194,67 @@ def damped_onset_run(
     if scene.damping is None:
         raise SceneError("the scene has no section [damping]: add it, with cn, ct or tau")
     damping = scene.damping
+    dissipation = partial(dissipative, cn=damping.cn, ct=damping.ct, drag_time=damping.tau)
     with ramped(scene, mu, watch) as ramp:
-        watch(f"pairs that become complex without dissipation, up to F_x = {ramp.forces[-1]:.6g}")
-        undamped = ramp.undamped()
-
-        def so_far(windows: tuple[DampedWindow, ...], fx: float) -> None:
-            if windows:
-                known(DampedOnset(mu, windows, undamped, None), fx)
-
-        dissipation = partial(dissipative, cn=damping.cn, ct=damping.ct, drag_time=damping.tau)
-        found = damped_windows(
-            lambda fx: dissipation(ramp.path(fx)),
-            ramp.forces,
-            look=() if undamped is None else inside(undamped.windows),
-            watch=watch,
-            known=so_far,
-        )
-        last = float(ramp.forces[-1])
-        if not found and ramp.flows:
-            raise NoEquilibriumError(
-                f"no motion grows up to F_x = {last:.10g}, and no equilibrium was found beyond: the packing flows "
-                "before an onset"
-            )
-        if not found:
-            raise DampedOnsetError(f"No motion grows up to fx = {last:.10g}: raise ramp.until.")
+        if ramp.whole:
+            found = _all_windows(ramp, mu, dissipation, watch, known)
+        else:
+            found = _first_window(ramp, mu, dissipation, watch, known, folder)
         watch("the path once more, with other increments")
-        again = ramp.engine, ramp.path, ramp.scene
+        again, undamped = (ramp.engine, ramp.path, ramp.scene), found.undamped
         if undamped is not None:
             undamped = with_path_error(undamped, *again)
-        return DampedOnset(
-            mu, with_damped_path_error(found, dissipation, *again), undamped, last if ramp.flows else None
+        windows = with_damped_path_error(found.windows, dissipation, *again)
+        return replace(found, windows=windows, undamped=undamped)
+
+
+def _all_windows(ramp: Ramped, mu: float, dissipation: Dissipation, watch: Watch, known: Known) -> DampedOnset:
+    """All windows of a ramp that is solved for, without the errors of the path."""
+    watch(f"pairs that become complex without dissipation, up to F_x = {ramp.forces[-1]:.6g}")
+    undamped = ramp.undamped()
+
+    def so_far(windows: tuple[DampedWindow, ...], fx: float) -> None:
+        if windows:
+            known(DampedOnset(mu, windows, undamped, None), fx)
+
+    look = () if undamped is None else inside(undamped.windows)
+    found = damped_windows(lambda fx: dissipation(ramp.path(fx)), ramp.forces, look=look, watch=watch, known=so_far)
+    last = float(ramp.forces[-1])
+    if not found:
+        raise _nothing_grows(last, ramp.flows)
+    return DampedOnset(mu, found, undamped, last if ramp.flows else None)
+
+
+def _first_window(
+    ramp: Ramped, mu: float, dissipation: Dissipation, watch: Watch, known: Known, folder: Path | None
+) -> DampedOnset:
+    """The first window of either kind of a large packing, without the errors of the path; all ranks search."""
+
+    def pencil(fx: float) -> Pencil:
+        return Pencil.of(dissipation(ramp.path(fx)))
+
+    def growing(says: str) -> None:
+        watch(f"with dissipation, {says}")
+
+    try:
+        first, doubtful = first_growing(pencil, ramp.forces, growing, searching(), folder)
+    except NoEquilibriumError as error:
+        raise _nothing_grows(ramp.path.kept[-1].fx, True) from error
+    if first is None:
+        raise _nothing_grows(float(ramp.forces[-1]), False)
+    found = DampedOnset(mu, (first,), None, None, doubtful)
+    known(found, first.fx_onset)
+    return replace(found, undamped=ramp.undamped(lambda says: watch(f"without dissipation, {says}"), folder))
+
+
+def _nothing_grows(last: float, flows: bool) -> DampedOnsetError | NoEquilibriumError:
+    """What is said of a ramp on which no motion grows."""
+    if flows:
+        return NoEquilibriumError(
+            f"no motion grows up to F_x = {last:.10g}, and no equilibrium was found beyond: the packing flows before "
+            "an onset"
         )
+    return DampedOnsetError(f"No motion grows up to fx = {last:.10g}: raise ramp.until.")
 
 
 def inside(windows: Iterable[Window]) -> list[float]:

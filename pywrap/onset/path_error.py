@@ -36,7 +36,7 @@ from scipy.linalg import LinAlgError, eigvals
 from scipy.sparse.linalg import ArpackError
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, dynamical_matrix, eigenpairs
-from ...analysis.damped_onset.modes import DampedMode, DampedModes, Pencil
+from ...analysis.damped_onset.modes import DampedMode, Pencil, nearest_mode
 from ...analysis.damped_onset.windows import DampedWindow
 from ...analysis.onset import force_bearing
 from ..equilibria.quasistatic import Equilibrium
@@ -308,10 +308,9 @@ def crossing(frequency: float, dissipation: Callable[[Packing], Packing]) -> Van
 
     def growth(packing: Packing) -> float:
         pencil = Pencil.of(dissipation(packing))
-        followed = known[0].at(pencil) if known else None
+        followed = (known[0].at(pencil) if known else None) or nearest_mode(pencil, frequency)
         if followed is None:
-            modes = DampedModes.of(pencil)
-            followed = modes.mode(int(np.argmin(np.abs(modes.rates - 1j * frequency))))
+            return np.nan
         known[:] = [followed]
         return float(followed.rate.real)
 

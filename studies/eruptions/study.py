@@ -79,8 +79,8 @@ def _page(result: Result) -> Result:
     }
 
 
-def starts_of(scene: Scene) -> tuple[list[Start], float | None]:
-    """Where the runs of a scene begin, and the last load that the packing bears if it does not bear them all.
+def eruptions_of(scene: Scene, _: object) -> Result:
+    """The task "eruptions" of a sweep: sizes at each load of [eruptions], and what ended them, without time series.
 
     Raises
     ------
@@ -88,7 +88,9 @@ def starts_of(scene: Scene) -> tuple[list[Start], float | None]:
         If the scene has no section [ramp] or [eruptions].
     """
     settings = _checked(scene)
-    return _starts(scene, sorted(settings.load), settings.time)
+    starts, flows_beyond = _starts(scene, sorted(settings.load), settings.time)
+    runs = [erupt(each) for each in starts]
+    return {"runs": [{k: v for k, v in run.items() if k != "series"} for run in runs], "flows_beyond": flows_beyond}
 
 
 def _checked(scene: Scene) -> Eruptions:

@@ -7,12 +7,13 @@ is a power of the number of disks (`Cost`), measured, for `sweep --dry-run`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ...pywrap import Scene
 from ...pywrap.scenes.study_sections import Modes
+from ..eruptions.study import eruptions_of
 from ..genericity.levels import growth, levels
 from ..genericity.surrogates import surrogates
 from ..modes.compute import modes
@@ -21,9 +22,10 @@ from ..modes.lossy_runs import lossy_runs
 from ..modes.random_matrices import random_matrices
 from ..packings import Start
 from ..trigger.compute import settings
+from ..trigger.study import trigger
 from ..yielding.compute import yielding
-from .events import eruptions, trigger
 from .onset import onset
+from .points import Point
 from .triggering import triggering
 
 Run = Callable[[Scene, Start], dict[str, Any]]
@@ -111,7 +113,7 @@ TASKS: Mapping[str, Task] = {
     "onset": Task(onset, _onset),
     "triggering": Task(triggering, _triggering),
     "trigger": Task(trigger, _trigger),
-    "eruptions": Task(eruptions, _eruptions),
+    "eruptions": Task(eruptions_of, _eruptions),
     "modes": Task(modes, _modes),
     "loss": Task(loss, _loss),
     "lossy runs": Task(lossy_runs, _loss),
@@ -121,3 +123,25 @@ TASKS: Mapping[str, Task] = {
     "growth": Task(growth, lambda scene: _increments(scene) * _dense(scene)),
     "surrogates": Task(surrogates, lambda scene: 3 * _onset(scene)),
 }
+
+
+def estimate(task: str, points: Sequence[Point]) -> list[str]:
+    """The cost of points that are not known yet, in plain words: CPU time of the task, and of settling packings."""
+    scenes = [point.scene for point in points if point.scene is not None]
+    seconds = [TASKS[task].seconds(scene) for scene in scenes]
+    settlings = {point.settling: point.scene for point in points if point.scene is not None}
+    settling = sum(settling_seconds(scene) for scene in settlings.values())
+    refused = len(points) - len(scenes)
+    return [
+        f"{len(scenes)} scenes to compute, {len(settlings)} packings to settle",
+        *([f"{refused} points make no scene, and will say why"] if refused else []),
+        f"about {_span(sum(seconds) + settling)} of one core, {_span(settling)} of it for settling; the longest scene "
+        f"takes about {_span(max(seconds, default=0.0))} (from 100 disks and measured exponents: right within a factor "
+        "of three)",
+    ]
+
+
+def _span(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

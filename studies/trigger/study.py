@@ -7,6 +7,8 @@ from ...pywrap import Scene
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.units import real_units
 from ..frame import Result, Study, Work
+from ..packings import Start
+from ..sweep.onset import onset
 from . import draw
 from .compute import (
     Row,
@@ -126,6 +128,31 @@ def _measured(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
             at = f"omega = {found['omega']:.4g} at {found['distance']:g}"
             work.say(f"{at}: triggers from {middle(found['below'], found['above']):.4g} on in LAMMPS")
     return [row for each in wanted if (row := known(each)) is not None]
+
+
+def trigger(scene: Scene, start: Start) -> Row:
+    """The task "trigger" of a sweep: the map of one scene, with the bisections that [trigger] asks for.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no section [ramp], or no v_0.
+    """
+    threshold(scene)
+    wave, first = settings(scene), onset(scene, start)
+    if first["ends"] != "onset":
+        return {"ends": first["ends"], "fx_c": None, "map": [], "measured": []}
+    packings = equilibria(scene, [first["fx_c"] * (1 - each) for each in wave.distance])
+    by_distance = {each: packings[first["fx_c"] * (1 - each)] for each in sorted(wave.distance, reverse=True)}
+    omegas = frequencies(next(iter(by_distance.values())), wave)
+    predicted = [row for each, packing in by_distance.items() for row in predictions(scene, packing, each, omegas)]
+    measured = [bisected(each) for each in waves(scene, packings, chosen(predicted, wave.runs))]
+    return {
+        "ends": "onset",
+        "fx_c": first["fx_c"],
+        "map": predicted,
+        "measured": [each | {"amplitude": middle(each["below"], each["above"])} for each in measured],
+    }
 
 
 trigger_map = Study(

@@ -73,7 +73,7 @@ def test_model_of_the_refusals_runs(lmp):
         ({"pair": "pair_style mindlin/smooth nan 5e4 1"}, "instead of 'nan'"),
         (
             {"pair": "pair_style mindlin/smooth 2e5 5e4 1 exact"},
-            "knows the keywords exponent, history, damping and compensated, but not exact",
+            "knows the keywords exponent, history, damping, energy and compensated, but not exact",
         ),
         ({"pair": "pair_style mindlin/smooth 2e5 5e4 1 compensated"}, "moves disks without the low parts"),
         ({"fix": "fix 1 all nve/disc 1.0 compensated"}, "needs pair_style mindlin/smooth KN KT MU compensated"),

@@ -72,3 +72,17 @@ def test_a_point_that_kills_every_worker_is_not_tried_for_ever(sweep):
     with pytest.raises(WorkerError, match="fewer --workers"):
         list(computed(pool, sweep.task, sweep.points))
     pool.shutdown()
+
+
+@pytest.mark.long
+def test_a_distributed_engine_whose_worker_is_killed_loses_nothing(tmp_path):
+    """Dask's local cluster, as docs/howto_cluster.md has it."""
+    pytest.importorskip("distributed")
+    from benchmarks.killed_worker import sweep_of, with_a_killed_worker, without_times
+
+    sweep = sweep_of(40)
+    alone = run_sweep(sweep, tmp_path / "alone", say=lambda _: None, workers=1)
+    found, killed = with_a_killed_worker(sweep, tmp_path / "cluster", 4)
+    assert killed > 0
+    assert [row["key"] for row in found] == [point.key for point in sweep.points]
+    assert [without_times(row) for row in found] == [without_times(row) for row in alone]

@@ -171,7 +171,7 @@ def onset(
     found: list[dict[str, Any]] = []
     for mu in wanted.law.mus:
         if wanted.damping is not None:
-            found.append(_damped_onset(wanted, mu, output, found))
+            found.append(_damped_onset(wanted, mu, output, folder, found))
         else:
             found.append(_undamped_onset(part, folder, wanted, mu))
     result = _written(output, found)
@@ -210,12 +210,14 @@ def _undamped_onset(modes: tuple[int, int] | None, folder: Path | None, scene: S
     _show_windows(run.onset.windows, real.get("si", []))
     for equilibrium in run.equilibria:
         say_way(equilibrium)
-    _say_doubtful(run.onset.doubtful)
+    _say_doubtful(run.onset.doubtful, "a pair was expected to become complex")
     _say_of_one_path(run.onset.windows)
     return {"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond} | real
 
 
-def _damped_onset(scene: Scene, mu: float, output: Path | None, before: list[dict[str, Any]]) -> dict[str, Any]:
+def _damped_onset(
+    scene: Scene, mu: float, output: Path | None, folder: Path | None, before: list[dict[str, Any]]
+) -> dict[str, Any]:
     """The onset of a scene with dissipation, as its JSON; and what a user reads of it.
 
     What is known is written as it comes, beside what is known `before` of other friction coefficients, with the load
@@ -230,7 +232,8 @@ def _damped_onset(scene: Scene, mu: float, output: Path | None, before: list[dic
             keeps(f"{output} has the windows with dissipation up to F_x = {fx:.6g}, without the errors of the path")
 
     with status(f"mu = {mu:g}") as show:
-        run = damped_onset_run(scene, mu, partial(_under_way, show, f"mu = {mu:g}", tells=output is None), known)
+        watch = partial(_under_way, show, f"mu = {mu:g}", folder=folder, tells=output is None)
+        run = damped_onset_run(scene, mu, watch, known, folder)
     first = run.windows[0]
     say(
         f"mu = {mu:g}: with dissipation F_x^c = {with_uncertainty(run.fx_c, run.error)} ({first.kind}, "
@@ -243,6 +246,7 @@ def _damped_onset(scene: Scene, mu: float, output: Path | None, before: list[dic
     for each in real.get("si", [])[:1]:
         stress, ratio, frequency = _columns(each)
         say(f"mu = {mu:g}: in SI a shear stress of {stress} Pa, {ratio} of the overburden, at {frequency} Hz")
+    _say_doubtful(run.doubtful, "a motion was expected to grow")
     _say_of_one_path(run.windows)
     return {"mu": mu} | run.as_dict() | real
 
@@ -260,11 +264,11 @@ def _columns(si: dict[str, float]) -> list[str]:
     return [f"{number:.4g}" for number in si.values()]
 
 
-def _say_doubtful(increments: Iterable[tuple[float, float]]) -> None:
+def _say_doubtful(increments: Iterable[tuple[float, float]], expected: str) -> None:
     for below, above in increments:
         say(
-            f"a pair was expected to become complex between F_x = {below:.6g} and {above:.6g}, and was not found: "
-            "an earlier onset may hide there; take smaller increments to be sure"
+            f"{expected} between F_x = {below:.6g} and {above:.6g}, and was not found: an earlier onset may hide "
+            "there; take smaller increments to be sure"
         )
 
 

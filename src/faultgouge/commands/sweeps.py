@@ -37,10 +37,9 @@ def sweep(
     """
     from faultgouge.studies.sweep.compute import LINES, run_sweep, stored
     from faultgouge.studies.sweep.draw import draw_sweep
-    from faultgouge.studies.sweep.estimate import estimate
     from faultgouge.studies.sweep.points import Sweep
     from faultgouge.studies.sweep.points import shard as part_of
-    from faultgouge.studies.sweep.tasks import TASKS
+    from faultgouge.studies.sweep.tasks import TASKS, estimate
 
     wanted, part = Sweep.from_toml(file, TASKS), _shard(shard)
     if dry_run:
@@ -136,8 +135,8 @@ def modes(
     from faultgouge.studies.modes.study import modes as count_modes
     from faultgouge.studies.modes.study import wanted_of
     from faultgouge.studies.sweep.compute import LINES
-    from faultgouge.studies.sweep.estimate import estimate
     from faultgouge.studies.sweep.points import shard as part_of
+    from faultgouge.studies.sweep.tasks import estimate
 
     wanted, part = wanted_of(file), _shard(shard)
     if is_root():

@@ -1,0 +1,301 @@
+"""The first window of growing motion of a large packing: clusters in slices of the spectrum, and the operator.
+
+Dissipation and the antisymmetric part couple a mode to its neighbours in the spectrum only. So slices are searched as
+for complex pairs (:mod:`~faultgouge.analysis.onset.sliced`). In the eigenbasis of a slice the modes that may grow are
+named, clusters about them announce where one begins to, and the operator confirms it
+(:mod:`~faultgouge.analysis.damped_onset.screening`).
+
+**Slices that are left out.** In each slice the antisymmetric part may be so many times larger before it can feed any
+motion as much as the motion loses (`Reduced.bears`). As long as it has not grown by `TRUSTED` of that, a slice is not
+looked at again.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from ..onset.basis import Basis, Levels
+from ..onset.edge import DoubtError, LostPairError, track
+from ..onset.found import Border, Candidate, Found
+from ..onset.limits import LIMITS, Limits
+from ..onset.ranks import ALONE, Ranks
+from ..onset.sliced import Increments, Sliced, Watch, first_along
+from ..packing.packing import Floats
+from ..spectrum.spectrum import active_coordinates
+from .edge import Crossing, DampedWindow, solved, window_of
+from .growing import LostTrackError, Place, nearly_growing, searched
+from .modes import DampedMode, Pencil
+from .screening import Cluster, Reduced, changed, clusters, cores_of, may_grow, reduced
+
+TRUSTED = 0.5
+"""Share of what a slice bears up to which it is left out: its modes change on the way."""
+
+BEFOREHAND = 1.3
+"""Where further slices have to be looked at, those that would have to at so many times larger loads are looked at, too:
+bases that are kept are made anew."""
+
+MOST_AHEAD = 8
+"""Increments at the most that are looked at while bases that are not kept pass by."""
+
+SHORTEST = 2.0**-6
+"""Shortest steps, in shares of the straight line from one pencil to another, in which a mode is followed."""
+
+LOOKS = 6
+"""Looks at an announced mode, for a load at which it grows."""
+
+SETTLED = 0.02
+"""Share of an increment by which the place of the largest growth may still move."""
+
+
+def first_growing(
+    pencil: Callable[[float], Pencil],
+    loads: Floats,
+    watch: Watch = lambda says: None,
+    ranks: Ranks = ALONE,
+    folder: Path | None = None,
+    limits: Limits = LIMITS,
+) -> tuple[DampedWindow | None, Increments]:
+    """The first window of growing motion of a large packing, if there is one, and increments before it in doubt.
+
+    Parameters
+    ----------
+    pencil : callable
+        fx -> Pencil. Loads beyond the one above the onset are asked for as by `first_along`.
+    loads : ndarray, shape (S,)
+        The increasing loads of the ramp, force per top disk.
+    watch, ranks, folder, limits
+        As of :func:`~faultgouge.analysis.find_onset`.
+
+    Returns
+    -------
+    DampedWindow or None
+        Its end is None where the mode grows at the next load.
+    tuple of (float, float)
+        Increments on which clusters announce a growing mode that the operator was not seen to have.
+    """
+    return first_along(SlicedGrowing(lambda fx: Place(pencil(fx)), None, watch, ranks, folder, limits), loads)
+
+
+class SlicedGrowing(Sliced[Place, DampedWindow]):
+    """The oracle of growing motion."""
+
+    _borne: Floats | None = None  # |A - A^T| up to which each mode of the spectrum is left out
+    _borders: Sequence[Border] = ()  # of the slices that were searched last
+    _lost: float | None = None  # frequency of the motion that is in doubt
+    _passing = False  # whether bases are not kept
+
+    def ahead(self, done: int) -> int:
+        """More and more of them, as dissipation may put off the onset by much; each costs a tenth of the bases."""
+        return min(done + 1, MOST_AHEAD)
+
+    # What clusters announce
+
+    def candidates(self, places: Sequence[Place], depth: int) -> list[list[Candidate]]:
+        """The modes that begin to grow in clusters of the slices that are looked at.
+
+        Of parts of an increment, while bases pass by, these are the slices about the motion that is in doubt.
+        """
+        if depth and self._lost is not None and self._passing:
+            about = [
+                each for each in self._borders if not self._lost**2 < each.first and not self._lost**2 > each.beyond
+            ]
+            if about:
+                self.bases.narrow((about[0].modes[0], about[-1].modes[1]))
+                return super().candidates(places, depth)
+        count = len(active_coordinates(places[0].matrix))
+        if self._borne is None or len(self._borne) != count:
+            self._borne = np.zeros(count)
+        feed = max(antisymmetric(place) for place in places)
+        if np.all(self._borne > feed):
+            return [[] for _ in places[1:]]
+        first, stop = self.bases.modes or (0, 0)
+        if min(self._borne[:first].min(initial=np.inf), self._borne[stop:].min(initial=np.inf)) <= feed:
+            feed *= BEFOREHAND
+        loud = np.flatnonzero(self._borne <= feed)
+        self.bases.narrow((int(loud[0]), int(loud[-1]) + 1))
+        self._passing = not self.bases.keeps(places[0].matrix)
+        return super().candidates(places, depth)
+
+    def _found_by_all(self, places: Sequence[Place]) -> list[Found]:
+        found = super()._found_by_all(places)
+        self._borders = [each.border for each in found]
+        if self._borne is not None:
+            for each in found:
+                self._borne[slice(*each.border.modes)] = TRUSTED * each.bears
+        return found
+
+    def _seen(self, basis: Basis, levels: Levels, places: Sequence[Place]) -> Found:
+        here, found = reduced(basis, levels, places[0].pencil), []
+        for before, after in pairwise(places):
+            there = changed(basis, before.pencil, here, after.pencil)
+            found.append(list(self._announced(basis, (before, here), (after, there))))
+            here = there
+        return Found(basis.border, found, here.bears * antisymmetric(places[-1]))
+
+    def _announced(
+        self, basis: Basis, here: tuple[Place, Reduced], there: tuple[Place, Reduced]
+    ) -> Iterator[Candidate]:
+        """The modes of a basis that grow in their clusters, or nearly do so."""
+        named = may_grow(here[1], there[1])
+        cores = cores_of(named[(named >= basis.own.start) & (named < basis.own.stop)])
+        ends = (here[0].pencil, here[1]), (there[0].pencil, there[1])
+        for cluster in clusters(basis, *ends, cores):
+            if not cluster.quiet:
+                yield from grown(cluster)
+
+    # What the operator has
+
+    def _confirmed(self, candidate: Candidate, there: Place, first: DampedWindow | None) -> DampedWindow | None:
+        self.watch(f"a motion that grows from about F_x = {candidate.onset:.6g}: its onset")
+        place = there if candidate.inside == there.fx else self.at(candidate.inside)
+        self._lost = announced_by(candidate, place.pencil).rate.imag
+        mode = mode_of(candidate, place.pencil)
+        announced = candidate.onset < there.fx  # else the mode nearly grows
+        if mode is None and announced:
+            raise DoubtError
+        if mode is not None and announced and not mode.growing:
+            mode = self._most(mode, there)
+        if mode is None or not mode.growing or (first is not None and self._later(mode, first)):
+            return None
+        above = followed(mode, there.pencil)
+        end = None if above.growing else self._crossing(mode, above)
+        for passed in reversed(self._passed):
+            below = followed(mode, passed.pencil)
+            if not below.growing:
+                return window_of(self._crossing(below, mode), end)
+            mode = below
+        return window_of(Crossing(mode.fx, 0.0, mode.rate.imag, "start"), end)
+
+    def _beyond(self, candidate: Candidate, first: DampedWindow, start: float) -> bool:
+        """Never: small differences of large couplings tell where weak dashpots begin to feed a mode.
+
+        So clusters, which know that a mode is about to grow, may be off by much in where. All are looked at.
+        """
+        return False
+
+    def _elsewhere(self, candidate: Candidate, window: DampedWindow, increment: float) -> bool:
+        """Never: the operator has followed the mode to where it begins to grow."""
+        return False
+
+    def _crossing(self, below: DampedMode, above: DampedMode) -> Crossing:
+        """Where a mode that is known at two loads crosses the axis."""
+        return solved(self._tracked(below, above), below.fx, above.fx)
+
+    def _tracked(self, *known: DampedMode) -> Callable[[float], DampedMode]:
+        """A mode at any load, from loads at which it is known."""
+        return track({mode.fx: mode for mode in known}, lambda near, fx: followed(near[0], self.at(fx).pencil))
+
+    def _later(self, mode: DampedMode, first: DampedWindow) -> bool:
+        """Whether a mode does not grow yet where the first window so far opens."""
+        if mode.fx <= first.fx_onset:
+            return False
+        return not followed(mode, self.at(first.fx_onset).pencil).growing
+
+    def _most(self, mode: DampedMode, there: Place) -> DampedMode | None:
+        """The mode where it grows on an increment; None if it is seen to lose energy on all of it."""
+        try:
+            return self._climbed(mode, there)
+        except LostPairError as error:  # nothing is lost but what a cluster has announced
+            raise DoubtError from error
+
+    def _climbed(self, mode: DampedMode, there: Place) -> DampedMode | None:
+        """The same, by parabolas through Re s; a LostPairError if the mode cannot be followed."""
+        here = self._passed[-1]
+        ends = [followed(mode, place.pencil) for place in (here, there)]
+        at = self._tracked(mode, *ends)
+        known = {each.fx: each for each in (mode, *ends)}
+        if len(known) < 3:
+            middle = 0.5 * (here.fx + there.fx)
+            known[middle] = at(middle)
+        for _ in range(LOOKS):
+            best = max(known.values(), key=lambda each: each.rate.real)
+            if best.growing:
+                return best
+            fx = vertex(sorted(known.values(), key=lambda each: abs(each.fx - best.fx))[:3])
+            fx = float(np.clip(fx, here.fx, there.fx))
+            if min(abs(fx - load) for load in known) < SETTLED * (there.fx - here.fx):
+                return None
+            known[fx] = at(fx)
+        raise DoubtError
+
+
+def antisymmetric(place: Place) -> float:
+    """|A - A^T|, 1 / time^2: what feeds motion."""
+    return float(np.linalg.norm((place.matrix - place.matrix.T).data))
+
+
+def grown(cluster: Cluster) -> Iterator[Candidate]:
+    """The modes of a cluster that begin to grow, and those that nearly do so at its upper load."""
+    below, above = cluster.loads
+    try:
+        oracle, there = searched(cluster, below, above)
+    except LostTrackError:  # its windows are not told apart: what grows at its ends has to do
+        oracle, there = None, Place(cluster.pencil(above))
+    windows = () if oracle is None else oracle.windows()
+    for window in windows:
+        if oracle is not None and window.fx_end is not None and cluster.owns(window.frequency):
+            modes = oracle.at(0.5 * (window.fx_onset + window.fx_end)).modes
+            if len(modes.growing):
+                nearest = min(modes.growing, key=lambda k: abs(modes.rates[k].imag - window.frequency))
+                yield candidate_of(window.fx_onset, cluster.lifted(modes.mode(int(nearest))))
+    begun = {window.frequency: window.fx_onset for window in windows if window.fx_end is None}
+    for mode in nearly_growing(cluster, there.modes):
+        onset = above
+        if mode.growing:
+            onset = min(begun.items(), key=lambda each: abs(each[0] - mode.rate.imag))[1] if begun else below
+        yield candidate_of(onset, cluster.lifted(mode))
+
+
+def candidate_of(onset: float, mode: DampedMode) -> Candidate:
+    """What is kept of a mode of a cluster."""
+    right, left = (np.column_stack([each.real, each.imag]) for each in (mode.right, mode.left))
+    return Candidate(onset, mode.fx, right, left)
+
+
+def announced_by(candidate: Candidate, pencil: Pencil) -> DampedMode:
+    """The mode of a cluster as one of the operator: its s is the root of y^H T(s) x above the axis of real s."""
+    x, y = (np.asarray(each @ np.array([1.0, 1.0j])) for each in (candidate.right, candidate.left))
+    products = [complex(np.vdot(y, each)) for each in (x, pencil.damping @ x, pencil.stiffness @ x)]
+    return DampedMode(pencil, complex(max(np.roots(products), key=lambda s: s.imag)), x, y)
+
+
+def mode_of(candidate: Candidate, pencil: Pencil) -> DampedMode | None:
+    """The operator's mode that a cluster has announced; None if there is none of its kind."""
+    guess = announced_by(candidate, pencil)
+    return guess.at(pencil, guess.rate)
+
+
+def followed(mode: DampedMode, pencil: Pencil) -> DampedMode:
+    """A mode at another load, in small steps of the straight line between both pencils where it has to be.
+
+    Raises
+    ------
+    LostPairError
+        If the shortest steps are too long.
+    """
+    if mode.pencil is pencil:
+        return mode
+    start, done, step = mode.pencil, 0.0, 1.0
+    while done < 1:
+        share = min(1.0, done + step)
+        image = mode.at(pencil if share == 1 else start.towards(pencil, share))
+        if image is not None:
+            mode, done = image, share
+        elif step > SHORTEST:
+            step *= 0.5
+        else:
+            raise LostPairError(
+                f"the motion of frequency {mode.rate.imag:.6g} cannot be told from its neighbours between F_x = "
+                f"{start.fx:.10g} and {pencil.fx:.10g}: take smaller increments"
+            )
+    return mode
+
+
+def vertex(modes: Sequence[DampedMode]) -> float:
+    """Where a parabola through Re s of three modes has its top; the best of them if it has none."""
+    loads, rates = np.array([mode.fx for mode in modes]), np.array([mode.rate.real for mode in modes])
+    scale = np.ptp(loads)
+    curve, slope, _ = np.polyfit((loads - loads[0]) / scale, rates, 2)
+    return float(loads[0] - 0.5 * slope / curve * scale) if curve < 0 else float(loads[0])

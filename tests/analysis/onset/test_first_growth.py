@@ -1,0 +1,120 @@
+"""The first window of growing motion in slices of the spectrum: against all modes, cut off, and on several ranks."""
+
+import numpy as np
+import pytest
+from families import OTHERS
+from scipy.linalg import block_diag
+from scipy.sparse import csr_array
+from test_found import PASSING, CutOffError, counting, cut_off_after, files
+from test_slicing import FEW, on_ranks
+
+from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, nearest_mode
+from faultgouge.analysis.damped_onset.sliced import first_growing
+from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating
+from faultgouge.pywrap import Scene
+from faultgouge.pywrap.onset.damped import ramped
+
+KINDS = {"weak": {"cn": 0.1}, "medium": {"cn": 10.0}, "drag": {"drag_time": 100.0}}
+
+
+@pytest.fixture(scope="module")
+def search(ramp):
+    """The search of the reference packing, from a little before its onset on."""
+
+    def make(kind, limits=FEW):
+        path = ramp(1.0, 1e-3, 26)
+        damped = dissipating(path, **KINDS[kind])
+        loads = np.array(path.grid[18:])
+        return lambda **how: first_growing(lambda fx: Pencil.of(damped(fx)), loads, limits=limits, **how)
+
+    return make
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_window_is_that_among_all_modes(ramp, search, kind):
+    path = ramp(1.0, 1e-3, 26)
+    expected = damped_windows(dissipating(path, **KINDS[kind]), path.grid[18:], first=True)[0]
+    found, doubtful = search(kind)()
+    assert doubtful == ()
+    assert abs(found.fx_onset - expected.fx_onset) <= found.error + expected.error
+    assert found.frequency == pytest.approx(expected.frequency, rel=1e-8)
+    assert found.kind == expected.kind == "hopf"
+    assert found.error < 1e-9
+
+
+@pytest.mark.slow
+def test_a_search_goes_on_to_the_bit(search, tmp_path):
+    seen, said = [], []
+    expected = search("weak", PASSING)(watch=counting(seen))
+    with pytest.raises(CutOffError):
+        search("weak", PASSING)(watch=cut_off_after(8), folder=tmp_path)
+    assert len(files(tmp_path)) == 8
+    assert search("weak", PASSING)(watch=counting(said), folder=tmp_path) == expected
+    assert said == seen[8:]
+    for each in on_ranks(2, lambda mine: search("weak", PASSING)(ranks=mine, folder=tmp_path)):
+        assert each.result() == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("limits", [FEW, PASSING])
+def test_ranks_find_the_same(search, limits):
+    expected = search("medium", limits)()
+    for each in on_ranks(2, lambda mine: search("medium", limits)(ranks=mine)):
+        assert each.result() == expected
+
+
+def oscillators(feed):
+    """Twelve modes in pairs, each pair fed by the load times its number; dashpots take the same of all."""
+
+    def pencil(fx):
+        levels = np.array([9.0, 10.0, *OTHERS])
+        turns = [np.array([[0, feed[k] * fx], [-feed[k] * fx, 0]]) for k in range(6)]
+        stiffness = np.diag(levels**2) + block_diag(*turns)
+        return Pencil(fx, *(csr_array(each) for each in (stiffness, np.eye(12))))
+
+    return pencil
+
+
+@pytest.mark.parametrize("loads", [np.linspace(0, 1, 5), np.linspace(0, 1, 41)])
+def test_slices_that_bear_more_are_left_out_until_they_do_not(loads):
+    """Where the first of two coupled modes of frequencies 9 and 10 begins to grow, in closed form.
+
+    On the axis s = i w: (81 - w^2)(100 - w^2) - w^2 + b^2 = 0 and w (181 - 2 w^2) = 0, b the antisymmetric coupling.
+    """
+    b = np.sqrt(90.5 + 9.5**2)
+    window, doubtful = first_growing(oscillators([2 * b, 1, 1, 1, 1, 1]), loads)
+    assert doubtful == ()
+    assert window.fx_onset == pytest.approx(0.5, abs=1e-9)
+    assert window.frequency == pytest.approx(np.sqrt(90.5), rel=1e-9)
+    assert first_growing(oscillators([1] * 6), loads) == (None, ())
+
+
+@pytest.mark.slow
+def test_the_nearest_mode_is_that_of_all(ramp):
+    path = ramp(1.0, 1e-3, 26)
+    pencil = Pencil.of(dissipating(path, cn=3.0, drag_time=50.0)(0.02))
+    modes = DampedModes.of(pencil)
+    for k in (3, 100, 200):
+        found = nearest_mode(pencil, float(modes.rates[k].imag) * (1 + 1e-6))
+        assert found.rate == pytest.approx(modes.rates[k], rel=1e-9)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("disks", "seed", "kind"),
+    [(200, 1, {"cn": 10.0, "ct": 5.0}), (200, 2, {"cn": 1.0}), (300, 3, {"cn": 0.1})],
+)
+def test_packings_against_all_eigenvalues(disks, seed, kind):
+    """The companion matrix has no eigenvalue that grows just below the onset, and one just above."""
+    packing = {"disks": disks, "width": round(1.192 * disks**0.5, 1), "seed": seed}
+    scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 2e-3, "until": 0.04}}
+    with ramped(Scene.from_mapping(scene)) as ramp:
+        path = dissipating(ramp.path, **kind)
+        window, doubtful = first_growing(lambda fx: Pencil.of(path(fx)), ramp.forces, limits=FEW)
+        assert doubtful == ()
+        below, above = (
+            np.linalg.eigvals(Pencil.of(path(window.fx_onset * share)).system.matrix).real.max()
+            for share in (1 - 1e-6, 1 + 1e-6)
+        )
+    assert below < 1e-11 < above

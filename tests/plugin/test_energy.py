@@ -1,0 +1,188 @@
+"""The energy that sliding and dashpots take at each contact: keyword energy of pair style and floor."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+KN, KT, MU, FX, FY, WIDTH = 2e5, 2e5 * 2 / 7, 0.5, 2.5, 3.0, 2.8
+
+HEAD = """
+units           lj
+dimension       2
+boundary        p f p
+atom_style      sphere
+atom_modify     map yes
+comm_modify     vel yes
+"""
+PILE = f"""
+region          box block 0 {WIDTH} -1 4 -0.5 0.5
+create_box      2 box
+create_atoms    1 single 0.5005 0.4996 0
+create_atoms    1 single 2.3 0.4996 0
+create_atoms    2 single 1.4 0.9346 0
+set             group all diameter 1.0
+set             group all mass 1.0
+group           top type 2
+"""
+LAW = f"""
+pair_style      mindlin/smooth {KN} {KT} {MU} damping 20.0 10.0 {{keywords}}
+pair_coeff      * *
+fix             floor all wall/mindlin/smooth {KN} {KT} {MU} ylo 0.0 damping 20.0 10.0 {{keywords}}
+fix             push top addforce {FX} -{FY} 0.0
+fix             move all nve/disc 1.0 {{compensated}}
+timestep        {{dt}}
+"""
+LOOK = """
+compute         ids all property/local patom1 patom2 cutoff radius
+compute         contact all pair/local p3 p7 p8 cutoff radius
+dump            pairs all local {every} pairs c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]
+dump            disks all custom {every} disks id id xu yu vx vy omegaz f_floor[3] f_floor[7] f_floor[{column}]
+dump_modify     pairs format float %.17g
+dump_modify     disks format float %.17g sort id
+"""
+"""Two disks on a floor that touch through the sides of a periodic box, and a third one that slides over them."""
+
+arithmetics = pytest.mark.parametrize("compensated", ["", "compensated"], ids=["double", "compensated"])
+
+
+def law(dt=1e-4, energy="energy yes", compensated=""):
+    return LAW.format(dt=dt, keywords=f"{energy} {compensated}", compensated=compensated)
+
+
+def look(every, compensated=""):
+    return LOOK.format(every=every, column=9 if compensated else 8)
+
+
+def frames(path):
+    """The tables of a dump, one a step."""
+    parts = path.read_text().split("ITEM: TIMESTEP\n")[1:]
+    return [np.array([line.split() for line in part.splitlines()[8:]], dtype=float) for part in parts]
+
+
+def contacts(pairs, disks):
+    """Slip, overlap and dissipated energy of each contact, by the IDs of its disks; 0 is the floor."""
+    found = {(min(row[:2]), max(row[:2])): row[2:] for row in pairs}
+    return found | {(0, row[0]): row[7:10] for row in disks if row[8] > 0}
+
+
+def tangential_energy(slip, overlap):
+    """Integral of the tangential force over the slip at one overlap: k_t delta^(1/2) s^2 (1/2 + x/3 - x^2/4)."""
+    x = np.abs(slip) / (MU * KN / KT * overlap)
+    return KT * np.sqrt(overlap) * slip**2 * (1 / 2 + x / 3 - x**2 / 4)
+
+
+def balance(folder):
+    """(work of the load, energy gained, energy dissipated, what overlaps gave to stuck contacts) of a run."""
+    disks = frames(folder / "disks")
+    seen = [contacts(*both) for both in zip(frames(folder / "pairs"), disks, strict=True)]
+
+    def energy(k):
+        # I = I_0 m R^2 with I_0 = m = 1 and R = 1/2
+        kinetic = 0.5 * np.sum(disks[k][:, 4:6] ** 2) + 0.125 * np.sum(disks[k][:, 6] ** 2)
+        return kinetic + sum(0.4 * KN * d**2.5 + tangential_energy(s, d) for s, d, _ in seen[k].values())
+
+    # the tangential force of this law has no potential: its stiffness changes with the overlap, at no cost
+    given, ended = 0.0, 0.0
+    for old, new in itertools.pairwise(seen):
+        ended += sum(old[each][2] for each in old.keys() - new.keys())
+        for each in old.keys() & new.keys():
+            (s, d, _), (t, e, _) = old[each], new[each]
+            given += tangential_energy((s + t) / 2, e) - tangential_energy((s + t) / 2, d)
+    way = disks[-1][2, 2:4] - disks[0][2, 2:4]
+    return way @ [FX, -FY], energy(-1) - energy(0), ended + sum(row[2] for row in seen[-1].values()), given
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("dashpots", "compensated"),
+    [("20.0 10.0", ""), ("0 0", ""), ("20.0 10.0", "compensated")],
+    ids=["sliding and dashpots", "sliding", "compensated"],
+)
+def test_work_of_the_load_is_stored_moves_or_is_dissipated(lmp, tmp_path, dashpots, compensated):
+    """What is missing is of first order in the time step: the power at the end of a step stands for the whole step."""
+    missing = []
+    for steps in (2000, 4000):
+        text = law(0.2 / steps, compensated=compensated).replace("20.0 10.0", dashpots)
+        done = lmp(HEAD + PILE + text + look(1, compensated) + f"run {steps}\n")
+        assert done.returncode == 0, done.stdout[-2000:]
+        work, gained, dissipated, given = balance(tmp_path)
+        missing.append(work + given - gained - dissipated)
+    assert dissipated > 0.05 * work
+    assert abs(given) < 0.1 * dissipated
+    assert abs(missing[1]) < 2e-3 * dissipated
+    assert missing[0] / missing[1] == pytest.approx(2.0, abs=0.1)
+
+
+@arithmetics
+def test_counting_changes_nothing_else(lmp, tmp_path, compensated):
+    def end(energy, column):
+        text = law(energy=energy, compensated=compensated) + look(100, compensated)
+        done = lmp(HEAD + PILE + text.replace(f"f_floor[{column + 1}]", f"f_floor[{column}]") + "run 1000\n")
+        assert done.returncode == 0, done.stdout[-2000:]
+        return frames(tmp_path / "pairs"), frames(tmp_path / "disks")
+
+    column = 8 if compensated else 7
+    without, counted = end("", column), end("energy yes", column)
+    for bare, full in zip(*(each[0] for each in (without, counted)), strict=True):
+        assert np.array_equal(bare[:, :4], full[:, :4])
+        assert not bare[:, 4].any()
+    assert all(np.array_equal(*both) for both in zip(without[1], counted[1], strict=True))
+    assert counted[0][-1][:, 4].max() > 0
+
+
+AGAIN = f"""
+write_restart   middle.restart
+clear
+{HEAD}
+read_restart    middle.restart
+group           top type 2
+"""
+
+
+@arithmetics
+@pytest.mark.ranks
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_energies_go_through_a_restart(lmp, tmp_path, compensated, ranks):
+    def end(middle, ranks=1):
+        halves = law(compensated=compensated), f"run 500\n{middle}", look(500, compensated), "run 500\n"
+        done = lmp(HEAD + PILE + "".join(halves), ranks=ranks)
+        assert done.returncode == 0, done.stdout[-2000:]
+        return contacts(frames(tmp_path / "pairs")[-1], frames(tmp_path / "disks")[-1])
+
+    straight, again = end(""), end(AGAIN + law(compensated=compensated), ranks)
+    assert straight.keys() == again.keys()
+    assert all(np.array_equal(straight[each], again[each]) for each in straight)
+    assert max(row[2] for row in straight.values()) > 0
+
+
+@pytest.mark.parametrize("first", ["yes", "no"])
+def test_slips_stay_where_a_restart_begins_or_ends_to_count(lmp, tmp_path, first):
+    """Energies begin at zero then, or are left out; a wall without them has no column for them."""
+    second = {"yes": "no", "no": "yes"}[first]
+    column = 8 if second == "yes" else 7
+    seen = LOOK.format(every=500, column=column)
+    script = PILE + law(energy=f"energy {first}") + "run 500\n" + AGAIN + law(energy=f"energy {second}") + seen
+    done = lmp(HEAD + script + "run 0\n")
+    assert done.returncode == 0, done.stdout[-2000:]
+    pairs, disks = frames(tmp_path / "pairs")[-1], frames(tmp_path / "disks")[-1]
+    bare = HEAD + PILE + law(energy="") + "run 500\n" + LOOK.format(every=500, column=7) + "run 0\n"
+    assert lmp(bare).returncode == 0
+    assert np.array_equal(pairs, frames(tmp_path / "pairs")[-1])
+    assert np.array_equal(disks[:, :9], frames(tmp_path / "disks")[-1][:, :9])
+    assert not pairs[:, 4].any()
+    if second == "yes":
+        assert not disks[:, 9].any()
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("energy yes", "energy"), "energy must be yes or no"),
+        ((f"{MU} damping", "0.0 damping"), "without friction there is no history to keep the energy of contacts in"),
+    ],
+)
+def test_refusals(lmp, change, says):
+    done = lmp(HEAD + PILE + law().replace(*change) + "run 0\n")
+    assert done.returncode != 0
+    assert says in done.stdout + done.stderr
