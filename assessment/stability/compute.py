@@ -1,9 +1,8 @@
 """Stiff and extreme cases: each holds within a stated bound, or is refused in one sentence.
 
-Never a NaN, a hang, a crash or a quiet wrong number. The cases are in `stability_cases`, a module for each kind of
-trouble; here they are run. stability.json and stability.md are written anew after
-every case, so that a case which takes the program down is the one that is missing. Runs with LAMMPS use all ranks,
-whose number changes no figure; rank 0 writes.
+Never a NaN, a hang, a crash or a quiet wrong number. The cases are in `cases`, a module for each kind of trouble; here
+they are run. stability.json and stability.md are written anew after every case, so that a case which takes the program
+down is the one that is missing. Runs with LAMMPS use all ranks, whose number changes no figure; rank 0 writes.
 """
 
 from __future__ import annotations

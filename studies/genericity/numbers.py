@@ -115,12 +115,9 @@ def _by_seed(table: Table) -> dict[int, dict[str, str]]:
 def kinds(onsets: Table) -> dict[str, Any]:
     """What begins the first window, of packings with one friction coefficient."""
     words = [kind for kind in onsets.words("kind") if kind]
-    sliding = onsets.numbers("sliding")
-    changed = onsets.numbers("opened") + onsets.numbers("closed")
-    return {
-        "coalescence": share(words.count("coalescence"), len(words)),
-        "sliding": share(int(np.sum(sliding > 0)), int(np.isfinite(sliding).sum())),
-        "changed": share(int(np.sum(changed > 0)), int(np.isfinite(changed).sum())),
+    counts = {"sliding": onsets.numbers("sliding"), "changed": onsets.numbers("opened") + onsets.numbers("closed")}
+    return {"coalescence": share(words.count("coalescence"), len(words))} | {
+        name: share(int(np.sum(each > 0)), int(np.isfinite(each).sum())) for name, each in counts.items()
     }
 
 
@@ -129,14 +126,8 @@ def modes(onsets: Table) -> dict[str, Any]:
     found = Table(tuple(row for row in onsets.rows if row.get("rank")))
     place = found.numbers("rank") / found.numbers("modes")
     neighbours = [int(pair[1]) - int(pair[0]) == 1 for pair in found.lists("ancestors")]
-    columns = {
-        "place": place,
-        "frequency": np.sqrt(found.numbers("lambda") / found.numbers("largest")),
-        "participation": found.numbers("participation"),
-        "rotation": found.numbers("rotation"),
-        "layer": found.numbers("layer"),
-        "ancestry": found.numbers("ancestry"),
-    }
+    columns = {"place": place, "frequency": np.sqrt(found.numbers("lambda") / found.numbers("largest"))}
+    columns |= {name: found.numbers(name) for name in ("participation", "rotation", "layer", "ancestry")}
     return {
         "onsets": len(found),
         "lowest": share(int(np.sum(place < 1 / 3)), len(found)),
@@ -195,15 +186,9 @@ def sizes(table: Table, reference: Table) -> dict[str, Any]:
     for number, part in sorted([*parts.items(), (100, reference.settled)]):
         load = np.full(len(part), 3.0) if number == 100 else part.numbers("load.fy")
         scaled = part.reach / load
-        rows.append(
-            {
-                "disks": number,
-                "packings": len(part),
-                "onsets": int(part.found.sum()),
-                "flows": part.words("ends").count("flows"),
-            }
-            | {"median": median_interval(scaled, part.found), "doubtful": int(np.sum(part.numbers("doubtful") > 0))}
-        )
+        row: dict[str, Any] = {"disks": number, "packings": len(part), "onsets": int(part.found.sum())}
+        row |= {"flows": part.words("ends").count("flows"), "median": median_interval(scaled, part.found)}
+        rows.append(row | {"doubtful": int(np.sum(part.numbers("doubtful") > 0))})
         disks.append(np.full(len(part), float(number)))
         reach.append(scaled)
         found.append(part.found)
@@ -216,29 +201,23 @@ def levels(table: Table) -> dict[str, Any]:
     good = table.settled
     disks = good.numbers("packing.disks")
     load = good.numbers("load.fy")
-    columns = {
-        "spacing": good.numbers("spacing"),
-        "ratio": good.numbers("ratio"),
-        # per force in spacings -> per F_x/F_y, 1 / time^2
-        "coupling": good.numbers("coupling") * load * good.numbers("spacing"),
-        "speed": good.numbers("speed") * load * good.numbers("spacing"),
-        "participation": good.numbers("participation"),
-        "median": good.numbers("f0") / load * np.sqrt(np.log(2)),
-    }
-    rows = []
+    columns = {name: good.numbers(name) for name in ("spacing", "ratio", "coupling", "speed", "participation")}
+    for name in ("coupling", "speed"):  # per force in spacings -> per F_x/F_y, 1 / time^2
+        columns[name] = columns[name] * load * columns["spacing"]
+    columns["median"] = good.numbers("f0") / load * np.sqrt(np.log(2))
+    rows: list[dict[str, Any]] = []
     for number in np.unique(disks):
         mine = disks == number
-        rows.append(
-            {"disks": int(number), "packings": int(mine.sum())}
-            | {name: _mean(values[mine]) for name, values in columns.items()}
-        )
+        means = {name: _mean(values[mine]) for name, values in columns.items()}
+        rows.append({"disks": int(number), "packings": int(mine.sum())} | means)
     exponents = {name: _slope(disks, values) for name, values in columns.items() if name != "ratio"}
     return {
         "rows": rows,
         "exponents": exponents,
         "f0": (good.numbers("f0") / load).tolist(),
         "disks": disks.tolist(),
-    } | {"expected": expected(good.numbers("f0")[disks == 100])}
+        "expected": expected(good.numbers("f0")[disks == 100]),
+    }
 
 
 def expected(f0: Floats, until: float = 0.03, draws: int = 10) -> dict[str, Any] | None:

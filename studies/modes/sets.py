@@ -10,19 +10,14 @@ seeds from another range.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from importlib.resources import files
 from math import ceil, sqrt
+from pathlib import Path
 from typing import Any
 
-from ..sweep.points import Sweep
+from ..sweep.points import Sweep, read_toml
 from ..sweep.tasks import TASKS
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 SIZES = {50: 100, 100: 100, 200: 50, 400: 30, 1000: 15}
 """Packings by number of disks, with a fixed force on each disk of the layer and mu = 1."""
@@ -114,8 +109,7 @@ def _first(most: int, share: float) -> str:
 
 def quartz(depth: str, disks: int = 100) -> dict[str, Any]:
     """The shipped scene of quartz spheres under an overburden, such as "10 MPa", with so many disks."""
-    path = files("faultgouge.scenes") / f"quartz_{depth.replace(' ', '')}.toml"
-    scene = tomllib.loads(path.read_text(encoding="utf-8"))
+    scene = read_toml(Path(str(files("faultgouge.scenes") / f"quartz_{depth.replace(' ', '')}.toml")))
     scene["packing"]["disks"] = disks
     return scene
 

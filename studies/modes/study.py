@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
 from ...analysis.files.wholefile import write_text
 from ...figures.style import save, spared
 from ...figures.writers import write_film
-from ...pywrap import Scene
+from ...pywrap import Scene, SceneError
 from ..sweep.compute import Progress, Row, Say, run_sweep
-from ..sweep.points import Sweep
+from ..sweep.points import Sweep, read_toml
 from ..sweep.table import write_csv
 from ..sweep.tasks import TASKS
 from .draw import PlaneFilm, over_load, plane
 from .numbers import along
 from .tables import Table
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q")
 
@@ -42,8 +36,8 @@ def wanted_of(path: Path) -> Sweep:
         If the file has neither.
     """
     try:
-        has_task = "task" in tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        has_task = "task" in read_toml(path)
+    except SceneError:
         has_task = False  # the reader of scenes says what is wrong
     if has_task:
         return Sweep.from_toml(path, {"modes": TASKS["modes"]})

@@ -23,6 +23,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,8 @@ class Point:
     @cached_property
     def settling(self) -> str:
         """What decides how the packing settles; points of one settling share the settled packing."""
-        assert self.scene is not None
+        if self.scene is None:
+            return self.key
         resolved = self.scene.resolved()
         for section in ("ramp", "friction", "output"):
             resolved.pop(section, None)
@@ -109,13 +111,7 @@ class Sweep:
             If the file cannot be read, is no TOML, or does not describe a sweep.
         """
         path = Path(path)
-        try:
-            mapping = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise SceneError(f"{path}: the sweep cannot be read ({error.strerror}): correct its path.") from None
-        except ValueError as error:
-            raise SceneError(f"{path}: the sweep is not valid TOML: {error}.") from None
-        return cls.from_mapping(mapping, tasks, path.parent, str(path))
+        return cls.from_mapping(read_toml(path), tasks, path.parent, str(path))
 
     @classmethod
     def from_mapping(
@@ -135,23 +131,17 @@ class Sweep:
             if not isinstance(mapping.get(section, {}), Mapping):
                 raise SceneError(f"{name}: {section} is not a section: write [{section}] and its keys below.")
         axes = {key: _values(key, values, name) for key, values in mapping.get("sweep", {}).items()}
-        count = 1
-        for values in axes.values():
-            count *= len(values)
+        count = prod(map(len, axes.values()))
         if count > MOST_POINTS:
             raise SceneError(f"{name}: {count} scenes are more than {MOST_POINTS}: make several sweeps of it.")
         scene = {part: _absolute(part, values, folder) for part, values in mapping.get("scene", {}).items()}
         for key in axes.keys() & {"packing.file"}:
             axes[key] = [str((folder / str(each)).resolve()) for each in axes[key]]
         sweep = cls(str(task), axes, scene)
-        sweep._check(name)
-        return sweep
-
-    def _check(self, name: str) -> None:
-        """Refuse what is wrong with every scene before any work is done."""
-        says = [point.says for point in self.points]
-        if all(each is not None for each in says):
+        says = [point.says for point in sweep.points]
+        if all(each is not None for each in says):  # what is wrong with every scene is refused before any work is done
             raise SceneError(f"{name}: no point of the sweep is a scene that can be run: {says[0]}")
+        return sweep
 
     @property
     def names(self) -> list[str]:
@@ -183,15 +173,23 @@ class Sweep:
         return {"task": self.task, "sweep": self.axes, "scene": self.scene}
 
 
+def read_toml(path: Path) -> dict[str, Any]:
+    """What a TOML file holds; SceneError if it cannot be read, or is no TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SceneError(f"{path}: the sweep cannot be read ({error.strerror}): correct its path.") from None
+    except ValueError as error:
+        raise SceneError(f"{path}: the sweep is not valid TOML: {error}.") from None
+
+
 def shard(points: tuple[Point, ...], part: tuple[int, int]) -> tuple[Point, ...]:
     """Part K of N of the points, counted from 1: whole settlings, so that no two parts settle the same packing."""
     mine, of = part
     order: dict[str, int] = {}
     for point in points:
-        order.setdefault(point.key if point.scene is None else point.settling, len(order))
-    return tuple(
-        point for point in points if order[point.key if point.scene is None else point.settling] % of == mine - 1
-    )
+        order.setdefault(point.settling, len(order))
+    return tuple(point for point in points if order[point.settling] % of == mine - 1)
 
 
 def digest(value: Any) -> str:

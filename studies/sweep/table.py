@@ -30,15 +30,6 @@ def flat(result: Mapping[str, Any], above: str = "") -> dict[str, Any]:
     return row
 
 
-def columns_of(rows: Iterable[Row], names: list[str]) -> list[str]:
-    """The names of the table's columns: swept keys, those of the results as they first appear, and `says`."""
-    found = dict.fromkeys(names)
-    for row in rows:
-        found |= dict.fromkeys(flat(row["result"]))
-    found.pop("says", None)
-    return [*found, "says"]
-
-
 def write_tables(rows: list[Row], names: list[str], folder: Path) -> None:
     """Write results.csv, and results.parquet if pandas and a writer of Parquet are there.
 
@@ -51,7 +42,8 @@ def write_tables(rows: list[Row], names: list[str], folder: Path) -> None:
     folder : Path
         Where.
     """
-    columns = columns_of(rows, names)
+    found = dict.fromkeys([*names, *(name for row in rows for name in flat(row["result"]))])
+    columns = [*(name for name in found if name != "says"), "says"]
     table = [row["values"] | flat(row["result"]) | {"says": row["says"]} for row in rows]
     write_csv(folder / "results.csv", columns, table)
     if find_spec("pandas") and find_spec("pyarrow"):

@@ -104,7 +104,7 @@ def computed(pool: Executor | None, task: str, points: Sequence[Point]) -> Gener
     """The rows of points as they end; closing the generator takes back those that no worker has begun."""
     groups: dict[str, deque[Point]] = defaultdict(deque)
     for point in points:
-        groups[point.key if point.scene is None else point.settling].append(point)
+        groups[point.settling].append(point)
     if pool is not None and len(points) > 1:
         yield from _Shared(pool, task).rows(groups.values())
         return

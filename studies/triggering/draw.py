@@ -100,8 +100,7 @@ def figures(triggering: Triggering, output: Path) -> None:
     speed, friction = (column(triggering.erupting, name) for name in ("layer_velocity", "friction"))
     save(draw_friction.weakening_figure(np.abs(speed), friction, weak, mu), output / "figure5b")
     save(draw_friction.measured_friction_figure(), output / "figure6")
-    linear = triggering.response.time, triggering.response.msd
-    save(draw_response.response_figure(runs["strong"], linear), output / "response")
+    save(draw_response.response_figure(runs["strong"], triggering.response.msd), output / "response")
     save(draw_response.amplitude_figure(sensitive), output / "amplitude")
     if near := sensitive.near:
         chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, 4).astype(int))]

@@ -99,30 +99,22 @@ def damping_figure(pairs: Sequence[PairForm]) -> Figure:
 
 
 @styled
-def response_figure(run: Course, response: Course) -> Figure:
+def response_figure(run: Course, linear: Floats) -> Figure:
     """The linear response of a packing, from K, over the run of LAMMPS.
 
     Parameters
     ----------
     run : Course
         D(t) of the run.
-    response : Course
-        The linear response at the same times.
+    linear : ndarray, shape (T,)
+        D of the linear response at the same times.
 
     Returns
     -------
     Figure
         Panel (a) both, panel (b) the difference in units of the largest D so far: D itself passes close to zero.
-
-    Raises
-    ------
-    ValueError
-        If the two are not at the same times.
     """
     time, msd = run
-    linear = response[1]
-    if not np.array_equal(time, response[0]):
-        raise ValueError("The run and its linear response must be given at the same times.")
     figure = Figure(figsize=(3.4, 3.4), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     upper.set_yscale("log")

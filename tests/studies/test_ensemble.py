@@ -177,6 +177,7 @@ def test_figure_shows_pairs_and_rises():
     ]
     onsets, pairs, rises = ensemble_figure([each["result"] for each in members]).axes
     assert [line.get_label() for line in onsets.lines[::2]] == [r"$\mu = 1$", r"$\mu = 0.8$"]
+    assert onsets.lines[0].get_ydata().tolist() == [0, 0.25, 0.5, 0.5]  # level where packings are lost from sight
     drawn = [(*line.get_xydata()[0], line.get_marker()) for line in pairs.lines[:3]]
     assert drawn == [(0.02, 0.01, "o"), (0.01, 0.02, "o"), (0.03, 0.02, ">")]
     assert pairs.get_xlabel() == r"$F_x^c(\mu = 1)$"

@@ -9,10 +9,12 @@ import pytest
 
 from faultgouge.analysis import spectrum, stiffness_matrix
 from faultgouge.analysis.onset import LIMITS
+from faultgouge.figures.packing import mobilised
 from faultgouge.pywrap import Engine, Scene, equilibrate, settle
 from faultgouge.studies.modes.compute import antisymmetric_norm, counted, modes, switched
 from faultgouge.studies.modes.sets import sets
 from faultgouge.studies.modes.sliced import sliced
+from faultgouge.studies.packings import sliding
 
 SCENE = {
     "packing": {"disks": 60, "width": 9.2, "seed": 77},
@@ -53,6 +55,8 @@ def test_without_b_no_pair_is_complex(loaded):
     every = np.ones(len(packing.contacts), dtype=bool)
     same = stiffness_matrix(packing, coupled=every) - stiffness_matrix(packing)
     assert abs(same).max() == 0
+    # the law is flat at its bound: what is within 1e-9 of the slip limit has the bound's force but for a rounding
+    np.testing.assert_array_equal(sliding(packing), mobilised(packing) > 1 - 1e-13)
     found = switched(packing)
     assert found["none"]["pairs"] == 0
     assert found["sticking"]["pairs"] > 0

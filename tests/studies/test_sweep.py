@@ -164,6 +164,7 @@ def test_a_cut_line_is_computed_again_and_a_longer_sweep_goes_on(tmp_path):
     assert said == [f"1 of 2 points are in {lines} already"]
     assert lines.read_text().startswith(first)
     assert [row["packing.seed"] for row in table(tmp_path)] == ["1", "2"]
+    assert len(stored(lines)) == 2  # nothing is left of the cut line
     lines.write_text("no result\n")
     with pytest.raises(SceneError, match="line 1"):
         stored(lines)

@@ -1,7 +1,11 @@
 """The page of the study of yield says what its table says."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
+from faultgouge.studies.packings import distance
 from faultgouge.studies.yielding.page import numbers, rows_of, text
 
 FOLDER = Path(__file__).parents[2] / "docs" / "yield"
@@ -24,3 +28,11 @@ def test_layers_without_loss_flow_below_their_static_yield_and_lossy_ones_do_not
     assert undamped["share"][2] < 1
     assert all(each["flow"] == 0 for each in lossy)
     assert all(each["share"] == [1, 1, 1] for each in lossy)
+
+
+def test_disks_that_carry_nothing_have_no_part_in_d(reference_packing):
+    packing = reference_packing(1.0)
+    position = packing.position + 1e-3
+    position[packing.rattlers] += 1.0
+    assert len(packing.rattlers) > 0
+    assert distance(packing, replace(packing, position=position)) == pytest.approx(2e-6, rel=1e-9)
