@@ -18,11 +18,11 @@ import numpy as np
 from scipy.sparse.linalg import ArpackError
 
 from ..onset.basis import Basis, Levels
-from ..onset.edge import LostPairError, track
+from ..onset.edge import DoubtError, LostPairError, track
 from ..onset.found import Border, Candidate, Found
 from ..onset.limits import LIMITS, Limits
 from ..onset.ranks import ALONE, Ranks
-from ..onset.sliced import DoubtError, Increments, Sliced, Watch, first_along
+from ..onset.sliced import Increments, Sliced, Watch, first_along
 from ..packing.packing import Floats
 from ..spectrum.spectrum import active_coordinates
 from .edge import Crossing, DampedWindow, solved, window_of

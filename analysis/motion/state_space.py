@@ -25,7 +25,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
-from ..operators.damping import damping_matrix
+from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
 from ..spectrum.spectrum import Complexes, active_coordinates, mass_weighted
@@ -78,8 +78,7 @@ class StateSpace:
         """
         a = mass_weighted(stiffness_matrix(packing), packing)
         g = mass_weighted(damping_matrix(packing), packing)
-        mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
-        return cls.of_matrices(a, g, np.sqrt(mass))
+        return cls.of_matrices(a, g, np.sqrt(coordinate_mass(packing)))
 
     @classmethod
     def of_matrices(cls, stiffness: csr_array, damping: csr_array, root_mass: Floats) -> "StateSpace":

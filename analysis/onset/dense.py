@@ -1,26 +1,31 @@
-"""The search for all windows of a small packing: the oracle that has all modes of a load if it needs them.
+r"""The search for all windows of a small packing: the oracle that has all modes of a load if it needs them.
 
 **Few pairs.** On most increments nothing happens, and to know that takes no decomposition. The pairs that
 perturbation theory names (:mod:`~faultgouge.analysis.onset.screening`) are followed one by one. Where at most one of
 them changes, and D and its slopes at both ends tell that nothing hides, the increment is done.
 
 **All modes.** Everywhere else the modes of both ends are assigned to each other, so that they keep their names
-(:func:`~faultgouge.analysis.onset.modes.assign`). A pair that is complex at one end and real at the other has an edge
-in between, which is solved for. The increment is divided next to the first edge, where something could hide, and
-half-way where a complex pair at one end is not recognised at the other; until nothing wider than `Family.narrowest` is
-left to doubt.
+(:func:`~faultgouge.analysis.onset.modes.assign`). Each pair that is complex at an end, and each pair of real neighbours
+between whose eigenvalues something could hide, is then followed alone: its edges are solved for. The increment is
+divided where such a pair is not recognised at both ends, changes more than plainly, or might meet a third mode on the
+way; until nothing wider than `Family.narrowest` is left to doubt. Whether one of two modes meets a third shows in the
+product :math:`(\lambda_1 - \lambda)(\lambda_2 - \lambda) = (\bar\lambda - \lambda)^2 - D / 4`, which is smooth where
+the two coalesce. An increment in which contacts change bends the levels: it is divided, too, if something may hide as
+the levels go on from the increment before.
 """
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing.packing import Floats, Indices
 from ..spectrum.spectrum import Complexes
-from .edge import Edge, Family, LostPairError, Window, locate
+from .edge import DoubtError, Edge, Family, LostPairError, Window, locate, other_sign
 from .modes import Members, Modes, Place, assign
 from .pair import Pair, continued, deepest_dip, dip_between
 from .screening import Screen, Screening
@@ -29,9 +34,11 @@ from .walk import between, walk
 Ends = tuple[Pair, Pair]
 """A pair at both ends of an increment."""
 
-Course = tuple[Pair | None, Pair | None, Edge | None]
-"""A pair over an increment: at the lower and at the upper load where it is complex there, and the edge in between if it
-is complex at one of them alone."""
+Course = tuple[Pair | None, Pair | None, tuple[Edge, ...]]
+"""A pair over an increment: at the lower and at the upper load where it is complex there, and its edges in between."""
+
+Fate = tuple[Pair | None, Pair | None, Ends | None]
+"""A pair at the lower and at the upper load where it is complex there, and at both loads if recognised at both."""
 
 
 class LostTrackError(FaultgougeError):
@@ -47,8 +54,8 @@ class Dense:
         self.family, self.screening = family, screening
         self._open: dict[Pair, Edge] | None = None  # the onsets of the windows that are open at the load reached so far
         self._closed: list[Window] = []
+        self._reached: tuple[Place, Place] | None = None  # the last step that was looked at
         self._known: list[Pair] = []  # the few pairs at the load reached so far
-        self._solved: dict[tuple[float, float], Edge] = {}
 
     def candidates(self, places: Sequence[Place], depth: int) -> Iterator[list[Ends] | None]:
         """The pairs that may meet; None where these are not few, or the increment has been divided."""
@@ -63,12 +70,19 @@ class Dense:
         self, candidates: list[Ends] | None, here: Place, there: Place, depth: int
     ) -> tuple[list[Course] | None, list[Place]]:
         """The courses of the few pairs if these are plain, else those of all, once nothing can hide any more."""
-        courses = None if candidates is None else self._plain(candidates)
+        courses = None if candidates is None else self._few(candidates)
         if courses is not None:
             return courses, []
-        step = Step(here.modes, there.modes)
-        divide = self._between(step)
-        return (None if divide else [self._course(step, *fate) for fate in step.fates]), divide
+        step = Step(here.modes, there.modes, self._arrival(here, there))
+        courses = self._all(step, depth)
+        if courses is None and there.fx - here.fx > self.family.narrowest:
+            share = self.family.limits.share
+            middle = between(self.family.at, here.fx, (1 - share) * here.fx + share * there.fx, there.fx)
+            if middle:
+                return None, middle
+        if courses is None:
+            courses = [self._blunt(here, there, *fate) for fate in step.fates]
+        return courses, []
 
     def record(self, sure: list[Course]) -> None:
         """Carry the open windows over an increment.
@@ -81,17 +95,19 @@ class Dense:
         if self._open is None:
             self._open = {before: Edge.start(before) for before, _, _ in sure if before}
         now: dict[Pair, Edge] = {}
-        for before, after, edge in sure:
-            onset = edge
+        for before, after, edges in sure:
+            onset = None
             if before is not None:
-                known = before.closest(self._open)
+                known = before if before in self._open else before.closest(self._open)
                 if known is None:
                     raise LostTrackError
                 onset = self._open.pop(known)
-            assert onset is not None
-            if after is None:
-                self._closed.append(Window.between(onset, edge))
-            else:
+            for edge in edges:
+                if onset is not None:
+                    self._closed.append(Window.between(onset, edge))
+                onset = edge if onset is None else None
+            if after is not None:
+                assert onset is not None
                 now[after] = onset
         if self._open:
             raise LostTrackError
@@ -118,23 +134,79 @@ class Dense:
             pairs.append((a, b))
         return pairs
 
-    def _plain(self, pairs: list[Ends]) -> list[Course] | None:
-        """The courses of those that are complex at an end; None if more than one changes, or one not plainly."""
-        changing = [pair for pair in pairs if not self._keeps_sign(*pair)]
-        edge = self._plain_edge(*changing[0]) if len(changing) == 1 else None
-        if changing and edge is None:
+    def _few(self, pairs: list[Ends]) -> list[Course] | None:
+        """The courses of a few pairs; None if more than one changes, or one not plainly."""
+        if sum(not self._keeps_sign(*ends) for ends in pairs) > 1:
             return None
-        ends = [[pair if pair.discriminant < 0 else None for pair in each] for each in pairs]
-        return [(before, after, edge) for before, after in ends if before or after]
+        complex_ends = [[pair if pair.discriminant < 0 else None for pair in ends] for ends in pairs]
+        return self._courses([(before, after, ends) for (before, after), ends in zip(complex_ends, pairs, strict=True)])
+
+    # All modes
+
+    def _all(self, step: "Step", depth: int) -> list[Course] | None:
+        """The courses of all pairs that are complex somewhere on a step; None if that is in doubt."""
+        near = step.near(self.family)
+        recognised = [(before, after, ends) for before, after, ends in step.fates if ends is not None]
+        if near is None or len(recognised) < len(step.fates):
+            return None
+        changing = [ends for before, after, ends in recognised if (before is None) != (after is None)]
+        limits = self.family.limits
+        parts = limits.bent if step.bent else limits.changing
+        if ((changing or near) and depth < parts) or not step.apart(changing, self.family):
+            return None
+        hidden = self._courses([(None, None, ends) for ends in near])
+        if hidden is None or (hidden and not step.apart([*changing, *near], self.family)):
+            return None
+        courses = self._courses(recognised)
+        return None if courses is None else courses + hidden
+
+    def _arrival(self, here: Place, there: Place) -> csr_array | None:
+        """The change of the operator over a step if it goes on as on the way to its beginning; None if not known."""
+        before, self._reached = self._reached, (here, there)
+        if before is None or before[1] is not here:
+            return None
+        last = before[0]
+        return (there.fx - here.fx) / (here.fx - last.fx) * (here.matrix - last.matrix)
+
+    def _courses(self, fates: list[tuple[Pair | None, Pair | None, Ends]]) -> list[Course] | None:
+        """The courses of those pairs that are complex somewhere; None if the edges of one are not plain."""
+        courses: list[Course] = []
+        for before, after, ends in fates:
+            edges = self._edges(ends, (before is None) != (after is None))
+            if edges is None:
+                return None
+            if before or after or edges:
+                courses.append((before, after, edges))
+        return courses
+
+    def _edges(self, ends: Ends, changes: bool) -> tuple[Edge, ...] | None:
+        """The edges of a pair that is recognised at both loads; None if they are not plain."""
+        pairs: list[Pair] = list(ends)
+        if not changes:
+            if self._keeps_sign(*ends):
+                return ()
+            if ends[0].discriminant * ends[1].discriminant <= 0:
+                return None
+            try:
+                inside = other_sign(self.family, pairs, self.family.narrowest, dipping=True)
+            except (NoEquilibriumError, LostPairError, DoubtError):
+                return None
+            if inside is None:
+                return ()
+            if not inside.definite:
+                return None
+            pairs.insert(1, inside)
+        edges = [self._plain_edge(*both) for both in pairwise(pairs)]
+        return None if None in edges else tuple(edge for edge in edges if edge)
 
     def _plain_edge(self, here: Pair, there: Pair) -> Edge | None:
-        """The edge of a pair if it has one and no more between two loads, as far as its D tells."""
-        solution = self._solution(here, there) if here.discriminant * there.discriminant <= 0 else None
+        """The edge of a pair between two loads, if it has one and no more, as far as its D tells."""
+        solution = self._solution(here, there)
         if solution is None:
             return None
         edge, below, above = solution
-        plain = here.fx < below.fx < above.fx < there.fx
-        return edge if plain and self._keeps_sign(here, below) and self._keeps_sign(above, there) else None
+        inner = here.fx < below.fx < above.fx < there.fx  # else one end is within rounding of the edge
+        return edge if not inner or (self._keeps_sign(here, below) and self._keeps_sign(above, there)) else None
 
     def _keeps_sign(self, here: Pair, there: Pair) -> bool:
         """Whether the discriminant of a pair surely has one sign between two loads."""
@@ -142,39 +214,14 @@ class Dense:
             return False
         return dip_between(here, there, self.family.limits)[0] <= self.family.narrowest
 
-    # All modes
-
-    def _between(self, step: "Step") -> list[Place]:
-        """Where a step is to be divided; nowhere if all is known of it."""
-        here, there = step.here, step.there
-        if (here.fx, there.fx) in self._solved or there.fx - here.fx <= self.family.narrowest:
-            return []
-        halfway = 0.5 * (here.fx + there.fx)
-        middle = halfway if any(ends is None for *_, ends in step.fates) else step.hidden_window(self.family)
-        changing = [ends for before, after, ends in step.fates if ends and not (before and after)]
-        if middle is None and changing:
-            solution = self._solution(*changing[0])
-            if solution is None:
-                middle = halfway
-            elif here.fx < solution[1].fx < solution[2].fx < there.fx:
-                # What lies on either side of this edge has yet to be looked at.
-                edge, below, above = solution
-                self._solved[below.fx, above.fx] = edge
-                return [Place(side.fx, side.matrix) for side in (below, above)]
-        if middle is None:
-            return []
-        return between(self.family.at, here.fx, middle, there.fx)
-
-    def _course(self, step: "Step", before: Pair | None, after: Pair | None, ends: Ends | None) -> Course:
-        """The course of a pair: its edge is half the step wide if it cannot be solved for."""
+    def _blunt(self, here: Place, there: Place, before: Pair | None, after: Pair | None, ends: Ends | None) -> Course:
+        """The course of a pair over a step that is not divided: an edge that is not solved for is half of it wide."""
         if before and after:
-            return before, after, None
-        edge = self._solved.get((step.here.fx, step.there.fx)) if ends else None
-        if ends and edge is None and (solution := self._solution(*ends)):
-            edge = solution[0]
+            return before, after, ()
+        solution = self._solution(*ends) if ends else None
         last = ends[1] if ends else before or after
         assert last is not None
-        return before, after, edge or Edge.between(step.here.fx, step.there.fx, last)
+        return before, after, (solution[0] if solution else Edge.between(here.fx, there.fx, last),)
 
     def _solution(self, here: Pair, there: Pair) -> tuple[Edge, Pair, Pair] | None:
         """The edge of a pair between two loads, and the pair close by on either side; None if it is not found."""
@@ -191,16 +238,15 @@ class Step:
     ----------
     forward : ndarray of int, shape (E,)
         The mode there of each mode here, -1 where there is none.
-    fates : list of (Pair or None, Pair or None, (Pair, Pair) or None)
-        The pairs that are complex at one end at least: at the lower and at the upper load if complex there, and at both
-        loads if recognised at both.
+    fates : list of Fate
+        The pairs that are complex at one end at least.
     """
 
-    def __init__(self, here: Modes, there: Modes) -> None:
-        self.here, self.there = here, there
+    def __init__(self, here: Modes, there: Modes, arrival: csr_array | None) -> None:
+        self.ends, self.arrival, self.span = (here, there), arrival, there.fx - here.fx
         self.forward = assign(here, there)
         backward = {int(image): k for k, image in enumerate(self.forward)}
-        self.fates: list[tuple[Pair | None, Pair | None, Ends | None]] = []
+        self.fates: list[Fate] = []
         arrived = set()
         for members in here.complex_pairs:
             image = int(self.forward[members[0]]), int(self.forward[members[1]])
@@ -215,47 +261,107 @@ class Step:
 
     def _recognised(self, members: Members, image: Members) -> Ends | None:
         """Two modes at both loads, conjugates or both real, if they are the same pair."""
-        if min(*members, *image) < 0 or not (self.here.together(members) and self.there.together(image)):
+        here, there = self.ends
+        if min(*members, *image) < 0 or not (here.together(members) and there.together(image)):
             return None
-        before, after = self.here.pair(members), self.there.pair(image)
+        before, after = here.pair(members), there.pair(image)
         return (before, after) if before.same_planes(after) else None
 
-    def hidden_window(self, family: Family) -> float | None:
-        """Place where a window wider than the narrowest, or a gap in one, most likely hides; None if nowhere."""
-        here, there = self.here, self.there
+    def near(self, family: Family) -> list[Ends] | None:
+        """Real neighbours between which a window wider than the narrowest may hide; None if one is not recognised."""
+        here = self.ends[0]
         known = np.flatnonzero(self.forward >= 0)
         image = self.forward[known]
         p, q = self._neighbours(known, image)
         if len(p) == 0:
-            return None
-        change = there.matrix - here.matrix
-        # In a window that stays open a gap may hide: turn D over.
-        sign = np.where(here.partner[known[p]] < 0, 1.0, -1.0)
+            return []
 
-        def end(modes: Modes, names: Indices) -> tuple[Floats, Floats]:
-            values, drift = modes.values[names], _sensitivity(modes, change)[names]
-            gap = values[p] - values[q]
-            return sign * (gap**2).real, sign * (2 * gap * (drift[p] - drift[q])).real
+        def wide(*drifts: Floats) -> NDArray[np.bool_]:
+            numbers: list[Floats] = []
+            for modes, drift, names in zip(self.ends, drifts, (known, image), strict=True):
+                values, rates = modes.values.real[names], drift[names]
+                gap = values[p] - values[q]
+                numbers += [gap**2, 2 * gap * (rates[p] - rates[q])]
+            d0, s0, d1, s1 = numbers
+            return deepest_dip(d0, s0, d1, s1, family.limits.bend)[0] * self.span > family.narrowest
 
-        width, at = deepest_dip(*end(here, known), *end(there, image), family.limits.bend)
-        span = there.fx - here.fx
-        worst = int(np.argmax(width))
-        if width[worst] * span <= family.narrowest:
+        near = wide(*self.drifts)
+        if self.arrival is not None and np.any(wide(_sensitivity(here, self.arrival).real, self.drifts[1]) & ~near):
             return None
-        margin = 0.25 * family.narrowest / span  # never return an end
-        return here.fx + span * float(np.clip(at[worst], margin, 1 - margin))
+        found: list[Ends] = []
+        for k in np.flatnonzero(near):
+            ends = self._recognised((int(known[p[k]]), int(known[q[k]])), (int(image[p[k]]), int(image[q[k]])))
+            if ends is None:
+                return None
+            found.append(ends)
+        return found
+
+    def apart(self, changing: list[Ends], family: Family) -> bool:
+        """Whether pairs that turn complex or real on the step surely meet neither a real mode nor one another."""
+        if not changing:
+            return True
+        here, there = self.ends
+        alone = np.flatnonzero((self.forward >= 0) & (here.partner < 0))
+        alone = alone[there.partner[self.forward[alone]] < 0]
+        names, motions = (alone, self.forward[alone]), []
+        for modes, rates, each, pairs in zip(self.ends, self.drifts, names, zip(*changing, strict=True), strict=True):
+            real = np.array([modes.values.real[each], np.zeros(len(each)), rates[each], np.zeros(len(each))])
+            motions.append(np.column_stack([*(_motion(pair, self.change) for pair in pairs), real]))
+        for k, pair in enumerate(changing):
+            below, above = (_resultant(motion[:, k], motion[:, k + 1 :]) for motion in motions)
+            if min(end.discriminant for end in pair) > 0:  # two of the real modes are its own
+                others = np.argsort(np.abs(below[0]))[2:]
+                below, above = below[:, others], above[:, others]
+            width = deepest_dip(below[0], below[1], above[0], above[1], family.limits.bend)[0].max(initial=0.0)
+            if min(below[0].min(initial=1.0), above[0].min(initial=1.0)) <= 0 or width * self.span > family.narrowest:
+                return False
+        return True
+
+    @property
+    def bent(self) -> bool:
+        """Whether contacts open or close on the step, whose stiffness goes as the root of the overlap."""
+        here, there = (modes.matrix for modes in self.ends)
+        return not (np.array_equal(here.indptr, there.indptr) and np.array_equal(here.indices, there.indices))
+
+    @cached_property
+    def change(self) -> csr_array:
+        """The difference of the operators."""
+        here, there = self.ends
+        return there.matrix - here.matrix
+
+    @cached_property
+    def drifts(self) -> tuple[Floats, Floats]:
+        """First-order change of each real eigenvalue over the step, y^H dA x / y^H x, at either end."""
+        here, there = self.ends
+        return _sensitivity(here, self.change).real, _sensitivity(there, self.change).real
 
     def _neighbours(self, known: Indices, image: Indices) -> tuple[Indices, Indices]:
-        """Two modes each that can meet: neighbours at one end, those that change order, and pairs that stay complex."""
-        here, there = self.here, self.there
+        """Two real modes each that can meet: neighbours at one end, and those that change order."""
+        here, there = self.ends
         p, q = np.triu_indices(len(known), 1)
         rank = np.empty(len(known), int)
         rank[np.argsort(there.values[image].real)] = np.arange(len(known))
         near = (q - p == 1) | (np.abs(rank[q] - rank[p]) == 1) | (rank[q] < rank[p])
         alone = (here.partner[known] < 0) & (there.partner[image] < 0)
-        staying = (here.partner[known[p]] == known[q]) & (there.partner[image[p]] == image[q])
-        kept = (near & alone[p] & alone[q]) | staying
+        kept = near & alone[p] & alone[q]
         return p[kept], q[kept]
+
+
+def _motion(pair: Pair, change: csr_array) -> Floats:
+    """Mean and discriminant of a pair, and the first-order changes of both."""
+    return np.array([pair.mean, pair.discriminant, 0.5 * np.trace(pair.block(change)), pair.slope(change)])
+
+
+def _resultant(pair: Floats, others: Floats) -> Floats:
+    """The product of the four differences of the eigenvalues of a pair and of others, and its first-order change.
+
+    All are given by their `_motion`, shapes (4,) and (4, P); a mode alone counts as a double eigenvalue.
+    """
+    gap, discriminants, drift, slopes = pair[0] - others[0], others[1], pair[2] - others[2], others[3]
+    half = gap**2 - 0.25 * (pair[1] + discriminants)
+    change = 2 * gap * drift - 0.25 * (pair[3] + slopes)
+    product = 0.25 * pair[1] * discriminants
+    return np.array([half**2 - product, 2 * half * change - 0.25 * (pair[3] * discriminants + pair[1] * slopes)])
 
 
 def _sensitivity(modes: Modes, change: csr_array) -> Complexes:

@@ -7,7 +7,7 @@ say how many there are. If D jumps, the equilibrium itself does: a contact opene
 the jump, and the edge is a *contact change*. A mere crossing touches D = 0 without a change of sign.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal, NamedTuple, TypeVar
@@ -19,7 +19,7 @@ from ..errors import FaultgougeError
 from ..packing.packing import Floats, Packing
 from .limits import LIMITS, Limits
 from .modes import Operator, Place
-from .pair import Pair, continued
+from .pair import Pair, continued, dip_between
 
 Kind = Literal["coalescence", "contact change", "start"]
 
@@ -34,6 +34,10 @@ class LostPairError(FaultgougeError):
             f"the pair of eigenvalues about {pair.mean:.6g} cannot be told from its neighbours {where}: "
             "take smaller increments"
         )
+
+
+class DoubtError(FaultgougeError):
+    """What a pair is expected to do the operator does not surely have."""
 
 
 @dataclass(frozen=True)
@@ -296,6 +300,30 @@ def edge_from_inside(family: Family, outside: Pair, inside: Pair) -> Edge:
         middle = family.followed(inside, family.at(0.5 * (outside.fx + inside.fx)))
         outside, inside = (middle, inside) if middle.discriminant > 0 else (outside, middle)
     return Edge.between(outside.fx, inside.fx, outside, inside)
+
+
+def other_sign(family: Family, known: Sequence[Pair], narrowest: float, *, dipping: bool = False) -> Pair | None:
+    """A pair at a load where its discriminant has another sign than at the first of those that are known.
+
+    None if it surely has that sign between all of them, but for stretches narrower than `narrowest`. A DoubtError is
+    raised if that is not known after `Limits.dips` looks; and, of a pair that has to be `dipping`, if its discriminant
+    does not dip where its slopes say so: these are then of loads too far apart.
+    """
+    sign, pairs = np.sign(known[0].discriminant), {pair.fx: pair for pair in known}
+    pair = family.track(pairs)
+    for _ in range(family.limits.dips):
+        places = [pairs[fx] for fx in sorted(pairs)]
+        other = next((each for each in places if each.discriminant * sign < 0), None)
+        if other is not None:
+            return other
+        dips = ((*dip_between(*ends, family.limits), ends) for ends in pairwise(places))
+        width, fx, ends = max(dips, key=lambda dip: dip[0])
+        if width <= narrowest:
+            return None
+        looked = pair(fx)
+        if dipping and abs(looked.discriminant) > min(abs(end.discriminant) for end in ends):
+            break
+    raise DoubtError
 
 
 def leads_back(family: Family, outside: Pair, inside: Pair) -> bool:

@@ -35,6 +35,13 @@ class Limits:
     """Curvature that two values and slopes of D do not show, as a share of the smaller D: more than enough for loads
     between which modes are recognised at all."""
 
+    changing: int = 1
+    """How often an increment is divided in which a pair changes."""
+    bent: int = 3
+    """The same where contacts open or close: levels then leave the straight line at loads that nobody knows."""
+    share: float = 0.47
+    """Where an increment is divided: not in the middle, as the edges of models lie at round numbers."""
+
     # The edge of a window
 
     root: float = 1e-7

@@ -6,7 +6,7 @@ do not swap names. (:math:`|y_a^H x_b|`, the obvious weight, vanishes at an exce
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
 
@@ -61,6 +61,7 @@ class Modes:
     right: Complexes
     left: Complexes
     partner: Indices
+    _pairs: dict[Members, Pair] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, fx: float, matrix: Operator) -> "Modes":
@@ -91,8 +92,10 @@ class Modes:
 
     def pair(self, members: Members) -> Pair:
         """The pair of two modes."""
-        two = list(members)
-        return Pair(self.fx, self.matrix, span(self.right[:, two]), span(self.left[:, two]))
+        if members not in self._pairs:
+            two = list(members)
+            self._pairs[members] = Pair(self.fx, self.matrix, span(self.right[:, two]), span(self.left[:, two]))
+        return self._pairs[members]
 
     def nearest(self, pair: Pair) -> Members:
         """The two modes, conjugates or both real, that lie closest to the planes of a pair at a neighbouring load."""
@@ -156,10 +159,13 @@ def matched(weight: Floats) -> Indices:
 def products(a: Complexes, b: Complexes) -> Floats:
     """|a_j^H b_k| over columns: in real arithmetic, but for the few columns that have imaginary parts."""
     p, q = np.flatnonzero(np.any(a.imag, axis=0)), np.flatnonzero(np.any(b.imag, axis=0))
-    products = np.abs(np.ascontiguousarray(a.real).T @ np.ascontiguousarray(b.real))
-    products[p] = np.abs(a[:, p].conj().T @ b)
-    products[:, q] = np.abs(a.conj().T @ b[:, q])
-    return products
+    x, y = (np.ascontiguousarray(part) for part in (a.real, b.real))
+    u, v = a.imag[:, p], b.imag[:, q]
+    real, imag = x.T @ y, np.zeros((a.shape[1], b.shape[1]))
+    real[np.ix_(p, q)] += u.T @ v
+    imag[:, q] = x.T @ v
+    imag[p] -= u.T @ y
+    return np.hypot(real, imag)
 
 
 def span(vectors: Complexes) -> Floats:

@@ -28,11 +28,11 @@ from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing.packing import Floats
 from .basis import Bases, Basis, Cluster, Levels, width_and_mixing
 from .dense import all_windows
-from .edge import Edge, Family, LostPairError, Window, edge_from_inside, leads_back
+from .edge import DoubtError, Edge, Family, LostPairError, Window, edge_from_inside, leads_back, other_sign
 from .found import NEW_PASS, Candidate, Found, Looked, Pass, pass_folder
 from .limits import LIMITS, Limits
 from .modes import Place
-from .pair import Pair, continued, dip_between
+from .pair import Pair, continued
 from .ranks import ALONE, Ranks
 from .screening import may_meet
 from .walk import walk
@@ -44,10 +44,6 @@ At = tuple[float, Levels]
 
 Increments = tuple[tuple[float, float], ...]
 """From load to load."""
-
-
-class DoubtError(FaultgougeError):
-    """The clusters announce what the operator does not have."""
 
 
 class Begun(Protocol):
@@ -304,26 +300,12 @@ class SlicedPairs(Sliced[Place, Window]):
             return None  # it is looked for on the next increment
         if pair is None:
             raise DoubtError
+        here = self._passed[-1]
         try:
-            return self._dipping(pair, there)
+            known = [pair, self._followed(pair, here), self._followed(pair, there)]
+            return other_sign(self.family, known, self._narrowest(there.fx - here.fx))
         except LostPairError as error:
             raise DoubtError from error
-
-    def _dipping(self, start: Pair, there: Place) -> Pair | None:
-        """A pair where it is complex, from a load where it is real; None if it surely is so on all of the increment."""
-        here = self._passed[-1]
-        known = {each.fx: each for each in (self._followed(start, here), start, self._followed(start, there))}
-        pair = self.family.track(known)
-        for _ in range(self.limits.dips):
-            pairs = [known[fx] for fx in sorted(known)]
-            inside = next((each for each in pairs if each.discriminant < 0), None)
-            if inside is not None:
-                return inside
-            width, fx = max(dip_between(below, above, self.limits) for below, above in pairwise(pairs))
-            if width <= self._narrowest(there.fx - here.fx):
-                return None
-            pair(fx)
-        raise DoubtError
 
 
 def first_window(

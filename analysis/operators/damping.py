@@ -53,7 +53,7 @@ def damping_matrix(packing: Packing) -> csr_array:
     matrix = assembled(terms, contacts.i, contacts.j[:pairs], len(packing))
     if packing.drag_time is None:
         return matrix
-    return csr_array(matrix + diags_array(_mass(packing) / packing.drag_time))
+    return csr_array(matrix + diags_array(coordinate_mass(packing) / packing.drag_time))
 
 
 def largest_damping_rate(packing: Packing) -> float:
@@ -67,12 +67,12 @@ def largest_damping_rate(packing: Packing) -> float:
     matrix = damping_matrix(replace(packing, drag_time=None))
     if matrix.nnz == 0:
         return 0.0
-    scale = diags_array(1 / np.sqrt(_mass(packing)))
+    scale = diags_array(1 / np.sqrt(coordinate_mass(packing)))
     # a fixed start makes the result the same on every rank
     found = eigsh(scale @ matrix @ scale, 1, which="LA", v0=np.ones(matrix.shape[0]), return_eigenvectors=False)
     return float(found[0])
 
 
-def _mass(packing: Packing) -> Floats:
-    """Of the coordinates (x.., y.., R theta..)."""
+def coordinate_mass(packing: Packing) -> Floats:
+    """Masses of the coordinates (x.., y.., R theta..), shape (3N,)."""
     return np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])

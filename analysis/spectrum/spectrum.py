@@ -40,6 +40,7 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
+from ..operators.damping import coordinate_mass
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
 from ..tabled import Tabled
@@ -252,8 +253,7 @@ def all_modes(matrix: csr_array) -> tuple[Complexes, Complexes, Complexes]:
 
 def mass_weighted(stiffness: csr_array, packing: Packing) -> csr_array:
     """M^(-1/2) K M^(-1/2), zero rows and all, shape (3N, 3N); 1 / time^2."""
-    mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
-    scale = 1.0 / np.sqrt(mass)
+    scale = 1.0 / np.sqrt(coordinate_mass(packing))
     rows = np.repeat(scale, np.diff(stiffness.indptr))
     return csr_array(
         (rows * stiffness.data * scale[stiffness.indices], stiffness.indices, stiffness.indptr), shape=stiffness.shape

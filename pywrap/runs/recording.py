@@ -107,11 +107,7 @@ class Record:
             file = self._opened(equilibrium.packing)
             with file.change():
                 file.complete = False
-                file.append(
-                    equilibrium.packing,
-                    floor=equilibrium.floor,
-                    evaluations=equilibrium.evaluations,
-                )
+                file.append(equilibrium.packing, floor=equilibrium.floor, evaluations=equilibrium.evaluations)
                 if equilibrium.way is not None:
                     file.put_attribute("ways", json.dumps(ways_of(file) | {len(file) - 1: equilibrium.way}))
             self._say_saved()
@@ -148,15 +144,12 @@ class Record:
         samples: list[Sample] = []
         motions: list[tuple[float, Motion]] = []
 
-        def watch(time: float, motion: Motion) -> None:
-            motions.append((time, motion))
-
         run = perturb(
             scene,
             start,
             communicator=self.communicator,
             weakening=weakening,
-            watch=watch if trajectory else None,
+            watch=(lambda time, motion: motions.append((time, motion))) if trajectory else None,
             keep=lambda reached: self._keep(name, samples, motions, reached),
             resume=checkpoint,
         )

@@ -147,9 +147,32 @@ def perturb(
         At once, if the scene has no section [perturb], its time step is over the limit, or its time shorter than one
         step.
     """
-    settings = needed(scene.perturb, "perturb")
-    dt, steps = sampling(settings, start.packing, samples, early)
-    return _undamped(settings, start.packing, dt, steps, communicator, weakening, watch, keep, resume)
+    settings, packing = needed(scene.perturb, "perturb"), start.packing
+    dt, steps = sampling(settings, packing, samples, early)
+    everyone = range(len(packing)) if settings.target == "all" else settings.target
+    target = None if everyone == "top" else [int(disk) for disk in everyone]
+    forces = *settings.cosine, target, weakening, settings.forcing(), settings.on or "layer"
+
+    def run() -> Iterator[Sample]:
+        with Engine(packing, communicator) as engine, engine.undamped(dt, *forces) as dynamics:
+            last = 0
+            if resume is not None:
+                last = resume.step
+                dynamics.resume(last, resume.state)
+            ends = _ends_of_parts(int(settings.time / dt))
+            for step in steps[steps > last].tolist():
+                for end in ends[(ends > last) & (ends < step)].tolist():
+                    dynamics.advance(end - last)
+                    last = end
+                    _end_part(dynamics, end, keep)
+                motion, last = dynamics.advance(step - last), step
+                if watch is not None:
+                    watch(step * dt, motion)
+                yield _sampled(step * dt, motion, packing)
+                if step in ends and step < steps[-1]:
+                    _end_part(dynamics, step, keep)
+
+    return run()
 
 
 def sampling(
@@ -176,39 +199,6 @@ def unforced(scene: Scene) -> Scene:
 def weakening_of(friction: Friction, v0: float) -> Weakening:
     """The scene's mu(v) for a threshold v_0, length / time."""
     return Weakening(B=friction.B, w=friction.w, mu_ss=friction.mu_ss, v0=v0, v_ss=friction.velocity_scale(v0))
-
-
-def _undamped(
-    settings: Perturb,
-    packing: Packing,
-    dt: float,
-    steps: NDArray[np.int64],
-    communicator: MPI.Comm | None,
-    weakening: Weakening | None,
-    watch: Callable[[float, Motion], None] | None,
-    keep: Callable[[Checkpoint], None] | None,
-    resume: Checkpoint | None,
-) -> Iterator[Sample]:
-    everyone = range(len(packing)) if settings.target == "all" else settings.target
-    target = None if everyone == "top" else [int(disk) for disk in everyone]
-    forces = *settings.cosine, target, weakening, settings.forcing(), settings.on or "layer"
-    with Engine(packing, communicator) as engine, engine.undamped(dt, *forces) as dynamics:
-        last = 0
-        if resume is not None:
-            last = resume.step
-            dynamics.resume(last, resume.state)
-        ends = _ends_of_parts(int(settings.time / dt))
-        for step in steps[steps > last].tolist():
-            for end in ends[(ends > last) & (ends < step)].tolist():
-                dynamics.advance(end - last)
-                last = end
-                _end_part(dynamics, end, keep)
-            motion, last = dynamics.advance(step - last), step
-            if watch is not None:
-                watch(step * dt, motion)
-            yield _sampled(step * dt, motion, packing)
-            if step in ends and step < steps[-1]:
-                _end_part(dynamics, step, keep)
 
 
 def _sampled(time: float, motion: Motion, packing: Packing) -> Sample:

@@ -13,6 +13,7 @@ from .refusals import NotNegative, Positive, Section, refusal
 
 KINDS = ("pulse", "sweep")
 OF_FILES = ("channel", "scale", "stretch")
+DERIVATIVES = {"displacement": 2, "velocity": 1, "acceleration": 0}
 
 
 class SignalKeys(Section):
@@ -120,12 +121,7 @@ class SignalKeys(Section):
             signal = read_signal(self.signal, self.channel).scaled(
                 1.0 if self.scale is None else self.scale, self.stretch or 1.0
             )
-        derivatives = (
-            {"displacement": 2, "velocity": 1, "acceleration": 0}[self.quantity or "velocity"]
-            if self.on == "floor"
-            else 0
-        )
-        for _ in range(derivatives):
+        for _ in range(DERIVATIVES[self.quantity or "velocity"] if self.on == "floor" else 0):
             signal = signal.differentiated()
         return signal
 

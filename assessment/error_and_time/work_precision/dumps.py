@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ....analysis import Packing, RunFile, read_dump, stiffness_matrix, touching
+from ....analysis.operators.damping import coordinate_mass
 from ....analysis.packing.contacts import Contacts
 from ....analysis.packing.packing import Floats
 from ....analysis.spectrum.spectrum import Complexes
@@ -32,8 +33,7 @@ G = 6
 
 def eigenvalues(packing: Packing) -> Complexes:
     """All 3N eigenvalues of M^(-1) K, zeros of rattlers included, 1 / time^2."""
-    mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
-    return np.linalg.eigvals(stiffness_matrix(packing).toarray() / mass[:, None])
+    return np.linalg.eigvals(stiffness_matrix(packing).toarray() / coordinate_mass(packing)[:, None])
 
 
 def loss(found: Packing, exact: Complexes) -> float:

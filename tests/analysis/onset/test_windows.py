@@ -37,6 +37,42 @@ def test_normal_form(d, points):
     assert window.overlap < 1e-2
 
 
+def no_few(here, there):
+    """A screening that names no few pairs: all modes are looked at."""
+
+
+def test_window_behind_a_bend():
+    """Levels that approach, and are bent apart in the last increment: its chord alone shows no window."""
+
+    def bent(f):
+        gap = 1 - f if f < 1.1 else 5 * (f - 1.1) - 0.1
+        return embedded([[10 + gap, 0.05], [-0.05, 10 - gap]])
+
+    first, second = all_windows(Family(bent, 1e-7), np.array([0.0, 0.5, 0.9, 1.3]), no_few)
+    assert (first.fx_onset, first.fx_end) == (pytest.approx(0.95, abs=DIGITS), pytest.approx(1.05, abs=DIGITS))
+    assert (second.fx_onset, second.fx_end) == (pytest.approx(1.11, abs=DIGITS), pytest.approx(1.13, abs=DIGITS))
+
+
+def test_third_mode_that_is_met_before_an_onset():
+    """On one increment a level meets a third one, and is then complex with another."""
+
+    def three(f):
+        levels = np.diag([10 + 5 * f, 13.0, 10.7, *OTHERS])
+        levels[0, 1], levels[1, 0] = 1.1, -1.1
+        levels[0, 2], levels[2, 0] = 0.02, -0.02
+        return levels
+
+    def complex_at(f):
+        return np.count_nonzero(np.linalg.eigvals(three(f)).imag > 1e-9)
+
+    narrow, wide = all_windows(Family(three, 1e-7), np.array([0.0, 1.0]), no_few)
+    assert narrow.fx_end < wide.fx_onset < 1.0
+    for window, before in ((narrow, 0), (wide, 0)):
+        assert complex_at(window.fx_onset - 1e-6) == before
+        assert complex_at(window.fx_onset + 1e-6) == before + 1
+    assert complex_at(narrow.fx_end + 1e-6) == 0
+
+
 @pytest.mark.parametrize("half_width", [2e-1, 1e-2, 1e-4, 1e-6])
 @pytest.mark.parametrize("place", [0.31, 0.5, 0.77])
 def test_window_narrower_than_the_increment(half_width, place):
