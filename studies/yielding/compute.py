@@ -2,14 +2,15 @@ r"""The yield of one packing: static, dynamic, and at finite rates of loading.
 
 **Dynamic.** From the equilibria at the shares `SHARES` of the static yield, the disks are moved at random by `NOISE`
 and let go, for `TIME`: undamped, and with dashpots of each restitution in `LOSSES`. Where no mode grows the noise stays
-what it is: the layer is *stable*, and no run is made. A layer that moves by more than a
-diameter of the largest disk flows. Otherwise the disks are brought to rest by damped dynamics, under the same load, and
-the equilibrium that they reach is compared with the first: D, slip of the layer, contacts that are lost and gained.
+what it is: the layer is *stable*, and no run is made. A layer that moves by more than a diameter of the largest disk
+flows. A layer that throws a disk out of the box *bursts*. Otherwise the disks are brought to rest by damped dynamics,
+under the same load, and the equilibrium that they reach is compared with the first: D, slip of the layer, contacts that
+are lost and gained.
 
 **Finite rates.** With dashpots of restitution 0.9 the load rises as F_x = rate t from zero, at the rates `RATES` of F_y
 per unit of time, up to the static yield. The distance from the quasi-static path is the root of D from the equilibrium
 of the same load (between kept ones, by straight lines). The load is given at which this distance first exceeds each
-of `BOUNDS`.
+of `BOUNDS`, and the load at which the layer bursts, if it does.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ import numpy as np
 
 from ...analysis import Packing, nearest_image
 from ...analysis.motion.signals import Signal
-from ...pywrap import Engine, Equilibrium, Scene
+from ...pywrap import Engine, EngineError, Equilibrium, Scene
+from ...pywrap.lammps.dynamics import Dynamics
 from ...pywrap.runs.undamped import time_step
 from ...pywrap.scenes.units import dashpot
 from ..eruptions.compute import growth_rate
@@ -43,7 +45,7 @@ TIME = 50.0
 LOOKS = 50
 """Looks at the disks in a run."""
 
-RATES = (10.0, 1.0, 0.1, 0.01)
+RATES = (10.0, 1.0, 0.1, 0.01, 0.001)
 """Rates of loading, F_y per unit of time."""
 
 BOUNDS = (1e-3, 1e-2)
@@ -86,13 +88,25 @@ def dynamic(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
         before = engine.packing
         with engine.undamped(dt) as dynamics:
             for _ in range(LOOKS):
-                dynamics.advance(int(TIME / dt / LOOKS))
+                if not _advanced(dynamics, int(TIME / dt / LOOKS)):
+                    return {"rate": rate, "ends": "bursts", "largest_D": largest, "slip": slip}
                 now = engine.packing
                 slip, before = slip + layer_slip(before, now), now
                 largest = max(largest, distance(packing, now))
                 if abs(slip) > 2 * packing.radius.max():
                     return {"rate": rate, "ends": "flows", "largest_D": largest, "slip": slip}
         return {"rate": rate, "largest_D": largest} | _rested(engine, packing, slip, start.residual)
+
+
+def _advanced(dynamics: Dynamics, steps: int) -> bool:
+    """Go on by some steps; False if a disk leaves the box on the way, after which LAMMPS has no state."""
+    try:
+        dynamics.advance(steps)
+    except EngineError as error:
+        if "Lost atoms" not in str(error):
+            raise
+        return False
+    return True
 
 
 def _rested(engine: Engine, packing: Packing, slip: float, residual: float) -> dict[str, Any]:
@@ -119,20 +133,24 @@ def loaded(path: Branch, cn: float, rate: float) -> dict[str, Any]:
     dt = time_step(packing)
     looks = min(LOOKS, int(duration / dt))
     left: dict[float, float | None] = dict.fromkeys(BOUNDS)
-    distances = []
+    distances, bursts = [0.0], None
     with (
         Engine(packing) as engine,
         engine.undamped(dt, signal=Signal(np.array([0.0, 2 * duration]), np.array([0.0, 2 * last]))) as dynamics,
     ):
         for look in range(1, looks + 1):
-            dynamics.advance(int(duration / dt * look / looks) - int(duration / dt * (look - 1) / looks))
+            fx = last * look / looks
+            if not _advanced(dynamics, int(duration / dt * look / looks) - int(duration / dt * (look - 1) / looks)):
+                bursts = fx / fy
+                break
             fx = dynamics.steps * dt * rate * fy
             off = _off(path, fx, engine.packing)
             distances.append(off)
             for bound in BOUNDS:
                 if left[bound] is None and off > bound:
                     left[bound] = fx / fy
-    return {"left": [left[each] for each in BOUNDS], "largest": max(distances), "last": distances[-1]}
+    reached = {"largest": max(distances), "last": distances[-1], "bursts": bursts}
+    return {"left": [left[each] for each in BOUNDS]} | reached
 
 
 def _off(path: Branch, fx: float, now: Packing) -> float:

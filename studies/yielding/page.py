@@ -15,7 +15,7 @@ from ..modes.tables import median
 from ..statistics import interval, share
 from .compute import LOSSES, RATES, SHARES
 
-FLOWING = ("flows", "fails at rest")
+FLOWING = ("flows", "bursts", "fails at rest")
 """How a run ends after which the layer does not rest."""
 
 ELSEWHERE = 1e-8
