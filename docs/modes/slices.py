@@ -1,0 +1,41 @@
+"""Pairs counted in slices of the spectrum, beside those of all eigenvalues.
+
+python docs/modes/slices.py FOLDER [DISKS]     rows of slices.jsonl: five packings of 1,000 disks, or those of DISKS
+
+Of more than 1,000 disks the slices stand alone.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+from bounds import at_loads
+
+from faultgouge.analysis import eigenvalues
+from faultgouge.studies.modes.compute import ALL, Counted
+from faultgouge.studies.modes.sliced import sliced
+
+PACKINGS = {1000: 5, 3000: 5}
+LOADS = (0.03, 0.1)
+
+
+def rows(disks: int, seed: int):
+    """The counts of one packing at each load that it bears."""
+    for load, packing in at_loads(disks, seed, LOADS):
+        row = {"disks": disks, "seed": seed, "fx_over_fy": load}
+        if disks <= ALL:
+            every = Counted.of(eigenvalues(packing))
+            row |= {"pairs": len(every.omega)} | {key: every.as_dict()[key] for key in ("growth_rate", "least_q")}
+        parts = sliced(packing)
+        found = Counted.of(parts.values).as_dict()
+        row |= {"modes": parts.modes, "sliced": found["pairs"], "error": parts.error}
+        yield row | {f"{key}_sliced": found[key] for key in ("growth_rate", "least_q")}
+
+
+if __name__ == "__main__":
+    disks = int(sys.argv[2]) if len(sys.argv) > 2 else 1000
+    with (Path(sys.argv[1]) / "slices.jsonl").open("a") as file:
+        for seed in range(1, PACKINGS[disks] + 1):
+            for row in rows(disks, seed):
+                file.write(json.dumps(row) + "\n")
+                file.flush()
