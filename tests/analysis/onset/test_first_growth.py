@@ -114,19 +114,29 @@ def test_what_grows_near_a_frequency_is_what_grows_of_all(ramp):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("disks", "seed", "kind"),
-    [(200, 1, {"cn": 10.0, "ct": 5.0}), (200, 4, {"drag_time": 100.0}), (300, 3, {"cn": 0.1})],
+    ("disks", "seed", "kind"), [(200, 7, {"cn": 1.0}), (200, 4, {"drag_time": 100.0}), (300, 3, {"cn": 0.1})]
 )
 def test_packings_against_all_eigenvalues(disks, seed, kind):
     """The companion matrix has no eigenvalue that grows just below the onset, and one just above."""
+    _, (below, above) = first_window_and_rates(
+        disks, seed, kind, lambda window: [window.fx_onset * share for share in (1 - 1e-6, 1 + 1e-6)]
+    )
+    assert below < 1e-11 < above
+
+
+@pytest.mark.long
+def test_a_packing_that_dissipation_holds_has_no_window():
+    window, rates = first_window_and_rates(200, 1, {"cn": 10.0, "ct": 5.0}, lambda _: [0.0, 0.01, 0.02, 0.03, 0.04])
+    assert window is None
+    assert max(rates) < 0
+
+
+def first_window_and_rates(disks, seed, kind, where):
+    """The first window of a settled packing from slices; the largest Re s at some loads from the companion matrix."""
     packing = {"disks": disks, "width": round(1.192 * disks**0.5, 1), "seed": seed}
     scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 2e-3, "until": 0.04}}
     with ramped(Scene.from_mapping(scene)) as ramp:
         path = dissipating(ramp.path, **kind)
         window, doubtful = first_growing(lambda fx: Pencil.of(path(fx)), ramp.forces, limits=FEW)
         assert doubtful == ()
-        below, above = (
-            np.linalg.eigvals(Pencil.of(path(window.fx_onset * share)).system.matrix).real.max()
-            for share in (1 - 1e-6, 1 + 1e-6)
-        )
-    assert below < 1e-11 < above
+        return window, [np.linalg.eigvals(Pencil.of(path(fx)).system.matrix).real.max() for fx in where(window)]
