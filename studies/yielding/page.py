@@ -36,7 +36,7 @@ def numbers(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "static": median([row["static"] for row in rows]),
         "dynamic": [_of_runs(rows, load, loss) for load in SHARES for loss in LOSSES],
         "yields": [yields(rows, loss) for loss in LOSSES],
-        "loading": [{"rate": rate, "left": _left(rows, rate)} for rate in RATES],
+        "loading": [_rising(rows, rate) for rate in RATES],
     }
 
 
@@ -70,10 +70,14 @@ def _of_runs(rows: list[dict[str, Any]], load: float, loss: float) -> dict[str, 
     }
 
 
-def _left(rows: list[dict[str, Any]], rate: float) -> list[float | None]:
-    found = [run["left"] for row in rows for run in row["loading"] if run["rate"] == rate]
-    columns = [[value for value in column if value is not None] for column in zip(*found, strict=True)]
-    return [float(np.median(column)) if column else None for column in columns]
+def _rising(rows: list[dict[str, Any]], rate: float) -> dict[str, Any]:
+    """In how many packings the load rose at a rate, where they left the path, and how many of them burst."""
+    runs = [run for row in rows for run in row["loading"] if run["rate"] == rate]
+    columns = [
+        [value for value in column if value is not None] for column in zip(*(run["left"] for run in runs), strict=True)
+    ]
+    left = [float(np.median(column)) if column else None for column in columns]
+    return {"rate": rate, "of": len(runs), "left": left, "bursts": sum(run.get("bursts") is not None for run in runs)}
 
 
 def text(found: dict[str, Any], packings: int, failed: int) -> str:
