@@ -233,7 +233,7 @@ def says(rows: Sequence[Row]) -> str:
 
 @matplotlib.rc_context(fname=STYLE)
 def figure_of(rows: Sequence[Row]) -> Figure:
-    """Where the ramps of each packing end, packings by the end of their reference; ramps that differ in red."""
+    """Where the ramps of each packing end, by the end of its reference; ramps that differ in another colour."""
     figure = Figure(figsize=(6.8, 3.2), layout="constrained")
     axes = figure.subplots()
     in_order = sorted(rows, key=lambda row: _load(row["ramps"][TRIED]))

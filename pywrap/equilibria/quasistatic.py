@@ -33,9 +33,12 @@ PARTS = 3, 7
 RESTS = 1e-9
 """Force on a disk, in units of F_y, at which dynamics end."""
 
-FEWEST_STEPS, PART_STEPS, DISK_STEPS = 20_000, 10_000_000, 80_000_000
-"""Steps of dynamics: at the least, and, over the number of disks, between two looks at the layer, and at the most. Just
-beyond the end of a branch the packing creeps, the longer the nearer: 800,000 steps of 100 disks take 5 s."""
+FEWEST_STEPS, MOST_STEPS, DISK_STEPS = 20_000, 800_000, 80_000_000
+"""Bounds of the number of steps of dynamics, and that number times the number of disks in between. Just beyond the end
+of a branch the packing creeps, the longer the nearer: 800,000 steps of 100 disks take 5 s."""
+
+LOOKS = 8
+"""Looks at the layer during dynamics."""
 
 TRIED = (
     "smaller increments, more iterations, increments of other sizes, a larger increment and back, and overdamped "
@@ -176,9 +179,10 @@ def _at_rest(engine: Engine, start: Equilibrium, fx: float) -> Equilibrium | Non
     """Where overdamped dynamics come to rest at fx; None where the layer flows on by a diameter, or creeps too long."""
     engine.restore(start.packing)
     engine.set_fx(fx)
-    here, count, flown, steps = start.packing, len(start.packing), 0.0, 0
-    while abs(flown) < 2 * here.radius.mean() and steps < max(FEWEST_STEPS, DISK_STEPS // count):
-        rest = engine.relax(RESTS * here.fy, steps=max(FEWEST_STEPS, PART_STEPS // count))
+    here, flown, steps = start.packing, 0.0, 0
+    most = min(MOST_STEPS, max(FEWEST_STEPS, DISK_STEPS // len(here)))
+    while abs(flown) < 2 * here.radius.mean() and steps < most:
+        rest = engine.relax(RESTS * here.fy, steps=max(FEWEST_STEPS, most // LOOKS))
         before, here, steps = here, engine.packing, steps + rest.steps
         if rest.status != "no":
             return Equilibrium(here, rest.residual, rounding_floor(here), steps)

@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from ....analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_on
 from ....analysis.damped_onset.windows import DampedWindow, damped_windows, dissipative
 from ....analysis.files.wholefile import write_text
 from ....analysis.onset import Window
+from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium, Scene, settle
 from ....pywrap.onset.damped import inside
 from ....pywrap.onset.path_error import OtherPaths, with_damped_path_error, with_path_error
@@ -177,7 +178,7 @@ class FirstOnset:
                 return path, window
         return None
 
-    def _window(self, path: EquilibriumPath, part: Any) -> Window | DampedWindow | None:
+    def _window(self, path: EquilibriumPath, part: Floats) -> Window | DampedWindow | None:
         """The first window between some loads."""
         try:
             undamped = find_onset(path, part).windows  # which are where damped ones are looked for, too
