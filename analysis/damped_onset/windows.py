@@ -26,7 +26,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import FaultgougeError
+from ..errors import FaultgougeError, NoEquilibriumError
 from ..onset.limits import LIMITS
 from ..onset.walk import increasing
 from ..packing.packing import Floats, Packing
@@ -106,28 +106,33 @@ def growing_windows(
     """
     loads = increasing(forces)
     looked = [float(fx) for fx in look if loads[0] < fx < loads[-1]]
-    places = np.unique(np.concatenate([loads, looked]))
     narrowest = LIMITS.narrowest * float(np.abs(loads).max())
     try:
-        return walked(Growing(pencil, narrowest, Screen()), places, first, watch, known)
+        return walked(Growing(pencil, narrowest, Screen()), loads, looked, first, watch, known)
     except LostTrackError:
-        return walked(Growing(pencil, narrowest, None), places, first, watch, known)
+        return walked(Growing(pencil, narrowest, None), loads, looked, first, watch, known)
 
 
 def walked(
     oracle: Growing,
     loads: Floats,
+    look: Iterable[float] = (),
     first: bool = False,
     watch: Callable[[str], None] = lambda says: None,
     known: Known = lambda windows, fx: None,
 ) -> tuple[DampedWindow, ...]:
-    """The windows that an oracle finds along a ramp."""
+    """The windows that an oracle finds along a ramp; a load to be looked at besides may have no equilibrium."""
     here = oracle.at(float(loads[0]))
     windows: tuple[DampedWindow, ...] = ()
-    for load in loads[1:]:
+    for load in np.unique([*loads[1:], *look]):
         so_far = f"; {len(windows)} windows so far, the first from {windows[0].fx_onset:.8g}" if windows else ""
         watch(f"motion that grows up to F_x = {load:.6g} of {loads[-1]:.6g}{so_far}")
-        there = oracle.at(float(load))
+        try:
+            there = oracle.at(float(load))
+        except NoEquilibriumError:
+            if load in loads:
+                raise
+            continue
         oracle.over(here, there)
         here, windows = there, oracle.windows()
         known(windows, here.fx)

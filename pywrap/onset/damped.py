@@ -17,6 +17,7 @@ from ...analysis.damped_onset.modes import Pencil
 from ...analysis.damped_onset.sliced import first_growing
 from ...analysis.damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows, dissipating, dissipative
 from ...analysis.onset import Increments, seeks_all
+from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
 from ..runs.path import EquilibriumPath, loads
 from ..scenes.refusals import SceneError
@@ -46,6 +47,8 @@ class DampedOnset:
         The last F_x that had an equilibrium, where the packing flows before the ramp's end.
     doubtful : tuple of (float, float)
         Of a large packing, increments before the onset in which motion was expected to grow and was not seen to.
+    equilibria : tuple of Equilibrium
+        Of the ramp, without dissipation, by increasing F_x; none of a result that is under way.
     """
 
     mu: float
@@ -53,6 +56,7 @@ class DampedOnset:
     undamped: Onset | None
     flows_beyond: float | None
     doubtful: Increments = ()
+    equilibria: tuple[Equilibrium, ...] = ()
 
     @property
     def fx_c(self) -> float:
@@ -200,12 +204,13 @@ def damped_onset_run(
             found = _all_windows(ramp, mu, dissipation, watch, known)
         else:
             found = _first_window(ramp, mu, dissipation, watch, known, folder)
+        equilibria = tuple(ramp.path.kept)
         watch("the path once more, with other increments")
         again, undamped = (ramp.engine, ramp.path, ramp.scene), found.undamped
         if undamped is not None:
             undamped = with_path_error(undamped, *again)
         windows = with_damped_path_error(found.windows, dissipation, *again)
-        return replace(found, windows=windows, undamped=undamped)
+        return replace(found, windows=windows, undamped=undamped, equilibria=equilibria)
 
 
 def _all_windows(ramp: Ramped, mu: float, dissipation: Dissipation, watch: Watch, known: Known) -> DampedOnset:

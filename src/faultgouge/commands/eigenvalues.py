@@ -250,6 +250,8 @@ def _damped_onset(
     for each in real.get("si", [])[:1]:
         stress, ratio, frequency = _columns(each)
         say(f"mu = {mu:g}: in SI a shear stress of {stress} Pa, {ratio} of the overburden, at {frequency} Hz")
+    for equilibrium in run.equilibria:
+        say_way(equilibrium)
     _say_doubtful(run.doubtful, "a motion was expected to grow")
     _say_of_one_path(run.windows)
     return {"mu": mu} | run.as_dict() | real
