@@ -6,7 +6,7 @@ import quasistatic
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array
 
-from faultgouge.analysis import damping_matrix, find_onset, stiffness_matrix
+from faultgouge.analysis import NoEquilibriumError, damping_matrix, find_onset, stiffness_matrix
 from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil
 from faultgouge.analysis.damped_onset.weak import balancing_ratio, drag_onset, weak_limit
 from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating, growing_windows
@@ -94,6 +94,22 @@ def test_what_is_known_is_told_as_it_comes():
     assert [len(windows) for windows, _ in told] == [0, 1, 1, 1]
     assert [windows[0].fx_end is None for windows, _ in told[1:]] == [True, False, False]
     assert told[-1][0] == found
+
+
+def test_a_load_besides_that_has_no_equilibrium_costs_no_window():
+    """Where a ramp goes on beyond a gap; a load of the ramp itself without an equilibrium is an error."""
+    pencil = family(crossing(0.2), (1e-3, 1e-3))
+
+    def with_a_gap(fx):
+        if 1.2 < fx < 1.8:
+            raise NoEquilibriumError("a gap", beyond=1.2)
+        return pencil(fx)
+
+    loads = [-1.0, 0.0, 1.0, 2.0]
+    (window,) = growing_windows(with_a_gap, loads, look=[0.4, 1.5])
+    assert window == growing_windows(pencil, loads, look=[0.4])[0]
+    with pytest.raises(NoEquilibriumError):
+        growing_windows(with_a_gap, [*loads[:3], 1.5, 2.0])
 
 
 def test_what_grows_from_the_beginning_says_so():
