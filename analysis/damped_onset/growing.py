@@ -40,6 +40,10 @@ CLUSTER = 1e-4
 NEARLY = 0.3
 """A mode of a cluster whose damping is below this share of the median is looked at with the operator, which decides."""
 
+BEYOND = 0.05
+"""Share of an increment by which a cluster is followed beyond the upper load: a cluster knows to 1e-2 or so of an
+increment where modes begin to grow. What grows there is looked at with the operator, too."""
+
 
 class LostTrackError(FaultgougeError):
     """The motions that grow at a load are not those that were known to."""
@@ -311,9 +315,15 @@ def searched(cluster: Cluster, below: float, above: float) -> tuple[Growing, Pla
 
 
 def nearly_growing(cluster: Cluster, modes: DampedModes) -> list[DampedMode]:
-    """Those modes of a cluster that grow, or nearly do so."""
+    """Those modes of a cluster that grow at its upper load, nearly do so, or grow a little beyond."""
     near = np.flatnonzero(modes.rates.real > NEARLY * np.median(modes.rates.real))
-    return [modes.mode(int(k)) for k in near if cluster.owns(modes.rates[k].imag)]
+    found = [modes.mode(int(k)) for k in near if cluster.owns(modes.rates[k].imag)]
+    below, above = cluster.loads
+    pencil = cluster.pencil(above + BEYOND * (above - below))
+    if np.count_nonzero(np.linalg.eigvals(pencil.system.matrix).real > 0) <= 2 * len(modes.growing):
+        return found
+    further = DampedModes.of(pencil)
+    return found + [further.mode(int(k)) for k in further.growing if cluster.owns(further.rates[k].imag)]
 
 
 def distinct(modes: Sequence[DampedMode]) -> list[DampedMode]:

@@ -53,6 +53,14 @@ def test_the_limit_of_weak_dashpots_is_predicted(ramp):
         assert case["measured"] == pytest.approx(known[case["cn"], case["ct"]]["measured"], rel=1e-8)
 
 
+@pytest.mark.slow
+def test_an_onset_just_before_the_last_load_is_found():
+    """The last load lies a millionth of F_x beyond the onset, which is less than small pencils know."""
+    with ramped(seeded(SCENE, 15)) as found:
+        (case,) = weak_cases(found, [(0.0, 1.0)])
+    assert case["measured"] == pytest.approx(case["predicted"], rel=1e-9)
+
+
 def test_the_table_of_weak_dashpots():
     """Five ratios of ten packings: predicted and measured among all modes."""
     rows = [each for each in table("weak") if "cn" in each]
