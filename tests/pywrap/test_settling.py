@@ -67,13 +67,6 @@ def test_disk_on_top_of_another_rolls_down():
     assert lowest(packing)[0] > -1e-6
 
 
-def test_minimum_is_not_left(frictionless):
-    found, _ = minimized(frictionless)
-    again, at_floor = minimized(found)
-    assert at_floor
-    assert np.abs(again.position - found.position).max() < 1e-9
-
-
 @pytest.fixture(scope="module")
 def settled():
     """A packing that is too large for dynamics alone."""
