@@ -80,7 +80,7 @@ def test_larger_packing_settles_to_the_floor(settled):
     assert not settled.packing.top[settled.packing.rattlers].any()
 
 
-@pytest.mark.parametrize("seed", [2, 3, 4, 5])
+@pytest.mark.parametrize("seed", [2, 3])
 @pytest.mark.slow
 def test_layer_of_a_tenth_comes_to_rest(seed):
     packing = settle(Scene.from_mapping(SCENE | {"packing": SCENE["packing"] | {"seed": seed}})).packing
