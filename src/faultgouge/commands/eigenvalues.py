@@ -157,6 +157,14 @@ def onset(
             "for. 0:600 are the 600 lowest.",
         ),
     ] = None,
+    slices: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Keep what a long search finds in this folder, and go on from what is there: jobs that name the same "
+            "folder share the search. By default -o FILE has its own, until it is done.",
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """The onset F_x^c and the windows of complex eigenvalues, for each friction coefficient of the scene.
@@ -164,14 +172,16 @@ def onset(
     With a section [damping]: the windows in which some motion grows in spite of
     the dissipation, or because of it, and beside them the undamped onset.
     """
-    from faultgouge.analysis.files.wholefile import check_folder
+    from faultgouge.analysis.files.wholefile import check_folder, make_folder
 
     wanted, part = read_scene(scene, "onset"), None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if output:
         check_folder(output)
-    folder = _search_folder(output)
+    if slices:
+        make_folder(slices)
+    folder = slices or _search_folder(output)
     found: list[dict[str, Any]] = []
     for mu in wanted.law.mus:
         if wanted.damping is not None:
@@ -179,7 +189,7 @@ def onset(
         else:
             found.append(_undamped_onset(part, folder, wanted, mu))
     result = _written(output, found)
-    if output and is_root() and folder is not None:
+    if is_root() and folder is not None and not slices:
         shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
     if as_json:
         print_json(result)
