@@ -34,6 +34,15 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
+Slices = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="Keep what a long search finds in this folder, and go on from what is there: jobs that name the same "
+        "folder share the search. By default -o FILE has its own, until it is done.",
+    ),
+]
+
 
 @app.command(epilog="Example: faultgouge spectrum run.h5 --json")
 def spectrum(
@@ -157,14 +166,7 @@ def onset(
             "for. 0:600 are the 600 lowest.",
         ),
     ] = None,
-    slices: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Keep what a long search finds in this folder, and go on from what is there: jobs that name the same "
-            "folder share the search. By default -o FILE has its own, until it is done.",
-        ),
-    ] = None,
+    slices: Slices = None,
     as_json: AsJson = False,
 ) -> None:
     """The onset F_x^c and the windows of complex eigenvalues, for each friction coefficient of the scene.
@@ -172,16 +174,14 @@ def onset(
     With a section [damping]: the windows in which some motion grows in spite of
     the dissipation, or because of it, and beside them the undamped onset.
     """
-    from faultgouge.analysis.files.wholefile import check_folder, make_folder
+    from faultgouge.analysis.files.wholefile import check_folder
 
     wanted, part = read_scene(scene, "onset"), None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if output:
         check_folder(output)
-    if slices:
-        make_folder(slices)
-    folder = slices or _search_folder(output)
+    folder = _search_folder(slices, output)
     found: list[dict[str, Any]] = []
     for mu in wanted.law.mus:
         if wanted.damping is not None:
@@ -205,8 +205,13 @@ def _written(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]
     return result
 
 
-def _search_folder(output: Path | None) -> Path | None:
+def _search_folder(slices: Path | None, output: Path | None) -> Path | None:
     """Where a long search leaves what it finds; nowhere if its result goes to no file, or to a device."""
+    from faultgouge.analysis.files.wholefile import make_folder
+
+    if slices:
+        make_folder(slices)
+        return slices
     return None if output is None or (output.exists() and not output.is_file()) else Path(f"{output}.slices")
 
 
