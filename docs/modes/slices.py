@@ -11,7 +11,7 @@ from pathlib import Path
 
 from bounds import at_loads
 
-from faultgouge.analysis import eigenvalues
+from faultgouge.analysis import dynamical_matrix, eigenvalues
 from faultgouge.studies.modes.compute import ALL, Counted
 from faultgouge.studies.modes.sliced import sliced
 
@@ -26,9 +26,9 @@ def rows(disks: int, seed: int):
         if disks <= ALL:
             every = Counted.of(eigenvalues(packing))
             row |= {"pairs": len(every.omega)} | {key: every.as_dict()[key] for key in ("growth_rate", "least_q")}
-        parts = sliced(packing)
-        found = Counted.of(parts.values).as_dict()
-        row |= {"modes": parts.modes, "sliced": found["pairs"], "error": parts.error}
+        values, error = sliced(packing)
+        found = Counted.of(values).as_dict()
+        row |= {"modes": dynamical_matrix(packing)[0].shape[0], "sliced": found["pairs"], "error": error}
         yield row | {f"{key}_sliced": found[key] for key in ("growth_rate", "least_q")}
 
 

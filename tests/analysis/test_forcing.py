@@ -76,15 +76,6 @@ def _velocities(response, omega, duration, count):
     return np.real((np.exp(np.multiply.outer(long, rate)) * part) @ np.exp(np.multiply.outer(rate, short)))
 
 
-def test_resonance_grows_as_the_time(packing):
-    """Pushed with the frequency of a mode, the velocity is c t/2 and no quotient of nothing by nothing."""
-    response = impulse_response(packing, layer_force(packing, 1.0))
-    strongest = int(np.argmax(np.where(response.rate.imag > 0, np.abs(response.weight), 0)))
-    omega, time = float(response.rate[strongest].imag), 1e4
-    near = response.velocity(omega, time + np.linspace(0, 2 * np.pi / omega, 400))
-    assert np.abs(near).max() == pytest.approx(abs(response.weight[strongest]) * time, rel=1e-2)
-
-
 @pytest.mark.slow
 def test_frequencies_of_the_time_step(packing):
     """A constant push makes each mode oscillate: the sampled response has the frequencies of velocity Verlet."""

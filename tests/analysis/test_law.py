@@ -103,15 +103,6 @@ def test_derivatives_are_continuous_at_the_bound(sign, exponent):
     assert inside == pytest.approx(-4e-4 * law.kt * overlap ** (exponent - 1), rel=1e-4)
 
 
-@both_exponents
-def test_tangential_stiffness_peaks_at_a_third(exponent):
-    law, overlap = MindlinLaw(2e5, 6e4, 1.0, exponent), 1e-3
-    x = np.linspace(0, 1, 301)
-    stiffness = -law.tangential_slip_derivative(overlap, x * law.slip_limit(overlap))
-    assert x[np.argmax(stiffness)] == pytest.approx(1 / 3, abs=1e-12)
-    assert stiffness.max() == pytest.approx(4 / 3 * law.kt * overlap ** (exponent - 1), rel=1e-14)
-
-
 finite = st.floats(1e-6, 1e6)
 share = st.integers(-3000, 3000).map(lambda thousandths: thousandths / 1000)
 

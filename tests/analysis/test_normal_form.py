@@ -85,22 +85,6 @@ def test_amplitude_is_the_maximum_of_the_solution(epsilon, tau):
     assert form.amplitude(tau) <= form.gain
 
 
-def test_first_beat_and_all_times():
-    for epsilon in (0.3, 0.1, 1e-2, 1e-4):
-        form = NormalForm(0.2, epsilon)
-        r = form.eigenvalues[1] - 1
-        assert 0 <= form.gain / form.amplitude() - 1 <= (np.pi * r / 4) ** 2 / 2 * 1.2  # d/2s = r/4, next order 1.2
-
-
-def test_amplitude_exponent():
-    epsilon = np.geomspace(1e-9, 1e-3, 13)
-    law = fit_power_law(epsilon, [NormalForm(0.3, e).amplitude() for e in epsilon])
-    # The exact g is (2/epsilon)^(1/2) (1 - epsilon/4 ..).
-    assert law.exponent == pytest.approx(-0.5, abs=1e-4)
-    assert law.factor == pytest.approx(np.sqrt(2), rel=1e-3)
-    assert 0 < law.error < 1e-4
-
-
 def damped(form, tau):
     """The maximum of (2/epsilon)^(1/2) exp(-t/2 tau) sin(t/(2^(1/2) tau_d)), at least the 1 of the start."""
     theta = np.arctan(np.sqrt(2) * tau / form.tau_d)
@@ -221,8 +205,3 @@ def test_whole_packing_follows_its_pair(packings, pairs, damped):
     # The rounding 3e-11 of the operator, over the splitting 0.12 and times the phase of a beat.
     np.testing.assert_allclose(response.displacement, expected, atol=1e-7 * np.abs(expected).max())
     assert pair.amplitude(tau) >= np.linalg.norm(scaled, axis=1).max()
-
-
-def test_crossover_of_the_real_pair(pairs):
-    for pair in pairs[:-2]:  # those with epsilon < 0.01
-        assert pair.half_gain_time() / pair.tau_d == pytest.approx(1.3455, rel=5e-3)

@@ -145,33 +145,6 @@ def test_resonance_is_no_special_case():
     np.testing.assert_allclose(at_rest.displacement, time**2 / 2)
 
 
-def test_energy_of_a_symmetric_operator():
-    """Kinetic and elastic energy are constant without a force, and grow by the work of one."""
-    basis = np.linalg.qr(np.random.default_rng(6).normal(size=(5, 5)))[0]
-    matrix, (force, start) = basis @ np.diag([0.5, 0.5, 1, 2, 7]) @ basis.T, vectors(5)
-    time = np.linspace(0, 30, 30001)
-
-    def energy(motion):
-        x, v = motion.displacement.real, motion.velocity.real
-        return 0.5 * np.sum(v * v + x * (x @ matrix), axis=1)
-
-    modes, oscillator = Modes.of(matrix), Oscillator(OMEGA)
-    free = energy(modes.apply(oscillator.released, time, start))
-    np.testing.assert_allclose(free, free[0], rtol=1e-13)
-    driven = modes.apply(oscillator.driven, time, force)
-    power = np.cos(OMEGA * time) * (driven.velocity.real @ force)
-    work = np.concatenate([[0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(time))])
-    # The trapezoidal rule with steps of 1e-3 is good to 1e-6 of it.
-    np.testing.assert_allclose(energy(driven), work, atol=1e-5 * work.max())
-
-
-def test_damping_takes_half_its_rate_from_the_amplitude():
-    """exp(-t/2 tau), not exp(-t/tau): the mean energy of a weakly damped mode falls as exp(-t/tau)."""
-    displacement, _ = motion_of(np.array([[9.0]]), [0.0], [1.0], [2 * np.pi / 3 * 30], tau=20.0)
-    # A whole number of periods but for gamma^2/lambda, and the damped start's own share of gamma/omega.
-    assert abs(displacement[0, 0]) == pytest.approx(np.exp(-20 * np.pi / 40), rel=1e-3)
-
-
 def dissipative(packing, cn=0.0, ct=0.0, tau=None):
     """A packing with dashpots and drag."""
     return replace(packing, law=replace(packing.law, cn=cn, ct=ct), drag_time=tau)
@@ -213,18 +186,6 @@ def test_what_is_left_of_a_sudden_start_is_the_transfer_function(equilibrium):
         # exp(-400 / 2 tau) = 4e-18 of the transient is left, which is far larger than the rest at omega = 0.01
         found = linear_response(packing, time, force=force, omega=omega).layer_velocity
         np.testing.assert_allclose(found, stationary, atol=1e-7 * np.abs(stationary).max())
-
-
-def test_the_transfer_function_absorbs_power(bed):
-    """The mean power |a|^2 Re V/2 of a force is what dashpots and drag take, as long as K is symmetric."""
-    packing = dissipative(bed(1.0), cn=1.0, ct=1.0)
-    omega = np.geomspace(0.1, 300, 50)
-    response = layer_response(packing, omega)
-    assert response.shape == (50,)
-    assert np.all(response.real > 0)
-    np.testing.assert_allclose(layer_response(packing, -omega), response.conj(), rtol=1e-9)
-    # without dissipation velocity and force are a quarter of a period apart
-    assert np.abs(layer_response(bed(1.0), omega).real).max() == 0
 
 
 def test_rattlers_are_held_still(bed):
@@ -286,17 +247,3 @@ def test_against_lammps(equilibrium, omega):
     exact = linear_response(packing, time, force=force, omega=omega)
     assert np.abs(exact.msd - msd).max() < 1e-2 * msd.max()
     assert np.abs(exact.layer_velocity - velocity).max() > 1e-3 * np.abs(velocity).max()
-
-
-def test_response_is_linear_in_force_and_start(equilibrium):
-    time, start = [0.1, 1.0, 7.0], 1e-8 * np.random.default_rng(8).normal(size=300)
-    force = layer_force(equilibrium, 1e-6)
-    both = linear_response(equilibrium, time, force=force, omega=3.0, initial=start)
-    one = linear_response(equilibrium, time, force=2 * force, omega=3.0)
-    other = linear_response(equilibrium, time, initial=2 * start)
-    np.testing.assert_allclose(
-        both.displacement, 0.5 * (one.displacement + other.displacement), atol=1e-14 * 1e-6, rtol=1e-12
-    )
-    unloaded = replace(equilibrium, fx=0.0)  # the load itself is no part of K
-    again = linear_response(unloaded, time, force=force, omega=3.0, initial=start)
-    np.testing.assert_array_equal(again.displacement, both.displacement)
