@@ -35,18 +35,20 @@ def numbers(tables: Mapping[str, Table]) -> dict[str, Any]:
     -------
     dict
         sizes : by number of disks, medians of each quantity over the loads, and the load of the last equilibrium;
-        powers : exponents of N; random : shares of random matrices beside those of the packings; loss : what stops
-        the pairs, by number of disks; structural : share of packings that grow, for each quality factor; quartz :
-        as loss, of the shipped scenes; runs : growth with dashpots in LAMMPS beside the pencil's; sets : medians
-        at `COMPARED` of every set; switches : the same with b of some contacts; histories : with total slips and
-        with rescaled ones.
+        powers : exponents of N at a fixed force on each disk of the layer, pressure_powers : at a fixed pressure;
+        random : shares of random matrices beside those of the packings; loss : what stops the pairs, by number of
+        disks; structural : share of packings that grow, for each quality factor; quartz : as loss, of the shipped
+        scenes; runs : growth with dashpots in LAMMPS beside the pencil's; sets : medians at `COMPARED` of every set;
+        switches : the same with b of some contacts; histories : with total slips and with rescaled ones.
     """
     by_size, randoms, lossy, runs = (_of_sizes(tables, kind) for kind in ("force", "random", "loss", "runs"))
+    pressed = dict(sorted((_of_sizes(tables, "pressure") | {n: by_size[n] for n in by_size if n == 100}).items()))
     quartz = {name: table for name, table in tables.items() if name.startswith(("quartz", "thick"))}
     counted = {name: table for name, table in tables.items() if name.split()[0] not in NOT_COMPARED}
     return {
         "sizes": {disks: to_the_end(table) for disks, table in by_size.items()},
         "powers": powers(by_size),
+        "pressure_powers": powers(pressed),
         "sets": {name: compared(counted[name]) for name in sorted(counted, key=_place)},
         "random": {disks: against_random(table, by_size) for disks, table in randoms.items()},
         "loss": {disks: losses(table) for disks, table in lossy.items()},

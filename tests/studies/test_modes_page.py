@@ -38,9 +38,32 @@ def test_the_load_of_a_share_falls_as_the_root_of_the_number_of_disks(found):
         assert low > -0.65
 
 
-def test_nothing_saturates_in_these_sizes(found):
+def test_growth_rises_with_the_size_at_a_fixed_force_and_is_not_known_to_at_a_fixed_pressure(found):
     assert found["powers"]["growth_rate at 0.1"]["power"][1] > 0
     assert found["powers"]["least_q at 0.1"]["power"][2] < 0
+    _, low, high = found["pressure_powers"]["growth_rate at 0.1"]["power"]
+    assert low < 0 < high
+
+
+def test_spacings_and_couplings_have_the_powers_that_the_page_says(found):
+    page = (DOCS / "modes.md").read_text()
+    exponents = json.loads((DOCS.parent / "genericity" / "genericity.json").read_text())["levels"]["exponents"]
+    spacing, coupling = (exponents[name]["value"] for name in ("spacing", "coupling"))
+    for stated in (spacing, coupling, coupling - spacing):
+        assert f"$N^{{{stated:.2f}}}$" in page
+    _, low, high = found["powers"]["load of share 0.1"]["power"]
+    assert low < spacing - coupling < high
+
+
+def test_other_packings_have_as_many_complex_modes_or_more(found):
+    usual, harmonic, stiff, rough = (
+        found["sets"][name] for name in ("force 100", "harmonic", "stiff tangent", "settled with friction")
+    )
+    assert harmonic["0.1"]["share"][1] > usual["0.1"]["share"][2]
+    assert stiff["0.1"]["share"][1] < usual["0.1"]["share"][0] < stiff["0.1"]["share"][2]
+    largest = found["sizes"]["1000"]
+    assert rough["0.03"]["share"][1] > largest["share"][largest["loads"].index(0.03)][2]
+    assert rough["end"][0] < usual["end"][1]
 
 
 def test_without_b_there_is_no_pair_and_sliding_contacts_make_the_strong_growth(found):
