@@ -73,8 +73,10 @@ def write_gsd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
             frame.configuration.step = number
             if each.displacement is not None:
                 frame.log["particles/displacement"] = quantities.in_space(each.displacement)
+                frame.log["particles/normal_force"] = quantities.disk_pressure(each.packing)
             frame.log |= {f"faultgouge/{key}": np.array([value]) for key, value in each.number.items()}
-            frame.log |= _forces(each)
+            if each.whole:
+                frame.log |= _forces(each.packing)
             for mode in modes:
                 frame.log[f"particles/{mode.name}"] = np.ascontiguousarray(mode.displacement.real.T)
                 frame.log[f"particles/{mode.name}_imag"] = np.ascontiguousarray(mode.displacement.imag.T)
@@ -82,18 +84,14 @@ def write_gsd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
     return f"{SINGLE}; the logged quantities have all of the packing in float64, and import takes these"
 
 
-def _forces(frame: Frame) -> dict[str, np.ndarray]:
-    """Forces, and the slips that they follow from, as far as these are known."""
-    packing = frame.packing
-    pressure = {"particles/normal_force": quantities.disk_pressure(packing)}
-    if not frame.whole:
-        return pressure
+def _forces(packing: Packing) -> dict[str, np.ndarray]:
+    """What follows from slips, and these."""
     # gsd has no empty arrays: a row of zeros stands for no contact
     rows = quantities.contact_rows(packing)
     return {
         CONTACTS: rows if len(rows) else np.zeros((1, 4 if packing.compensated else 3)),
         "particles/net_force": quantities.in_space(quantities.disk_force(packing)[:, :2]),
-        **pressure,
+        "particles/normal_force": quantities.disk_pressure(packing),
         "particles/mobilised": quantities.disk_mobilised(packing),
     }
 
