@@ -69,7 +69,6 @@ benchmark: $(VENV)/.installed
 	$(BIN)/faultgouge explain scenes/paper.toml
 	$(BIN)/faultgouge explain scenes/frictionless.toml
 	$(BIN)/python benchmarks/increment.py
-	$(BIN)/python benchmarks/onset_against_scan.py
 	$(BIN)/python benchmarks/scale.py
 	$(BIN)/faultgouge report -o report
 

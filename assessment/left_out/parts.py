@@ -122,4 +122,4 @@ class Part:
 
 def same_motion(one: Motion, other: Motion) -> bool:
     """Whether positions and velocities are the same to the bit."""
-    return all(np.array_equal(mine, theirs) for mine, theirs in zip(one, other, strict=True))
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in one._fields)
