@@ -114,12 +114,12 @@ $(VENV)/bin/python:
 	$(PIP) --upgrade 'pip>=25.1'
 
 # what tests and commands need beside Python: the dependencies, the package's metadata, and the plugin for the LAMMPS that
-# is there
+# is there; `install` makes new files, as what runs has mapped the old ones
 $(VENV)/.plugin: $(VENV)/bin/python $(PLUGIN)
 	$(PIP) --group build
 	$(PIP) --no-build-isolation .
 	mkdir -p src/faultgouge/lib
-	cd $(VENV) && cp "$$(bin/python -c 'import faultgouge.plugin as p; print(p.directory())')"/*.so $(CURDIR)/src/faultgouge/lib
+	cd $(VENV) && install "$$(bin/python -c 'import faultgouge.plugin as p; print(p.directory())')"/*.so $(CURDIR)/src/faultgouge/lib
 	touch $@
 
 $(VENV)/.installed: $(VENV)/.plugin $(PYTHON_SOURCES)

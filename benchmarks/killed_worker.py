@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import dask
 from distributed import Client, LocalCluster, SpecCluster
 
 from faultgouge.studies.sweep.compute import run_sweep
@@ -25,6 +26,13 @@ SCENE = {
     "load": {"fy": 3.0},
     "ramp": {"step": 5e-3, "until": 0.025},
 }
+
+PATIENT = {
+    "distributed.comm.timeouts.connect": "5 minutes",
+    "distributed.comm.timeouts.tcp": "5 minutes",
+    "distributed.deploy.lost-worker-timeout": "5 minutes",
+}
+"""Dask's patience, as on the page for clusters: by default half a minute, and a quarter for a worker to start anew."""
 
 Row = dict[str, Any]
 
@@ -44,6 +52,7 @@ def with_a_killed_worker(sweep: Sweep, folder: Path, workers: int) -> tuple[list
     killed: list[int] = []
     # one thread a worker: LAMMPS does not stand several in a process
     with (
+        dask.config.set(PATIENT),
         LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster,
         Client(cluster) as client,
     ):

@@ -3,19 +3,23 @@
 A *pass* goes through all slices of the spectrum, for a few neighbouring loads. A slice of 100,000 disks takes 13 s, and
 leaves little: the pairs that may turn complex, and the eigenvalues that neighbouring slices must agree on. So each
 slice has a file, which the rank that has searched the slice writes in one step; and a search that was cut off goes on.
+Several searches may share a folder: each takes what no other has taken.
 
 The folder of a pass is named by a checksum of the loads, of the operators there, of the modes and of the limits, and of
 the version of this program. What was found for another packing, or by another version, is not taken for this one.
 """
 
+import errno
+import fcntl
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
+from uuid import uuid4
 from zipfile import BadZipFile
 
 import numpy as np
@@ -30,8 +34,14 @@ from .limits import Limits
 Shift = tuple[float, tuple[int, int]]
 """The shift of a slice, and the numbers of the first eigenvalue that belongs to it and of the first that does not."""
 
+Take = Callable[[tuple[int, int]], bool]
+"""Takes the slice of some modes, and says whether no other search has it."""
+
 SHIFTS = "shifts.npz"
 """The file of all shifts: to find these, eigenvalues are counted, which takes minutes for 100,000 disks."""
+
+TAKEN = "taken"
+"""The file whose bytes are locked, each by the search that has taken the slice which begins at so many modes."""
 
 
 class DamagedSliceError(BadInputError):
@@ -55,6 +65,11 @@ class Border(NamedTuple):
     first: float
     beyond: float
     spacing: float
+
+    @property
+    def size(self) -> int:
+        """How many modes the slice has."""
+        return self.modes[1] - self.modes[0]
 
     @classmethod
     def of(cls, number: int, values: Floats, own: slice) -> "Border":
@@ -149,12 +164,34 @@ class Pass:
         """Those of the known slices."""
         return [each.border for each in self.found]
 
+    @contextmanager
+    def taking(self) -> Iterator[Take]:
+        """What takes a slice if no other search has it; all are given back at the end.
+
+        A taken slice is a byte of a file that is locked. The system unlocks what a process leaves that dies. Where
+        there are no locks, two searches find the same.
+        """
+        folder = self.folder
+        if folder is None:
+            yield lambda modes: True
+            return
+        make_folder(folder)
+        with (folder / TAKEN).open("ab") as taken:
+
+            def take(modes: tuple[int, int]) -> bool:
+                try:
+                    fcntl.lockf(taken, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, modes[0])
+                except OSError as error:
+                    return error.errno not in (errno.EAGAIN, errno.EACCES)
+                return not (folder / _name(modes)).exists()
+
+            yield take
+
     def keep(self, found: Found) -> None:
         """Write what has been found in a slice, if there is a folder; an OutputError if that cannot be."""
         flat = [(k, each) for k, candidates in enumerate(found.candidates) for each in candidates]
-        first, stop = found.border.modes
         self._write(
-            f"{first}-{stop}.npz",
+            _name(found.border.modes),
             modes=found.border.modes,
             border=found.border[1:],
             bears=found.bears,
@@ -173,7 +210,9 @@ class Pass:
             content = BytesIO()
             np.savez(content, **arrays)
             make_folder(self.folder)
-            write_whole(self.folder / name, content.getvalue())
+            own = self.folder / f"{uuid4().hex}.new"  # another search may write the same file at the same time
+            write_whole(own, content.getvalue())
+            own.replace(self.folder / name)
 
 
 NEW_PASS = Pass()
@@ -189,6 +228,11 @@ def pass_folder(parent: Path, places: Sequence[Looked], modes: tuple[int, int], 
             for array in (matrix.data, matrix.indices, matrix.indptr):
                 digest.update(np.ascontiguousarray(array).data)
     return parent / digest.hexdigest()[:16]
+
+
+def _name(modes: tuple[int, int]) -> str:
+    """The file of a slice."""
+    return f"{modes[0]}-{modes[1]}.npz"
 
 
 def _found(path: Path) -> Found:

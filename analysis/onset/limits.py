@@ -131,6 +131,8 @@ class Limits:
     """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision."""
     ahead: int = 2
     """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
+    wait: float = 2.0
+    """Seconds between two looks at what other searches have found, where these have taken all that is left."""
     chunk: int = 1024
     """Rows of a basis that are multiplied at a time: what comes out stays in the cache."""
 

@@ -16,8 +16,10 @@ confirmed ones (packings of 1,000 disks, increments of 1e-3).
 its kind, so a pair is followed from inside of its window to the edge.
 """
 
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Generic, Protocol, TypeVar
@@ -127,13 +129,19 @@ class Sliced(ABC, Generic[P, W]):
         return [sorted(chain(*each), key=lambda candidate: candidate.onset) for each in increments]
 
     def _found_by_all(self, places: Sequence[P]) -> list[Found]:
-        """What the slices of all ranks have, by the order of the spectrum."""
-        known = self._known(places)
-        fresh = self.ranks.together(lambda: self._found(places, known))
-        return sorted(chain(known.found, *fresh), key=lambda each: each.border.modes)
+        """What the slices of all ranks have, by the order of the spectrum; those of other searches are waited for."""
+        first, stop = self.bases.range(places[0].matrix)
+        while True:
+            known = self._known(places)
+            fresh = self.ranks.together(partial(self._found, places, known))
+            found = sorted(chain(known.found, *fresh), key=lambda each: each.border.modes)
+            if known.folder is None or sum(each.border.size for each in found) == stop - first:
+                return found
+            if not any(fresh):
+                time.sleep(self.limits.wait)
 
     def _known(self, places: Sequence[P]) -> Pass:
-        """What an earlier search has left; nothing if bases are kept, as the increments beyond need these."""
+        """What other searches have left; nothing if bases are kept, as the increments beyond need these."""
         matrix = places[0].matrix
         if self.folder is None or self.bases.keeps(matrix):
             return NEW_PASS
@@ -144,7 +152,7 @@ class Sliced(ABC, Generic[P, W]):
         """What this rank's slices have, without those that are known."""
         found: list[Found] = []
         first, stop = self.bases.range(places[0].matrix)
-        before = sum(each.modes[1] - each.modes[0] for each in known.borders)
+        before = sum(each.size for each in known.borders)
         done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
         failure: FaultgougeError | None = None
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"

@@ -12,7 +12,7 @@ are as many as there are eigenvalues below :math:`\sigma`. So every eigenvalue o
 spectrum. Where two slices meet both must give the same eigenvalue the same number.
 
 Several ranks count together, and each finds a run of neighbouring slices (:mod:`~faultgouge.analysis.onset.ranks`) of
-those that no earlier search has left (:mod:`~faultgouge.analysis.onset.found`).
+those that no other search has found or taken (:mod:`~faultgouge.analysis.onset.found`).
 """
 
 from collections import deque
@@ -31,7 +31,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import FaultgougeError
 from ..factors.sparse_lu import minimum_degree, symmetric_lu
 from ..packing.packing import Floats, Indices
-from .found import NEW_PASS, Border, Pass, Shift
+from .found import NEW_PASS, Border, Pass, Shift, Take
 from .limits import LIMITS, Limits
 from .ranks import ALONE, Ranks
 
@@ -109,7 +109,8 @@ def slices(
         Who shares the slices; those of this rank are found. Its threads are also the slices at the most that are under
         way beyond the one that is asked for. All ranks must come to the end of their slices.
     known : Pass
-        The slices in it are left out. The shifts are taken from it; if it has none, the first rank keeps them there.
+        The slices in it are left out, and those that another search takes. The shifts are taken from it; if it has
+        none, the first rank keeps them there.
 
     Raises
     ------
@@ -125,11 +126,13 @@ def slices(
             known.keep_shifts(shifts)
         found = {each.modes for each in known.borders}
         wanted = [each for each in shifts if each[1] not in found]
+        own = wanted[ranks.part(len(wanted))]
         try:
-            for part in _in_turn(pool, ranks.workers, spectrum, wanted[ranks.part(len(wanted))], margin):
-                mine.append(part.border)
-                _compare(*mine[-2:])
-                yield part
+            with known.taking() as take:
+                for part in _in_turn(pool, ranks.workers, spectrum, own, margin, take):
+                    mine.append(part.border)
+                    _compare(*mine[-2:])
+                    yield part
         except FaultgougeError as error:
             failure = error
 
@@ -142,15 +145,17 @@ def slices(
 
 
 def _in_turn(
-    pool: ThreadPoolExecutor, workers: int, spectrum: "_Spectrum", shifts: Sequence[Shift], margin: int
+    pool: ThreadPoolExecutor, workers: int, spectrum: "_Spectrum", shifts: Sequence[Shift], margin: int, take: Take
 ) -> Iterator[Slice]:
-    """Slices in their order."""
+    """Slices in their order, those that could be taken."""
     waiting: deque[Future[Slice]] = deque()
-    for place in range(len(shifts) + workers):
-        if place < len(shifts):
-            waiting.append(pool.submit(spectrum.slice_about, *shifts[place], margin))
-        if place >= workers and waiting:
+    for shift, own in shifts:
+        if take(own):
+            waiting.append(pool.submit(spectrum.slice_about, shift, own, margin))
+        if len(waiting) > workers:
             yield waiting.popleft().result()
+    while waiting:
+        yield waiting.popleft().result()
 
 
 def _compare(*borders: Border) -> None:

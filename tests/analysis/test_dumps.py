@@ -186,8 +186,3 @@ def test_json_that_is_no_packing(tmp_path, cluster, content, says):
     with pytest.raises(PackingFileError, match=says) as error:
         read_packing(path, cluster.law)
     assert "packing.json" in str(error.value)
-
-
-def test_no_json_at_all(tmp_path, cluster):
-    with pytest.raises(PackingFileError, match="cannot be read"):
-        read_packing(tmp_path / "none.json", cluster.law)

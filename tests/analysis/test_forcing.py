@@ -133,11 +133,6 @@ def test_pulse_peaks_where_it_says_and_sweep_goes_from_one_frequency_to_the_othe
     assert half_periods[-1] == pytest.approx(6.0, rel=0.1)
 
 
-def test_derivative_of_a_parabola_is_exact_inside():
-    time = np.linspace(0.0, 1.0, 11)
-    np.testing.assert_allclose(Signal(time, time**2).differentiated().value[1:-1], 2 * time[1:-1], rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("time", "value", "says"),
     [

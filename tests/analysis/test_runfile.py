@@ -55,45 +55,27 @@ def test_what_was_written_is_what_is_read(tmp_path, states):
             run.packing(4)
 
 
-def test_damping_is_in_the_file_if_it_is_in_the_packing(tmp_path, cluster):
-    parameters = []
-    damped = replace(cluster, law=replace(cluster.law, cn=0.1, ct=0.2), drag_time=0.3)
-    for k, state in enumerate((cluster, damped)):
-        with RunFile.create(tmp_path / f"{k}.h5", state) as run:
-            run.append(state)
-        with RunFile(tmp_path / f"{k}.h5") as run:
-            assert run.packing(0) == state
-        with h5py.File(tmp_path / f"{k}.h5") as file:
-            parameters.append(set(file["parameters"]))
-    harmonic = {"exponent"} if cluster.law.exponent == 1 else set()
-    assert parameters[0] == {"radius", "mass", "top", "kn", "kt", "mu", "inertia_factor", "box_length"} | harmonic
-    assert parameters[1] - parameters[0] == {"cn", "ct", "drag_time"}
-
-
-def test_a_rescaled_history_is_in_the_file_if_the_law_has_it(tmp_path, cluster):
-    state = replace(cluster, law=replace(cluster.law, exponent=1.5, rescaled=True))
+@pytest.mark.parametrize(
+    ("law", "changes", "stored"),
+    [
+        ({}, {}, set()),
+        ({"cn": 0.1, "ct": 0.2}, {"drag_time": 0.3}, {"cn", "ct", "drag_time"}),
+        ({"exponent": 1.5, "rescaled": True}, {}, {"rescaled"}),
+        ({"exponent": 1.0, "kt": 0.0}, {"box_length": None}, {"exponent"}),
+    ],
+    ids=["undamped", "damped", "rescaled", "open sides, harmonic, without friction"],
+)
+def test_what_is_not_there_is_not_in_the_file(tmp_path, cluster, law, changes, stored):
+    state = replace(cluster, law=replace(cluster.law, **law), **changes)
     with RunFile.create(tmp_path / "run.h5", state) as run:
         run.append(state)
-        assert run.packing() == state
-        assert run.packing().law.rescaled is True
-
-
-def test_open_box_and_frictionless_law(tmp_path, cluster):
-    state = replace(cluster, box_length=None, law=MindlinLaw(1.0, 0.0, 0.0))
-    with RunFile.create(tmp_path / "run.h5", state) as run:
+    with RunFile(tmp_path / "run.h5", "a") as run:
         run.append(state)
-        assert run.packing() == state
-
-
-def test_appending_goes_on_later(tmp_path, states):
-    path = tmp_path / "run.h5"
-    with RunFile.create(path, states[0]) as run:
-        run.append(states[0])
-    with RunFile(path, "a") as run:
-        run.append(states[1])
-    with RunFile(path) as run:
-        for k in (0, 1):
-            assert run.packing(k) == states[k]
+        assert [run.packing(k) for k in (0, 1)] == [state, state]
+    always = {"radius", "mass", "top", "kn", "kt", "mu", "inertia_factor"}
+    optional = ({"box_length"} if state.box_length else set()) | ({"exponent"} if state.law.exponent == 1 else set())
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert set(file["parameters"]) == always | optional | stored
 
 
 @pytest.mark.slow
@@ -307,45 +289,6 @@ def test_frames_with_more_and_more_contacts_stay_compact(tmp_path):
             file.append(replace(row, contacts=Contacts(some, np.full(len(some), -1), slip[some])))
     plain = 8 * (3 + 1 + 3) * n * frames  # positions, angles, contacts
     assert path.stat().st_size < 0.6 * plain
-
-
-def test_datasets_depend_on_the_frames_alone(tmp_path, states):
-    for name in ("a.h5", "b.h5"):
-        with RunFile.create(tmp_path / name, states[0], {"host": name}) as run:
-            for state in states:
-                run.append(state, floor=2.0)
-
-    def datasets(name):
-        found = {}
-        with h5py.File(tmp_path / name) as file:
-            file.visititems(lambda key, item: found.update({key: item[()]}) if isinstance(item, h5py.Dataset) else None)
-        return found
-
-    first, second = datasets("a.h5"), datasets("b.h5")
-    assert first.keys() == second.keys()
-    for key, value in first.items():
-        np.testing.assert_array_equal(value, second[key])
-
-
-@pytest.mark.parametrize("periodic", [True, False])
-@pytest.mark.slow
-def test_mdanalysis_opens_it(tmp_path, states, periodic):
-    path = str(tmp_path / "run.h5")
-    states = states if periodic else [replace(state, box_length=None) for state in states]
-    with RunFile.create(path, states[0]) as run:
-        for state in states:
-            run.append(state)
-    import MDAnalysis  # a third of a second to import
-
-    universe = MDAnalysis.Universe.empty(6, trajectory=True)
-    universe.load_new(path, format="H5MD", convert_units=False)
-    assert len(universe.trajectory) == 4
-    for snapshot, state in zip(universe.trajectory, states, strict=True):
-        # MDAnalysis keeps positions in single precision, observables in double.
-        np.testing.assert_allclose(snapshot.positions[:, :2], state.position, rtol=1e-6)
-        np.testing.assert_array_equal(snapshot.data["angle"], state.angle)
-        if periodic:
-            assert snapshot.dimensions[0] == np.float32(state.box_length)
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not HDF5", "truncated", "foreign", "other h5md"])

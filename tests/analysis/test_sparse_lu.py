@@ -132,7 +132,3 @@ def test_mumps_is_left_alone_where_it_may_not_be_used(backend):
     matrix = csc_array(lattice(8) + 20 * eye_array(192))
     assert isinstance(symmetric_lu(matrix, mumps=False), sparse_lu.SuperLUFactors)
     assert isinstance(symmetric_lu(matrix), sparse_lu.SuperLUFactors) == (backend == "SuperLU")
-
-
-def test_minimum_degree_is_a_permutation():
-    assert np.array_equal(np.sort(minimum_degree(csc_array(lattice(8) + 40 * eye_array(192)))), np.arange(192))

@@ -143,14 +143,6 @@ def test_shift_invert_finds_what_lapack_finds(ramp, near):
         np.testing.assert_allclose(some.overlap[known], pair.overlap, rtol=1e-8)
 
 
-def test_a_tolerance_saves_solves(ramp):
-    packing = ramp(1.0, 1e-3, 22)(0.022)
-    exact = eigenpairs(packing, 2058.4, 6)
-    rough = eigenpairs(packing, 2058.4, 6, tolerance=1e-4)
-    assert rough.solves < exact.solves
-    np.testing.assert_allclose(rough.values, exact.values, rtol=1e-4)
-
-
 @pytest.mark.parametrize("count", [0, 284])
 def test_impossible_number_of_eigenpairs(bed, count):
     with pytest.raises(ValueError, match="285"):

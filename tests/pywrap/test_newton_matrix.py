@@ -12,7 +12,6 @@ from faultgouge.pywrap import Engine
 from faultgouge.pywrap.equilibria.newton_matrix import AFLOAT, factored
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 from faultgouge.pywrap.lammps.contact_graph import ContactGraph
-from faultgouge.pywrap.lammps.contact_rows import ContactRows
 from faultgouge.pywrap.lammps.trial import Trial
 
 
@@ -114,30 +113,6 @@ def test_a_trial_is_its_packing(reference_packing):
     assert trial.residual == pytest.approx(packing.residual, rel=1e-6)
 
 
-@pytest.mark.parametrize("compensated", [False, True])
-def test_contacts_through_rows(reference_packing, compensated):
-    packing = reference_packing(1.0)
-    rng = np.random.default_rng(7)
-    slip, low = rng.standard_normal((2, len(packing.contacts)))
-    contacts = packing.contacts.slipped(slip, low if compensated else None)
-    packing = replace(packing, contacts=contacts)
-    rows = ContactRows(packing.radius, compensated)
-    graph, again, again_low = rows.read(rows.slips(packing), rows.floor(packing))
-    assert np.array_equal(graph.i, contacts.i)
-    assert np.array_equal(graph.j, contacts.j)
-    assert np.array_equal(again, slip)
-    assert (np.array_equal(again_low, low)) if compensated else again_low is None
-    # the same graph as long as the contacts are the same, and another one when they are not
-    other = replace(packing, contacts=contacts.slipped(-slip, low if compensated else None))
-    assert rows.read(rows.slips(other), rows.floor(other))[0] is graph
-    fewer = Contacts(contacts.i[1:], contacts.j[1:], slip[1:], low[1:] if compensated else None)
-    fewer = replace(packing, contacts=fewer)
-    changed = rows.read(rows.slips(fewer), rows.floor(fewer))
-    assert changed[0] is not graph
-    assert np.array_equal(changed[0].i, contacts.i[1:])
-    assert np.array_equal(changed[1], slip[1:])
-
-
 def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
     """A change of forces from changed displacements, and back: with what K knows of new contacts, and without."""
     base = reference_packing(1.0)
@@ -155,13 +130,3 @@ def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
     errors = [np.abs(factored(trial, trial.floor, start).solve(softening) - change).max() for start in (since, None)]
     # a hundredth of the stiffness is left
     assert errors[0] < 0.03 < 0.3 < errors[1]
-
-
-def test_which_contacts_are_old(reference_packing):
-    contacts, radius = reference_packing(1.0).contacts, reference_packing(1.0).radius
-    graph = ContactGraph(contacts, radius)
-    kept = np.arange(len(contacts)) % 5 > 0
-    fewer = ContactGraph(Contacts(contacts.i[kept], contacts.j[kept], contacts.slip[kept]), radius)
-    assert np.array_equal(graph.old(fewer), kept)
-    assert fewer.old(graph) is None
-    assert graph.old(graph) is None

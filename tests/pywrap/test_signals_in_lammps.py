@@ -64,7 +64,6 @@ def test_deck_takes_a_table_and_is_the_same_on_two_ranks(lmp, tmp_path):
         ("0 1\n1 nan\n", "something else than two numbers, time and value, in line 2"),
         ("0 1\n2 1\n1 1\n", "not later than the one before in line 3"),
         ("0 1\n", "fewer than two rows"),
-        ("0 1\n1 two\n", "something else than two numbers"),
     ],
 )
 @pytest.mark.slow

@@ -40,14 +40,6 @@ def fill(matrix, order):
     return splu(csc_array(matrix), **options).nnz
 
 
-def test_order_is_a_permutation_that_keeps_disks_together(packing, pairs):
-    coordinates = np.flatnonzero(np.arange(3 * len(packing)) % 7)  # some are no unknowns
-    order = elimination_order(*pairs, len(packing), coordinates)
-    assert np.array_equal(np.sort(order), np.arange(len(coordinates)))
-    disks = coordinates[order] % len(packing)
-    assert np.count_nonzero(np.diff(disks)) == len(packing) - 1
-
-
 def test_fill_is_no_more_than_that_of_minimum_degree_on_the_matrix(packing, matrix, pairs):
     order = elimination_order(*pairs, len(packing), np.arange(3 * len(packing)))
     # on a crystal, where entries vanish by symmetry, it is little more than half

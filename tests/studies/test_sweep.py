@@ -1,7 +1,6 @@
 """Sweeps: which scenes, what is kept, that kills, workers and shards leave the same table, and what is refused."""
 
 import csv
-import json
 import os
 import signal
 import subprocess
@@ -159,28 +158,6 @@ def test_merge_refuses_what_does_not_belong_together(tmp_path):
     merge([tmp_path / "a"], tmp_path / "c", said.append)
     assert said[0].startswith("1 of 2 scenes")
     assert len(table(tmp_path / "c")) == 1
-
-
-def part_of_modes(path, modes, fx, doubtful=()):
-    window = {"fx_onset": fx, "fx_end": None, "lambda": 1.0, "error": 1e-11, "kind": "coalescence"}
-    part = {"mu": 1.0, "fx_c": fx, "error": 1e-11, "windows": [window], "doubtful": list(doubtful), "modes": modes}
-    path.write_text(json.dumps(part))
-    return path
-
-
-def test_parts_of_the_modes_are_merged(tmp_path):
-    parts = [
-        part_of_modes(tmp_path / "b.json", [600, 1200], 0.002, [[0.0001, 0.0002], [0.0005, 0.0007]]),
-        part_of_modes(tmp_path / "a.json", [0, 600], 0.0004),
-        part_of_modes(tmp_path / "d.json", [1500, 1800], 0.003),
-    ]
-    said = []
-    merge(parts, tmp_path / "whole", said.append)
-    whole = json.loads((tmp_path / "whole" / "onset.json").read_text())
-    assert (whole["fx_c"], whole["modes"], whole["missing"]) == (0.0004, [0, 1800], [[1200, 1500]])
-    assert whole["doubtful"] == [[0.0001, 0.0002]]
-    assert [window["fx_onset"] for window in whole["windows"]] == [0.0004, 0.002, 0.003]
-    assert any("1200:1500" in line for line in said)
 
 
 @pytest.mark.slow

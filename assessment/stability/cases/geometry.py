@@ -105,7 +105,7 @@ def _at_the_bound() -> Outcome:
         force = engine.net_force.reshape(3, 2)[:, 0]
     excess = abs(abs(force[0]) - packing.law.mu * abs(force[1]))
     limit = packing.law.slip_limit(packing.geometry.overlap)
-    stiffness = np.abs(packing.law.tangential_slip_derivative(packing.geometry.overlap, limit))[0]
+    stiffness = np.abs(packing.law.derivatives(packing.geometry.overlap, limit).slip_derivative[0])
     return measured(excess + stiffness, 0.0, "|f_t| - mu f_n in LAMMPS, and df_t/ds of the analysis, at the bound")
 
 

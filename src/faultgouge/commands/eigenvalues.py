@@ -34,6 +34,15 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
+Slices = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="Keep what a long search finds in this folder, and go on from what is there: jobs that name the same "
+        "folder share the search. By default -o FILE has its own, until it is done.",
+    ),
+]
+
 
 @app.command(epilog="Example: faultgouge spectrum run.h5 --json")
 def spectrum(
@@ -157,6 +166,7 @@ def onset(
             "for. 0:600 are the 600 lowest.",
         ),
     ] = None,
+    slices: Slices = None,
     as_json: AsJson = False,
 ) -> None:
     """The onset F_x^c and the windows of complex eigenvalues, for each friction coefficient of the scene.
@@ -171,7 +181,7 @@ def onset(
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if output:
         check_folder(output)
-    folder = _search_folder(output)
+    folder = _search_folder(slices, output)
     found: list[dict[str, Any]] = []
     for mu in wanted.law.mus:
         if wanted.damping is not None:
@@ -179,7 +189,7 @@ def onset(
         else:
             found.append(_undamped_onset(part, folder, wanted, mu))
     result = _written(output, found)
-    if output and is_root() and folder is not None:
+    if is_root() and folder is not None and not slices:
         shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
     if as_json:
         print_json(result)
@@ -195,8 +205,13 @@ def _written(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]
     return result
 
 
-def _search_folder(output: Path | None) -> Path | None:
+def _search_folder(slices: Path | None, output: Path | None) -> Path | None:
     """Where a long search leaves what it finds; nowhere if its result goes to no file, or to a device."""
+    from faultgouge.analysis.files.wholefile import make_folder
+
+    if slices:
+        make_folder(slices)
+        return slices
     return None if output is None or (output.exists() and not output.is_file()) else Path(f"{output}.slices")
 
 

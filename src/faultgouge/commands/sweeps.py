@@ -60,17 +60,10 @@ def sweep(
 
 @app.command(epilog="Example: faultgouge merge shard1 shard2 shard3 -o whole")
 def merge(
-    parts: Annotated[
-        list[Path], typer.Argument(metavar="DIR...", help="Folders of `sweep --shard`, or files of `onset --modes`.")
-    ],
+    parts: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Folders of `sweep --shard`.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The folder to write.")] = Path("merged"),
 ) -> None:
-    """Shards of a sweep put together, or parts of the modes of an onset.
-
-    The table of merged shards is the one of a sweep that was never divided. Of
-    JSON files that `onset --modes FIRST:STOP -o FILE` has left, the first window
-    is taken and onset.json written.
-    """
+    """Shards of a sweep put together: the table of a sweep that was never divided."""
     from faultgouge.studies.sweep.draw import draw_sweep
     from faultgouge.studies.sweep.merge import merge as merge_parts
 

@@ -1,5 +1,8 @@
-"""A search that is cut off goes on, to the bit, from what it has left in a folder."""
+"""A search that is cut off goes on, to the bit, from what it has left in a folder; two searches may share one."""
 
+import multiprocessing
+import os
+import signal
 from dataclasses import replace
 from itertools import chain
 
@@ -16,7 +19,7 @@ from faultgouge.analysis.onset.found import Border, Candidate, DamagedSliceError
 from faultgouge.analysis.onset.sliced import first_window
 from faultgouge.analysis.onset.slicing import SliceError
 
-PASSING = replace(FEW, kept=0)
+PASSING = replace(FEW, kept=0, wait=0.1)
 """Slices of 24 modes, in bases that are not kept in memory."""
 
 
@@ -90,6 +93,46 @@ def test_other_ranks_go_on(search, whole, tmp_path, ranks):
     nothing = []
     assert search()(watch=counting(nothing), folder=tmp_path) == expected
     assert nothing == []
+
+
+def search_that_waits(search, folder, stands, may_go_on, ends):
+    """Search in a folder, stand still when two slices are kept, and a third is found; then tell how many there were."""
+    seen = []
+
+    def watch(says):
+        counting(seen)(says)
+        if len(seen) == 3:
+            stands.set()
+            may_go_on.wait()
+
+    ends.put((search(watch=watch, folder=folder), len(seen)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("killed", [False, True])
+def test_two_searches_share_a_folder(search, whole, tmp_path, killed):
+    """Each slice is searched by one of them; the slices under way in a process that is killed go to the other."""
+    context = multiprocessing.get_context("fork")
+    stands, may_go_on, ends = context.Event(), context.Event(), context.Queue()
+    other = context.Process(target=search_that_waits, args=(search(), tmp_path, stands, may_go_on, ends))
+    other.start()
+    assert stands.wait(60)
+    seen, turns, standing = [], [], [other.pid]
+
+    def watch(says):
+        counting(seen)(says)
+        turns.extend([says] if says.endswith("are known") else [])
+        if says in turns[:-1] and other.pid in standing:  # once more: all is taken, and the other process waited for
+            standing.remove(other.pid)
+            os.kill(other.pid, signal.SIGKILL) if killed else may_go_on.set()
+
+    expected, all_said = whole
+    assert search()(watch=watch, folder=tmp_path) == expected
+    assert not standing
+    found, others = (expected, 2) if killed else ends.get(timeout=60)
+    other.join(60)
+    assert found == expected
+    assert len(seen) + others == len(all_said)
 
 
 @pytest.mark.slow
