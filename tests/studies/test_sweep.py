@@ -1,6 +1,7 @@
 """Sweeps: which scenes, what is kept, that kills, workers and shards leave the same table, and what is refused."""
 
 import csv
+import json
 import os
 import signal
 import subprocess
