@@ -7,7 +7,6 @@ import quasistatic
 
 from faultgouge.analysis.motion.power_law import fit_power_law
 from faultgouge.analysis.motion.response import linear_response
-from faultgouge.analysis.onset import full_operator
 from faultgouge.analysis.onset.pair_form import pair_forms
 from faultgouge.analysis.spectrum.normal_form import ORTHOGONAL, NormalForm
 
@@ -132,19 +131,6 @@ def packings(ramp):
 @pytest.fixture(scope="module")
 def pairs(packings):
     return pair_forms(packings, DOUBLE_EIGENVALUE)
-
-
-@pytest.mark.slow
-def test_pair_is_the_normal_form_without_an_approximation(packings, pairs):
-    for packing, pair in zip(packings, pairs, strict=True):
-        operator = np.asarray(full_operator(packing) @ np.eye(300))
-        np.testing.assert_allclose(pair.left.T @ pair.right, np.eye(2), atol=1e-12)
-        np.testing.assert_allclose(pair.right.T @ pair.right, np.eye(2), atol=1e-12)
-        # u |A|_F = 3e-11 of the operator, over an eigenvalue of 2e3
-        projected = pair.left.T @ operator @ pair.right / pair.frequency**2
-        np.testing.assert_allclose(projected, matrix(pair.form), atol=1e-13)
-        # W has the singular values 1/cos of the angles between the right and the left plane: oblique, but not by much
-        assert 1 < np.linalg.norm(pair.left, 2) < 1 / np.cos(0.5)
 
 
 def test_amplitude_of_a_real_pair_diverges_with_exponent_one_half(pairs):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from suffixes import GSD
 
-from faultgouge.analysis import BadInputError, RunFile, nearest_image
+from faultgouge.analysis import RunFile, nearest_image
 from faultgouge.pywrap.exchange import chosen_frames, frames_of, packing_of, read_disks, upper_layer, write_frames
 
 SUFFIXES = (".xyz", GSD)
@@ -107,11 +107,3 @@ def test_the_command(faultgouge_here, refusal, tmp_path, ramp, sheared):
         (("-o", "film.pvd"), "add --frames all"),
     ):
         assert says in refusal("export", ramp, *words)
-
-
-def test_frames_may_be_counted_from_the_last(ramp):
-    with RunFile(ramp) as run:
-        assert chosen_frames(run, "-1:") == range(1, 2)
-        assert chosen_frames(run, "all") == range(2)
-        with pytest.raises(BadInputError, match="give all"):
-            chosen_frames(run, "a:b")

@@ -42,20 +42,6 @@ def dump(packing, step=0, columns="id type x y z radius", count=None, z=0.0):
     return "\n".join([*head, *rows]) + "\n"
 
 
-@pytest.mark.slow
-def test_csv_with_slips_is_the_same_packing(tmp_path, faultgouge, sheared):
-    (tmp_path / "packing.csv").write_text(csv(sheared))
-    (tmp_path / "slips.csv").write_text(slips(sheared.contacts))
-    law = ("--kn", "2e5", "--kt", sheared.law.kt, "--fx", sheared.fx, "--fy", "3", "--inertia", "0.5")
-    words = ("packing.csv", "--width", sheared.box_length, "--contacts", "slips.csv", *law)
-    done = faultgouge("import", *words, "-o", "packing.h5")
-    assert done.returncode == 0, done.stderr
-    with RunFile(tmp_path / "packing.h5") as file:
-        found = file.packing()
-    np.testing.assert_array_equal(found.contacts.slip, sheared.contacts.slip)
-    np.testing.assert_array_equal(found.net_force, sheared.net_force)
-
-
 @pytest.mark.parametrize("names", ["x,y,radius", "radius,y,x,top"])
 @pytest.mark.parametrize("mark", [";", "\t", " "])
 def test_csv_as_others_write_it(tmp_path, sheared, names, mark):
