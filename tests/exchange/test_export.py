@@ -56,10 +56,10 @@ def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
 
 @pytest.mark.parametrize("suffix", FORMATS)
 @pytest.mark.slow
-def test_the_commands_there_and_back(faultgouge, tmp_path, stored, sheared, suffix):
-    done = faultgouge("export", stored, "-o", f"packing{suffix}")
+def test_the_commands_there_and_back(faultgouge_here, tmp_path, stored, sheared, suffix):
+    done = faultgouge_here("export", stored, "-o", f"packing{suffix}")
     assert done.returncode == 0, done.stderr
-    done = faultgouge("import", f"packing{suffix}", "-o", "back.h5")
+    done = faultgouge_here("import", f"packing{suffix}", "-o", "back.h5")
     assert done.returncode == 0, done.stderr
     with RunFile(tmp_path / "back.h5") as file:
         assert file.complete

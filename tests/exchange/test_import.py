@@ -155,7 +155,7 @@ def test_what_mdanalysis_reads_with_radii(tmp_path, sheared):
 
 
 @pytest.mark.slow
-def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packing):
+def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge_here, reference_packing):
     """Numbers with five digits: a hundredth of an overlap, and forces of the order of the load."""
     packing = reference_packing(1.0)
     (tmp_path / "rough.csv").write_text(
@@ -166,12 +166,12 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packi
         )
     )
     words = ("import", "rough.csv", "--width", packing.box_length, *LAW, "-o", "rest.h5")
-    done = faultgouge(*words)
+    done = faultgouge_here(*words)
     assert done.returncode == 2
     assert "not in balance under fy = 3" in done.stderr
     assert "--relax" in done.stderr
     assert not (tmp_path / "rest.h5").exists()
-    done = faultgouge(*words, "--relax")
+    done = faultgouge_here(*words, "--relax")
     assert done.returncode == 0, done.stderr
     assert "brought to rest" in done.stderr
     with RunFile(tmp_path / "rest.h5") as file:
