@@ -95,7 +95,6 @@ def test_ovito_steps_through_it(motion, sheared, suffix):
 @pytest.mark.slow
 def test_the_command(faultgouge_here, refusal, tmp_path, ramp, sheared):
     done = faultgouge_here("export", ramp, "--frames", "all", "-o", "film.pvd")
-    assert done.returncode == 0, done.stderr
     assert "2 frames of equilibria; written to film.pvd" in done.stderr
     assert sorted(path.name for path in (tmp_path / "film").iterdir()) == ["00000.vtp", "00001.vtp"]
     assert f'timestep="{sheared.fx!r}"' in (tmp_path / "film.pvd").read_text()

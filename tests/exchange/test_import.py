@@ -166,13 +166,11 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge_here, reference_
         )
     )
     words = ("import", "rough.csv", "--width", packing.box_length, *LAW, "-o", "rest.h5")
-    done = faultgouge_here(*words)
-    assert done.returncode == 2
+    done = faultgouge_here(*words, code=2)
     assert "not in balance under fy = 3" in done.stderr
     assert "--relax" in done.stderr
     assert not (tmp_path / "rest.h5").exists()
     done = faultgouge_here(*words, "--relax")
-    assert done.returncode == 0, done.stderr
     assert "brought to rest" in done.stderr
     with RunFile(tmp_path / "rest.h5") as file:
         rest = file.packing()
@@ -196,7 +194,6 @@ def test_disks_with_slips_come_to_rest_with_friction_on_any_number_of_ranks(tmp_
     found = []
     for name, ranks in (("one.h5", None), ("two.h5", 2)):
         done = faultgouge(*words, "--relax", "-o", name, ranks=ranks)
-        assert done.returncode == 0, done.stderr
         assert "brought to rest" in done.stderr
         with RunFile(tmp_path / name) as file:
             found.append(file.packing())
