@@ -42,8 +42,8 @@ TROUBLE = [
     Case("a", "too large", lambda: measured(2.0, 1.0, "twice")),
     Case("a", "no number", lambda: measured(float("nan"), 1.0, "what should hold")),
     Case("b", "crash", crash),
-    Case("b", "refused", lambda: refused(lambda: int("x"), ValueError, "invalid literal")),
-    Case("b", "not refused", lambda: refused(lambda: int("1"), ValueError, "invalid literal")),
+    Case("b", "refused", lambda: refused(lambda: int("x"), "invalid literal")),
+    Case("b", "not refused", lambda: refused(lambda: int("1"), "invalid literal")),
     Case("b", "last", lambda: measured(0.0, 0.0, "nothing at all")),
 ]
 
@@ -114,9 +114,7 @@ def test_outcome_of_a_refusal():
 @pytest.mark.long
 def test_same_table_on_two_ranks(faultgouge, tmp_path):
     one = faultgouge("stability", "--quick", "-o", "one", "--json")
-    two = faultgouge("stability", "--quick", "-o", "two", ranks=2)
-    assert one.returncode == 0, one.stderr
-    assert two.returncode == 0, two.stderr
+    faultgouge("stability", "--quick", "-o", "two", ranks=2)
     assert (tmp_path / "one" / "stability.json").read_text() == (tmp_path / "two" / "stability.json").read_text()
     assert json.loads(one.stdout) == json.loads((tmp_path / "one" / "stability.json").read_text())
     assert len(json.loads(one.stdout)["cases"]) == len(QUICK)
