@@ -60,7 +60,7 @@ class Dense:
     def candidates(self, places: Sequence[Place], depth: int) -> Iterator[list[Ends] | None]:
         """The pairs that may meet; None where these are not few, or the increment has been divided."""
         for here, there in pairwise(places):
-            planes = self.screening(here.matrix, there.matrix) if depth == 0 else None
+            planes = self.screening(here.matrix, there.matrix, len(self._open or {})) if depth == 0 else None
             pairs = None if planes is None else self._followed(planes, here, there)
             if depth == 0:
                 self._known = [after for _, after in pairs or []]
@@ -380,7 +380,7 @@ def all_windows(family: Family, loads: Floats, screening: Screening | None = Non
     try:
         return _walked(Dense(family, screening or Screen(family.limits)), loads)
     except LostTrackError:
-        return _walked(Dense(family, lambda here, there: None), loads)
+        return _walked(Dense(family, lambda here, there, known: None), loads)
 
 
 def _walked(oracle: Dense, loads: Floats) -> tuple[Window, ...]:

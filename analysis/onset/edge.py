@@ -184,7 +184,14 @@ class Family:
 
     def track(self, known: dict[float, Pair]) -> Callable[[float], Pair]:
         """A pair at any load, followed from the nearest load where it is known."""
-        return track(known, lambda nearest, fx: self.followed(nearest[0], self.at(fx)))
+
+        def follow(nearest: list[Pair], fx: float) -> Pair:
+            place = self.at(fx)
+            guess = nearest[0].towards(nearest[1], fx) if len(nearest) > 1 else None
+            image = None if guess is None else continued(guess, fx, place.matrix, self.limits)
+            return image if image and image.same_planes(nearest[0]) else self.followed(nearest[0], place)
+
+        return track(known, follow)
 
     def followed(self, pair: Pair, place: Place) -> Pair:
         """A pair at another load: continued, found among all modes, or followed in small steps; else LostPairError."""

@@ -11,7 +11,7 @@ are smooth functions of the load where the two eigenvectors become parallel, at 
 **Continuation.** The bases of a neighbouring operator are improved by inverse iteration,
 :math:`V \leftarrow (A - \sigma)^{-1} V`, :math:`U \leftarrow (A - \sigma)^{-T} U`, with one factorisation for all
 steps. The error falls by :math:`|\lambda - \sigma| / |\lambda_3 - \sigma|` a step, :math:`\lambda_3` the closest of the
-other eigenvalues. The shift stands off the pair by the size of B - mean, or the common eigenvector would dominate the
+other eigenvalues. The shift stands off the pair by a tenth of B - mean, or the common eigenvector would dominate the
 inverse close to a coalescence. If a third eigenvalue is closer to that shift, others are tried. A complex pair is also
 found by its eigenvectors, with its own eigenvalue as the shift: no other eigenvalue is nearer than the real axis.
 
@@ -46,6 +46,9 @@ from ..spectrum.spectrum import Complexes, believable, unit_rounding
 from .limits import LIMITS, Limits
 
 Planes = tuple[Floats, Floats]
+
+FAR = 2.0
+"""Distance of a load from one of two others, in units of theirs, up to which planes are extrapolated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +120,15 @@ class Pair:
         b, db = self.entries, self.block(change)
         # The planes turn in first order, which changes invariants of the block in second order only.
         return float(2 * (b[0, 0] - b[1, 1]) * (db[0, 0] - db[1, 1]) + 4 * (db[0, 1] * b[1, 0] + b[0, 1] * db[1, 0]))
+
+    def towards(self, other: "Pair", fx: float) -> "Pair | None":
+        """A guess of the pair at another load: its planes in proportion; None if the load is too far from both."""
+        share = (fx - self.fx) / (other.fx - self.fx)
+        if abs(share) > FAR:
+            return None
+        ends = (self.right, other.right), (self.left, other.left)
+        right, left = (np.linalg.qr(a + share * (b @ np.linalg.inv(a.T @ b) - a))[0] for a, b in ends)
+        return replace(self, right=right, left=left)
 
     def same_planes(self, other: "Pair") -> bool:
         """Whether both pairs have the same planes rather than not: all principal angles below 60 degrees."""

@@ -99,9 +99,9 @@ def _others(rows: Floats, pairs: tuple[Indices, Indices]) -> Floats:
     return rows
 
 
-Screening = Callable[[csr_array, csr_array], list[Floats] | None]
+Screening = Callable[[csr_array, csr_array, int], list[Floats] | None]
 """Who names the pairs that may meet between two operators, by orthonormal bases, shape (n, 2), of their planes; None if
-they are more than a few, or not known."""
+they are more than a few, or not known. So many pairs are known to be complex at the first of the two."""
 
 
 class Screen:
@@ -113,10 +113,15 @@ class Screen:
         self._basis: Basis | None = None
         self._seen: tuple[csr_array, Levels] | None = None
 
-    def __call__(self, here: csr_array, there: csr_array) -> list[Floats] | None:
-        """The planes of the pairs; None if they are more than `Limits.few`, or if the coordinates change."""
+    def __call__(self, here: csr_array, there: csr_array, known: int) -> list[Floats] | None:
+        """The planes of the pairs; None if they are more than `Limits.few`, or if the coordinates change.
+
+        The basis is renewed where it names more pairs than those that are known to be complex.
+        """
+        if known > self.limits.few:
+            return None
         found = None if self._basis is None else self._look(self._basis, here, there)
-        if (found is None or len(found) > 0) and self._base is not here:
+        if (found is None or len(found) > known) and self._base is not here:
             self._base, self._basis, self._seen = here, Basis.of(here, self.limits), None
             found = self._look(self._basis, here, there)
         return found

@@ -51,6 +51,7 @@ from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
 from ..runs.path import EquilibriumPath
 from ..scenes.scene import Scene
+from .nearby_root import nearby_root
 
 Floats = NDArray[np.float64]
 Vanishes = Callable[[Packing], float]
@@ -73,21 +74,9 @@ LONGEST_RUN = 2
 SMALL = 30
 """Disks up to which all eigenvalues take no longer than some."""
 
-STEPS = 8
-"""Secant steps to the onset on the other path; two or three do."""
-
 UNKNOWN = 2.0
 """Uncertainty of an extrapolated onset, in units of the correction. As a rule a correction is good to a tenth.
 Where its coefficient changes sign along the path, the correction is wrong by more than itself."""
-
-WIDENINGS = 20
-"""Factors of two between the half of an increment and the smallest step in which a jump is looked for."""
-
-NOISY = 10
-"""Rounding errors about which the last of the secant steps may still jump."""
-
-SETTLED = 0.02
-"""Last secant step, in units of the shift, at which the shift is known: it only has to tell the size of an error."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +118,7 @@ class PathError:
 
     @property
     def error(self) -> float:
-        """Uncertainty of the onset from its path, force; rounding may hide two roundings of the shift."""
+        """Uncertainty of the onset from its path, force."""
         hidden = 2 * self.rounding
         if np.isnan([self.shift, self.finer, *self.moved]).any():
             return self.increment
@@ -246,12 +235,16 @@ class OtherPaths:
         other = _halved(ramp) if few else _thinned(ramp, changed)
         increment = float(np.diff(ramp).max())
 
+        slope = None
+
         def shifted(through: Floats, known: list[Equilibrium]) -> float:
+            nonlocal slope
             try:
                 there = self._along(through, known)
-                return _root(lambda load: vanishes(there(load)), fx, rounding, 0.5 * increment) - fx
+                root, slope = nearby_root(lambda load: vanishes(there(load)), fx, rounding, 0.5 * increment, slope)
             except FAILURES:
                 return np.nan
+            return root - fx
 
         shift = shifted(other, self._coarser)
         weight = _cubes(other) / _cubes(ramp) - 1
@@ -269,8 +262,8 @@ class OtherPaths:
         NoEquilibriumError
             If the ramp has no equilibrium at fx.
         """
-        before = sum(each.fx < fx for each in self.path.kept)
-        states = [*self._states[:before], bearing_contacts(self.path(fx), self._scene.load.fy)]
+        before = self._states[: sum(each.fx < fx for each in self.path.kept)]
+        states = [*before, bearing_contacts(self.path(fx), self._scene.load.fy)]
         return np.array([a != b for a, b in pairwise(states)])
 
     def _along(self, through: Floats, known: list[Equilibrium]) -> EquilibriumPath:
@@ -336,7 +329,6 @@ def meeting(eigenvalue: float) -> Vanishes:
 
 def crossing(frequency: float, dissipation: Callable[[Packing], Packing]) -> Vanishes:
     """Re s of the motion nearest to a frequency, 1 / time, as a function of the packing without its dissipation."""
-
     known: list[DampedMode] = []
 
     def growth(packing: Packing) -> float:
@@ -348,50 +340,3 @@ def crossing(frequency: float, dissipation: Callable[[Packing], Packing]) -> Van
         return float(followed.rate.real)
 
     return growth
-
-
-def _root(function: Callable[[float], float], fx: float, rounding: float, reach: float) -> float:
-    """The load nearest to fx, known to a share of its distance, at which a function changes its sign: by secants, or,
-    where it jumps there, by halving; nan beyond the reach."""
-    known: dict[float, float] = {}
-
-    def at(load: float) -> float:
-        if load not in known:
-            known[load] = function(load)
-        return known[load]
-
-    found = _secant(at, fx, rounding, reach)
-    return _bracketed(at, fx, rounding, reach) if np.isnan(found) else found
-
-
-def _bracketed(function: Callable[[float], float], fx: float, rounding: float, reach: float) -> float:
-    """Steps to either side of fx grow until the sign is another one, and the last of them is halved."""
-    sign, near, far = np.sign(function(fx)), 0.0, max(NOISY * rounding, reach * 2.0**-WIDENINGS)
-    while far <= reach:
-        for side in (-1.0, 1.0):
-            if np.sign(function(fx + side * far)) == sign:
-                continue
-            low, high = near, far
-            while high - low > max(SETTLED * high, rounding):
-                middle = 0.5 * (low + high)
-                low, high = (middle, high) if np.sign(function(fx + side * middle)) == sign else (low, middle)
-            return fx + side * high
-        near, far = far, 4 * far
-    return np.nan
-
-
-def _secant(discriminant: Callable[[float], float], fx: float, rounding: float, reach: float) -> float:
-    """The root of a smooth function near fx; nan where it is not found."""
-    step = max(30 * rounding, 1e-9 * fx)
-    a, b = fx, fx + step
-    at_a, at_b = discriminant(a), discriminant(b)
-    for _ in range(STEPS):
-        if at_b == at_a:
-            return np.nan
-        a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b
-        if not abs(b - fx) < reach:
-            return np.nan
-        if abs(b - a) <= max(SETTLED * abs(b - fx), rounding):
-            return b
-        at_b = discriminant(b)
-    return b if abs(b - a) <= NOISY * rounding else np.nan

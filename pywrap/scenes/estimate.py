@@ -48,12 +48,23 @@ SECONDS_A_STEP = 2e-6, 1.7e-7
 """Of LAMMPS: of a step, and of a step for each disk."""
 SECONDS_AN_INCREMENT = 1e-3, 1e-4
 """Of Newton's method: of an increment, and for each disk."""
-SECONDS_A_SEARCH = 2.5e-7, 3e-3
-"""Of the search for complex pairs in an increment: for each disk cubed up to `DENSE` disks, for each disk beyond."""
-DAMPED = 2.0
-"""Of the search for growing motion beside that for complex pairs, in units of the latter: 1.6 to 5 for 100 disks."""
+SECONDS_A_SEARCH = 4e-9, 3e-7
+"""Of the search for complex pairs up to `DENSE` disks, for each disk cubed: of an increment, and of a window."""
+WINDOWS = 14.0, 4.0
+"""Windows a and b of a packing up to the load u, in units of F_y/N, as a u^2 / (u + b): 1 to 3 up to 0.7, 5 to 11 up to
+2, 78 up to 4 where they are most, 474 up to 35."""
+DAMPED = 2.5
+"""Of the search for growing motion beside that for complex pairs, in units of the latter: 1.3 to 4.5 for 100 disks."""
 DENSE = 300
-"""Disks up to which the search takes all eigenvalues."""
+"""Disks up to which the search takes all eigenvalues, and beyond which it ends at the first window."""
+SECONDS_A_PASS = 6e-3, 2.2e-6
+"""Of a pass over all slices of the spectrum: for each disk, and for each disk squared."""
+DAMPED_PASS = 1.5
+"""Of a pass for growing motion, in units of one for complex pairs."""
+FIRST = 1.0, 3.5
+"""Load of the first window without and with dissipation, in units of F_y/N."""
+AGAIN = 0.05
+"""Of an increment with bases that are kept, in units of a pass."""
 GROWTH = 300_000
 """Steps of the undamped run in which reproduce measures a growth rate; a tenth or three times as many."""
 TRIGGERING_RUNS = 4
@@ -153,10 +164,8 @@ def estimated(scene: Keys, task: Task) -> Estimate:
         if perturb is not None and scene.friction is not None:
             steps += TRIGGERING_RUNS * perturb.time / (perturb.time_step or _undamped_step(scene))
     if task in ("onset", "reproduce"):
-        search = SECONDS_A_SEARCH[0] * disks**3 if disks <= DENSE else SECONDS_A_SEARCH[1] * disks
-        if task == "onset" and scene.damping is not None:
-            search *= 1 + DAMPED
-        seconds = len(scene.law.mus) * (seconds + increments * search)
+        search = _search_seconds(scene, increments, task == "onset" and scene.damping is not None)
+        seconds = len(scene.law.mus) * (seconds + search)
         kept = increments + 1
     seconds += steps * (SECONDS_A_STEP[0] + SECONDS_A_STEP[1] * disks)
     memory = disks * (BYTES_AT_ALL + kept * BYTES_KEPT)
@@ -234,6 +243,25 @@ def impossible(scene: Keys) -> tuple[str, str] | None:
                 f"raise it, or leave it out for {_overdamped_step(scene):.2g}"
             )
     return None
+
+
+def _search_seconds(scene: Keys, increments: float, damped: bool) -> float:
+    """Time of the search for the onset, on one core."""
+    disks = scene.packing.disks
+    step = scene.ramp.step if scene.ramp is not None else 0.0
+    unit = scene.load.fy / disks
+    if disks <= DENSE:
+        load = increments * step / unit
+        windows = WINDOWS[0] * load**2 / (load + WINDOWS[1])
+        search = disks**3 * (SECONDS_A_SEARCH[0] * increments + SECONDS_A_SEARCH[1] * windows)
+        return search * (1 + DAMPED if damped else 1)
+    one = disks * (SECONDS_A_PASS[0] + SECONDS_A_PASS[1] * disks)
+    kept, seconds = BYTES_OF_BASES[0] * disks**2 < BYTES_OF_BASES[1], 0.0
+    for first, share in list(zip(FIRST, (1.0, DAMPED_PASS), strict=True))[: 1 + damped]:
+        searched = min(increments, first * unit / step) if step else 0.0
+        # a basis that is not kept serves twice as many increments each time
+        seconds += share * one * (1 + (AGAIN * searched if kept else math.log2(1 + 0.5 * searched)))
+    return seconds
 
 
 def _searched_bytes(disks: int) -> float:

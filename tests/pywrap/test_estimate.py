@@ -93,6 +93,32 @@ def test_a_loop_of_links_and_deep_brackets_are_refused(tmp_path, refused_scene):
         assert name in refused_scene({**SCENE, "packing": {"file": name}}, tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("disks", "fy", "step", "until", "cn", "measured"),
+    [
+        (100, 3.0, 1e-3, 0.12, None, 29.0),
+        (100, 74.7, 1.0, 26.0, None, 137.0),
+        (100, 74.7, 1.0, 26.0, 50.0, 431.0),
+        (100, 3.0, 1e-3, 0.06, 1.0, 20.0),
+        (400, 3.0, 1e-3, 0.1, 1.0, 15.0),
+        (1000, 3.0, 2e-3, 0.1, None, 8.0),
+        (1000, 3.0, 2e-3, 0.1, 1.0, 32.0),
+        (3000, 3.0, 5e-4, 0.02, 1.0, 124.0),
+        (10_000, 3.0, 2e-4, 0.02, None, 275.0),
+        (10_000, 3.0, 2e-4, 0.02, 1.0, 1680.0),
+        (30_000, 3.0, 6.7e-5, 0.002, None, 3198.0),
+    ],
+)
+def test_time_of_a_search(disks, fy, step, until, cn, measured):
+    """Against processor time (docs/benchmarks.md, seed 11 and quartz), within a factor of three, settling apart."""
+    packing = {"disks": disks, "width": 1.192 * disks**0.5, "seed": 1}
+    scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": fy}, "ramp": {"step": step, "until": until}}
+    scene |= {} if cn is None else {"damping": {"cn": cn}}
+    read = Scene.from_mapping(scene)
+    seconds = estimated(read, "onset").seconds - estimated(read, "settle").seconds
+    assert measured / 3 < seconds < 3 * measured
+
+
 @pytest.mark.parametrize(("disks", "measured"), [(3000, 1.7e9), (10_000, 0.9e9), (30_000, 1.7e9), (100_000, 5.2e9)])
 def test_memory_of_a_search_in_slices(disks, measured):
     """Against peaks of the whole process in two threads (docs/benchmarks.md), within a factor of two."""
