@@ -77,18 +77,6 @@ def test_nothing_is_lost_near_a_coalescence(epsilon, tau):
             np.testing.assert_allclose(part[k].real, expected, atol=5e-13 * np.abs(expected).max(), rtol=0)
 
 
-def test_only_coalescing_pairs_are_kept_together():
-    assert Modes.of(oblique(0.1)).blocks == {}
-    for epsilon in (1e-4, 1e-12, 0.0, -1e-4):
-        modes = Modes.of(oblique(epsilon))
-        assert list(modes.blocks) == [0]
-        assert np.linalg.cond(modes.basis) < 20  # eigenvectors would have 1/epsilon^(1/2)
-        np.testing.assert_allclose(modes.basis @ modes.inverse, np.eye(5), atol=1e-14)
-        # tr^2 - 4 det of the block, to the rounding of |A| = 10
-        first, second = np.diag(modes.blocks[0])
-        assert (first - second) ** 2 == pytest.approx(0.16 * epsilon * (2 - epsilon), abs=1e-13)
-
-
 def test_two_pairs_and_a_pair_among_other_modes():
     """Two coalescences, one of them with a third eigenvalue between its members."""
     inner = np.zeros((6, 6))

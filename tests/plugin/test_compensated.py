@@ -111,17 +111,6 @@ def test_reference_packing_is_balanced_in_truth(equilibrium):
     assert np.abs(packing.net_force - true.ravel()).max() < 1e-17
 
 
-@pytest.mark.slow
-def test_overdamped_dynamics_balances_as_well(equilibrium):
-    """From 1e-4 away: relaxation is linear, and goes on to 1e-15, where doubles stop at 1e-11."""
-    packing = equilibrium.packing
-    with Engine(packing) as engine:
-        engine.set_fx(packing.fx + 1e-6)
-        relaxation = engine.relax(1e-15)
-        assert relaxation.status == "yes"
-        assert relaxation.residual <= 1e-15
-
-
 def test_state_goes_through_lammps_to_the_bit(equilibrium):
     packing = equilibrium.packing
     with Engine(packing) as engine:

@@ -270,9 +270,9 @@ def test_adapted_dashpots_are_dashpots_from_the_start(lmp, tmp_path):
 
 @pytest.mark.ranks
 @pytest.mark.slow
-def test_deck_with_damping_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path):
+def test_deck_with_damping_and_weakening_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path):
     written = []
-    settings = ["-var", "fx", "0.01", "-var", "time", "2.0", "-var", "amplitude", "1e-6"]
+    settings = ["-var", "fx", "0.01", "-var", "time", "2.0", "-var", "amplitude", "1e-6", "-var", "v_ss", "2e-9"]
     settings += ["-var", "cn", "2.0", "-var", "ct", "1.0", "-var", "tau", "20.0"]
     for ranks in (1, 2):
         done = lmp(DECKS / "perturb.in", "-var", "decks", str(DECKS), *settings, ranks=ranks)

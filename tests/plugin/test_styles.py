@@ -101,15 +101,3 @@ fix_modify      floor mu v_less
 def test_unknown_parameter_is_refused_by_adapt(said_against):
     adapt = "variable less equal 0.5\nfix adapt all adapt 1 pair mindlin/smooth nonsense * * v_less\n"
     assert "nonsense" in said_against(MODEL.format(decks=DECKS, mu=1.0, fx=0.0, dt=1e-3, extra=adapt) + "run 1")
-
-
-@pytest.mark.ranks
-@pytest.mark.slow
-def test_weakening_friction_is_the_same_on_two_ranks(lmp, tmp_path):
-    written = []
-    settings = ["-var", "fx", "0.01", "-var", "time", "2.0", "-var", "amplitude", "1e-6", "-var", "v_ss", "2e-9"]
-    for ranks in (1, 2):
-        done = lmp(DECKS / "perturb.in", "-var", "decks", str(DECKS), *settings, ranks=ranks)
-        assert done.returncode == 0, done.stdout[-1000:]
-        written.append((tmp_path / "perturb.end.disks").read_text())
-    assert written[0] == written[1]
