@@ -31,22 +31,6 @@ import numpy as np
 BIN = Path(sys.executable).parent
 HERE = Path(__file__).parent
 COLUMNS = ("disks", "ghosts", "messages", "kB", "reductions", "memory", "time")
-OVERLAP = 1e-3
-
-
-def crystal(disks: int) -> str:
-    """A LAMMPS data file of a hexagonal crystal of disks of diameter 1, as wide as high."""
-    rise = (1 - OVERLAP) * 3**0.5 / 2
-    columns = round((disks * rise) ** 0.5)
-    rows = round(disks / columns)
-    row, column = np.divmod(np.arange(rows * columns), columns)
-    x = (1 - OVERLAP) * (column + 0.25 + 0.5 * (row % 2))
-    y = 0.5 - OVERLAP + rise * row
-    width, height = (1 - OVERLAP) * columns, y[-1]
-    kind = np.where(row >= rows - 2, 2, 1)
-    atoms = "\n".join(f"{n} {t} 1 1 {a:.17g} {b:.17g} 0" for n, (t, a, b) in enumerate(zip(kind, x, y, strict=True), 1))
-    head = f"crystal\n\n{len(x)} atoms\n2 atom types\n0 {width:.17g} xlo xhi\n-2 {3 * (height + 2):.17g} ylo yhi\n"
-    return head + "-0.5 0.5 zlo zhi\n\nAtoms # sphere\n\n" + atoms + "\n"
 
 
 def one_rank(data: str, decks: str, steps: int) -> None:
@@ -86,6 +70,8 @@ def measured(data: Path, ranks: int, decks: Path, steps: int, library: Path) -> 
 
 def main() -> None:
     """Print the table."""
+    from faultgouge.assessment.stability.cases.packings import crystal
+    from faultgouge.pywrap.lammps.data_file import data_file
     from faultgouge.pywrap.lammps.decks import DECKS
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -108,7 +94,8 @@ def main() -> None:
         print(f"{'all disks':>10s}{'ranks':>6s}" + "".join(f"{name:>11s}" for name in (*COLUMNS, "a disk")))
         for disks in options.disks:
             data = Path(folder) / "crystal.data"
-            data.write_text(crystal(disks))
+            columns = round((disks * 0.75**0.5) ** 0.5)
+            data.write_text(data_file(crystal(columns, round(disks / columns))))
             for ranks in options.ranks:
                 row = measured(data, ranks, options.decks, options.steps, library)
                 print(f"{disks:10d}{ranks:6d}" + "".join(f"{value:11.4g}" for value in row.values()), flush=True)

@@ -165,12 +165,6 @@ def onset(
     return time.perf_counter() - begin, fx_c
 
 
-def text(value: float | int | None, format_: str) -> str:
-    """A number in the table, or a dash."""
-    width = int(format_.split(".")[0])
-    return "-".rjust(width) if value is None else format(value, format_)
-
-
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -191,44 +185,31 @@ def main() -> None:
     table("crystals", options.crystals, ["--crystals", "1"])
 
 
-COLUMNS = {
-    "settle": "9.1f",
-    "newton": "9.2f",
-    "assembly": "9.3f",
-    "solve": "9.2f",
-    "largest": "9.3f",
-    "undamped": "9.2f",
-    "file": "9.3f",
-    "memory": "9.2f",
-    "part": "9.1f",
-    "onset": "9.1f",
-    "in all": "9.2f",
-}
-UNITS = {"memory": "GB", "in all": "GB", "file": "MB"}
-FORCES = {"fx_part": "F_x^c of part", "fx_c": "F_x^c"}
+COLUMNS = ("disks", "settle", "newton", "assembly", "solve", "largest", "undamped", "file", "memory", "part", "onset")
+"""Of the table; beside them, memory in all, and the onsets."""
 
 
 def table(title: str, sizes: list[int], arguments: list[str]) -> None:
     """Measure packings of several sizes, each in a process of its own, and print them."""
-    print(f"\n{title:18s}" + "".join(f"{name:>9s}" for name in COLUMNS) + "".join(f"{f:>16s}" for f in FORCES.values()))
-    print(f"{'':18s}" + "".join(f"{UNITS.get(name, 's'):>9s}" for name in COLUMNS))
+    columns = (*COLUMNS, "in all", "fx_part", "fx_c")
+    print(f"\n{title}; s, memory in GB, file in MB\n" + "".join(f"{name:>11s}" for name in columns))
     rows: list[Row] = []
     for disks in sizes:
         command = [sys.executable, __file__, "--one", "--disks", str(disks), *arguments]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
             sys.exit(f"{disks} disks: {done.stderr.strip().splitlines()[-1]}")
-        row = json.loads(done.stdout.splitlines()[-1])
-        rows.append(row)
-        cells = "".join(text(row.get(name), format_) for name, format_ in COLUMNS.items())
-        print(f"{row['disks']:18d}{cells}" + "".join(text(row.get(f), "16.10f") for f in FORCES), flush=True)
+        rows.append(json.loads(done.stdout.splitlines()[-1]))
+        print(_line([rows[-1].get(name) for name in columns]), flush=True)
     if len(rows) > 1:
         small, large = rows[0], rows[-1]
+        pairs = [(small.get(name), large.get(name)) for name in COLUMNS]
         span = math.log(large["disks"] / small["disks"])
-        exponents = {
-            name: math.log(large[name] / small[name]) / span for name in COLUMNS if small.get(name) and large.get(name)
-        }
-        print(f"{'exponent':18s}" + "".join(text(exponents.get(name), "9.2f") for name in COLUMNS))
+        print("exponents\n" + _line([math.log(b / a) / span if a and b else None for a, b in pairs]))
+
+
+def _line(values: list[float | int | None]) -> str:
+    return "".join(f"{'-':>11s}" if value is None else f"{value:11.5g}" for value in values)
 
 
 if __name__ == "__main__":

@@ -5,11 +5,9 @@ process of its own, so that a crash or a hang is seen. Files without a checksum,
 as well: what makes no sense is refused. (Whether a number that makes sense is the right one, only a checksum can tell.)
 """
 
-import os
 import random
-import signal
-import time
 from collections.abc import Callable, Iterator
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Literal
 
@@ -22,7 +20,9 @@ from faultgouge.analysis.files.wholefile import HEADER_SIZE
 LONGEST = 20.0
 """Seconds that opening a file may take."""
 
-Edit = Callable[[h5py.File, random.Random], None]
+FORKED = get_context("fork")
+
+Edit = Callable[[h5py.File, str, random.Random], None]
 
 
 def sound_file(path: Path) -> None:
@@ -74,31 +74,21 @@ def run(count: int, folder: Path, seed: int = 0) -> Iterator[tuple[str, str]]:
     sound_file(sound)
     expected = content(sound)
     for turn in range(count):
-        what = DAMAGES[turn % len(DAMAGES)](sound, damaged, chance)
+        what = DAMAGES[turn % len(DAMAGES)](sound.read_bytes(), chance, damaged)
         yield what, _outcome(damaged, expected if damaged.read_bytes().startswith(b"fault") else None)
 
 
 def _outcome(path: Path, expected: list[bytes] | None) -> str:
     """What is wrong with how a file is opened, in a process of its own; empty if nothing is."""
-    readable, writable = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(readable)
-        os.write(writable, _opened(path, expected).encode()[:4000])
-        os._exit(0)
-    os.close(writable)
-    deadline = time.monotonic() + LONGEST
-    while not os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT):
-        if time.monotonic() > deadline:
-            os.kill(child, signal.SIGKILL)
-            os.waitpid(child, 0)
-            os.close(readable)
-            return f"hangs for {LONGEST:g} s"
-        time.sleep(0.005)
-    _, status = os.waitpid(child, 0)
-    with os.fdopen(readable, "rb") as stream:
-        says = stream.read().decode()
-    return says if status == 0 else f"ends with status {os.waitstatus_to_exitcode(status)}"
+    receiver, sender = FORKED.Pipe(duplex=False)
+    child = FORKED.Process(target=lambda: sender.send(_opened(path, expected)[:4000]))
+    child.start()
+    child.join(LONGEST)
+    if child.is_alive():
+        child.kill()
+        child.join()
+        return f"hangs for {LONGEST:g} s"
+    return f"ends with status {child.exitcode}" if child.exitcode else str(receiver.recv())
 
 
 def _opened(path: Path, expected: list[bytes] | None) -> str:
@@ -121,39 +111,32 @@ def _opened(path: Path, expected: list[bytes] | None) -> str:
     return ""
 
 
-def _flipped(sound: Path, damaged: Path, chance: random.Random) -> str:
-    data = bytearray(sound.read_bytes())
+def _flipped(data: bytes, chance: random.Random, damaged: Path) -> str:
     places = [chance.randrange(len(data)) for _ in range(chance.choice([1, 1, 1, 20]))]
+    changed = bytearray(data)
     for place in places:
-        data[place] ^= 1 << chance.randrange(8)
-    damaged.write_bytes(data)
+        changed[place] ^= 1 << chance.randrange(8)
+    damaged.write_bytes(changed)
     return f"bits flipped in the bytes {places}"
 
 
-def _truncated(sound: Path, damaged: Path, chance: random.Random) -> str:
-    data = sound.read_bytes()
+def _truncated(data: bytes, chance: random.Random, damaged: Path) -> str:
     size = chance.randrange(len(data))
     damaged.write_bytes(data[:size])
     return f"cut to {size} bytes"
 
 
-def _zeroed(sound: Path, damaged: Path, chance: random.Random) -> str:
-    data = bytearray(sound.read_bytes())
+def _zeroed(data: bytes, chance: random.Random, damaged: Path) -> str:
     place, size = chance.randrange(len(data)), chance.choice([16, 512, 4096])
-    data[place : place + size] = bytes(len(data[place : place + size]))
-    damaged.write_bytes(data)
+    damaged.write_bytes(data[:place] + bytes(len(data[place : place + size])) + data[place + size :])
     return f"{size} bytes zeroed from {place}"
 
 
-def _edited(sound: Path, damaged: Path, chance: random.Random) -> str:
-    return _with_edit(sound.read_bytes(), damaged, chance)
+def _edited_without_checksum(data: bytes, chance: random.Random, damaged: Path) -> str:
+    return "without checksum, " + _edited(data[HEADER_SIZE:], chance, damaged)
 
 
-def _edited_without_checksum(sound: Path, damaged: Path, chance: random.Random) -> str:
-    return "without checksum, " + _with_edit(sound.read_bytes()[HEADER_SIZE:], damaged, chance)
-
-
-def _with_edit(data: bytes, damaged: Path, chance: random.Random) -> str:
+def _edited(data: bytes, chance: random.Random, damaged: Path) -> str:
     damaged.write_bytes(data)
     with h5py.File(damaged, "r+") as file:
         names: list[str] = []
@@ -168,7 +151,7 @@ def _delete(file: h5py.File, name: str, chance: random.Random) -> None:
     del file[name]
 
 
-def _replace(value: object) -> Callable[[h5py.File, str, random.Random], None]:
+def _replace(value: object) -> Edit:
     def edit(file: h5py.File, name: str, chance: random.Random) -> None:
         del file[name]
         file[name] = value
@@ -190,7 +173,7 @@ def _reshape(file: h5py.File, name: str, chance: random.Random) -> None:
         file[name] = chance.choice([value.ravel(), value[..., None], value.ravel()[: value.size // 2], value.T])
 
 
-def _put(number: float) -> Callable[[h5py.File, str, random.Random], None]:
+def _put(number: float) -> Edit:
     def edit(file: h5py.File, name: str, chance: random.Random) -> None:
         item = file[name]
         if isinstance(item, h5py.Dataset) and item.size and item.dtype.kind == "f":
@@ -217,7 +200,7 @@ def _link(file: h5py.File, name: str, chance: random.Random) -> None:
     file[name] = h5py.SoftLink(chance.choice(["/", "/nowhere", f"/{name}"]))
 
 
-EDITS: dict[str, Callable[[h5py.File, str, random.Random], None]] = {
+EDITS: dict[str, Edit] = {
     "deleted": _delete,
     "made a number": _replace(1.0),
     "made a text": _replace("text"),
@@ -232,7 +215,7 @@ EDITS: dict[str, Callable[[h5py.File, str, random.Random], None]] = {
     "a link": _link,
 }
 
-DAMAGES: tuple[Callable[[Path, Path, random.Random], str], ...] = (
+DAMAGES: tuple[Callable[[bytes, random.Random, Path], str], ...] = (
     _flipped,
     _flipped,
     _truncated,

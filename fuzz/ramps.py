@@ -185,27 +185,6 @@ def rows_of(path: Path, packings: int, workers: int) -> Iterator[Row]:
             yield future.result()
 
 
-def table(rows: Sequence[Row]) -> str:
-    """A line for each packing, and below it one for each ramp that differs from the reference."""
-    lines = ["draw disks seed   mu     kt exponent  ends at F_x/F_y of the reference; other ends"]
-    for row in rows:
-        end = _end(row["ramps"][TRIED])
-        lines.append(
-            f"{row['draw']:4} {row['disks']:5} {row['seed']:4} {row['mu']:4} {row['kt']:>6} {row['exponent']:8}  {end}"
-        )
-        lines += [
-            f"     {each['precision']}, increments of {each['step']:g}: {_end(each)} ({each['verdict']}); at "
-            f"{each['compared_to'] / FY:.4g} disks are {each['apart']:.1e} apart, {each['contacts']} contacts differ"
-            for each in row["ramps"]
-            if each["verdict"] != "agrees"
-        ]
-    return "\n".join([*lines, says(rows)])
-
-
-def _end(found: Row) -> str:
-    return "reached 0.1" if found["ends"] is None else f"{found['ends'] / FY:.6f}"
-
-
 def says(rows: Sequence[Row]) -> str:
     """What stability.md says of the ramps."""
     ramps = [each for row in rows for each in row["ramps"]]
@@ -273,7 +252,7 @@ def main() -> int:
         rows.append(row)
         print(f"ramps: {len(rows)} of {packings} packings", file=sys.stderr, flush=True)
     rows.sort(key=lambda row: row["draw"])
-    print(table(rows))
+    print(says(rows))
     write_text(chosen.output / "ramps.txt", says(rows) + "\n")
     save(figure_of(rows), chosen.output / "ramps")
     return int(any(each["verdict"] == "not found" for row in rows for each in row["ramps"]))

@@ -19,7 +19,7 @@ def test_odd_scenes(tmp_path):
 @pytest.mark.ranks
 @pytest.mark.slow
 @pytest.mark.long
-@pytest.mark.parametrize("work", [work.name for work in kills.WORKS])
+@pytest.mark.parametrize("work", kills.WORKS)
 def test_killed_commands(tmp_path, work):
     assert [pair for pair in kills.run(1, tmp_path, seed=1, only=work) if pair[1]] == []
 

@@ -1,8 +1,13 @@
-"""The comparison of a page with what its commands print tells right from wrong."""
+"""Pages show what their commands print now; and the comparison tells right from wrong."""
+
+import re
+from pathlib import Path
 
 import pytest
 
 from docs.run_page import commands, difference, files, run
+
+ROOT = Path(__file__).parents[2]
 
 SHOWN = ("mu = 1: F_x^c = 0.015009832275(11)", "written to run.h5")
 
@@ -16,24 +21,25 @@ SHOWN = ("mu = 1: F_x^c = 0.015009832275(11)", "written to run.h5")
         ("mu = 1: F_x^c = 0.015009832275(11)\nwritten to other.h5", False),
         ("mu = 1: F_x^c = 0.015009832275(11)", False),
         ("mu = 1: F_x^c = 0.015009832275(11)\nwritten to run.h5\nand more", False),
+        # progress of a slow machine
+        ("settling: 2000 steps\nequilibria: 5 of 21\nmu = 1: F_x^c = 0.015009832275(11)\nwritten to run.h5", True),
     ],
 )
 def test_words_are_equal_and_numbers_agree(printed, right):
     assert (difference(SHOWN, printed) == "") is right
 
 
-def test_noise_of_rounding_may_differ_but_stays_noise():
-    assert difference(("residual 5.1e-11",), "residual 7e-12") == ""
-    assert difference(("residual 5.1e-11",), "residual 5.1e-6") != ""
-
-
-def test_progress_of_a_slow_machine_is_no_difference():
-    assert difference(SHOWN, "settling: 2000 steps\nequilibria: 5 of 21\n" + "\n".join(SHOWN)) == ""
-
-
-def test_dots_stand_for_any_lines():
-    assert difference(("a 1", "...", "z 9"), "a 1\nb 2\nc 3\nz 9\n") == ""
-    assert difference(("a 1", "...", "z 9"), "a 1\nb 2\n") != ""
+@pytest.mark.parametrize(
+    ("shown", "printed", "right"),
+    [
+        ("residual 5.1e-11", "residual 7e-12", True),  # noise of rounding may differ, and stays noise
+        ("residual 5.1e-11", "residual 5.1e-6", False),
+        ("a 1\n...\nz 9", "a 1\nb 2\nc 3\nz 9\n", True),  # dots stand for any lines
+        ("a 1\n...\nz 9", "a 1\nb 2\n", False),
+    ],
+)
+def test_noise_and_dots(shown, printed, right):
+    assert (difference(tuple(shown.split("\n")), printed) == "") is right
 
 
 def test_a_page_is_run(tmp_path):
@@ -44,3 +50,29 @@ def test_a_page_is_run(tmp_path):
     wrong = run(page, tmp_path)
     assert "x = 1" in wrong[0]
     assert "exit code 1" in wrong[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("page", "count", "pictures"),
+    [
+        # two ranks that share their cores with others take ten times as long
+        pytest.param("README.md", 4, 0, marks=[pytest.mark.ranks, pytest.mark.long]),
+        pytest.param("docs/decks.md", 4, 0, marks=[pytest.mark.ranks, pytest.mark.long]),
+        pytest.param("docs/tutorial.md", None, 5, marks=pytest.mark.long),
+        ("docs/api.md", None, 1),
+    ],
+)
+def test_a_page_shows_what_its_commands_print(tmp_path, page, count, pictures):
+    path = ROOT / page
+    assert count in (None, len(list(commands(path))))
+    assert run(path, tmp_path) == []
+    shown = re.findall(r"\]\((pictures/tutorial/[\w.]+)\)", path.read_text())
+    assert all((path.parent / picture).exists() for picture in shown)
+    made = [Path(picture).name for picture in shown] or [path.name for path in tmp_path.glob("*.png")]
+    assert len(made) == pictures
+    assert all((tmp_path / picture).stat().st_size > 10_000 for picture in made)
+
+
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 150

@@ -46,8 +46,8 @@ def test_without_a_period_nothing_is_drawn_twice(packing):
 
 
 def test_upper_layer_is_yellow_and_rattlers_are_hollow(packing):
-    axes = draw_packing(packing).axes[0]
-    faces = labelled(axes, EllipseCollection, "disks").get_facecolor().tolist()
+    figure = draw_packing(packing)
+    faces = labelled(figure.axes[0], EllipseCollection, "disks").get_facecolor().tolist()
     # A disk that the box cuts is there twice.
     x = packing.position[:, 0] % packing.box_length
     copies = 1 + ((x < packing.radius) | (x > packing.box_length - packing.radius))
@@ -55,6 +55,8 @@ def test_upper_layer_is_yellow_and_rattlers_are_hollow(packing):
     loaded = packing.top.copy()
     loaded[packing.rattlers] = False
     assert faces.count(list(to_rgba(UPPER))) == copies[loaded].sum()
+    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert names == ["upper layer", "rattler (no contact)"]
 
 
 def test_bars_are_as_wide_as_their_force(packing):
@@ -70,21 +72,23 @@ def test_bars_are_as_wide_as_their_force(packing):
     assert widths.min() / widths.max() == pytest.approx(forces.min(), rel=1e-12)
 
 
-def test_colour_is_the_share_of_the_slip_limit(packing):
-    figure = draw_packing(packing, color="slip")
+@pytest.mark.parametrize(
+    ("color", "label", "values"),
+    [
+        ("slip", "slip / slip limit", lambda packing: 1e-3),
+        (
+            "mobilised",
+            r"mobilised friction $|f_t|/(\mu f_n)$",
+            lambda packing: np.unique(np.abs(packing.tangential_force) / (packing.law.mu * packing.normal_force)),
+        ),
+        ("force", "normal force $f_n$", lambda packing: np.unique(packing.normal_force)),
+    ],
+)
+def test_what_colour_shows(packing, color, label, values):
+    figure = draw_packing(packing, color=color)
     chains = labelled(figure.axes[0], LineCollection, "contacts")
-    assert np.asarray(chains.get_array()) == pytest.approx(1e-3, rel=1e-12)  # two roundings of the fixture
-    assert [axes.get_ylabel() for axes in figure.axes] == ["", "slip / slip limit"]
-
-
-def test_colour_is_the_mobilised_friction_or_the_force(packing):
-    for color, values in (
-        ("mobilised", np.abs(packing.tangential_force) / (packing.law.mu * packing.normal_force)),
-        ("force", packing.normal_force),
-    ):
-        chains = labelled(draw_packing(packing, color=color).axes[0], LineCollection, "contacts")
-        drawn = np.unique(np.asarray(chains.get_array()))
-        np.testing.assert_array_equal(drawn, np.unique(values))
+    np.testing.assert_allclose(np.unique(np.asarray(chains.get_array())), values(packing), rtol=1e-12)  # roundings
+    assert [axes.get_ylabel() for axes in figure.axes] == ["", label]
 
 
 def test_another_colour_is_refused(packing):
@@ -100,12 +104,6 @@ def test_axes_that_are_given_are_drawn_into(packing):
     assert len(labelled(right, EllipseCollection, "disks").get_offsets()) >= len(packing)
     assert not left.collections
     plt.close(figure)
-
-
-def test_the_key_says_what_yellow_and_hollow_mean(packing):
-    figure = draw_packing(packing)
-    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert names == ["upper layer", "rattler (no contact)"]
 
 
 @pytest.mark.parametrize("change", [{"law": MindlinLaw(2e5, 0.0, 0.0)}, {"contacts": None}])
