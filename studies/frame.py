@@ -6,7 +6,6 @@ NAME.json, pictures and NAME.md are written in the end.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
-from ..analysis.files.wholefile import make_folder, write_text
+from ..analysis.files.wholefile import make_folder, write_json, write_text
 from ..figures.pages import render
 from ..figures.style import save, save_as, spared
 from ..pywrap import Scene
@@ -55,11 +54,6 @@ def leave(
     draw_all(figures, folder, say, keep)
     write_text(folder / f"{name}.md", render(package, f"{name}.md.j2", **page))
     return folder / f"{name}.md"
-
-
-def write_json(path: Path, result: Result) -> None:
-    """Write what a study has found; the file is replaced as a whole."""
-    write_text(path, json.dumps(result, indent=1) + "\n")
 
 
 def draw_all(figures: Figures, folder: Path, say: Say, keep: Callable[[Figure, Path], object] = save) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from ...analysis.files.wholefile import write_text
+from ...analysis.files.wholefile import write_json
 from ..sweep.compute import LINES, Progress, Say, run_sweep, stored
 from .sets import SHARES, sets
 
@@ -53,7 +53,7 @@ def record(output: Path) -> None:
         "rows": len(rows),
         "cpu_seconds": round(sum(row["cpu_seconds"] for row in rows)),
     }
-    write_text(path, json.dumps(made, indent=1) + "\n")
+    write_json(path, made)
 
 
 def _commit() -> str:

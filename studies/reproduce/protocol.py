@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from ...analysis.digits import with_uncertainty
-from ...analysis.files.wholefile import make_folder, write_text
+from ...analysis.files.wholefile import make_folder, write_json, write_text
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
-from ..frame import draw_all, write_json
+from ..frame import draw_all
 from ..triggering.compute import summary as triggering_summary
 from ..triggering.draw import figures as triggering_figures
 from .compute import growth_run, pair_curve, recorded_ramp, summary_of, triggering_run

@@ -10,7 +10,6 @@ point of this sweep are not computed again. A last line that a kill has cut is c
 from __future__ import annotations
 
 import fcntl
-import json
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import closing, contextmanager
@@ -18,7 +17,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from ...analysis.files.wholefile import make_folder, write_text
+from ...analysis.files.wholefile import make_folder, write_json
 from ...pywrap import SceneError
 from .. import rows
 from .examine import Row
@@ -79,7 +78,7 @@ def run_sweep(
             return []
         make_folder(output)
         with _alone(output):
-            write_text(output / ASKED, json.dumps(sweep.as_dict() | {"shard": list(part)}, indent=1) + "\n")
+            write_json(output / ASKED, sweep.as_dict() | {"shard": list(part)})
             known = stored(output / LINES)
             missing = [point for point in points if point.key not in known]
             if len(missing) < len(points):

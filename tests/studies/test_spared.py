@@ -33,6 +33,12 @@ def said():
     return []
 
 
+@pytest.fixture
+def stored(tmp_path, reference_packing):
+    with RunFile.create(tmp_path / "run.h5", reference_packing(1.0)) as run:
+        run.append(reference_packing(1.0), floor=1e-11, evaluations=1)
+
+
 def test_the_sentence_says_what_and_why(said):
     with spared("x.png", said.append):
         raise ValueError("first line\nsecond line")
@@ -57,14 +63,11 @@ def test_genericity_keeps_its_numbers_and_its_page(tmp_path, no_pictures, said):
     assert all("was not drawn (RuntimeError: no font at all)" in sentence for sentence in said)
 
 
-def test_a_spectrum_keeps_its_eigenvalues(tmp_path, reference_packing, faultgouge_here, monkeypatch):
+def test_a_spectrum_keeps_its_eigenvalues(stored, faultgouge_here, monkeypatch):
     def fails(*_):
         raise LinAlgError("no convergence")
 
     monkeypatch.setattr("faultgouge.analysis.motion.transient.transient_gains", fails)
-    packing = reference_packing(1.0)
-    with RunFile.create(tmp_path / "run.h5", packing) as run:
-        run.append(packing, floor=1e-11, evaluations=1)
     done = faultgouge_here("spectrum", "run.h5", "--json")
     result = json.loads(done.stdout)
     assert len(result["eigenvalues"]) > 200
@@ -72,10 +75,7 @@ def test_a_spectrum_keeps_its_eigenvalues(tmp_path, reference_packing, faultgoug
     assert "the transient gain was not found (LinAlgError: no convergence); the eigenvalues are complete" in done.stderr
 
 
-def test_draw_says_its_words_before_the_picture(tmp_path, reference_packing, faultgouge_here, no_pictures):
-    packing = reference_packing(1.0)
-    with RunFile.create(tmp_path / "run.h5", packing) as run:
-        run.append(packing, floor=1e-11, evaluations=1)
+def test_draw_says_its_words_before_the_picture(stored, faultgouge_here, no_pictures):
     done = faultgouge_here("draw", "run.h5", code=1)
     assert "100 disks" in done.stderr
 
