@@ -8,17 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
+from mpi4py import MPI
 
 from ..analysis.files.wholefile import make_folder, write_json, write_text
 from ..figures.pages import render
 from ..figures.style import save, save_as, spared
 from ..pywrap import Scene
-from ..pywrap.onset.sharing import Progress, Say, Share, shared_out
 from ..pywrap.scenes.units import real_units
+from .hands import Progress, Say, Share, hands
 from .rows import Rows
 
 Result = dict[str, Any]
@@ -125,9 +127,11 @@ class Study:
             If the packing has no onset, or bears none of the loads.
         """
         self.check(scene)
-        with shared_out() as share:
-            if share is None:
+        pool: Any
+        with hands(workers=1) as pool:
+            if MPI.COMM_WORLD.rank != 0:
                 return {}
+            share: Share = map if pool is None else partial(pool.map, unordered=True)
             make_folder(output)
             rows = Rows(output / f"{self.name}.jsonl", scene, self.beside)
             found = self.compute(scene, Work(rows, share, say, progress))

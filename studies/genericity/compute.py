@@ -10,7 +10,8 @@ from pathlib import Path
 from mpi4py import MPI
 
 from ...analysis.files.wholefile import write_json
-from ..sweep.compute import LINES, Progress, Say, run_sweep, stored
+from ..hands import Progress, Say
+from ..sweep.compute import LINES, run_sweep, stored
 from .sets import SHARES, sets
 
 

@@ -10,7 +10,7 @@ point of this sweep are not computed again. A last line that a kill has cut is c
 from __future__ import annotations
 
 import fcntl
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -20,13 +20,11 @@ from mpi4py import MPI
 from ...analysis.files.wholefile import make_folder, write_json
 from ...pywrap import SceneError
 from .. import rows
+from ..hands import Progress, Say, hands
 from .examine import Row
 from .points import Sweep, shard
 from .table import write_tables
-from .workers import computed, hands
-
-Say = Callable[[str], None]
-Progress = Callable[[Iterator[Row], int], Iterable[Row]]
+from .workers import computed
 
 LINES, ASKED, LOCK = "results.jsonl", "sweep.json", "sweep.lock"
 

@@ -9,7 +9,8 @@ from typing import Any
 
 from ...analysis.files.wholefile import make_folder, write_json, write_text
 from ...pywrap import SceneError
-from .compute import ASKED, LINES, Say, stored
+from ..hands import Say
+from .compute import ASKED, LINES, stored
 from .points import Sweep
 from .table import Row, write_tables
 from .tasks import TASKS
