@@ -9,11 +9,10 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import Workers, progress, say, show_table
+from .terminal import Folder, Workers, progress, say, show_table
 
 app = typer.Typer()
 
-Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted one is continued.")]
 Shard = Annotated[
     str, typer.Option(metavar="K/N", help="Part K of N alone, for job arrays; each with a folder of its own.")
 ]

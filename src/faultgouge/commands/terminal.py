@@ -30,6 +30,8 @@ EVERY = 60.0
 
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)]
 Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted one is continued.")]
+Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted one is continued.")]
+NewFolder = Annotated[Path, typer.Option("-o", "--output", help="The folder for numbers, pictures and page.")]
 Workers = Annotated[
     int | None,
     typer.Option(min=1, metavar="N", show_default=False, help="Processes that compute; all cores unless given."),
