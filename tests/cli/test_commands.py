@@ -113,6 +113,7 @@ def test_run_of_another_scene_is_not_continued(faultgouge, tmp_path):
 def test_perturb_writes_the_series(faultgouge, tmp_path):
     done = faultgouge("perturb", "scene.toml", "--json")
     series = json.loads(done.stdout)
+    assert ", at most " in done.stderr
     assert series["time"][-1] == pytest.approx(0.5, abs=1e-3)
     # a stable packing at rest: D stays at the rounding of coordinates, the residual over the softest mode squared
     assert 0 < max(series["msd"]) < 1e-22
