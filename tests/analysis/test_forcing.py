@@ -9,7 +9,6 @@ from transfer import layer_response
 from faultgouge.analysis.motion.forcing import floor_force, impulse_response, sampled_response
 from faultgouge.analysis.motion.response import layer_force, linear_response
 from faultgouge.analysis.motion.signals import Signal, SignalError, pulse, sweep
-from faultgouge.analysis.spectrum.spectrum import discrete_frequency, spectrum
 
 OMEGA = 5.0
 NEAR_ONSET = 0.0218  # F_x^c = 0.021833056408
@@ -74,34 +73,6 @@ def _velocities(response, omega, duration, count):
     rate, part = response.rate, response.weight / (1j * omega - response.rate)
     rate, part = np.append(rate, 1j * omega), np.append(-part, part.sum())
     return np.real((np.exp(np.multiply.outer(long, rate)) * part) @ np.exp(np.multiply.outer(rate, short)))
-
-
-@pytest.mark.slow
-def test_frequencies_of_the_time_step(packing):
-    """A constant push makes each mode oscillate: the sampled response has the frequencies of velocity Verlet."""
-    dt = 0.1 / spectrum(packing).omega_max
-    force, times = layer_force(packing, 1.0), 0.5 * np.arange(1, 401)
-    constant = Signal([0.0, 1e3], [1.0, 1.0])
-    exact = linear_response(packing, dt * np.round(times / dt), force=force, dt=dt)
-    stepped = sampled_response(packing, constant, times, force, dt=dt)
-    without = sampled_response(packing, constant, times, force)
-    reference = linear_response(packing, times, force=force)
-    scale = np.abs(exact.layer_velocity).max()
-    assert np.abs(without.layer_velocity - reference.layer_velocity).max() < 1e-8 * scale
-    frequency = np.sqrt(spectrum(packing).eigenvalues.real.max())
-    # the fastest mode is off by half a radian at the end; with the frequencies of the step none is
-    assert (frequency - discrete_frequency(frequency**2, dt).real) * times[-1] < -0.5
-    late = slice(300, None)
-    close = np.abs(stepped.velocity[late] - _at(packing, force, times[late], dt)).max()
-    assert close < 5e-3 * np.abs(stepped.velocity).max()
-
-
-def _at(packing, force, times, dt):
-    """Velocities of velocity Verlet between its steps: a line between the two."""
-    below = np.floor(times / dt) * dt
-    share = ((times - below) / dt)[:, None]
-    one, two = (linear_response(packing, each, force=force, dt=dt).velocity for each in (below, below + dt))
-    return (1 - share) * one + share * two
 
 
 def test_moving_floor_is_a_force_on_every_disk(packing):

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix, touching
 from faultgouge.analysis.operators.stiffness import contact_terms
-from faultgouge.pywrap import Engine
+from faultgouge.pywrap import Engine, Equilibrium, equilibrate
+from faultgouge.pywrap.equilibria.newton import iterated
 from faultgouge.pywrap.equilibria.newton_matrix import AFLOAT, factored
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 from faultgouge.pywrap.lammps.contact_graph import ContactGraph
@@ -130,3 +131,65 @@ def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
     errors = [np.abs(factored(trial, trial.floor, start).solve(softening) - change).max() for start in (since, None)]
     # a hundredth of the stiffness is left
     assert errors[0] < 0.03 < 0.3 < errors[1]
+
+
+class _Seen(Exception):  # noqa: N818, no error
+    """A displacement that was asked for."""
+
+
+def without(packing, disk, kept):
+    """The packing in which a disk has no more than some of its contacts."""
+    c = packing.contacts
+    mine = np.flatnonzero((c.i == disk) | (c.j == disk))
+    rest = np.setdiff1d(np.arange(len(c)), mine[kept:])
+    return replace(packing, contacts=Contacts(c.i[rest], c.j[rest], c.slip[rest]))
+
+
+def test_expelled_are_disks_with_one_contact_and_with_two_new_ones(reference_packing):
+    whole = reference_packing(1.0)
+    one, two, new = np.flatnonzero((ContactGraph(whole.contacts, whole.radius).degree > 2) & ~whole.top)[[0, 30, 60]]
+    trial = without(without(without(whole, one, 1), two, 2), new, 2)
+    since = without(trial, new, 0).contacts
+    expelled = factored(trial_of(trial), 0.0, ContactGraph(since, whole.radius)).expelled
+    assert expelled[one]
+    assert not expelled[two]
+    assert expelled[new]
+
+
+def test_a_disk_between_two_new_contacts_takes_a_longer_step(reference_packing):
+    """The force goes as delta^(3/2), and a root of that order is met by so many times Newton's step."""
+    there = reference_packing(1.0)
+    disk = int(np.flatnonzero((ContactGraph(there.contacts, there.radius).degree == 3) & ~there.top)[0])
+    there, place, other = without(there, disk, 2), there.position.copy(), int(np.flatnonzero(there.top)[0])
+    place[disk] = place[other] + [0.0, there.radius[disk] + there.radius[other] - 1e-4]
+    start = replace(there, position=place, contacts=touching(place, there.radius, there.box_length))
+    trial = trial_of(there, 1e-6 * np.random.default_rng(8).standard_normal(300))
+    asked = []
+
+    def displaced(base, displacement):
+        asked.append(displacement)
+        if len(asked) > 1:
+            raise _Seen
+        return trial
+
+    with pytest.raises(_Seen):
+        iterated(displaced, Trial.of(start))
+    expected = factored(trial, trial.floor, ContactGraph(start.contacts, start.radius)).solve(trial.force)
+    expected[[disk, 100 + disk, 200 + disk]] *= 1.5
+    np.testing.assert_array_equal(asked[1], expected)
+
+
+def test_a_rattler_that_a_neighbour_runs_into_is_moved_out_of_the_way(reference_packing):
+    packing = reference_packing(1.0)
+    rattler, others = packing.rattlers[0], np.delete(np.arange(100), packing.rattlers[0])
+    branch = packing.position[others] - packing.position[rattler]
+    distance = np.hypot(*branch.T)
+    gap = distance - packing.radius[others] - packing.radius[rattler]
+    near = np.argsort(gap)[2]
+    position = packing.position.copy()
+    position[rattler] += (gap[near] - 1e-9) * branch[near] / distance[near]
+    packing = replace(packing, position=position)
+    start = Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
+    with Engine(packing) as engine:
+        found = equilibrate(engine, equilibrate(engine, start, 0.0), 1e-2)
+    assert rattler in found.packing.rattlers

@@ -37,7 +37,7 @@ def test_record_moves_the_packing_as_linear_response_says(packing, on, scale):
             rows.append(motion.velocity[packing.top, 0].mean())
     times = dt * every * np.arange(1, len(rows) + 1)
     force = layer_force(packing, 1.0) if on == "layer" else floor_force(packing)
-    predicted = sampled_response(packing, acting, times, force, dt=dt).layer_velocity
+    predicted = sampled_response(packing, acting, times, force).layer_velocity
     assert np.abs(rows).max() > 1e-8  # four decades above the noise
     assert np.abs(np.array(rows) - predicted).max() < 1e-2 * np.abs(rows).max()
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from faultgouge.assessment.left_out.costs import in_turns
 from faultgouge.assessment.left_out.explain import _affordable, _switched, explain
+from faultgouge.assessment.left_out.parts import Cost
 from faultgouge.assessment.left_out.switches import Feature, Loaded, Run, features
 from faultgouge.pywrap import Scene, settle
 
@@ -96,7 +96,7 @@ def test_costs_are_ratios_with_their_spread(paper):
     for part in paper.parts:
         low, middle, high = part.cost.ratio
         assert 0 < low <= middle <= high, part.name
-        assert min(part.cost.without + part.cost.with_it) > 0
+        assert part.cost.seconds.min() > 0
     costs = {part.name: part.cost.ratio[1] for part in paper.parts}
     # a history makes a step half as long again, or twice as long, on every machine
     assert costs["tangential history"] > 1.2
@@ -140,15 +140,15 @@ def run():
 
 def test_a_wrong_claim_is_found_out(run, tmp_path):
     """A push that is said to touch nobody, and one that is said to leave the motion."""
-    nobody = np.zeros(len(run.packing), dtype=bool)
     pushed = replace(run, motion={"amplitude": 1.0, "omega": 1.0})
     with run.started(MPI.COMM_SELF, tmp_path / "log") as (engine, _):
         loaded = Loaded.of(engine, tmp_path / "log")
-    for touched, moves in ((nobody, True), (run.packing.top, False)):
+    top = np.flatnonzero(run.packing.top)
+    for touched, moves in (((), True), (top, False)):
         part = _switched(Feature("push", "", run, pushed, touched, moves), loaded, 50, tmp_path)
         assert part.identical is False
         assert not part.included
-    honest = _switched(Feature("push", "", run, pushed, run.packing.top, True), loaded, 50, tmp_path)
+    honest = _switched(Feature("push", "", run, pushed, top), loaded, 50, tmp_path)
     assert honest.identical is True
 
 
@@ -158,23 +158,17 @@ def test_open_scene_has_no_period(run):
     assert side.reason == "x has the period 11.9"
     assert again.reason == "the sides are open"
     assert again.without.packing.box_length is None
-    assert not again.touched.any()  # a period wide enough for all: no contact across it
+    assert len(again.touched) == 0  # a period wide enough for all: no contact across it
 
 
 def test_turns_measure_time_without_the_pauses_of_one_thread():
-    both = in_turns("nap", lambda: sleep(0.01), lambda: sleep(0.04), turns=5, parallel=True)
-    assert min(both.without) >= 0.01
+    both = Cost.of("nap", lambda: sleep(0.01), lambda: sleep(0.04), turns=5, parallel=True)
+    assert both.seconds[:, 0].min() >= 0.01
     assert 1.5 < both.ratio[1] < 5
-    assert len(both.without) == len(both.with_it) == 5
-    alone = in_turns("nap", lambda: sum(range(100_000)), lambda: (sum(range(100_000)), sleep(0.02)), turns=5)
+    assert both.seconds.shape == (5, 2)
+    alone = Cost.of("sum", lambda: sum(range(100_000)), lambda: (sum(range(100_000)), sleep(0.02)), turns=5)
     assert alone.ratio[1] < 2
     assert alone.medians[1] < 0.02
-
-
-def test_turns_begin_with_either():
-    order = []
-    in_turns("call", lambda: order.append("without"), lambda: order.append("with"), turns=3)
-    assert order == ["with", "without", "without", "with"] * 2
 
 
 @pytest.mark.slow
