@@ -28,13 +28,7 @@ Share = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
 
 class Processes(Executor):
-    """Processes of this machine, each with an interpreter of its own; all of them end with this process.
-
-    Parameters
-    ----------
-    number : int
-        Of processes.
-    """
+    """So many processes of this machine, each with an interpreter of its own; all of them end with this process."""
 
     def __init__(self, number: int) -> None:
         self._number = number
@@ -67,14 +61,10 @@ class Processes(Executor):
 
 @contextmanager
 def hands(workers: int | None, executor: Executor | None = None) -> Iterator[Executor | None]:
-    """An executor for the points of a sweep; None where this process computes by itself, or works for another rank.
+    """An executor; None where this process computes by itself, or works for another rank.
 
-    Parameters
-    ----------
-    workers : int or None
-        Processes; None: as many as there are cores. Ranks of mpiexec take their place.
-    executor : Executor or None
-        In place of all of these. It is not shut down.
+    So many workers are processes, as many as there are cores for None; ranks of mpiexec take their place, and an
+    executor, which is not shut down, that of all of these.
     """
     number = cores() if workers is None else workers
     if executor is not None:

@@ -22,17 +22,7 @@ def compute(
     share: float = 1.0,
     workers: int | None = 1,
 ) -> None:
-    """Compute what is missing of all sweeps.
-
-    Parameters
-    ----------
-    output : Path
-        The folder.
-    say, progress, workers
-        As of `run_sweep`.
-    share : float
-        Of the packings of each set.
-    """
+    """Compute what is missing of all sweeps, with this share of the packings of each; the rest as of `run_sweep`."""
     for part in [*(each for each in SHARES if each < share), share]:
         for name, sweep in sets(part).items():
             say(f"{name}: {100 * part:.3g} % of the packings")
