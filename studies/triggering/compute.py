@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...analysis import Growth, RunFile, fit_growth
+from ...analysis import RunFile, fit_growth
 from ...analysis.motion.power_law import PowerLaw, fit_power_law
 from ...analysis.motion.response import Response, layer_force, linear_response
 from ...analysis.onset.pair_form import PairForm, pair_forms
@@ -102,40 +102,10 @@ class Triggering:
     sensitive: Sensitivity
 
     @property
-    def deviation(self) -> float:
-        """Largest difference between D of the strong run and of the linear response, in units of the largest D."""
-        msd = column(self.strong, "msd")
-        return float(np.abs(msd - self.response.msd).max() / msd.max())
-
-    @property
-    def rise(self) -> float:
-        """Decades between the largest D of the perturbed run and of the one with mu(v)."""
-        return float(np.log10(largest(self.erupting) / largest(self.perturbed)))
-
-    @property
     def crossing(self) -> float | None:
         """The time at which the layer of the run with mu(v) first exceeds v_0, or None."""
         faster = np.abs(column(self.erupting, "layer_velocity")) > self.weakening.v0
         return float(column(self.erupting, "time")[np.argmax(faster)]) if faster.any() else None
-
-    @property
-    def growth(self) -> float:
-        """Decades between the jump and the largest D of the run with mu(v)."""
-        return float(np.log10(largest(self.erupting) / jump(self.erupting)))
-
-    @property
-    def fitted(self) -> Growth | None:
-        """Growth of D from ten times the jump to a tenth of its largest value; None if there is no decade between."""
-        time, msd = column(self.erupting, "time"), column(self.erupting, "msd")
-        try:
-            return fit_growth(time, msd, 10 * jump(self.erupting), 0.1 * float(msd.max()))
-        except ValueError:
-            return None
-
-    @property
-    def grows(self) -> bool:
-        """Whether D goes on to grow after its jump."""
-        return bool(self.growth >= np.log10(GROWTH_FACTOR))
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,24 +233,33 @@ def sensitivity(run: OnsetRun) -> Sensitivity:
 
 def summary(triggering: Triggering) -> dict[str, Any]:
     """Numbers for summary.json."""
-    sensitive = triggering.sensitive
-    runs = ("unperturbed", "perturbed", "erupting")
+    sensitive, erupting, strong = triggering.sensitive, triggering.erupting, column(triggering.strong, "msd")
+    most = {name: largest(getattr(triggering, name)) for name in ("unperturbed", "perturbed", "erupting")}
+    growth = float(np.log10(most["erupting"] / jump(erupting)))
     return {
         "fx": triggering.start.fx,
         "v0": triggering.weakening.v0,
         "v_ss": triggering.weakening.v_ss,
-        "largest_D": {name: largest(getattr(triggering, name)) for name in runs},
-        "rise_in_decades": triggering.rise,
-        "jump": jump(triggering.erupting),
-        "grows_after_the_jump": triggering.grows,
-        "growth_in_decades": triggering.growth,
-        "growth_after_the_jump": None if triggering.fitted is None else asdict(triggering.fitted),
+        "largest_D": most,
+        "rise_in_decades": float(np.log10(most["erupting"] / most["perturbed"])),
+        "jump": jump(erupting),
+        "grows_after_the_jump": bool(growth >= np.log10(GROWTH_FACTOR)),
+        "growth_in_decades": growth,
+        "growth_after_the_jump": _fitted(erupting),
         "forecast": asdict(triggering.foreseen),
         "largest_D_of_the_control": None if triggering.control is None else largest(triggering.control),
-        "linear_response_deviation": triggering.deviation,
-        "smallest_mu": float(column(triggering.erupting, "friction").min()),
+        "linear_response_deviation": float(np.abs(strong - triggering.response.msd).max() / strong.max()),
+        "smallest_mu": float(column(erupting, "friction").min()),
         "amplitude_exponent": sensitive.fit.exponent,
         "amplitude_exponent_error": sensitive.fit.error,
         "distances": [float(sensitive.distance.min()), float(sensitive.distance.max())],
         "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in sensitive.near],
     }
+
+
+def _fitted(run: tuple[Sample, ...]) -> dict[str, float] | None:
+    """Growth of D from ten times the jump to a tenth of its largest value; None if there is no decade between."""
+    try:
+        return asdict(fit_growth(column(run, "time"), column(run, "msd"), 10 * jump(run), 0.1 * largest(run)))
+    except ValueError:
+        return None
