@@ -27,7 +27,7 @@ from ...figures.series import draw_series, few_decades, positive, scientific
 from ...figures.style import INK, styled
 from ...pywrap.lammps.dynamics import Weakening
 from ..frame import Figures
-from .compute import Sensitivity, Triggering, column
+from .compute import Sensitivity, Triggering
 
 Course = tuple[Floats, Floats]
 """Times, and D at these, length^2."""
@@ -41,17 +41,16 @@ DAMPING = np.geomspace(1e-2, 1e2, 33)
 def figures(found: Triggering) -> Figures:
     """The paper's figures 2, 5 and 6, and three of the response: in time, over the distance from the onset, and over
     damping."""
-    weak, mu, near = found.weakening, found.start.packing.law.mu, found.sensitive.near
+    weak, mu, near, erupting = found.weakening, found.start.packing.law.mu, found.sensitive.near, found.erupting
     names = ("unperturbed", "perturbed", "erupting", "control", "strong")
     series = {name: getattr(found, name) for name in names if getattr(found, name) is not None}
-    runs = {name: (column(run, "time"), column(run, "msd")) for name, run in series.items()}
-    speed, friction = (column(found.erupting, name) for name in ("layer_velocity", "friction"))
+    runs = {name: (run["time"], run["msd"]) for name, run in series.items()}
     three = runs["unperturbed"], runs["perturbed"], runs["erupting"]
     chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, 4).astype(int))] if near else []
     return {
         "figure2": lambda: friction_law_figure(replace(weak, v0=0.0, v_ss=1.0), mu),
         "figure5a": lambda: eruption_figure(*three, runs.get("control"), found.crossing),
-        "figure5b": lambda: weakening_figure(np.abs(speed), friction, weak, mu),
+        "figure5b": lambda: weakening_figure(np.abs(erupting["layer_velocity"]), erupting["friction"], weak, mu),
         "figure6": measured_friction_figure,
         "response": lambda: response_figure(runs["strong"], found.response.msd),
         "amplitude": lambda: amplitude_figure(found.sensitive),

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...figures.pages import render
 from ...pywrap.scenes.refusals import needed
-from .compute import ABOVE_NOISE, Triggering, column, summary
+from .compute import ABOVE_NOISE, Triggering, summary
 
 
 def section(triggering: Triggering) -> str:
@@ -18,7 +18,7 @@ def section(triggering: Triggering) -> str:
         triggering=triggering,
         numbers=numbers,
         calibrated=isinstance(needed(triggering.scene.friction, "friction").v0, str),
-        highest_speed=float(np.abs(column(triggering.erupting, "layer_velocity")).max()),
+        highest_speed=float(np.abs(triggering.erupting["layer_velocity"]).max()),
         jumped=float(np.log10(numbers["jump"] / numbers["largest_D"]["perturbed"])),
         above_noise=ABOVE_NOISE,
     )

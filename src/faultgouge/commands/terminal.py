@@ -91,12 +91,7 @@ def say_way(equilibrium: Equilibrium) -> None:
 class Minutes:
     """A line on standard error every minute, off a terminal; a context manager.
 
-    A thread says the lines: work may be within one call for longer than a minute.
-
-    Parameters
-    ----------
-    message : str
-        The line, until there is another.
+    A thread says the line, until there is another: work may be within one call for longer than a minute.
     """
 
     def __init__(self, message: str) -> None:
