@@ -131,24 +131,6 @@ def test_net_force_is_that_of_the_loop(cluster):
     np.testing.assert_allclose(cluster.net_force, quasistatic.forces(cluster), rtol=0, atol=rounding)
 
 
-def test_contacts_conserve_momentum_and_twist_by_their_overlap(cluster):
-    """Full radii as lever arms: each pair adds the couple r f_t - (R_i + R_j) f_t = -overlap f_t."""
-    pairs = ~cluster.contacts.floor
-    only = Contacts(*(a[pairs] for a in (cluster.contacts.i, cluster.contacts.j, cluster.contacts.slip)))
-    free = replace(cluster, contacts=only, fx=0.0, fy=0.0, box_length=None)
-    inside = free.geometry.overlap > 0  # without the box, the pair across it is far apart
-    fx, fy, t = free.net_force.reshape(3, -1)
-    couple = free.position[:, 0] @ fy - free.position[:, 1] @ fx + free.radius @ t
-    # Sums of a dozen forces round at a few units in the last place of the largest one.
-    rounding = 40 * np.finfo(float).eps * free.normal_force.max()
-    assert abs(fx.sum()) < rounding
-    assert abs(fy.sum()) < rounding
-    twist = -(free.geometry.overlap * free.tangential_force)[inside].sum()
-    assert abs(twist) > 1e-3
-    # the couple multiplies each force by a coordinate
-    assert couple == pytest.approx(twist, abs=rounding * np.abs(free.position).max())
-
-
 def test_residual_leaves_out_rattlers_of_the_upper_layer():
     packing = Packing(
         position=[[0, 0.5], [5, 3]],

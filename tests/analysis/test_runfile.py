@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
-from faultgouge.analysis import Contacts, MindlinLaw, OutputError, Packing, PackingFileError, RunFile
+from faultgouge.analysis import Contacts, MindlinLaw, OutputError, PackingFileError, RunFile
 
 
 @pytest.fixture
@@ -130,29 +130,6 @@ def test_what_an_error_leaves_half_done_is_not_saved(tmp_path, states):
     assert [each.name for each in tmp_path.iterdir()] == ["run.h5"]
 
 
-def test_the_file_is_sound_at_any_moment(tmp_path, states):
-    """Somebody who reads while it is written, at any moment, meets a whole file."""
-    path = tmp_path / "run.h5"
-    with RunFile.create(path, states[0]) as run:
-        for k in range(20):
-            with RunFile(path) as reader:
-                assert len(reader) <= k
-            run.append(states[k % 4])
-
-
-def test_a_checkpoint_is_replaced_and_removed(tmp_path, states):
-    path = tmp_path / "run.h5"
-    with RunFile.create(path, states[0]) as run:
-        for k in range(3):
-            run.put_checkpoint(step=np.int64(k), x=np.full((k + 1, 2), 0.1))
-    with RunFile(path, "a") as run:
-        assert run.checkpoint["step"] == 2
-        np.testing.assert_array_equal(run.checkpoint["x"], np.full((3, 2), 0.1))
-        run.put_checkpoint()
-    with RunFile(path) as run:
-        assert run.checkpoint == {}
-
-
 @pytest.fixture
 def sound(tmp_path, states):
     path = tmp_path / "run.h5"
@@ -270,25 +247,6 @@ def test_a_file_holds_one_set_of_disks(tmp_path, states):
         with pytest.raises(ValueError, match="residual is taken"):
             run.append(states[1], residual=0.0)
         assert len(run) == 1
-
-
-def test_frames_with_more_and_more_contacts_stay_compact(tmp_path):
-    """A contact more makes the table of contacts wider, which must not store it twice; zeros and indices are packed."""
-    n, frames = 2000, 10
-    slip = np.random.default_rng(0).normal(0, 1e-6, n)
-    row = Packing(
-        position=np.column_stack([np.arange(n), np.full(n, 0.4999)]),
-        radius=np.full(n, 0.5),
-        contacts=Contacts([], [], []),
-        law=MindlinLaw(2e5, 2e5, 1.0),
-    )
-    path = tmp_path / "run.h5"
-    with RunFile.create(path, row) as file:
-        for frame in range(frames):
-            some = np.arange(n - frames + frame)
-            file.append(replace(row, contacts=Contacts(some, np.full(len(some), -1), slip[some])))
-    plain = 8 * (3 + 1 + 3) * n * frames  # positions, angles, contacts
-    assert path.stat().st_size < 0.6 * plain
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not HDF5", "truncated", "foreign", "other h5md"])

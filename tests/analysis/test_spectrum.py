@@ -83,13 +83,6 @@ def test_pairs_behind_the_onset(ramp):
     assert pair.eigenvalue in result.unstable
 
 
-def test_imaginary_part_grows_as_the_root_of_the_distance(ramp):
-    path, onset = ramp(1.0, 1e-3, 22), 0.021833056408868
-    near, nearer = (spectrum(path(onset + distance)).pairs[0].eigenvalue.imag for distance in (1e-5, 1e-7))
-    # The next order is the distance over the width of the window, 1e-2.
-    assert near / nearer == pytest.approx(10, rel=1e-2)
-
-
 def test_copies_of_a_packing_have_its_pairs_each_and_no_others(cluster):
     """Three copies out of reach of each other: threefold eigenvalues, which rounding splits at will."""
     c = cluster.contacts

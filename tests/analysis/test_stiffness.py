@@ -63,23 +63,6 @@ def test_paper_form_lacks_the_turning_of_the_tangent(cluster):
     np.testing.assert_allclose(difference, missing, rtol=0, atol=4e-16 * scale)
 
 
-def test_mirror(cluster):
-    """x -> -x, theta -> -theta: tau is an axial vector's companion, so slips change sign."""
-    c = cluster.contacts
-    mirrored = replace(
-        cluster,
-        position=cluster.position * [-1, 1],
-        angle=-cluster.angle,
-        contacts=Contacts(c.i, c.j, -c.slip),
-        fx=-cluster.fx,
-    )
-    sign = np.repeat([-1, 1, -1], len(cluster))
-    np.testing.assert_array_equal(mirrored.net_force, sign * cluster.net_force)
-    np.testing.assert_array_equal(
-        stiffness_matrix(mirrored).toarray(), sign[:, None] * stiffness_matrix(cluster).toarray() * sign
-    )
-
-
 @pytest.mark.parametrize(("kt", "mu"), [(0.0, 1.0), (6e4, 0.0)])
 def test_no_friction_no_rotation(cluster, kt, mu):
     smooth = replace(cluster, law=replace(cluster.law, kt=kt, mu=mu))

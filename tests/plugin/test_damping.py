@@ -149,37 +149,6 @@ def test_second_order_in_the_time_step(exponent, parts):
     assert 3.7 < coarse / fine < 4.3
 
 
-@pytest.mark.slow
-def test_energy_falls_as_the_matrix_says(reference_packing):
-    """Without friction there is an energy; what it loses is the integral of v C v, to second order in the step."""
-    start, errors = reference_packing(0.0), []
-    packing = damped(start, cn=20.0, ct=0.0, drag_time=3.0, fy=3.3)  # the load is raised at the start
-    n, time = len(packing), 0.064
-
-    def energy_and_loss(position, velocity):
-        now = replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
-        v = np.concatenate([*velocity.T, np.zeros(n)])
-        height = packing.fy * position[packing.top, 1].sum()
-        elastic = 0.4 * now.normal_force @ now.geometry.overlap  # k_n delta^(5/2)/(5/2)
-        stored = elastic + height + 0.5 * packing.mass @ (velocity**2).sum(1)
-        return stored, v @ damping_matrix(now) @ v
-
-    assert not packing.top[packing.rattlers].any()
-    for dt in (5e-4, 2.5e-4, 1.25e-4):
-        rows = [energy_and_loss(packing.position, np.zeros((n, 2)))]
-        with Engine(packing) as engine, engine.undamped(dt) as dynamics:
-            for _ in range(round(time / dt)):
-                motion = dynamics.advance(1)
-                rows.append(energy_and_loss(motion.position, motion.velocity))
-        energy, loss = np.array(rows).T
-        lost = dt * (loss.sum() - 0.5 * (loss[0] + loss[-1]))
-        assert lost > 0.1 * np.abs(energy[0] - energy[-1]) > 0
-        errors.append(abs(energy[-1] - energy[0] + lost) / lost)
-    assert errors[2] < 1e-3
-    assert 3.4 < errors[0] / errors[1] < 4.6
-    assert 3.4 < errors[1] / errors[2] < 4.6
-
-
 MODEL = """
 variable        decks index {decks}
 variable        fx index {fx}

@@ -145,13 +145,6 @@ def test_the_same_motion_with_and_without(reference_packing, law, other_law, opt
     assert_same_motion(one, other)
 
 
-def test_open_sides_compute_what_a_wide_period_computes(reference_packing):
-    packing = opened(reference_packing(1.0))
-    wide = replace(packing, position=packing.position + np.array([2.0, 0.0]), box_length=20.0)
-    narrow = replace(packing, position=packing.position + np.array([2.0, 0.0]))
-    assert_same_motion(motion_of(narrow, steps=50), motion_of(wide, steps=50))
-
-
 def test_dumps_without_friction_have_no_slips_and_no_angles(reference_packing, tmp_path):
     packing = with_law(reference_packing(1.0), mu=0.0)
     with Engine(packing) as engine:

@@ -83,17 +83,6 @@ def test_factors_of_a_matrix_nearby_solve(matrix, pairs, solver):
     assert np.linalg.norm(other @ step - force) <= ACCURATE * np.linalg.norm(force)
 
 
-def test_factors_of_a_matrix_with_fewer_coordinates_solve(matrix, pairs):
-    other, _ = changed(matrix, [1234, 17, 2100])
-    fewer, force = SparseSolver(other, *pairs), np.random.default_rng(3).standard_normal(matrix.shape[0])
-    fewer.solve(force)
-    more = SparseSolver(matrix, *pairs, fewer)
-    step = more.solve(force)
-    assert fewer.own
-    assert not more.own
-    assert np.linalg.norm(matrix @ step - force) <= ACCURATE * np.linalg.norm(force)
-
-
 @pytest.mark.slow
 def test_factors_that_do_not_serve_are_replaced(matrix, pairs, solver):
     # half of the disks softer by far: GMRES is not done in time
