@@ -82,8 +82,7 @@ def eruption_figure(
         curves.insert(1, (control, CONTROL, r"$\mu(v)$ below both onsets"))
     for axes in (early, late):
         for run, colour, name in curves:
-            time, msd = positive(*run)
-            draw_series(time, msd, axes, label=name, color=colour)
+            draw_series(*run, axes, label=name, color=colour)
         if crossing is not None:
             axes.axvline(crossing, color=INK, linewidth=0.6, linestyle=":")
     if crossing is not None:
