@@ -6,20 +6,21 @@ NAME.json, pictures and NAME.md are written in the end.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
+from mpi4py import MPI
 
-from ..analysis.files.wholefile import make_folder, write_text
+from ..analysis.files.wholefile import make_folder, write_json, write_text
 from ..figures.pages import render
 from ..figures.style import save, save_as, spared
 from ..pywrap import Scene
-from ..pywrap.onset.sharing import Progress, Say, Share, shared_out
 from ..pywrap.scenes.units import real_units
+from .hands import Progress, Say, Share, hands
 from .rows import Rows
 
 Result = dict[str, Any]
@@ -55,11 +56,6 @@ def leave(
     draw_all(figures, folder, say, keep)
     write_text(folder / f"{name}.md", render(package, f"{name}.md.j2", **page))
     return folder / f"{name}.md"
-
-
-def write_json(path: Path, result: Result) -> None:
-    """Write what a study has found; the file is replaced as a whole."""
-    write_text(path, json.dumps(result, indent=1) + "\n")
 
 
 def draw_all(figures: Figures, folder: Path, say: Say, keep: Callable[[Figure, Path], object] = save) -> None:
@@ -131,9 +127,11 @@ class Study:
             If the packing has no onset, or bears none of the loads.
         """
         self.check(scene)
-        with shared_out() as share:
-            if share is None:
+        pool: Any
+        with hands(workers=1) as pool:
+            if MPI.COMM_WORLD.rank != 0:
                 return {}
+            share: Share = map if pool is None else partial(pool.map, unordered=True)
             make_folder(output)
             rows = Rows(output / f"{self.name}.jsonl", scene, self.beside)
             found = self.compute(scene, Work(rows, share, say, progress))

@@ -46,16 +46,9 @@ def append(path: Path, row: Mapping[str, Any]) -> None:
 
 
 class Rows:
-    """Lines of one scene in a file; lines of other scenes are left alone.
+    """Lines of one scene in a file, NAME.jsonl; lines of other scenes are left alone.
 
-    Parameters
-    ----------
-    path : Path
-        The file, NAME.jsonl. A last line that a crash cut short is taken off.
-    scene : Scene
-        Whose lines count.
-    beside : str
-        A section of the scene that may change without making lines of it worthless.
+    The section `beside` of the scene may change without making its lines worthless.
     """
 
     def __init__(self, path: Path, scene: Scene, beside: str) -> None:

@@ -49,13 +49,7 @@ def between(value: float, draws: Sequence[float] | Floats) -> dict[str, float]:
 
 
 def lowers(strong: Mapping[str, Any], weak: Mapping[str, Any]) -> bool | None:
-    """Whether the second of two ramps has the lower onset; None if either may have it.
-
-    Parameters
-    ----------
-    strong, weak : mapping
-        "ends", how the ramp ends, "onset" or else, and "reach", the largest F_x up to which there is no window.
-    """
+    """Whether the second of two ramps, "ends" and "reach", has the lower onset; None if either may have it."""
     if weak["ends"] == "onset" and weak["reach"] < strong["reach"]:
         return True
     # the weak one has none up to there, or a later one
@@ -103,12 +97,9 @@ def quartiles(reach: ArrayLike, found: ArrayLike) -> list[float | None]:
 
 
 def median_interval(reach: ArrayLike, found: ArrayLike, draws: int = 2000, seed: int = 0) -> list[float | None]:
-    """Median of F_x^c and its 95 % interval from resampled packings; None where it lies beyond what the ramps reached.
+    """Median of F_x^c with lower and upper end of its 95 % interval from resampled packings.
 
-    Returns
-    -------
-    list of float or None
-        Median, lower and upper end.
+    None stands for what lies beyond what the ramps reached.
     """
     reach, found = np.asarray(reach, dtype=float), np.asarray(found, dtype=bool)
     ends: list[float | None] = [None, None]

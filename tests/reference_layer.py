@@ -8,6 +8,15 @@ BIN = Path(sys.executable).parent
 
 REFERENCE = Path(__file__).parent / "reference" / "packing7.json"
 
+
+def toml(scene, prefix=""):
+    """A scene as the text of a TOML file, each section with a prefix to its name."""
+    return "".join(
+        f"[{prefix}{name}]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in section.items())
+        for name, section in scene.items()
+    )
+
+
 LAYER = f"""
 [packing]
 file = "{REFERENCE}"
@@ -29,24 +38,8 @@ impact_velocity = "1 m/s"
 """
 """Of quartz spheres."""
 
-BEYOND_ITS_ONSET = f"""{LAYER}
-[ramp]
-step = 6e-3
-until = 0.024
-[perturb]
-fx = 0.024
-time = 1.0
-"""
+BEYOND_ITS_ONSET = LAYER + toml({"ramp": {"step": 6e-3, "until": 0.024}, "perturb": {"fx": 0.024, "time": 1.0}})
 """A ramp in four steps through the onset, 0.0218, and an undamped run from its end."""
-
-
-def toml(scene, prefix=""):
-    """A scene as the text of a TOML file, each section with a prefix to its name."""
-    return "".join(
-        f"[{prefix}{name}]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in section.items())
-        for name, section in scene.items()
-    )
-
 
 SMALL = {
     "packing": {"disks": 30, "top": 5, "width": 6.0},

@@ -7,6 +7,7 @@ its length. One flipped byte anywhere is then noticed. HDF5 looks for its superb
 """
 
 import hashlib
+import json
 import os
 from pathlib import Path
 
@@ -59,6 +60,11 @@ def write_whole(path: Path, *parts: bytes) -> None:
 def write_text(path: Path, text: str) -> None:
     """Replace a text file, in one step; errors as those of `write_whole`."""
     write_whole(path, text.encode())
+
+
+def write_json(path: Path, value: object) -> None:
+    """Replace a JSON file, in one step; errors as those of `write_whole`."""
+    write_text(path, json.dumps(value, indent=1) + "\n")
 
 
 def check_folder(path: Path) -> None:

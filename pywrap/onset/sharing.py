@@ -1,40 +1,12 @@
-"""Work that is shared out over ranks.
-
-Of several ranks one hands out independent pieces, and the others take them one by one (:func:`shared_out`). Or all take
-their part of the same search (:func:`searching`).
-"""
+"""A search that all ranks share."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from functools import partial
-from typing import Any
 
 from mpi4py import MPI
-from mpi4py.futures import MPICommExecutor
 
 from ...analysis.onset import Ranks
-
-Share = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
-
-Say = Callable[[str], None]
-"""Takes a line of progress."""
-
-Progress = Callable[[Iterable[Any], int], Iterable[Any]]
-"""Takes results as they end and their number, and hands them on."""
-
-
-@contextmanager
-def shared_out() -> Iterator[Share | None]:
-    """A function like `map`, whose results come as they end, in any order; None on the ranks that work for another."""
-    if MPI.COMM_WORLD.size == 1:
-        yield map
-        return
-    pool: Any
-    with MPICommExecutor(MPI.COMM_WORLD) as pool:
-        yield None if pool is None else partial(pool.map, unordered=True)
 
 
 def searching() -> Ranks:

@@ -25,18 +25,10 @@ WORDS = {
 
 @styled
 def size_figure(runs: list[dict[str, Any]]) -> Figure:
-    """Sizes over the load.
+    """Sizes over the load, of the runs of eruptions.json.
 
-    Parameters
-    ----------
-    runs : list of dict
-        Those of eruptions.json.
-
-    Returns
-    -------
-    Figure
-        The largest D, the largest displacement of the layer squared, and contacts that are open or slide at the most,
-        over F_x. The markers of D say what ended the growth; open ones are damped runs.
+    The largest D, the largest displacement of the layer squared, and contacts that are open or slide at the most, over
+    F_x. The markers of D say what ended the growth; open ones are damped runs.
     """
     figure = Figure(figsize=(3.4, 4.2), layout="constrained")
     sizes, contacts = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))

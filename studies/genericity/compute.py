@@ -9,8 +9,9 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from ...analysis.files.wholefile import write_text
-from ..sweep.compute import LINES, Progress, Say, run_sweep, stored
+from ...analysis.files.wholefile import write_json
+from ..hands import Progress, Say
+from ..sweep.compute import LINES, run_sweep, stored
 from .sets import SHARES, sets
 
 
@@ -21,17 +22,7 @@ def compute(
     share: float = 1.0,
     workers: int | None = 1,
 ) -> None:
-    """Compute what is missing of all sweeps.
-
-    Parameters
-    ----------
-    output : Path
-        The folder.
-    say, progress, workers
-        As of `run_sweep`.
-    share : float
-        Of the packings of each set.
-    """
+    """Compute what is missing of all sweeps, with this share of the packings of each; the rest as of `run_sweep`."""
     for part in [*(each for each in SHARES if each < share), share]:
         for name, sweep in sets(part).items():
             say(f"{name}: {100 * part:.3g} % of the packings")
@@ -53,7 +44,7 @@ def record(output: Path) -> None:
         "rows": len(rows),
         "cpu_seconds": round(sum(row["cpu_seconds"] for row in rows)),
     }
-    write_text(path, json.dumps(made, indent=1) + "\n")
+    write_json(path, made)
 
 
 def _commit() -> str:

@@ -20,14 +20,9 @@ from .tables import Table
 
 @styled
 def onsets_figure(onsets: Table, predicted: Floats) -> Figure:
-    """Packings without an onset up to F_x, by friction coefficient, and onsets at two of them.
+    """Packings of the first set without an onset up to F_x, by friction coefficient, and onsets at two of them.
 
-    Parameters
-    ----------
-    onsets : Table
-        The first set.
-    predicted : ndarray
-        F_0 of packings of 100 disks, force per disk of the layer.
+    Beside them what follows from F_0 of packings of 100 disks, `predicted`, force per disk of the layer.
     """
     figure = Figure(figsize=(6.8, 3.1), layout="constrained")
     left, right = figure.subplots(1, 2)

@@ -22,15 +22,7 @@ DRAWS = 300
 
 
 def size_law(disks: Floats, reach: Floats, found: Bools) -> dict[str, Any]:
-    """The exponent p of F_0 = c N^-p and the shape k, each with its interval.
-
-    Parameters
-    ----------
-    disks : ndarray, shape (M,)
-        N of each packing.
-    reach, found : ndarray, shape (M,)
-        As of `statistics.distribution`.
-    """
+    """The exponent p of F_0 = c N^-p and the shape k, each with its interval; N of each packing is in `disks`, (M,)."""
     return _with_intervals(np.log(disks), reach, found, {"exponent": (1, -1.0), "shape": (2, None)}) | {
         "packings": len(reach)
     }

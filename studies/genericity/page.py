@@ -18,19 +18,9 @@ from .tables import Table
 
 
 def write_page(folder: Path, say: Callable[[str], None] = print) -> Path:
-    """Write genericity.md, genericity.json and the pictures from the tables of a folder.
+    """Write genericity.md, genericity.json and the pictures from the tables of a folder, SET/results.csv.
 
-    Parameters
-    ----------
-    folder : Path
-        With a folder for each set, and results.csv in each.
-    say : callable
-        Told of a picture that could not be drawn.
-
-    Returns
-    -------
-    Path
-        The page.
+    Returns the path of the page; `say` is told of a picture that could not be drawn.
     """
     tables = read_tables(folder)
     found = numbers(tables)

@@ -20,7 +20,7 @@ All are searched as the packing is, up to the same load.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -53,9 +53,11 @@ def surrogates(scene: Scene, start: Start) -> dict[str, Any]:
         "random": _first(lambda fx: csr_array(drawn.at(fx)), steps, narrowest),
     }
     rest = start(scene.law.mus[0])
-    shuffle = Shuffle(rest.packing, np.random.default_rng(seed))
+    names = _names(force_bearing(rest.packing))
+    order = np.random.default_rng(seed).permutation(len(names)).tolist()
+    instead = {name: names[k] for name, k in zip(names, order, strict=True)}
     with path_from(rest, scene) as path:
-        return row | {"shuffled": _first(lambda fx: shuffle(path(fx)), steps, narrowest)}
+        return row | {"shuffled": _first(lambda fx: shuffled(path(fx), instead), steps, narrowest)}
 
 
 def _first(operator: Callable[[float], csr_array], steps: Floats, narrowest: float) -> dict[str, Any]:
@@ -71,15 +73,7 @@ def _first(operator: Callable[[float], csr_array], steps: Floats, narrowest: flo
 
 
 def randomized(pencil: Pencil, generator: np.random.Generator) -> Pencil:
-    """The pencil with spacings and couplings permuted among neighbouring levels, and random signs.
-
-    Parameters
-    ----------
-    pencil : Pencil
-        That of a packing.
-    generator : numpy.random.Generator
-        Decides.
-    """
+    """A packing's pencil with spacings and couplings permuted among neighbouring levels, and random signs."""
     gaps = np.diff(pencil.values)
     blocks = [slice(k, k + BLOCK) for k in range(0, len(gaps), BLOCK)]
     for block in blocks:
@@ -112,32 +106,16 @@ def _above(i: int, j: int, size: int) -> tuple[Any, Any]:
     return rows[above], columns[above]
 
 
-class Shuffle:
-    """The operator of a packing with the antisymmetric parts of its contacts permuted.
-
-    Parameters
-    ----------
-    rest : Packing
-        Whose contacts between disks are permuted.
-    generator : numpy.random.Generator
-        Decides.
-    """
-
-    def __init__(self, rest: Packing, generator: np.random.Generator) -> None:
-        names = _names(force_bearing(rest))
-        order = generator.permutation(len(names))
-        self.source = {name: names[k] for name, k in zip(names, order.tolist(), strict=True)}
-
-    def __call__(self, packing: Packing) -> csr_array:
-        """A of the packing with the permuted antisymmetric part in place of its own, 1 / time^2."""
-        packing = force_bearing(packing)
-        own = mass_weighted(stiffness_matrix(packing), packing)
-        symmetric = csr_array(0.5 * (own + own.T))
-        names = _names(packing)
-        place = {name: k for k, name in enumerate(names)}
-        source = np.array([place.get(self.source.get(name, name), k) for k, name in enumerate(names)], dtype=int)
-        every = np.concatenate([source, np.arange(len(names), len(packing.contacts))])
-        return csr_array(symmetric + mass_weighted(antisymmetric_part(packing, every), packing))
+def shuffled(packing: Packing, instead: Mapping[tuple[int, int], tuple[int, int]]) -> csr_array:
+    """A of a packing, 1 / time^2, in which each contact has the antisymmetric part of another one of its own."""
+    packing = force_bearing(packing)
+    own = mass_weighted(stiffness_matrix(packing), packing)
+    symmetric = csr_array(0.5 * (own + own.T))
+    names = _names(packing)
+    place = {name: k for k, name in enumerate(names)}
+    source = np.array([place.get(instead.get(name, name), k) for k, name in enumerate(names)], dtype=int)
+    every = np.concatenate([source, np.arange(len(names), len(packing.contacts))])
+    return csr_array(symmetric + mass_weighted(antisymmetric_part(packing, every), packing))
 
 
 def _names(packing: Packing) -> list[tuple[int, int]]:

@@ -11,7 +11,8 @@ from ...figures.style import save, spared
 from ...figures.writers import write_film
 from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.refusals import read_toml
-from ..sweep.compute import Progress, Row, Say, run_sweep
+from ..hands import Progress, Say
+from ..sweep.compute import Row, run_sweep
 from ..sweep.points import Sweep
 from ..sweep.table import write_csv
 from ..sweep.tasks import TASKS

@@ -23,7 +23,7 @@ from ...pywrap.onset.undamped import OnsetRun, onset_run
 from ...pywrap.runs.undamped import perturb, time_step
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Perturb
-from ..triggering.compute import Triggering, equilibrium_at, trigger
+from ..triggering.compute import Triggering, equilibrium_at, series_of, trigger
 
 EFOLDS = 48.0
 """Length of the undamped run in units of 1/rate: D grows by up to 20 decades in it."""
@@ -129,8 +129,9 @@ def growth_run(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
             samples.append(sample)
             if sample.msd > 1e6 * ceiling:
                 break
-        file.append_series("undamped", **{key: [getattr(s, key) for s in samples] for key in vars(samples[0])})
-    time, msd = np.array([s.time for s in samples]), np.array([s.msd for s in samples])
+        series = series_of(samples)
+        file.append_series("undamped", **series)
+    time, msd = series["time"], series["msd"]
     try:
         measured = fit_growth(time, msd, *_growing(msd, ceiling))
     except ValueError:

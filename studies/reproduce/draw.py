@@ -30,19 +30,8 @@ def figures(curves: Sequence[PairCurve], growth: GrowthRun) -> Figures:
 def growth_figure(time: Floats, msd: Floats, rate: float, fitted: Growth) -> Figure:
     """The mean square displacement that grows out of rounding noise (the paper's figure 4).
 
-    Parameters
-    ----------
-    time, msd : ndarray, shape (n,)
-        D(t), length^2; what is not positive is not drawn.
-    rate : float
-        2 |Im omega| of the fastest growing pair, 1 / time.
-    fitted : Growth
-        The exponential growth that was measured.
-
-    Returns
-    -------
-    Figure
-        D on a logarithmic axis; beside it, a decade and a half above, the slope that the spectrum predicts.
+    D(t), length^2, on a logarithmic axis where it is positive; beside it, a decade and a half above, the slope that the
+    spectrum predicts: `rate`, 2 |Im omega| of the fastest growing pair, 1 / time.
     """
     figure = Figure(figsize=(3.4, 2.7), layout="constrained")
     axes = figure.add_subplot()

@@ -13,13 +13,15 @@ from typing import Any
 import numpy as np
 
 from ...analysis.digits import with_uncertainty
+from ...analysis.files.wholefile import write_json
 from ...figures.pages import lines
 from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.refusals import needed
-from ..frame import draw_all, write_json
+from ..frame import draw_all
+from ..hands import Progress, Say
 from ..statistics import quartiles, share
-from ..sweep.compute import Progress, Row, Say, run_sweep
+from ..sweep.compute import Row, run_sweep
 from ..sweep.points import Sweep
 from ..sweep.tasks import TASKS
 from ..sweep.triggering import economical, frictions, grows, rise

@@ -17,20 +17,12 @@ from ..sweep.triggering import Row, grows, rise
 
 @styled
 def ensemble_figure(found: Sequence[Row]) -> Figure:
-    """Onsets of an ensemble, both friction coefficients against each other, and the rise of D.
+    """Results of the task "triggering"; packings without any ramp are not drawn.
 
-    Parameters
-    ----------
-    found : sequence of dict
-        Results of the task "triggering"; packings without any ramp are not drawn.
-
-    Returns
-    -------
-    Figure
-        Panel (a) the share of packings with an onset up to F_x, for each friction coefficient, with ticks where
-        packings are lost from sight without one; (b) the onset with the weakened friction over that with the
-        first, filled where D went on to grow after its jump, triangles where one of the two is only known to lie
-        beyond; (c) how many packings rose by how many decades, and how many controls.
+    Panel (a) the share of packings with an onset up to F_x, for each friction coefficient, with ticks where packings
+    are lost from sight without one; (b) the onset with the weakened friction over that with the first, filled where D
+    went on to grow after its jump, triangles where one of the two is only known to lie beyond; (c) how many packings
+    rose by how many decades, and how many controls.
     """
     figure = Figure(figsize=(3.4, 6.0), layout="constrained")
     onsets, pairs, rises = figure.subplots(3, 1, height_ratios=(1, 1.5, 1))

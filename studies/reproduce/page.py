@@ -21,20 +21,10 @@ def report(
     found: Triggering | str | None,
     another: list[OnsetRun] | None,
 ) -> str:
-    """report.md.
+    """report.md of ramps for each friction coefficient, the run above the onset, and the triggering below it.
 
-    Parameters
-    ----------
-    scene : Scene
-        What was run.
-    runs : list of OnsetRun
-        Ramp and onset for each friction coefficient.
-    growth : GrowthRun
-        The undamped run above the onset.
-    found : Triggering, str or None
-        The perturbation below the onset, or why there is nothing to trigger; None if no scene asks for it.
-    another : list of OnsetRun or None
-        Ramps and onsets of the packing that is triggered, if it is another one.
+    `found` is a sentence where there is nothing to trigger, and None if no scene asks for it; `another` has the ramps
+    of the packing that is triggered, if it is another one.
     """
     order = sorted(runs, key=lambda run: run.mu)
     return render(

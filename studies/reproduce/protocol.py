@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from ...analysis.digits import with_uncertainty
-from ...analysis.files.wholefile import make_folder, write_text
+from ...analysis.files.wholefile import make_folder, write_json, write_text
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
-from ..frame import draw_all, write_json
+from ..frame import draw_all
+from ..hands import Say
 from ..triggering.compute import summary as triggering_summary
 from ..triggering.draw import figures as triggering_figures
 from .compute import growth_run, pair_curve, recorded_ramp, summary_of, triggering_run
 from .draw import figures
 from .page import report
-
-Say = Callable[[str], None]
 
 
 def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | None = None) -> dict[str, Any]:

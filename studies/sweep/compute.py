@@ -10,24 +10,21 @@ point of this sweep are not computed again. A last line that a kill has cut is c
 from __future__ import annotations
 
 import fcntl
-import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import closing, contextmanager
 from pathlib import Path
 
 from mpi4py import MPI
 
-from ...analysis.files.wholefile import make_folder, write_text
+from ...analysis.files.wholefile import make_folder, write_json
 from ...pywrap import SceneError
 from .. import rows
+from ..hands import Progress, Say, hands
 from .examine import Row
 from .points import Sweep, shard
 from .table import write_tables
-from .workers import computed, hands
-
-Say = Callable[[str], None]
-Progress = Callable[[Iterator[Row], int], Iterable[Row]]
+from .workers import computed
 
 LINES, ASKED, LOCK = "results.jsonl", "sweep.json", "sweep.lock"
 
@@ -79,7 +76,7 @@ def run_sweep(
             return []
         make_folder(output)
         with _alone(output):
-            write_text(output / ASKED, json.dumps(sweep.as_dict() | {"shard": list(part)}, indent=1) + "\n")
+            write_json(output / ASKED, sweep.as_dict() | {"shard": list(part)})
             known = stored(output / LINES)
             missing = [point for point in points if point.key not in known]
             if len(missing) < len(points):

@@ -46,14 +46,8 @@ def reach_of(row: Row) -> Reach | None:
 def draw_pairs(axes: Axes, packings: Iterable[tuple[Row, Row, bool]], **style: Any) -> None:
     """Onsets with a smaller friction coefficient over those with a larger one; triangles where one lies beyond.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where.
-    packings : iterable of (row, row, bool)
-        How the ramps with the larger and the smaller one end, "ends" and "reach", and whether the marker is filled.
-    **style
-        Of the markers.
+    Of each packing: how the ramps with the larger and the smaller one end, "ends" and "reach", and whether its marker,
+    which has this style, is filled.
     """
     for strong, weak, filled in packings:
         known = [end["ends"] == "onset" for end in (strong, weak)]
@@ -68,14 +62,7 @@ def draw_pairs(axes: Axes, packings: Iterable[tuple[Row, Row, bool]], **style: A
 def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
     """The share of scenes with an onset up to F_x, and the onsets over each swept key.
 
-    Parameters
-    ----------
-    found : sequence of (row, (F_x, whether it is the onset))
-        Forces per disk of the upper layer. Triangles stand where there is no onset up to there.
-
-    Returns
-    -------
-    Figure
+    Forces are per disk of the upper layer; triangles stand where there is no onset up to there.
     """
     keys = _varied([row for row, _ in found])
     figure = Figure(figsize=(3.4, 2.2 * (1 + len(keys))), layout="constrained")
@@ -98,14 +85,7 @@ def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
 def eruptions_figure(found: Sequence[tuple[Row, dict[str, float]]]) -> Figure:
     """The largest mean square displacement D of every run over its load, one colour a scene.
 
-    Parameters
-    ----------
-    found : sequence of (row, run)
-        Runs with "fx", force per disk of the upper layer, and "msd", length^2.
-
-    Returns
-    -------
-    Figure
+    A run has "fx", force per disk of the upper layer, and "msd", length^2.
     """
     figure = Figure(figsize=(3.4, 2.6), layout="constrained")
     axes = figure.add_subplot(xlabel="$F_x$", ylabel="largest $D$", yscale="log")

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...analysis.files.wholefile import make_folder, write_text
+from ...analysis.files.wholefile import make_folder, write_json, write_text
 from ...pywrap import SceneError
-from .compute import ASKED, LINES, Say, stored
+from ..hands import Say
+from .compute import ASKED, LINES, stored
 from .points import Sweep
 from .table import Row, write_tables
 from .tasks import TASKS
@@ -53,7 +54,7 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> list[Row]:
         known |= stored(part / LINES)
     rows = [known[point.key] for point in sweep.points if point.key in known]
     make_folder(output)
-    write_text(output / ASKED, json.dumps(sweep.as_dict() | {"shard": [1, 1]}, indent=1) + "\n")
+    write_json(output / ASKED, sweep.as_dict() | {"shard": [1, 1]})
     write_text(output / LINES, "".join(json.dumps(row) + "\n" for row in rows))
     write_tables(rows, sweep.names, output)
     say(f"{len(rows)} of {len(sweep.points)} scenes from {len(parts)} folders; written: {output}/results.csv")

@@ -88,16 +88,9 @@ def first_window(path: EquilibriumPath, scene: Scene) -> tuple[Ends, float, Onse
 
 
 def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
-    """The pair of modes that meets next to an eigenvalue, and the contacts of the packing.
+    """The pair of modes that meets next to an eigenvalue, 1 / time^2, and the contacts of a packing.
 
-    Parameters
-    ----------
-    packing : Packing
-        Just below the onset.
-    rest : Packing
-        At F_x = 0.
-    eigenvalue : float
-        Where the two meet, 1 / time^2.
+    The packing is just below the onset, and `rest` the one at F_x = 0.
     """
     near = eigenpairs(force_bearing(packing), eigenvalue * (1 + 1e-6), 2)
     vector = near.right[:, 0].real / np.linalg.norm(near.right[:, 0].real)

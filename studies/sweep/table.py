@@ -31,17 +31,7 @@ def flat(result: Mapping[str, Any], above: str = "") -> dict[str, Any]:
 
 
 def write_tables(rows: list[Row], names: list[str], folder: Path) -> None:
-    """Write results.csv, and results.parquet if pandas and a writer of Parquet are there.
-
-    Parameters
-    ----------
-    rows : list of dict
-        In the order of the table.
-    names : list of str
-        The swept keys.
-    folder : Path
-        Where.
-    """
+    """Write rows in the order of the table, with the swept keys by name: results.csv, results.parquet if it can be."""
     found = dict.fromkeys([*names, *(name for row in rows for name in flat(row["result"]))])
     columns = [*(name for name in found if name != "says"), "says"]
     table = [row["values"] | flat(row["result"]) | {"says": row["says"]} for row in rows]

@@ -27,7 +27,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError, Packing, spectrum
-from ...pywrap import Engine, Equilibrium, Sample, Scene
+from ...pywrap import Engine, Equilibrium, Scene
 from ...pywrap.lammps.dynamics import Weakening
 from ...pywrap.onset.path_error import with_path_error
 from ...pywrap.runs.path import EquilibriumPath
@@ -36,7 +36,7 @@ from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction, Perturb
 from ..packings import Start
 from ..statistics import lowers
-from ..triggering.compute import GROWTH_FACTOR, calibrated, equilibrium_at, jump, largest
+from ..triggering.compute import GROWTH_FACTOR, Series, calibrated, equilibrium_at, jump, largest, series_of
 from .onset import first_window
 
 Row = dict[str, Any]
@@ -160,10 +160,10 @@ def eruption(
     loads = middle, max(0.0, 2 * window[0] - middle)
     start, below = (equilibrium_at(scene, path, fx, MPI.COMM_SELF) for fx in loads)
 
-    def run(start: Equilibrium, amplitude: float, weakening: Weakening | None = None) -> tuple[Sample, ...]:
+    def run(start: Equilibrium, amplitude: float, weakening: Weakening | None = None) -> Series:
         changes = {"fx": start.fx, "amplitude": amplitude}
         one = scene.model_copy(update={"perturb": settings.model_copy(update=changes)})
-        return tuple(perturb(one, start, communicator=MPI.COMM_SELF, weakening=weakening))
+        return series_of(perturb(one, start, communicator=MPI.COMM_SELF, weakening=weakening))
 
     quiet = run(start, 0.0)
     weakening = calibrated(friction, quiet)

@@ -1,4 +1,4 @@
-"""Who computes the points of a sweep: this process, processes beside it, ranks of mpiexec, or anybody's executor.
+"""The points of a sweep in the hands of workers.
 
 Points that settle alike share the settled packing: the first of them is handed out alone, and the others with the
 packing that it brought back. As the packing is the same to the bit wherever it was settled, no row depends on the
@@ -7,22 +7,13 @@ workers. A worker that is killed takes nothing with it: what it had in hand is h
 
 from __future__ import annotations
 
-import os
-import signal
-import sys
 from collections import defaultdict, deque
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
-from multiprocessing import get_context, resource_tracker
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from typing import Any
 
-from mpi4py import MPI
-from mpi4py.futures import MPICommExecutor
-
 from ...analysis import FaultgougeError, Packing
-from ...analysis.onset.ranks import cores
-from ...parent import end_with
+from ..hands import Processes
 from .examine import Row, examined
 from .points import Point
 
@@ -32,72 +23,6 @@ TRIES = 3
 
 class WorkerError(FaultgougeError):
     """Workers are killed again and again."""
-
-
-class Processes(Executor):
-    """Processes of this machine, each with an interpreter of its own; all of them end with this process.
-
-    Parameters
-    ----------
-    number : int
-        Of processes.
-    """
-
-    def __init__(self, number: int) -> None:
-        self._number = number
-        self._pool = self._started()
-
-    def _started(self) -> ProcessPoolExecutor:
-        # the tracker would warn of semaphores where this process is killed; it frees them all the same
-        sys.warnoptions.append("ignore:resource_tracker:UserWarning")
-        resource_tracker.ensure_running()
-        sys.warnoptions.pop()
-        # no fork: MPI and LAMMPS do not survive one
-        pool = ProcessPoolExecutor(self._number, get_context("spawn"), initializer=end_with, initargs=(os.getpid(),))
-        # Ctrl-C is for this process alone, with which the others end: they inherit that SIGINT is blocked
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-        pool.submit(os.getpid)
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        return pool
-
-    def renew(self) -> None:
-        """Start other processes in place of these, of which one has been killed."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        self._pool = self._started()
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        return self._pool.submit(fn, *args, **kwargs)
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        self._pool.shutdown(wait, cancel_futures=cancel_futures)
-
-
-@contextmanager
-def hands(workers: int | None, executor: Executor | None) -> Iterator[Executor | None]:
-    """An executor for the points of a sweep; None where this process computes by itself, or works for another rank.
-
-    Parameters
-    ----------
-    workers : int or None
-        Processes; None: as many as there are cores. Ranks of mpiexec take their place.
-    executor : Executor or None
-        In place of all of these. It is not shut down.
-    """
-    number = cores() if workers is None else workers
-    if executor is not None:
-        yield executor
-    elif MPI.COMM_WORLD.size > 1:
-        ranks: Any
-        with MPICommExecutor(MPI.COMM_WORLD) as ranks:
-            yield ranks
-    elif number < 2:
-        yield None
-    else:
-        processes = Processes(number)
-        try:
-            yield processes
-        finally:
-            processes.shutdown(wait=False, cancel_futures=True)
 
 
 def computed(pool: Executor | None, task: str, points: Sequence[Point]) -> Generator[Row, None, None]:

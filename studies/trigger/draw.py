@@ -17,17 +17,9 @@ WAVE = {"layer": "amplitude of the force $a$", "floor": "acceleration of the flo
 
 @styled
 def map_figure(result: dict[str, Any]) -> Figure:
-    """The critical amplitude over frequency and distance from the onset.
+    """The critical amplitude over frequency and distance from the onset, of what trigger.json holds.
 
-    Parameters
-    ----------
-    result : dict
-        What trigger.json holds.
-
-    Returns
-    -------
-    Figure
-        Colours from K; circles where LAMMPS was asked, in the colour of its own answer.
+    Colours are from K; there are circles where LAMMPS was asked, in the colour of its own answer.
     """
     distance, omega, amplitude = _grid(result["map"])
     figure = Figure(figsize=(3.4, 2.6), layout="constrained")
@@ -53,18 +45,10 @@ def map_figure(result: dict[str, Any]) -> Figure:
 
 @styled
 def threshold_figure(result: dict[str, Any]) -> Figure:
-    """The critical amplitude over the frequency, a curve for each distance from the onset.
+    """The critical amplitude over the frequency, a curve for each distance from the onset, of what trigger.json holds.
 
-    Parameters
-    ----------
-    result : dict
-        What trigger.json holds.
-
-    Returns
-    -------
-    Figure
-        Lines from K with the transient, dotted ones of the stationary motion alone at the smallest distance; triangles
-        are runs of LAMMPS that did (upwards) and did not (downwards) trigger.
+    Lines are from K with the transient, dotted ones of the stationary motion alone at the smallest distance; triangles
+    are runs of LAMMPS that did (upwards) and did not (downwards) trigger.
     """
     distance, omega, amplitude = _grid(result["map"])
     figure = Figure(figsize=(3.4, 2.9), layout="constrained")

@@ -16,7 +16,7 @@ Closer and closer to the onset, the response of the pair that is about to coales
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...analysis import Growth, RunFile, fit_growth
+from ...analysis import RunFile, fit_growth
 from ...analysis.motion.power_law import PowerLaw, fit_power_law
 from ...analysis.motion.response import Response, layer_force, linear_response
 from ...analysis.onset.pair_form import PairForm, pair_forms
@@ -62,6 +62,10 @@ COMPARED_TIME = 50.0
 """Length of that run, time: a few hundred periods of the pair."""
 
 
+Series = dict[str, Floats]
+"""What a run yields, one array a field of `Sample`, shape (T,)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Triggering:
     """Three undamped runs from one equilibrium.
@@ -74,11 +78,11 @@ class Triggering:
         Linearly stable.
     weakening : Weakening
         mu(v), with v_0 the largest velocity of the unperturbed run.
-    unperturbed, perturbed, erupting : tuple of Sample
+    unperturbed, perturbed, erupting : dict
         Without perturbation, with it, and with it and mu(v).
-    control : tuple of Sample or None
+    control : dict or None
         As the last, at a force where the packing is stable with the weakened friction, too; None if none is known.
-    strong : tuple of Sample
+    strong : dict
         With a perturbation `ABOVE_NOISE` as strong, for a shorter time: its D stands out of the noise of doubles and is
         compared with the linear response.
     response : Response
@@ -92,50 +96,20 @@ class Triggering:
     scene: Scene
     start: Equilibrium
     weakening: Weakening
-    unperturbed: tuple[Sample, ...]
-    perturbed: tuple[Sample, ...]
-    erupting: tuple[Sample, ...]
-    control: tuple[Sample, ...] | None
-    strong: tuple[Sample, ...]
+    unperturbed: Series
+    perturbed: Series
+    erupting: Series
+    control: Series | None
+    strong: Series
     response: Response
     foreseen: Forecast
     sensitive: Sensitivity
 
     @property
-    def deviation(self) -> float:
-        """Largest difference between D of the strong run and of the linear response, in units of the largest D."""
-        msd = column(self.strong, "msd")
-        return float(np.abs(msd - self.response.msd).max() / msd.max())
-
-    @property
-    def rise(self) -> float:
-        """Decades between the largest D of the perturbed run and of the one with mu(v)."""
-        return float(np.log10(largest(self.erupting) / largest(self.perturbed)))
-
-    @property
     def crossing(self) -> float | None:
         """The time at which the layer of the run with mu(v) first exceeds v_0, or None."""
-        faster = np.abs(column(self.erupting, "layer_velocity")) > self.weakening.v0
-        return float(column(self.erupting, "time")[np.argmax(faster)]) if faster.any() else None
-
-    @property
-    def growth(self) -> float:
-        """Decades between the jump and the largest D of the run with mu(v)."""
-        return float(np.log10(largest(self.erupting) / jump(self.erupting)))
-
-    @property
-    def fitted(self) -> Growth | None:
-        """Growth of D from ten times the jump to a tenth of its largest value; None if there is no decade between."""
-        time, msd = column(self.erupting, "time"), column(self.erupting, "msd")
-        try:
-            return fit_growth(time, msd, 10 * jump(self.erupting), 0.1 * float(msd.max()))
-        except ValueError:
-            return None
-
-    @property
-    def grows(self) -> bool:
-        """Whether D goes on to grow after its jump."""
-        return bool(self.growth >= np.log10(GROWTH_FACTOR))
+        faster = np.abs(self.erupting["layer_velocity"]) > self.weakening.v0
+        return float(self.erupting["time"][np.argmax(faster)]) if faster.any() else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,26 +141,26 @@ class Sensitivity:
         return tuple(pair for pair in self.pairs if pair.amplitude() >= LEAST_CROSSOVER)
 
 
-def column(samples: tuple[Sample, ...], name: str) -> Floats:
-    """One quantity of a time series, shape (T,)."""
-    return np.array([getattr(sample, name) for sample in samples])
+def series_of(samples: Iterable[Sample]) -> Series:
+    """What a run yields, as arrays of shape (T,)."""
+    rows = [vars(sample) for sample in samples]
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
-def largest(samples: tuple[Sample, ...]) -> float:
+def largest(run: Series) -> float:
     """The largest D of a run, length^2."""
-    return float(column(samples, "msd").max())
+    return float(run["msd"].max())
 
 
-def calibrated(friction: Friction, unperturbed: tuple[Sample, ...]) -> Weakening:
+def calibrated(friction: Friction, unperturbed: Series) -> Weakening:
     """mu(v) with the v_0 of the scene, or with the largest velocity of the layer in an unperturbed run."""
-    v0 = np.abs(column(unperturbed, "layer_velocity")).max() if isinstance(friction.v0, str) else friction.v0
+    v0 = np.abs(unperturbed["layer_velocity"]).max() if isinstance(friction.v0, str) else friction.v0
     return weakening_of(friction, float(v0))
 
 
-def jump(samples: tuple[Sample, ...]) -> float:
+def jump(run: Series) -> float:
     """The largest D in the first `JUMP_SHARE` of a run, length^2."""
-    time, msd = column(samples, "time"), column(samples, "msd")
-    return float(msd[time <= JUMP_SHARE * time[-1]].max())
+    return float(run["msd"][run["time"] <= JUMP_SHARE * run["time"][-1]].max())
 
 
 def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: OnsetRun, path: Path) -> Triggering:
@@ -214,12 +188,12 @@ def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: O
         time: float = settings.time,
         start: Equilibrium = start,
         early: int = EARLY,
-    ) -> tuple[Sample, ...]:
+    ) -> Series:
         one = settings.model_copy(update={"amplitude": amplitude, "time": time})
-        samples = tuple(perturb(scene.model_copy(update={"perturb": one}), start, early=early, weakening=weakening))
+        series = series_of(perturb(scene.model_copy(update={"perturb": one}), start, early=early, weakening=weakening))
         with RunFile(path, "a") as file:
-            file.append_series(name, **{key: column(samples, key) for key in vars(samples[0])})
-        return samples
+            file.append_series(name, **series)
+        return series
 
     unperturbed = run("unperturbed", 0.0, early=200)  # as `perturb` calibrates v_0
     weakening = calibrated(friction, unperturbed)
@@ -230,7 +204,7 @@ def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: O
     strong = run("strong", amplitude, time=min(settings.time, COMPARED_TIME))
     response = linear_response(
         packing,
-        column(strong, "time"),
+        strong["time"],
         force=layer_force(packing, amplitude),
         omega=settings.omega or 0.0,
         dt=time_step(packing, settings.time_step),
@@ -263,24 +237,33 @@ def sensitivity(run: OnsetRun) -> Sensitivity:
 
 def summary(triggering: Triggering) -> dict[str, Any]:
     """Numbers for summary.json."""
-    sensitive = triggering.sensitive
-    runs = ("unperturbed", "perturbed", "erupting")
+    sensitive, erupting, strong = triggering.sensitive, triggering.erupting, triggering.strong["msd"]
+    most = {name: largest(getattr(triggering, name)) for name in ("unperturbed", "perturbed", "erupting")}
+    growth = float(np.log10(most["erupting"] / jump(erupting)))
     return {
         "fx": triggering.start.fx,
         "v0": triggering.weakening.v0,
         "v_ss": triggering.weakening.v_ss,
-        "largest_D": {name: largest(getattr(triggering, name)) for name in runs},
-        "rise_in_decades": triggering.rise,
-        "jump": jump(triggering.erupting),
-        "grows_after_the_jump": triggering.grows,
-        "growth_in_decades": triggering.growth,
-        "growth_after_the_jump": None if triggering.fitted is None else asdict(triggering.fitted),
+        "largest_D": most,
+        "rise_in_decades": float(np.log10(most["erupting"] / most["perturbed"])),
+        "jump": jump(erupting),
+        "grows_after_the_jump": bool(growth >= np.log10(GROWTH_FACTOR)),
+        "growth_in_decades": growth,
+        "growth_after_the_jump": _fitted(erupting),
         "forecast": asdict(triggering.foreseen),
         "largest_D_of_the_control": None if triggering.control is None else largest(triggering.control),
-        "linear_response_deviation": triggering.deviation,
-        "smallest_mu": float(column(triggering.erupting, "friction").min()),
+        "linear_response_deviation": float(np.abs(strong - triggering.response.msd).max() / strong.max()),
+        "smallest_mu": float(erupting["friction"].min()),
         "amplitude_exponent": sensitive.fit.exponent,
         "amplitude_exponent_error": sensitive.fit.error,
         "distances": [float(sensitive.distance.min()), float(sensitive.distance.max())],
         "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in sensitive.near],
     }
+
+
+def _fitted(run: Series) -> dict[str, float] | None:
+    """Growth of D from ten times the jump to a tenth of its largest value; None if there is no decade between."""
+    try:
+        return asdict(fit_growth(run["time"], run["msd"], 10 * jump(run), 0.1 * largest(run)))
+    except ValueError:
+        return None

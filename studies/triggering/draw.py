@@ -27,7 +27,7 @@ from ...figures.series import draw_series, few_decades, positive, scientific
 from ...figures.style import INK, styled
 from ...pywrap.lammps.dynamics import Weakening
 from ..frame import Figures
-from .compute import Sensitivity, Triggering, column
+from .compute import Sensitivity, Triggering
 
 Course = tuple[Floats, Floats]
 """Times, and D at these, length^2."""
@@ -41,17 +41,16 @@ DAMPING = np.geomspace(1e-2, 1e2, 33)
 def figures(found: Triggering) -> Figures:
     """The paper's figures 2, 5 and 6, and three of the response: in time, over the distance from the onset, and over
     damping."""
-    weak, mu, near = found.weakening, found.start.packing.law.mu, found.sensitive.near
+    weak, mu, near, erupting = found.weakening, found.start.packing.law.mu, found.sensitive.near, found.erupting
     names = ("unperturbed", "perturbed", "erupting", "control", "strong")
     series = {name: getattr(found, name) for name in names if getattr(found, name) is not None}
-    runs = {name: (column(run, "time"), column(run, "msd")) for name, run in series.items()}
-    speed, friction = (column(found.erupting, name) for name in ("layer_velocity", "friction"))
+    runs = {name: (run["time"], run["msd"]) for name, run in series.items()}
     three = runs["unperturbed"], runs["perturbed"], runs["erupting"]
     chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, 4).astype(int))] if near else []
     return {
         "figure2": lambda: friction_law_figure(replace(weak, v0=0.0, v_ss=1.0), mu),
         "figure5a": lambda: eruption_figure(*three, runs.get("control"), found.crossing),
-        "figure5b": lambda: weakening_figure(np.abs(speed), friction, weak, mu),
+        "figure5b": lambda: weakening_figure(np.abs(erupting["layer_velocity"]), erupting["friction"], weak, mu),
         "figure6": measured_friction_figure,
         "response": lambda: response_figure(runs["strong"], found.response.msd),
         "amplitude": lambda: amplitude_figure(found.sensitive),
@@ -68,20 +67,9 @@ def eruption_figure(
 ) -> Figure:
     """D(t) below the onset: left alone, perturbed, and perturbed with weakening friction (the paper's figure 5a).
 
-    Parameters
-    ----------
-    unperturbed, perturbed, weakening : Course
-        The three runs, of the same packing. What is not positive is not drawn.
-    control : Course, optional
-        The last at a load where the packing is stable with the weakened friction, too.
-    crossing : float, optional
-        When the layer first exceeds v_0, marked.
-
-    Returns
-    -------
-    Figure
-        D on a logarithmic axis; the left panel has a logarithmic axis of time, for the jump, and the right one a linear
-        axis, for the growth after it.
+    The control is the last of the three at a load where the packing is stable with the weakened friction, too; the
+    crossing is when the layer first exceeds v_0. The left panel has a logarithmic axis of time, for the jump, and the
+    right one a linear axis, for the growth after it; D that is not positive is not drawn.
     """
     figure = Figure(figsize=(3.4, 2.7), layout="constrained")
     early, late = figure.subplots(1, 2, sharey=True)
@@ -94,8 +82,7 @@ def eruption_figure(
         curves.insert(1, (control, CONTROL, r"$\mu(v)$ below both onsets"))
     for axes in (early, late):
         for run, colour, name in curves:
-            time, msd = positive(*run)
-            draw_series(time, msd, axes, label=name, color=colour)
+            draw_series(*run, axes, label=name, color=colour)
         if crossing is not None:
             axes.axvline(crossing, color=INK, linewidth=0.6, linestyle=":")
     if crossing is not None:
@@ -135,15 +122,7 @@ def share(law: Weakening, velocity: ArrayLike) -> Floats:
 
 @styled
 def friction_law_figure(law: Weakening, mu_0: float) -> Figure:
-    """The law mu(v) (the paper's figure 2).
-
-    Parameters
-    ----------
-    law : Weakening
-        The axis counts from its v_0, in units of its v_ss.
-    mu_0 : float
-        Static friction coefficient.
-    """
+    """The law mu(v) over v from v_0 on, in units of v_ss (the paper's figure 2)."""
     figure = Figure(layout="constrained")
     axes = figure.add_subplot(xlabel=r"$(v - v_0)/v_{ss}$", ylabel=r"$\mu(v)$")
     fall = 1 / law.w
@@ -163,23 +142,10 @@ def friction_law_figure(law: Weakening, mu_0: float) -> Figure:
 
 @styled
 def weakening_figure(velocity: ArrayLike, mu: ArrayLike, law: Weakening, mu_0: float) -> Figure:
-    """The friction coefficient that a run has gone through, over the velocity (the paper's figure 5b).
+    """The friction coefficient that a run has gone through, over the velocity, and its law (the paper's figure 5b).
 
-    Parameters
-    ----------
-    velocity : array_like, shape (n,)
-        Mean velocity of the upper layer, length / time. Where it is not positive, mu is mu_0 and nothing is drawn.
-    mu : array_like, shape (n,)
-        Friction coefficient of the run at the same times.
-    law : Weakening
-        The law with this run's v_0 and v_ss, as a line.
-    mu_0 : float
-        Static friction coefficient.
-
-    Returns
-    -------
-    Figure
-        The axis of velocities is logarithmic.
+    Both are of the same times, shape (n,). Where the mean velocity of the upper layer, length / time, is not positive,
+    mu is mu_0 and nothing is drawn: the axis is logarithmic.
     """
     velocity, mu = positive(velocity, mu)
     figure = Figure(layout="constrained")
@@ -238,18 +204,7 @@ def measured_friction_figure() -> Figure:
 
 @styled
 def amplitude_figure(found: Sensitivity) -> Figure:
-    """Response amplitude over the distance from the onset, with its exponent.
-
-    Parameters
-    ----------
-    found : Sensitivity
-        Amplitudes and their power law.
-
-    Returns
-    -------
-    Figure
-        Both axes logarithmic; points, and the fitted power law.
-    """
+    """Response amplitude over the distance from the onset, with the fitted power law."""
     figure = Figure(layout="constrained")
     axes = figure.add_subplot(xscale="log", yscale="log", ylabel="largest response / start")
     axes.set_xlabel("distance from the onset, $1 - F_x/F_x^c$")
@@ -265,18 +220,10 @@ def amplitude_figure(found: Sensitivity) -> Figure:
 
 @styled
 def damping_figure(pairs: Sequence[PairForm]) -> Figure:
-    r"""Response amplitude over the damping time: the crossover where tau_d = tau.
+    """Response amplitude over the damping time, of a pair at several distances from its coalescence.
 
-    Parameters
-    ----------
-    pairs : sequence of PairForm
-        The pair at several distances from the coalescence.
-
-    Returns
-    -------
-    Figure
-        Both axes logarithmic. Dotted lines are the undamped amplitudes, dots mark tau = tau_d, rings the damping
-        that takes half of the undamped amplitude. Strong damping leaves an amplitude that is the same for all epsilon.
+    Dotted lines are the undamped amplitudes, dots mark the crossover tau = tau_d, rings the damping that takes half of
+    the undamped amplitude. Strong damping leaves an amplitude that is the same for all epsilon.
     """
     figure = Figure(figsize=(3.4, 2.7), layout="constrained")
     axes = figure.add_subplot(xscale="log", yscale="log", ylabel="largest response / start")
@@ -314,19 +261,9 @@ def damping_figure(pairs: Sequence[PairForm]) -> Figure:
 
 @styled
 def response_figure(run: Course, linear: Floats) -> Figure:
-    """The linear response of a packing, from K, over the run of LAMMPS.
+    """D of the linear response of a packing, from K, at the times of a run of LAMMPS, over D of the run.
 
-    Parameters
-    ----------
-    run : Course
-        D(t) of the run.
-    linear : ndarray, shape (T,)
-        D of the linear response at the same times.
-
-    Returns
-    -------
-    Figure
-        Panel (a) both, panel (b) the difference in units of the largest D so far: D itself passes close to zero.
+    Panel (a) both, panel (b) the difference in units of the largest D so far: D itself passes close to zero.
     """
     time, msd = run
     figure = Figure(figsize=(3.4, 3.4), layout="constrained")

@@ -7,6 +7,8 @@ import sys
 import time
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 from reference_layer import BIN, LAYER, toml
 
@@ -227,8 +229,14 @@ def test_what_a_library_ends_is_said(tmp_path, ends, code, says):
 
 
 @pytest.mark.slow
-def test_the_work_ends_with_its_guard(tmp_path):
-    (tmp_path / "scene.toml").write_text(SCENE)
-    path, command = tmp_path / "run.h5", [BIN / "faultgouge", "ramp", "scene.toml"]
-    returned, *_ = interrupted(tmp_path, command, signal.SIGKILL, lambda: equilibria(path) > 1)
+def test_the_work_ends_with_its_guard_and_goes_on_to_the_bit(faultgouge, tmp_path):
+    (tmp_path / "scene.toml").write_text(LAYER + toml({"ramp": {"step": 1e-3, "until": 0.024}}))
+    killed, command = tmp_path / "killed.h5", [BIN / "faultgouge", "ramp", "scene.toml", "-o", "killed.h5"]
+    returned, *_ = interrupted(tmp_path, command, signal.SIGKILL, lambda: equilibria(killed) > 3)
     assert returned == -signal.SIGKILL
+    for name in ("killed.h5", "whole.h5"):
+        faultgouge("ramp", "scene.toml", "-o", name)
+    with h5py.File(killed) as one, h5py.File(tmp_path / "whole.h5") as other:
+        for name in ("particles/disks/position/value", "observables/contacts/value", "observables/evaluations/value"):
+            assert np.array_equal(one[name][...], other[name][...], equal_nan="evaluations" not in name)
+        assert len(one["observables/fx/value"]) == 25

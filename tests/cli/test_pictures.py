@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from PIL import Image
-from reference_layer import BEYOND_ITS_ONSET, BIN
+from reference_layer import BIN
 
 from faultgouge.analysis import RunFile
 from faultgouge.notebook import picture
@@ -18,39 +18,28 @@ else:
     import tomli as tomllib
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory, faultgouge_in):
-    """A ramp beyond the onset 0.0218, and an undamped run from its end."""
-    made = tmp_path_factory.mktemp("pictures")
-    (made / "scene.toml").write_text(BEYOND_ITS_ONSET + "[output]\ntrajectory = true\n")
-    for command in ("ramp", "perturb"):
-        done = faultgouge_in(made, command, "scene.toml", "-o", f"{command}.h5")
-    assert "at most" in done.stderr
-    return made
-
-
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 @pytest.mark.slow
-def test_a_packing(folder, suffix, faultgouge_in):
-    done = faultgouge_in(folder, "draw", "ramp.h5", "--frame", "2", "-o", f"packing.{suffix}")
+def test_a_packing(beyond, suffix, faultgouge_in):
+    done = faultgouge_in(beyond, "draw", "ramp.h5", "--frame", "2", "-o", f"packing.{suffix}")
     assert "F_x = 0.012, F_y = 3: 100 disks" in done.stderr
-    assert (folder / f"packing.{suffix}").stat().st_size > 10_000
+    assert (beyond / f"packing.{suffix}").stat().st_size > 10_000
 
 
 @pytest.mark.slow
-def test_the_pair_before_and_after_the_onset(folder, faultgouge_in):
-    before = faultgouge_in(folder, "draw", "ramp.h5", "--frame", "3", "--mode", "pair", "-o", "before.png")
+def test_the_pair_before_and_after_the_onset(beyond, faultgouge_in):
+    before = faultgouge_in(beyond, "draw", "ramp.h5", "--frame", "3", "--mode", "pair", "-o", "before.png")
     assert len(re.findall(r"mode \d+: lambda = [\d.]+, participation", before.stderr)) == 2
-    after = faultgouge_in(folder, "draw", "ramp.h5", "--mode", "pair", "-o", "after.png")
+    after = faultgouge_in(beyond, "draw", "ramp.h5", "--mode", "pair", "-o", "after.png")
     assert re.search(r"mode \d+: lambda = [\d.]+ \+- [\d.]+ i, participation ratio 0\.\d+, rotation", after.stderr)
 
 
 @pytest.mark.slow
-def test_films_of_a_run_a_ramp_and_a_mode(folder, faultgouge_in):
+def test_films_of_a_run_a_ramp_and_a_mode(beyond, faultgouge_in):
     for name, more in (("perturb", ()), ("ramp", ()), ("ramp", ("--mode", "pair"))):
         command = ("movie", f"{name}.h5", *more, "--seconds", "1", "--rate", "5", "--dots", "50", "-o", "film.gif")
-        faultgouge_in(folder, *command)
-        with Image.open(folder / "film.gif") as gif:
+        faultgouge_in(beyond, *command)
+        with Image.open(beyond / "film.gif") as gif:
             assert gif.n_frames == 5
 
 
@@ -67,8 +56,8 @@ def test_films_of_a_run_a_ramp_and_a_mode(folder, faultgouge_in):
     ],
 )
 @pytest.mark.slow
-def test_bad_input_is_refused_in_a_sentence(folder, command, says, faultgouge_in):
-    done = faultgouge_in(folder, *command, code=2)
+def test_bad_input_is_refused_in_a_sentence(beyond, command, says, faultgouge_in):
+    done = faultgouge_in(beyond, *command, code=2)
     assert says in " ".join(done.stderr.split())
 
 
@@ -95,8 +84,8 @@ def test_version_in_both_ways():
 
 
 @pytest.mark.slow
-def test_a_packing_shows_itself(folder):
-    with RunFile(folder / "ramp.h5") as file:
+def test_a_packing_shows_itself(beyond):
+    with RunFile(beyond / "ramp.h5") as file:
         packing, same, other = file.packing(1), file.packing(1), file.packing(2)
     assert len(repr(packing)) < 200
     assert picture(packing).startswith(b"\x89PNG")

@@ -1,33 +1,20 @@
 """The main job, on the reference packing: what it leaves behind, and that its numbers are those of physics."""
 
 import json
-import signal
-import subprocess
-import time
 
 import h5py
-import numpy as np
 import pytest
-from reference_layer import BIN, LAYER, UNITS
+from reference_layer import LAYER, UNITS, toml
 
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.units import real_units
 
-SCENE = (
-    LAYER.replace("kn = 2e5", "kn = 2e5\nmu = [1.0, 0.8]")
-    + f"""
-[ramp]
-step = 1e-3
-until = 0.024
-[perturb]
-fx = 0.0205
-time = 40.0
-amplitude = 1e-9
-omega = 0.01
-[friction]
-v_ss = "10 v0"
-{UNITS}"""
-)
+SECTIONS = {
+    "ramp": {"step": 1e-3, "until": 0.024},
+    "perturb": {"fx": 0.0205, "time": 40.0, "amplitude": 1e-9, "omega": 0.01},
+    "friction": {"v_ss": "10 v0"},
+}
+SCENE = LAYER.replace("kn = 2e5", "kn = 2e5\nmu = [1.0, 0.8]") + toml(SECTIONS) + UNITS
 
 FIGURES = ("figure1", "figure2", "figure3", "figure4", "figure5a", "figure5b", "figure6", "amplitude", "damping")
 
@@ -80,21 +67,3 @@ def test_reproduce(faultgouge, tmp_path):
     assert rows["amplitude of the wave, as ground velocity"] == f"{real.ground_velocity(1e-9, 0.01, 'layer'):.3g} m/s"
     assert rows["v_0, above which friction weakens"].endswith("m/s")
     assert rows["time in which the fastest motion grows e-fold"].endswith(" s")
-
-
-@pytest.mark.slow
-def test_a_ramp_that_is_killed_goes_on(tmp_path):
-    (tmp_path / "scene.toml").write_text(SCENE)
-    command = [BIN / "faultgouge", "ramp", "scene.toml", "-o"]
-    running = subprocess.Popen([*command, "killed.h5"], cwd=tmp_path, stderr=subprocess.PIPE)
-    killed = tmp_path / "killed.h5"
-    while running.poll() is None and (not killed.exists() or killed.stat().st_size < 60_000):
-        time.sleep(0.01)
-    running.send_signal(signal.SIGKILL)
-    running.wait()
-    for name in ("killed.h5", "whole.h5"):
-        subprocess.run([*command, name], cwd=tmp_path, capture_output=True, text=True, timeout=300)
-    with h5py.File(killed) as one, h5py.File(tmp_path / "whole.h5") as other:
-        for name in ("particles/disks/position/value", "observables/contacts/value", "observables/evaluations/value"):
-            assert np.array_equal(one[name][...], other[name][...], equal_nan="evaluations" not in name)
-        assert len(one["observables/fx/value"]) == 25

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reference_layer import BEYOND_ITS_ONSET
 
 from faultgouge.analysis import RunFile
 from faultgouge.figures.view import equally_spaced
@@ -24,9 +23,9 @@ def test_one_packing_has_a_pair(reference_packing):
 
 
 @pytest.mark.long
-def test_few_eigenvalues_show_the_pair_that_all_show(folder):
+def test_few_eigenvalues_show_the_pair_that_all_show(beyond):
     """What a large packing has: the same pair at each load, and the eigenvalues that are closest to the pair."""
-    with RunFile(folder / "ramp.h5") as run:
+    with RunFile(beyond / "ramp.h5") as run:
         packings = [run.packing(k) for k in range(len(run))]
     some, everything = (followed(packings, everything=each) for each in (False, True))
     # one pair of one matrix by two iterations: their planes agree to rounding, which a split pair takes in as its root
@@ -37,14 +36,11 @@ def test_few_eigenvalues_show_the_pair_that_all_show(folder):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory, faultgouge_in):
-    """A ramp through the onset 0.0218, an undamped run, and their pages."""
-    made = tmp_path_factory.mktemp("view")
-    (made / "scene.toml").write_text(BEYOND_ITS_ONSET)
+def pages(beyond, faultgouge_in):
+    """The folder, with a page of either file."""
     for name in ("ramp", "perturb"):
-        for words in ((name, "scene.toml", "-o", f"{name}.h5"), ("view", f"{name}.h5", "-o", f"{name}.html")):
-            faultgouge_in(made, *words)
-    return made
+        faultgouge_in(beyond, "view", f"{name}.h5", "-o", f"{name}.html")
+    return beyond
 
 
 @pytest.fixture(scope="module")
@@ -67,13 +63,13 @@ MARKS = """(() => { const m = Bokeh.documents[0].get_model_by_name('marks').data
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1440, 390])
 @pytest.mark.parametrize("name", ["ramp", "perturb"])
-def test_the_page_offline(folder, browser, name, width, scheme):
+def test_the_page_offline(pages, browser, name, width, scheme):
     page = browser.new_page(viewport={"width": width, "height": 800}, color_scheme=scheme)
     wrong, asked = [], []
     page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("request", lambda request: asked.append(request.url))
-    page.goto((folder / f"{name}.html").as_uri())
+    page.goto((pages / f"{name}.html").as_uri())
     page.wait_for_function("document.getElementById('says')?.textContent.includes('λ')")
     pair = "Object.values(Bokeh.documents[0].get_model_by_name('members').data).slice(0, 2).map((x) => [...x])"
     before = page.evaluate(pair)

@@ -33,6 +33,12 @@ def said():
     return []
 
 
+@pytest.fixture
+def stored(tmp_path, reference_packing):
+    with RunFile.create(tmp_path / "run.h5", reference_packing(1.0)) as run:
+        run.append(reference_packing(1.0), floor=1e-11, evaluations=1)
+
+
 def test_the_sentence_says_what_and_why(said):
     with spared("x.png", said.append):
         raise ValueError("first line\nsecond line")
@@ -45,26 +51,23 @@ def test_an_interrupt_is_no_failed_picture(said):
     assert said == []
 
 
-def test_genericity_keeps_its_numbers_and_its_page(tmp_path, no_pictures, said):
-    tables = Path(__file__).parents[2] / "docs" / "genericity"
-    for table in tables.glob("*/results.csv"):
-        (tmp_path / table.parent.name).mkdir()
-        shutil.copy(table, tmp_path / table.parent.name)
-    page = write_page(tmp_path, said.append)
-    assert page.exists()
-    assert json.loads((tmp_path / "genericity.json").read_text())
+def test_genericity_keeps_its_numbers_and_its_page_which_are_those_of_the_docs(tmp_path, no_pictures, said):
+    docs = Path(__file__).parents[2] / "docs" / "genericity"
+    for table in (*docs.glob("*/results.csv"), docs / "made.json"):
+        (tmp_path / table.relative_to(docs)).parent.mkdir(exist_ok=True)
+        shutil.copy(table, tmp_path / table.relative_to(docs))
+    write_page(tmp_path, said.append)
+    for name in ("genericity.json", "genericity.md"):
+        assert (tmp_path / name).read_text() == (docs / name).read_text()
     assert len(said) == 4
     assert all("was not drawn (RuntimeError: no font at all)" in sentence for sentence in said)
 
 
-def test_a_spectrum_keeps_its_eigenvalues(tmp_path, reference_packing, faultgouge_here, monkeypatch):
+def test_a_spectrum_keeps_its_eigenvalues(stored, faultgouge_here, monkeypatch):
     def fails(*_):
         raise LinAlgError("no convergence")
 
     monkeypatch.setattr("faultgouge.analysis.motion.transient.transient_gains", fails)
-    packing = reference_packing(1.0)
-    with RunFile.create(tmp_path / "run.h5", packing) as run:
-        run.append(packing, floor=1e-11, evaluations=1)
     done = faultgouge_here("spectrum", "run.h5", "--json")
     result = json.loads(done.stdout)
     assert len(result["eigenvalues"]) > 200
@@ -72,10 +75,7 @@ def test_a_spectrum_keeps_its_eigenvalues(tmp_path, reference_packing, faultgoug
     assert "the transient gain was not found (LinAlgError: no convergence); the eigenvalues are complete" in done.stderr
 
 
-def test_draw_says_its_words_before_the_picture(tmp_path, reference_packing, faultgouge_here, no_pictures):
-    packing = reference_packing(1.0)
-    with RunFile.create(tmp_path / "run.h5", packing) as run:
-        run.append(packing, floor=1e-11, evaluations=1)
+def test_draw_says_its_words_before_the_picture(stored, faultgouge_here, no_pictures):
     done = faultgouge_here("draw", "run.h5", code=1)
     assert "100 disks" in done.stderr
 

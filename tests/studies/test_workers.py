@@ -7,10 +7,11 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from reference_layer import SMALL
 
+from faultgouge.studies.hands import Processes, hands
 from faultgouge.studies.sweep.compute import run_sweep
 from faultgouge.studies.sweep.points import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
-from faultgouge.studies.sweep.workers import Processes, WorkerError, computed, hands
+from faultgouge.studies.sweep.workers import WorkerError, computed
 
 pytestmark = pytest.mark.slow
 
@@ -52,7 +53,7 @@ def kill_a_worker():
 
 def test_a_killed_worker_takes_nothing_with_it(sweep, rows):
     found = []
-    with hands(2, None) as pool:
+    with hands(2) as pool:
         for row in computed(pool, sweep.task, sweep.points):
             if not found:
                 kill_a_worker()

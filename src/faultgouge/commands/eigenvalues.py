@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -29,7 +28,7 @@ from .terminal import (
 
 if TYPE_CHECKING:
     from ..analysis import DampedWindow, Packing, Spectrum, Window
-    from ..pywrap import Scene
+    from ..pywrap import Equilibrium, Scene
     from ..pywrap.onset.damped import DampedOnset
 
 app = typer.Typer()
@@ -197,11 +196,11 @@ def onset(
 
 def _written(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]:
     """The JSON of all friction coefficients, written if there is a file for it."""
-    from faultgouge.analysis.files.wholefile import write_text
+    from faultgouge.analysis.files.wholefile import write_json
 
     result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
     if output and is_root():
-        write_text(output, json.dumps(result, indent=1) + "\n")
+        write_json(output, result)
     return result
 
 
@@ -223,14 +222,12 @@ def _undamped_onset(modes: tuple[int, int] | None, folder: Path | None, scene: S
     with status(f"mu = {mu:g}") as show:
         watch = partial(_under_way, show, f"mu = {mu:g}", folder=folder)
         run = onset_run(scene, mu, modes=modes, watch=watch, folder=folder)
-    real = _in_si(scene, [(each.fx_onset, abs(each.eigenvalue) ** 0.5) for each in run.onset.windows])
+    found = run.onset.windows
+    real = _in_si(scene, [(each.fx_onset, abs(each.eigenvalue) ** 0.5) for each in found])
     among = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
     say(f"mu = {mu:g}: F_x^c = {with_uncertainty(run.onset.fx_c, run.onset.error)}{among}")
-    _show_windows(run.onset.windows, real.get("si", []))
-    for equilibrium in run.equilibria:
-        say_way(equilibrium)
-    _say_doubtful(run.onset.doubtful, "a pair was expected to become complex")
-    _say_of_one_path(run.onset.windows)
+    _show_windows(found, real.get("si", []))
+    _say_what_is_uncertain(run.equilibria, run.onset.doubtful, "a pair was expected to become complex", found)
     return {"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond} | real
 
 
@@ -265,10 +262,7 @@ def _damped_onset(
     for each in real.get("si", [])[:1]:
         stress, ratio, frequency = _columns(each)
         say(f"mu = {mu:g}: in SI a shear stress of {stress} Pa, {ratio} of the overburden, at {frequency} Hz")
-    for equilibrium in run.equilibria:
-        say_way(equilibrium)
-    _say_doubtful(run.doubtful, "a motion was expected to grow")
-    _say_of_one_path(run.windows)
+    _say_what_is_uncertain(run.equilibria, run.doubtful, "a motion was expected to grow", run.windows)
     return {"mu": mu} | run.as_dict() | real
 
 
@@ -285,16 +279,20 @@ def _columns(si: dict[str, float]) -> list[str]:
     return [f"{number:.4g}" for number in si.values()]
 
 
-def _say_doubtful(increments: Iterable[tuple[float, float]], expected: str) -> None:
-    for below, above in increments:
+def _say_what_is_uncertain(
+    equilibria: Iterable[Equilibrium],
+    doubtful: Iterable[tuple[float, float]],
+    expected: str,
+    windows: Sequence[Window] | Sequence[DampedWindow],
+) -> None:
+    """How equilibria were reached, where an onset may hide, and where the error of the path is not known."""
+    for equilibrium in equilibria:
+        say_way(equilibrium)
+    for below, above in doubtful:
         say(
             f"{expected} between F_x = {below:.6g} and {above:.6g}, and was not found: an earlier onset may hide "
             "there; take smaller increments to be sure"
         )
-
-
-def _say_of_one_path(windows: Sequence[Window] | Sequence[DampedWindow]) -> None:
-    """What is said of onsets at which no equilibrium was found again, to tell the error of the path."""
     alone = [each for each in windows if each.path_error is None and each.kind != "start"]
     if alone:
         say(

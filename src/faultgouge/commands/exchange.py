@@ -182,11 +182,8 @@ def _placed(file: Path, frame: int | None, floor: float, width: str | None, cont
 def _width(text: str) -> float | None:
     if text == "open":
         return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not value > 0:
+    value = _number_or_text(text)
+    if not (isinstance(value, float) and value > 0):
         raise typer.BadParameter(f"--width {text}: give the period along x, above 0, or open")
     return value
 
@@ -212,14 +209,13 @@ def _packing(
     _refuse_gaps(disks, top, scene, values)
     layer = upper_layer(disks, top)
     wanted = _scene(scene, disks, values)
-    inertia = wanted.inertia_factor if scene else values.get("inertia_factor", 1.0)
     return packing_of(
         disks,
         law_of(wanted, wanted.law.mus[0]),
         layer,
-        fx=options.get("fx", 0.0) if scene else values.get("fx", 0.0),
+        fx=(options if scene else values).get("fx", 0.0),
         fy=wanted.load.fy,
-        inertia_factor=inertia,
+        inertia_factor=wanted.inertia_factor if scene else values.get("inertia_factor", 1.0),
         drag_time=drag_time(wanted),
     )
 
@@ -230,12 +226,10 @@ def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict
     from faultgouge.pywrap.exchange.layer import WAYS
 
     gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
-    if scene is None:
-        laws = {
-            "kn": ("--kn 2e5", "the normal stiffness"),
-            "fy": ("--fy 3", "the load on each disk of the upper layer"),
-        }
-        gaps |= dict(words for key, words in laws.items() if key not in values)
+    if scene is None and "kn" not in values:
+        gaps["--kn 2e5"] = "the normal stiffness"
+    if scene is None and "fy" not in values:
+        gaps["--fy 3"] = "the load on each disk of the upper layer"
     if not gaps:
         return
     *others, last = gaps.values()
@@ -256,11 +250,7 @@ def _scene(scene: Path | None, disks: Disks, values: dict[str, Any]) -> Scene:
     law: dict[str, Any] = {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values}
     if values.get("rescaled"):
         law["history"] = "rescaled"
-    sections = {
-        "packing": {},
-        "law": law,
-        "load": {"fy": values["fy"]},
-    }
+    sections = {"packing": {}, "law": law, "load": {"fy": values["fy"]}}
     return Scene.from_mapping(sections | ({"damping": damping} if damping else {}))
 
 

@@ -10,13 +10,9 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import AsJson, ScenePath, Workers, print_json, progress, read_scene, say, status
+from .terminal import AsJson, Folder, NewFolder, ScenePath, Workers, print_json, progress, read_scene, say, status
 
 T = TypeVar("T")
-
-Folder = Annotated[
-    Path, typer.Option("-o", "--output", help="The folder for numbers, pictures and page; an interrupted one goes on.")
-]
 
 app = typer.Typer()
 
@@ -51,9 +47,7 @@ def reproduce(
     scene: Annotated[
         Path | None, typer.Argument(metavar="[SCENE]", help="Another scene than the one that ships.")
     ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for figures, numbers and report.")] = Path(
-        "results"
-    ),
+    output: NewFolder = Path("results"),
     ensemble: Annotated[
         int, typer.Option(min=0, metavar="M", help="Instead, onsets and eruptions of M packings of the scene.")
     ] = 0,
@@ -96,9 +90,7 @@ def reproduce(
 
 @app.command(epilog="Example: faultgouge report --quick -o report")
 def report(
-    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for report, figures and numbers.")] = Path(
-        "report"
-    ),
+    output: NewFolder = Path("report"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points: a minute instead of ten.")] = False,
 ) -> None:
     """Error against run time: which method to take when, for six tasks, with figures and numbers."""
@@ -111,9 +103,7 @@ def report(
 
 @app.command(epilog="Example: mpiexec -n 2 faultgouge stability -o stability")
 def stability(
-    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for table, picture and numbers.")] = Path(
-        "stability"
-    ),
+    output: NewFolder = Path("stability"),
     quick: Annotated[bool, typer.Option("--quick", help="The small part of the cases.")] = False,
     as_json: AsJson = False,
 ) -> None:

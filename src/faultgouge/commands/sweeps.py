@@ -9,22 +9,23 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import Workers, progress, say, show_table
+from .terminal import Folder, Workers, progress, say, show_table
 
 app = typer.Typer()
 
-Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted one is continued.")]
+Shard = Annotated[
+    str, typer.Option(metavar="K/N", help="Part K of N alone, for job arrays; each with a folder of its own.")
+]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what there is to do and what it will cost.")]
 
 
 @app.command(epilog="Example: faultgouge sweep genericity.toml -o sweep")
 def sweep(
     file: Annotated[Path, typer.Argument(metavar="SWEEP", help="The sweep, a TOML file.", show_default=False)],
     output: Folder = Path("sweep"),
-    shard: Annotated[
-        str, typer.Option(metavar="K/N", help="Part K of N alone, for job arrays; each with a folder of its own.")
-    ] = "1/1",
+    shard: Shard = "1/1",
     workers: Workers = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what there is to do and what it will cost.")] = False,
+    dry_run: DryRun = False,
 ) -> None:
     """One task for every scene of a product of keys: results.jsonl, the table results.csv, and a picture.
 
@@ -113,9 +114,9 @@ def modes(
         Path, typer.Argument(metavar="SCENE|SWEEP", help="A scene, or a sweep of the task modes.", show_default=False)
     ],
     output: Folder = Path("modes"),
-    shard: Annotated[str, typer.Option(metavar="K/N", help="Part K of N of a sweep alone.")] = "1/1",
+    shard: Shard = "1/1",
     workers: Workers = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what there is to do and what it will cost.")] = False,
+    dry_run: DryRun = False,
 ) -> None:
     """Complex modes along the ramp: how many, how fast they grow, and which loss would stop them.
 

@@ -30,6 +30,8 @@ EVERY = 60.0
 
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)]
 Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted one is continued.")]
+Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted one is continued.")]
+NewFolder = Annotated[Path, typer.Option("-o", "--output", help="The folder for numbers, pictures and page.")]
 Workers = Annotated[
     int | None,
     typer.Option(min=1, metavar="N", show_default=False, help="Processes that compute; all cores unless given."),
@@ -89,12 +91,7 @@ def say_way(equilibrium: Equilibrium) -> None:
 class Minutes:
     """A line on standard error every minute, off a terminal; a context manager.
 
-    A thread says the lines: work may be within one call for longer than a minute.
-
-    Parameters
-    ----------
-    message : str
-        The line, until there is another.
+    A thread says the line, until there is another: work may be within one call for longer than a minute.
     """
 
     def __init__(self, message: str) -> None:
