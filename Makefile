@@ -6,7 +6,7 @@
 # make plugin      builds the C++ plugin anew, after an edit of it
 # make check       format, lint and types
 # make benchmark   time per step beside LAMMPS's own granular styles; what each part of a scene costs; where an increment's
-#                  time goes; the onset, solved and scanned; error against run time; growth with size
+#                  time goes; error against run time; growth with size
 # make pictures    the report and the stiff cases that the documentation shows, in docs/report and docs/stability
 # make wheel       sdist and wheel, to be given away, in dist/
 # make wheel-aarch64   the same wheel for 64-bit ARM, cross-compiled
@@ -69,7 +69,6 @@ benchmark: $(VENV)/.installed
 	$(BIN)/faultgouge explain scenes/paper.toml
 	$(BIN)/faultgouge explain scenes/frictionless.toml
 	$(BIN)/python benchmarks/increment.py
-	$(BIN)/python benchmarks/onset_against_scan.py
 	$(BIN)/python benchmarks/scale.py
 	$(BIN)/faultgouge report -o report
 

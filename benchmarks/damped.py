@@ -15,6 +15,12 @@ loads of the ramp before the onset, nor just below it, and one of them must have
     nice python benchmarks/damped.py --first --disks 200 --packings 4 --seed 4 --until 0.04 --table 200.csv
     nice python benchmarks/damped.py --first --disks 300 400 --packings 3 --seed 4 --until 0.04 --table 400.csv
 
+With `--large` a packing is settled and its first window is sought on all ranks of `mpiexec`, as by `faultgouge onset`,
+with `cn = 1`: 10,000 disks take a quarter of an hour on two cores. Scene, packing and onset stay in a folder, and the
+same command goes on from there.
+
+    nice python benchmarks/damped.py --large --disks 10000 --ranks 2 --step 2e-4 --folder large
+
 It ends with exit code 1 where windows differ. All of it takes two minutes of one processor for 60 disks, and ten
 for 100.
 """
@@ -25,6 +31,8 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import argparse
 import csv
+import resource
+import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -148,6 +156,25 @@ def cases(disks: int, seeds: Iterator[int], packings: int, until: float, kinds: 
             print(f"seed {seed} left out: {error}", flush=True)
 
 
+def large(disks: int, ranks: int, step: float, folder: Path) -> None:
+    """Settle a packing, seek its first window on some ranks, and tell how long that took."""
+    folder.mkdir(parents=True, exist_ok=True)
+    packing, scene = folder / "packing.h5", folder / "damped.toml"
+    rest = f"[law]\nkn = 2e5\n[load]\nfy = 3.0\n[ramp]\nstep = {step:g}\nuntil = {100 * step:g}\n[damping]\ncn = 1.0\n"
+    program = [sys.executable, "-m", "faultgouge"]
+    if not packing.exists():
+        width = round(1.192 * disks**0.5, 1)
+        scene.write_text(f"[packing]\ndisks = {disks}\nwidth = {width}\nseed = 1\n{rest}")
+        subprocess.run([*program, "settle", str(scene), "-o", str(packing)], check=True)
+    scene.write_text(f'[packing]\nfile = "{packing.name}"\n{rest}')
+    before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    search = [*program, "onset", str(scene), "-o", str(folder / "onset.json")]
+    subprocess.run(["mpiexec", "-n", str(ranks), *search] if ranks > 1 else search, check=True)
+    after, seconds = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter() - begin
+    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    print(f"{disks} disks on {ranks} ranks: {seconds:.0f} s, {processor:.0f} s of processor time")
+
+
 def main() -> None:
     """Search, compare, and write the table as it grows."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -156,8 +183,15 @@ def main() -> None:
     parser.add_argument("--packings", type=int, default=20, help="how many of each size")
     parser.add_argument("--seed", type=int, default=1, help="of the first packing of each size")
     parser.add_argument("--until", type=float, default=0.02, help="largest F_x; 20 increments")
+    parser.add_argument("--large", action="store_true", help="the first window of one packing, by the command")
+    parser.add_argument("--ranks", type=int, default=2, help="with --large: of mpiexec")
+    parser.add_argument("--step", type=float, default=2e-4, help="with --large: increment of F_x")
+    parser.add_argument("--folder", type=Path, default=Path("large"), help="with --large: for what is written")
     parser.add_argument("--table", type=Path, default=Path(__file__).parent / "damped.csv", help="the table")
     options = parser.parse_args()
+    if options.large:
+        large(options.disks[0], options.ranks, options.step, options.folder)
+        return
     compare, kinds = (against_all_eigenvalues, FIRST_KINDS) if options.first else (compared, KINDS)
     wrong, total, rows = 0, options.packings * len(options.disks), []
     with options.table.open("w", newline="") as file:

@@ -1,20 +1,22 @@
-"""The frame of a study of one scene that goes on in its folder: refuse, compute, write, draw, fill the page.
+"""The frame of studies: what every study leaves in its folder, and a study of one scene that goes on in its folder.
 
-What a study found is kept row by row in NAME.jsonl, and rows of the same scene are not computed again. NAME.json,
-pictures and NAME.md are written in the end.
+What a study of one scene found is kept row by row in NAME.jsonl, and rows of the same scene are not computed again.
+NAME.json, pictures and NAME.md are written in the end.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+from matplotlib.figure import Figure
 
 from ..analysis.files.wholefile import make_folder, write_text
 from ..figures.pages import render
-from ..figures.style import spared
+from ..figures.style import save, save_as, spared
 from ..pywrap import Scene
 from ..pywrap.onset.sharing import Progress, Say, Share, shared_out
 from ..pywrap.scenes.units import real_units
@@ -22,18 +24,58 @@ from .rows import Rows
 
 Result = dict[str, Any]
 
+Figures = Mapping[str, Callable[[], Figure]]
+"""What draws each picture, by the name of its file."""
 
-@dataclass(frozen=True)
-class Work:
-    """What the computing part of a study is given beside the scene.
 
-    Attributes
+def leave(
+    folder: Path,
+    package: str,
+    name: str,
+    result: Result,
+    page: Result,
+    figures: Figures,
+    say: Say,
+    keep: Callable[[Figure, Path], object] = save,
+) -> Path:
+    """Write what a study has found into its folder, and return the path of its page.
+
+    Parameters
     ----------
-    rows : Rows
-        What is known, and where what is found goes.
-    share, say, progress
-        As :mod:`~faultgouge.pywrap.onset.sharing` has them.
+    package, name : str
+        `__package__` of the study, whose folder has the template NAME.md.j2, and NAME.
+    result : dict
+        What NAME.json holds.
+    page : dict
+        What the template names.
+    figures, say, keep
+        As of `draw_all`.
     """
+    write_json(folder / f"{name}.json", result)
+    draw_all(figures, folder, say, keep)
+    write_text(folder / f"{name}.md", render(package, f"{name}.md.j2", **page))
+    return folder / f"{name}.md"
+
+
+def write_json(path: Path, result: Result) -> None:
+    """Write what a study has found; the file is replaced as a whole."""
+    write_text(path, json.dumps(result, indent=1) + "\n")
+
+
+def draw_all(figures: Figures, folder: Path, say: Say, keep: Callable[[Figure, Path], object] = save) -> None:
+    """Draw pictures, which `keep` saves under paths without ending; one that cannot be drawn costs a sentence alone."""
+    for name, figure in figures.items():
+        with spared(f"{name}.png", say):
+            keep(figure(), folder / name)
+
+
+def save_png(figure: Figure, stem: Path) -> None:
+    """Save a figure as PNG alone."""
+    save_as(figure, stem.with_suffix(".png"))
+
+
+class Work(NamedTuple):
+    """What the computing part of a study is given beside the scene: what is known, and how to share and to speak."""
 
     rows: Rows
     share: Share
@@ -43,22 +85,20 @@ class Work:
 
 @dataclass(frozen=True)
 class Study:
-    """A study, which is called with a scene and a folder.
+    """A study of one scene, which is called with the scene and a folder.
 
     Attributes
     ----------
-    package : str
-        `__package__` of the study, whose folder has the template NAME.md.j2.
-    name : str
-        Of its files.
+    package, name : str
+        As of `leave`.
     beside : str
         A section of the scene that may change without making what was found worthless.
     check : callable
         Raises SceneError for a scene without what is needed.
     compute : callable
         Scene and `Work` to what NAME.json holds beside the scene and its units.
-    draw : callable
-        Saves the pictures: takes what NAME.json holds, the rows and the folder.
+    figures : callable
+        From what NAME.json holds and the rows, what draws each picture.
     page : callable
         From what NAME.json holds, what the template names beside `result`, which is that, and its `units`.
     """
@@ -68,7 +108,7 @@ class Study:
     beside: str
     check: Callable[[Scene], object]
     compute: Callable[[Scene, Work], Result]
-    draw: Callable[[Result, Rows, Path], None]
+    figures: Callable[[Result, Rows], Figures]
     page: Callable[[Result], Result]
 
     def __call__(
@@ -99,9 +139,6 @@ class Study:
             found = self.compute(scene, Work(rows, share, say, progress))
         real = real_units(scene)
         result = {"scene": scene.resolved(), "units": None if real is None else real.as_dict()} | found
-        write_text(output / f"{self.name}.json", json.dumps(result, indent=1) + "\n")
-        with spared(f"{self.name}: a picture", say):
-            self.draw(result, rows, output)
-        page = render(self.package, f"{self.name}.md.j2", result=result, units=result["units"], **self.page(result))
-        write_text(output / f"{self.name}.md", page)
+        names = {"result": result, "units": result["units"], **self.page(result)}
+        leave(output, self.package, self.name, result, names, self.figures(result, rows), say)
         return result

@@ -7,13 +7,14 @@ like the others is an assumption; how many there are is given with each result.)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+from ..analysis.packing.packing import Floats, Indices
+
 Bools = NDArray[np.bool_]
 
 
@@ -33,6 +34,32 @@ def interval(value: Sequence[float | None] | None, digits: str = ".2g", beyond: 
         return "-"
     middle, low, high = (beyond if each is None or np.isinf(each) else format(each, digits) for each in value)
     return f"{middle} ({low} to {high})"
+
+
+def resampled(groups: Sequence[Indices], draws: int) -> Iterator[list[Indices]]:
+    """Each group drawn again, with replacement, so many times."""
+    generator = np.random.default_rng(0)
+    return ([generator.choice(group, len(group)) for group in groups] for _ in range(draws))
+
+
+def between(value: float, draws: Sequence[float] | Floats) -> dict[str, float]:
+    """A number with the 95 % interval of what resampled packings give in its place: {"value", "low", "high"}."""
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return {"value": float(value), "low": float(low), "high": float(high)}
+
+
+def lowers(strong: Mapping[str, Any], weak: Mapping[str, Any]) -> bool | None:
+    """Whether the second of two ramps has the lower onset; None if either may have it.
+
+    Parameters
+    ----------
+    strong, weak : mapping
+        "ends", how the ramp ends, "onset" or else, and "reach", the largest F_x up to which there is no window.
+    """
+    if weak["ends"] == "onset" and weak["reach"] < strong["reach"]:
+        return True
+    # the weak one has none up to there, or a later one
+    return False if strong["ends"] == "onset" and strong["reach"] <= weak["reach"] else None
 
 
 def distribution(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:

@@ -84,14 +84,22 @@ def reference_packing(reference: dict) -> Callable[[float], Packing]:
     return make
 
 
+def _ended(done: subprocess.CompletedProcess, code: int | None) -> subprocess.CompletedProcess:
+    assert code in (None, done.returncode), done.stderr
+    assert "Traceback" not in done.stderr
+    return done
+
+
 @pytest.fixture(scope="session")
 def faultgouge_in() -> Callable[..., subprocess.CompletedProcess]:
-    """Runs the command in a folder, on one rank or on several."""
+    """Runs the command in a folder, on one rank or several; it is to end with an exit code and without a traceback."""
 
-    def run(folder: Path, *words: object, ranks: int | None = None) -> subprocess.CompletedProcess:
+    def run(
+        folder: Path, *words: object, ranks: int | None = None, code: int | None = 0
+    ) -> subprocess.CompletedProcess:
         before = [] if ranks is None else [BIN / "mpiexec", "-n", str(ranks)]
         command = [*before, BIN / "faultgouge", *map(str, words)]
-        return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=LIMIT)
+        return _ended(subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=LIMIT), code)
 
     return run
 
@@ -106,23 +114,23 @@ def faultgouge(faultgouge_in, tmp_path: Path) -> Callable[..., subprocess.Comple
 def faultgouge_here(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Callable[..., subprocess.CompletedProcess]:
-    """Runs the command in tmp_path within this process, without the second that a process of its own takes to start."""
+    """Runs the command in tmp_path within this process, which saves the second that a process takes to start."""
 
-    def run(*words: object) -> subprocess.CompletedProcess:
+    def run(*words: object, code: int = 0) -> subprocess.CompletedProcess:
         from faultgouge.commands import program
         from faultgouge.ending import fail
 
         monkeypatch.chdir(tmp_path)
         capsys.readouterr()
-        code: object = 0
+        exit_code: object = 0
         try:
             program()([str(word) for word in words], standalone_mode=False)
         except Exception as error:
             with pytest.raises(SystemExit) as ended:
                 fail(error)
-            code = ended.value.code
+            exit_code = ended.value.code
         said = capsys.readouterr()
-        return subprocess.CompletedProcess(words, int(str(code)), said.out, said.err)
+        return _ended(subprocess.CompletedProcess(words, int(str(exit_code)), said.out, said.err), code)
 
     return run
 

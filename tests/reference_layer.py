@@ -1,5 +1,6 @@
 """The reference packing as a scene of the command line, and where the command lies."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -37,6 +38,15 @@ fx = 0.024
 time = 1.0
 """
 """A ramp in four steps through the onset, 0.0218, and an undamped run from its end."""
+
+
+def toml(scene, prefix=""):
+    """A scene as the text of a TOML file, each section with a prefix to its name."""
+    return "".join(
+        f"[{prefix}{name}]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in section.items())
+        for name, section in scene.items()
+    )
+
 
 SMALL = {
     "packing": {"disks": 30, "top": 5, "width": 6.0},

@@ -39,7 +39,10 @@ FLOORS = {
         ("runs",),
         ("onset",),
     ),
-    "faultgouge.assessment": (("error_and_time", "left_out", "stability"),),
+    "faultgouge.assessment": (
+        ("timing",),
+        ("error_and_time", "left_out", "stability"),
+    ),
 }
 """Rooms from the ground up. A room knows those below its floor, and none beside it."""
 

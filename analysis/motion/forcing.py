@@ -9,12 +9,7 @@ with the damping matrix C of the packing, which may be zero. Two ways to its sol
 **In time** (`sampled_response`). With z = (q, q') in mass-weighted coordinates the equation is :math:`\dot z = A z +
 b\, s(t)`. Where s is a straight line over a step h, the step is exact: it is the exponential of A with s and its slope
 as two further unknowns (C. F. Van Loan, IEEE Trans. Autom. Control 23, 395, 1978). Nothing is diagonalised, so that it
-holds at an exceptional point as anywhere. For a run with velocity Verlet, A has the frequencies of the time step,
-
-.. math:: \Omega^2 = \frac{4}{dt^2} \arcsin^2 \frac{\sqrt\lambda\, dt}{2}
-    = \lambda + \frac{\lambda^2 dt^2}{12} + \frac{\lambda^3 dt^4}{90} + \dots ,
-
-a power series in the matrix. What is left of the time step are amplitudes that are off by :math:`(\Omega\,dt)^2/6`.
+holds at an exceptional point as anywhere.
 
 **In frequency** (`impulse_response`). One number matters for triggering: the mean velocity v of the upper layer, on
 which friction depends. A unit impulse gives :math:`v(t) = \sum_k c_k e^{s_k t}`, with the rates s_k of all motions
@@ -30,7 +25,7 @@ sensitivity. The largest |v| up to a time is what decides whether friction weake
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -164,7 +159,6 @@ def sampled_response(
     signal: Signal,
     times: ArrayLike,
     force: ArrayLike,
-    dt: float | None = None,
 ) -> Response:
     """Motion of the linearised packing from rest under the force f s(t).
 
@@ -178,8 +172,6 @@ def sampled_response(
         Equally spaced times h, 2h, ...
     force : array_like, shape (3N,)
         f on (x.., y.., R theta..), as of :func:`~faultgouge.analysis.motion.response.layer_force` or `floor_force`.
-    dt : float, optional
-        Time step of the velocity Verlet run whose frequencies are to be met; exact dynamics by default.
 
     Returns
     -------
@@ -195,8 +187,6 @@ def sampled_response(
     if time.ndim != 1 or not len(time) or np.any(np.abs(time - time[0] * np.arange(1, len(time) + 1)) > 1e-6 * time[0]):
         raise ValueError("The times of a sampled response are h, 2h, 3h and so on.")
     system = StateSpace.of(packing)
-    if dt is not None:
-        system = replace(system, stiffness=_of_time_step(system.stiffness, dt))
     active, root = system.active, system.root_mass
     pieces = max(1, int(np.ceil(KNOTS * time[0] / signal.shortest)))
     step, size = time[0] / pieces, len(active)
@@ -221,13 +211,3 @@ def floor_force(packing: Packing) -> Floats:
     """The force -m along x on every disk, (x.., y.., R theta..): that of a unit acceleration of the floor, seen from
     the floor; shape (3N,)."""
     return np.concatenate([-packing.mass, np.zeros(2 * len(packing))])
-
-
-def _of_time_step(stiffness: Floats, dt: float) -> Floats:
-    """The squared frequencies of velocity Verlet as a function of the matrix of the exact ones."""
-    small, power, result = stiffness * dt**2, np.eye(len(stiffness)), np.zeros_like(stiffness)
-    # 2 arcsin^2(x/2) = sum of x^(2n) / (n^2 binom(2n, n)); 8 terms give all digits up to omega dt = 0.2
-    for weight in (1 / 2, 1 / 24, 1 / 180, 1 / 1120, 1 / 6300, 1 / 33264, 1 / 168168, 1 / 823680):
-        power = power @ small
-        result += 2 * weight * power
-    return result / dt**2

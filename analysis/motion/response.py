@@ -19,7 +19,7 @@ Functions of the matrix of a packing close to a coalescence of two eigenvalues k
 Coordinates that feel no force, those of rattlers, are held still.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -82,10 +82,8 @@ class LinearMotion:
     modes: Modes
 
     @classmethod
-    def of(cls, packing: Packing, damping_time: float | None = None) -> "LinearMotion":
-        """Decompose a packing; parameters and errors as of `linear_response`."""
-        if damping_time is not None:
-            packing = replace(packing, drag_time=damping_time)
+    def of(cls, packing: Packing) -> "LinearMotion":
+        """Decompose a packing; errors as of `linear_response`."""
         system = StateSpace.of(packing)
         return cls(packing, system, Modes.of(system.matrix if _dissipative(packing) else system.stiffness))
 
@@ -141,7 +139,6 @@ def linear_response(
     force: ArrayLike | None = None,
     omega: float = 0.0,
     initial: ArrayLike | None = None,
-    damping_time: float | None = None,
     dt: float | None = None,
 ) -> Response:
     """Motion of the linearised packing from rest, with its dashpots and drag.
@@ -160,8 +157,6 @@ def linear_response(
         Angular frequency of the force, radian / time.
     initial : array_like, shape (3N,), optional
         Displacement at t = 0, length; none by default.
-    damping_time : float, optional
-        tau of the drag -M q'/tau, time; that of the packing by default.
     dt : float, optional
         Time step of the undamped velocity Verlet run to be met; exact dynamics by default.
 
@@ -172,26 +167,23 @@ def linear_response(
     Raises
     ------
     ValueError
-        If a shape does not fit, a time is negative, a damping time or step is not positive, a step is given with
-        dissipation, or the times are not multiples of the step.
+        If a shape does not fit, a time is negative, a step is not positive or is given with dissipation, or the
+        times are not multiples of the step.
     numpy.linalg.LinAlgError
         If more than two eigenvalues coalesce.
     """
-    motion = LinearMotion.of(packing, damping_time)
-    return motion.response(times, force=force, omega=omega, initial=initial, dt=dt)
+    return LinearMotion.of(packing).response(times, force=force, omega=omega, initial=initial, dt=dt)
 
 
-def layer_force(packing: Packing, amplitude: float, disks: ArrayLike | None = None) -> Floats:
-    """A force along x on some disks.
+def layer_force(packing: Packing, amplitude: float) -> Floats:
+    """A force along x on the upper layer.
 
     Parameters
     ----------
     packing : Packing
         The configuration.
     amplitude : float
-        a, force on each of them.
-    disks : array_like of bool, shape (N,), optional
-        Which; the upper layer by default.
+        a, force on each of its disks.
 
     Returns
     -------
@@ -199,7 +191,7 @@ def layer_force(packing: Packing, amplitude: float, disks: ArrayLike | None = No
         On (x.., y.., R theta..).
     """
     force = np.zeros(3 * len(packing))
-    force[: len(packing)] = amplitude * np.asarray(packing.top if disks is None else disks, dtype=bool)
+    force[: len(packing)] = amplitude * packing.top
     return force
 
 

@@ -387,7 +387,7 @@ def _walked(oracle: Dense, loads: Floats) -> tuple[Window, ...]:
     """The windows that an oracle finds along a ramp."""
     here = oracle.family.at(loads[0])
     for load in loads[1:]:
-        there = oracle.family.at(load)
-        walk(oracle, [here, there])
-        here = there
+        for there in oracle.family.steps(here, load):
+            walk(oracle, [here, there])
+            here = there
     return oracle.windows()

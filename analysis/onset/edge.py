@@ -20,6 +20,7 @@ from ..packing.packing import Floats, Packing
 from .limits import LIMITS, Limits
 from .modes import Operator, Place
 from .pair import Pair, continued, dip_between
+from .walk import between
 
 Kind = Literal["coalescence", "contact change", "start"]
 
@@ -153,16 +154,33 @@ class Family:
     """The operator as a function of the load, and how closely the search looks at it.
 
     `operator` is fx -> the matrix A, ndarray or sparse, shape (n, n); windows narrower than `narrowest`, a force, are
-    not looked for.
+    not looked for. `states` is fx -> what A is smooth with, of loads at which A is known: where it changes, A bends.
     """
 
     operator: Callable[[float], Operator]
     narrowest: float
     limits: Limits = LIMITS
+    states: Callable[[float], bytes] = lambda fx: b""
 
     def at(self, fx: float) -> Place:
         """The operator at a load."""
         return Place(float(fx), csr_array(self.operator(float(fx))))
+
+    def steps(self, here: Place, load: float) -> list[Place]:
+        """The steps that lead to a load: where the states change on the way, one about each change is a short one."""
+        there = self.at(load)
+        shortest = self.limits.bending * (load - here.fx)
+
+        def parted(below: Place, above: Place) -> list[Place]:
+            if above.fx - below.fx <= shortest or self.states(below.fx) == self.states(above.fx):
+                return [above]
+            middle = between(self.at, below.fx, 0.5 * (below.fx + above.fx), above.fx)
+            return [*parted(below, middle[0]), *parted(middle[0], above)] if middle else [above]
+
+        places = [here, *parted(here, there)]
+        states = [self.states(place.fx) for place in places]
+        smooth = [before == now == after for before, now, after in zip(states, states[1:], states[2:], strict=False)]
+        return [place for place, inside in zip(places[1:], [*smooth, False], strict=True) if not inside]
 
     def track(self, known: dict[float, Pair]) -> Callable[[float], Pair]:
         """A pair at any load, followed from the nearest load where it is known."""

@@ -42,6 +42,9 @@ class Limits:
     share: float = 0.47
     """Where an increment is divided: not in the middle, as the edges of models lie at round numbers."""
 
+    bending: float = 2.0**-4
+    """Length in increments of the step about a load at which contacts change, in which a window may still hide."""
+
     # The edge of a window
 
     root: float = 1e-7

@@ -11,12 +11,12 @@ from scipy.sparse import csr_array
 
 from ..digits import with_uncertainty
 from ..errors import FaultgougeError
-from ..packing.packing import Packing
+from ..packing.packing import Floats, Packing
 from ..tabled import Tabled
 from .dense import all_windows
 from .edge import Family, Window, load_error
 from .limits import LIMITS, Limits
-from .modes import Operator, full_operator
+from .modes import Operator, contact_states, full_operator
 from .ranks import ALONE, Ranks
 from .sliced import Increments, Watch, first_window
 from .walk import increasing
@@ -115,8 +115,11 @@ def complex_windows(
     left out. All else is as in :func:`find_onset`.
     """
     loads = increasing(forces)
-    narrowest = limits.narrowest * float(np.abs(loads).max()) if narrowest is None else narrowest
-    return all_windows(Family(operator, narrowest, limits), loads)
+    return all_windows(Family(operator, _narrowest(loads, limits) if narrowest is None else narrowest, limits), loads)
+
+
+def _narrowest(loads: Floats, limits: Limits) -> float:
+    return limits.narrowest * float(np.abs(loads).max())
 
 
 def find_onset(
@@ -171,16 +174,18 @@ def find_onset(
     loads = increasing(forces)
     start = equilibrium(float(loads[0]))
     unbalanced: dict[float, float] = {}
+    states: dict[float, bytes] = {}
 
     def operator(fx: float) -> csr_array:
         packing = start if fx == loads[0] else equilibrium(fx)
-        unbalanced[fx] = load_error(packing)
+        unbalanced[fx], states[fx] = load_error(packing), contact_states(packing, limits)
         return full_operator(packing, limits)
 
     doubtful: Increments
     complete = seeks_all(start, modes, limits)
     if complete:
-        windows, doubtful = complex_windows(operator, loads, narrowest=narrowest, limits=limits), ()
+        narrowest = _narrowest(loads, limits) if narrowest is None else narrowest
+        windows, doubtful = all_windows(Family(operator, narrowest, limits, states.__getitem__), loads), ()
     else:
         first, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks, folder)
         windows = (first,) if first else ()

@@ -225,11 +225,6 @@ class MindlinLaw:
         overlap = _closed(overlap)
         return self.kn * overlap * self._powers(overlap)[0]
 
-    def normal_energy(self, overlap: ArrayLike) -> Floats:
-        """Elastic energy kn overlap^(p+1) / (p+1) of the repulsion; the tangential force has none."""
-        overlap = _closed(overlap)
-        return self.normal_force(overlap) * overlap / (self.exponent + 1)
-
     def normal_stiffness(self, overlap: ArrayLike) -> Floats:
         """d f_n / d overlap = p kn overlap^(p-1), force / length."""
         return self.exponent * self.kn * self._powers(_closed(overlap))[0]
@@ -265,27 +260,6 @@ class MindlinLaw:
         slip, x = self._reduced(overlap, slip)
         return -self.kt * self._powers(overlap)[0] * (1 + x - x * x) * slip
 
-    def tangential_slip_derivative(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
-        """a = d f_t / d slip at constant overlap, force / length; never positive, zero at the bound."""
-        overlap = _closed(overlap)
-        _, x = self._reduced(overlap, slip)
-        # Factored, 1 + 2x - 3x^2 vanishes at the bound to the last bit.
-        return -self.kt * self._powers(overlap)[0] * ((1 - x) * (1 + 3 * x)) * self.frictional
-
-    def tangential_overlap_derivative(self, overlap: ArrayLike, slip: ArrayLike, parting: ArrayLike = 0.5) -> Floats:
-        """b = d f_t / d overlap while nothing slips, force / length: what makes the forces non-conservative.
-
-        Parameters
-        ----------
-        overlap, slip : array_like
-            Overlap and slip of each contact, length.
-        parting : array_like
-            Share of the derivative while the overlap falls; only a rescaled history has another one while it grows.
-        """
-        overlap = _closed(overlap)
-        slip, x = self._reduced(overlap, slip)
-        return -self.kt * self._overlap_factor(x, parting) * _ratio(slip, self._powers(overlap)[1])
-
     def _overlap_factor(self, x: Floats, parting: ArrayLike) -> Floats:
         """-b in units of kt s overlap^(p-2)."""
         # (p-1) f_t/overlap and the term of d x/d overlap = -x/overlap, joined
@@ -297,7 +271,16 @@ class MindlinLaw:
         return growing + np.asarray(parting, dtype=np.float64) * (falling - growing)
 
     def derivatives(self, overlap: Floats, slip: Floats, parting: ArrayLike = 0.5) -> Derivatives:
-        """All of the above at once, at a fraction of the cost; overlaps that are not positive give zeros."""
+        """Forces and their derivatives; overlaps that are not positive give zeros.
+
+        Parameters
+        ----------
+        overlap, slip : ndarray
+            Overlap and slip of each contact, length.
+        parting : array_like
+            Share of the derivative while the overlap falls in b; only a rescaled history has another one while the
+            overlap grows.
+        """
         overlap, p = np.maximum(overlap, 0.0), self.exponent
         root, rest_power = self._powers(overlap)
         normal_force, normal_stiffness = self.kn * overlap * root, p * self.kn * root

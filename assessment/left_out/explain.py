@@ -32,9 +32,9 @@ from ...pywrap.runs.path import next_equilibrium
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.sections import Ramp
 from ...pywrap.settling.bed import settle
-from .costs import FEW, SHARE, TURNS, Part, in_turns, same_motion
+from .parts import FEW, SHARE, TURNS, Cost, Part, same_motion
 from .processors import ranks, threads
-from .switches import UNREACHED, Feature, Loaded, Run, features, where
+from .switches import UNREACHED, Feature, Loaded, Run, features
 
 LARGEST = 400
 """Disks up to which a packing is settled to be explained: half a second. Of a larger one a strip of as many is, of the
@@ -110,7 +110,6 @@ def explain(scene: Scene) -> Explanation:
         with bare.started(MPI.COMM_SELF) as (_, dynamics):
             steps = _steps(dynamics)
         parts = [_switched(feature, loaded, steps, folder) for feature in features(run)]
-        parts += [_compensated(bare, loaded, steps, folder)]
         parts += [_dumps(scene, start, folder), _contact_output(scene, bare, loaded, steps, folder)]
         parts += [_trajectory(scene, start, bare, steps, folder)]
         parts += [ranks(bare, steps, folder), threads(start.packing)]
@@ -133,39 +132,23 @@ def _switched(feature: Feature, scene: Loaded, steps: int, folder: Path) -> Part
         without, plain = both.enter_context(feature.without.started(MPI.COMM_SELF, logs[0]))
         with_it, switched = both.enter_context(feature.with_it.started(MPI.COMM_SELF, logs[1]))
         adds = Loaded.of(with_it, logs[1]).beyond(Loaded.of(without, logs[0]))
-        others = np.tile(~feature.touched, 2)
-        n = len(others)
-        identical = np.array_equal(without.net_force[:n][others], with_it.net_force[:n][others])
-        cost = in_turns("step", lambda: plain.advance(steps), lambda: switched.advance(steps), steps)
+        others = ~np.isin(np.arange(len(feature.with_it.packing)), feature.touched)
+        forces = without.net_force, with_it.net_force
+        here, there = (force[: 2 * len(others)][np.tile(others, 2)] for force in forces)
+        identical = np.array_equal(here, there)
+        cost = Cost.of("step", lambda: plain.advance(steps), lambda: switched.advance(steps), steps)
         same = "forces at the start"
-        if np.any(feature.touched):
-            same += f" on the {(~feature.touched).sum()} other disks"
+        if not others.all():
+            same += f" on the {others.sum()} other disks"
         if not feature.moves:
             same = f"positions and velocities after {steps * (TURNS + 1) + 1} steps"
             identical &= same_motion(plain.advance(1), switched.advance(1))
+    if feature.name == "compensated coordinates" and not identical:
+        same += f" differ by {np.abs(forces[1] - forces[0]).max():.1g}, which doubles round away"
     included = bool(adds) and set(adds) <= set(scene.everything)
     if feature.name == "tangential history":
         adds += (f"{_rotations(feature.with_it.packing) - _rotations(feature.without.packing)} rotations in K",)
     return Part(feature.name, included, feature.reason, adds, cost, same, bool(identical))
-
-
-def _compensated(run: Run, loaded: Loaded, steps: int, folder: Path) -> Part:
-    """Coordinates, slips and forces with low parts, and without."""
-    packing, contacts = run.packing, run.packing.contacts
-    plain = replace(packing, position_low=None, contacts=replace(contacts, slip_low=None))
-    low = packing if packing.compensated else replace(packing, position_low=np.zeros_like(packing.position))
-    without, with_it = (replace(run, packing=each) for each in (plain, low))
-    reason = f'precision = "{"compensated" if packing.compensated else "double"}"'
-    feature = Feature("compensated coordinates", reason, without, with_it, where(packing, []), moves=True)
-    part = _switched(feature, loaded, steps, folder)
-    if part.identical:
-        return part
-    forces = []
-    for each in (without, with_it):
-        with each.started(MPI.COMM_SELF) as (engine, _):
-            forces.append(engine.net_force)
-    same = f"forces at the start differ by {np.abs(forces[1] - forces[0]).max():.1g}, which doubles round away"
-    return replace(part, same=same)
 
 
 def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
@@ -191,7 +174,7 @@ def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
             reached.append(found.packing)
 
         # an equilibrium by damped dynamics takes half a second
-        cost = in_turns("equilibrium", without, with_it, turns=FEW)
+        cost = Cost.of("equilibrium", without, with_it, turns=FEW)
         parts = Loaded.of(engine, log).parts
     adds = [f"part {part}" for part in parts if part == "write.in"]
     adds += [f"file {path.name}" for path in sorted(files.iterdir())]
@@ -205,8 +188,7 @@ def _contact_output(scene: Scene, run: Run, loaded: Loaded, steps: int, folder: 
     wanted = scene.output is not None and scene.output.dumps
     reason = "in the dumps" if wanted else "no output.dumps"
     watched = replace(run, contacts=folder / "contacts")
-    nobody = where(run.packing, [])
-    feature = Feature("per-contact output", f"{reason}; measured every 100 steps", run, watched, nobody, moves=False)
+    feature = Feature("per-contact output", f"{reason}; measured every 100 steps", run, watched, moves=False)
     return replace(_switched(feature, loaded, steps, folder), included=wanted)
 
 
@@ -218,7 +200,7 @@ def _trajectory(scene: Scene, start: Equilibrium, run: Run, steps: int, folder: 
         (_, plain), (_, watched) = (stack.enter_context(run.started(MPI.COMM_SELF)) for _ in range(2))
         record = stack.enter_context(Record(path, scene, MPI.COMM_SELF))
         record.append(start)
-        cost = in_turns(
+        cost = Cost.of(
             f"sample of {steps} steps",
             lambda: plain.advance(steps),
             lambda: record.append_motion(0.0, watched.advance(steps)),

@@ -4,8 +4,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from .costs import Cost
 from .explain import Explanation
+from .parts import Cost
 
 
 def explanation_table(explanation: Explanation) -> Group:

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from ...analysis import Packing, dynamical_matrix
 from ...analysis.packing.packing import Floats
-from .costs import FEW, Part, in_turns, same_motion
+from .parts import FEW, Cost, Part, same_motion
 from .switches import Run
 
 DENSE = 400
@@ -57,7 +57,7 @@ def time_ranks(job: str) -> None:
                 alone.advance(steps)
             world.Barrier()
 
-        cost = in_turns("step", on_one, lambda: together.advance(steps), steps, parallel=True)
+        cost = Cost.of("step", on_one, lambda: together.advance(steps), steps, parallel=True)
         motion = together.advance(1)
         if alone is not None:
             result = cost, same_motion(alone.advance(1), motion)
@@ -79,7 +79,7 @@ def threads(packing: Packing) -> Part:
 
     # two threads that wait for one core take a third of a second
     per = f"dense solve of {len(matrix)} equations"
-    cost = in_turns(per, lambda: solve(1), lambda: solve(2), turns=FEW, parallel=True)
+    cost = Cost.of(per, lambda: solve(1), lambda: solve(2), turns=FEW, parallel=True)
     reason = f"{here} thread{'s' * (here > 1)} in BLAS, by OPENBLAS_NUM_THREADS; the plugin has none"
     identical = np.array_equal(solutions[1], solutions[2])
     same = "the solution" if identical else "the solution differs in its last digits"

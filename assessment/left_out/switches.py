@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ...analysis import Contacts, MindlinLaw, Packing, touching
+from ...analysis import Contacts, Packing, touching
 from ...analysis.motion.signals import Signal
 from ...pywrap import Engine
 from ...pywrap.lammps.dynamics import Dynamics, Weakening
@@ -76,14 +76,8 @@ class Loaded:
     @property
     def everything(self) -> tuple[str, ...]:
         """All in one, as "fix slips" and so on; variables belong to the deck parts and are left out."""
-        kinds = {
-            "part": self.parts,
-            "fix": self.fixes,
-            "compute": self.computes,
-            "dump": self.dumps,
-            "array": self.arrays,
-        }
-        return *(f"{kind} {name}" for kind, names in kinds.items() for name in names), *self.settings
+        kinds = {"part": "parts", "fix": "fixes", "compute": "computes", "dump": "dumps", "array": "arrays"}
+        return *(f"{kind} {name}" for kind, names in kinds.items() for name in getattr(self, names)), *self.settings
 
     def beyond(self, other: Loaded) -> tuple[str, ...]:
         """What is here and not there."""
@@ -130,15 +124,18 @@ class Run:
                 engine.lammps.command("run 0 post no")
             yield engine, dynamics
 
-    def moved_by(self, *names: str, otherwise: dict[str, Any]) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+    def of(self, **changes: Any) -> Run:
+        """The same run of a packing that differs in these arguments."""
+        return replace(self, packing=replace(self.packing, **changes))
+
+    def moved_by(self, *names: str, otherwise: dict[str, Any]) -> tuple[dict[str, Any], ArrayLike]:
         """What moves the disks, by its names in `motion`, or what else would; and the disks."""
         own = {key: value for key, value in self.motion.items() if key in (*names, "target")}
         what = own if names[0] in own else otherwise
-        target = what.get("target")
-        return what, self.packing.top if target is None else where(self.packing, target)
+        return what, what.get("target", np.flatnonzero(self.packing.top))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Feature:
     """One feature of a run, and the two runs that differ in it.
 
@@ -148,7 +145,7 @@ class Feature:
         Its name, and why the scene has it or not.
     without, with_it : Run
         The two.
-    touched : ndarray of bool, shape (N,)
+    touched : array_like of int
         The disks on which it acts from the first moment.
     moves : bool
         Whether it changes the motion.
@@ -158,8 +155,8 @@ class Feature:
     reason: str
     without: Run
     with_it: Run
-    touched: NDArray[np.bool_]
-    moves: bool
+    touched: ArrayLike = ()
+    moves: bool = True
 
 
 def features(run: Run) -> Iterator[Feature]:
@@ -174,92 +171,61 @@ def features(run: Run) -> Iterator[Feature]:
     ------
     Feature
     """
-    law = run.packing.law
-    rough_law = law if law.frictional else replace(law, kt=2 / 7 * law.kn, mu=1.0)
     bare = replace(run, motion={})
-    yield _floor(bare)
-    yield _history(bare, rough_law)
-    yield _periodicity(bare)
-    yield _weakening(run, replace(bare, packing=replace(run.packing, law=rough_law)))
-    yield from _damping(bare, law)
-    yield _perturbation(run, bare)
-    yield _signal(run, bare)
-
-
-def _floor(bare: Run) -> Feature:
-    packing = bare.packing
-    on_floor = where(packing, packing.contacts.i[packing.contacts.floor])
-    reason = f"{on_floor.sum()} of {len(packing)} disks rest on it, and nothing else bears the load"
-    return Feature("floor", reason, replace(bare, floor=False), bare, on_floor, moves=True)
-
-
-def _history(bare: Run, rough_law: MindlinLaw) -> Feature:
-    """Zero slips in both, so that friction alone differs."""
-    packing, law = bare.packing, bare.packing.law
-    packing = replace(packing, contacts=touching(packing.position, packing.radius, packing.box_length))
-    return Feature(
-        "tangential history",
-        f"mu = {law.mu:g}, kt = {law.kt:g}" + ("" if law.frictional else ": no tangential force"),
-        replace(bare, packing=replace(packing, law=replace(law, mu=0.0))),
-        replace(bare, packing=replace(packing, law=rough_law)),
-        where(packing, []),
-        moves=True,
-    )
-
-
-def _periodicity(bare: Run) -> Feature:
-    opened, closed, across = _opened_and_closed(bare.packing)
-    box = bare.packing.box_length
-    reason = "the sides are open" if box is None else f"x has the period {box:g}"
-    open_run, closed_run = (replace(bare, packing=packing) for packing in (opened, closed))
-    return Feature("periodicity", reason, open_run, closed_run, across, moves=True)
-
-
-def _weakening(run: Run, rough: Run) -> Feature:
+    law = run.packing.law
+    rough = bare.of(law=law if law.frictional else replace(law, kt=2 / 7 * law.kn, mu=1.0))
+    yield from _of_contacts(bare, rough)
     weakening, reason = run.motion.get("weakening"), "section [friction]; measured below its threshold"
     if weakening is None:
         weakening, reason = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=UNREACHED, v_ss=1.0), "no section [friction]"
     weakens = replace(rough, motion={"weakening": weakening})
-    return Feature("dynamic friction", reason, rough, weakens, where(run.packing, []), moves=False)
+    yield Feature("dynamic friction", reason, rough, weakens, moves=False)
+    yield from _of_damping(bare)
+    yield from _of_motion(run, bare)
+    packing, reason = run.packing, f'precision = "{"compensated" if run.packing.compensated else "double"}"'
+    plain = bare.of(position_low=None, contacts=replace(packing.contacts, slip_low=None))
+    low = bare if packing.compensated else bare.of(position_low=np.zeros_like(packing.position))
+    yield Feature("compensated coordinates", reason, plain, low)
 
 
-def _perturbation(run: Run, bare: Run) -> Feature:
+def _of_contacts(bare: Run, rough: Run) -> Iterator[Feature]:
+    """Floor, friction and period."""
+    packing, law, box = bare.packing, bare.packing.law, bare.packing.box_length
+    on_floor = np.unique(packing.contacts.i[packing.contacts.floor])
+    reason = f"{len(on_floor)} of {len(packing)} disks rest on it, and nothing else bears the load"
+    yield Feature("floor", reason, replace(bare, floor=False), bare, on_floor)
+    reason = f"mu = {law.mu:g}, kt = {law.kt:g}" + ("" if law.frictional else ": no tangential force")
+    # zero slips in both, so that friction alone differs
+    unslipped = touching(packing.position, packing.radius, box)
+    smooth = bare.of(contacts=unslipped, law=replace(law, mu=0.0))
+    yield Feature("tangential history", reason, smooth, rough.of(contacts=unslipped))
+    opened, closed, across = _opened_and_closed(bare)
+    reason = "the sides are open" if box is None else f"x has the period {box:g}"
+    yield Feature("periodicity", reason, opened, closed, across)
+
+
+def _of_damping(bare: Run) -> Iterator[Feature]:
+    """Dashpots and drag, each with what the scene has or else a hundredth of what is critical for one contact."""
+    packing, law, tau = bare.packing, bare.packing.law, bare.packing.drag_time
+    rate = np.sqrt(law.stiffness_scale(packing.fy) / packing.mass.mean())
+    dashpot = float(0.01 * packing.mass.mean() * rate / law.growth(np.array(law.overlap_of_force(packing.fy))))
+    reason = f"cn = {law.cn:g}, ct = {law.ct:g}" if law.damped else "no cn or ct in [damping]"
+    damped = law if law.damped else replace(law, cn=dashpot, ct=dashpot)
+    yield Feature("dashpots", reason, bare.of(law=replace(law, cn=0.0, ct=0.0)), bare.of(law=damped))
+    reason = "no tau in [damping]" if tau is None else f"tau = {tau:g}"
+    yield Feature("drag", reason, bare.of(drag_time=None), bare.of(drag_time=tau or 100 / rate))
+
+
+def _of_motion(run: Run, bare: Run) -> Iterator[Feature]:
+    """What pushes the disks."""
     push, pushed = run.moved_by("amplitude", "omega", otherwise={"amplitude": 1e-9, "omega": 0.01})
     reason = f"amplitude {push['amplitude']:g}" if "amplitude" in run.motion else "no amplitude in [perturb]"
-    return Feature("perturbation", reason, bare, replace(bare, motion=push), pushed, moves=True)
-
-
-def _signal(run: Run, bare: Run) -> Feature:
+    yield Feature("perturbation", reason, bare, replace(bare, motion=push), pushed)
     constant = Signal(np.array([0.0, 1e6]), np.array([1e-9, 1e-9]))
     sent, moved = run.moved_by("signal", "on", otherwise={"signal": constant, "on": "layer"})
     reason = f"{len(sent['signal'])} rows, on the {sent['on']}" if "signal" in run.motion else "no signal in [perturb]"
-    if sent["on"] == "floor":
-        moved = np.ones(len(run.packing), dtype=bool)
-    return Feature("signal", reason, bare, replace(bare, motion=sent), moved, moves=True)
-
-
-def _damping(bare: Run, law: MindlinLaw) -> Iterator[Feature]:
-    """Dashpots and drag, each with what the scene has or else a hundredth of what is critical for one contact."""
-    packing = bare.packing
-    rate = np.sqrt(law.stiffness_scale(packing.fy) / packing.mass.mean())
-    dashpot = float(0.01 * packing.mass.mean() * rate / law.growth(np.array(law.overlap_of_force(packing.fy))))
-    damped = law if law.damped else replace(law, cn=dashpot, ct=dashpot)
-    for name, reason, without, with_it in (
-        (
-            "dashpots",
-            f"cn = {law.cn:g}, ct = {law.ct:g}" if law.damped else "no cn or ct in [damping]",
-            replace(packing, law=replace(law, cn=0.0, ct=0.0)),
-            replace(packing, law=damped),
-        ),
-        (
-            "drag",
-            "no tau in [damping]" if packing.drag_time is None else f"tau = {packing.drag_time:g}",
-            replace(packing, drag_time=None),
-            replace(packing, drag_time=packing.drag_time or 100 / rate),
-        ),
-    ):
-        without_run, with_run = (replace(bare, packing=each) for each in (without, with_it))
-        yield Feature(name, reason, without_run, with_run, where(packing, []), moves=True)
+    everything = np.arange(len(run.packing))
+    yield Feature("signal", reason, bare, replace(bare, motion=sent), everything if sent["on"] == "floor" else moved)
 
 
 def _arrays(instance: Any, fixes: tuple[str, ...]) -> Iterator[str]:
@@ -273,13 +239,9 @@ def _arrays(instance: Any, fixes: tuple[str, ...]) -> Iterator[str]:
         yield "d_theta"
 
 
-def where(packing: Packing, disks: ArrayLike) -> NDArray[np.bool_]:
-    """Which disks are among those listed, shape (N,)."""
-    return np.isin(np.arange(len(packing)), disks)
-
-
-def _opened_and_closed(packing: Packing) -> tuple[Packing, Packing, NDArray[np.bool_]]:
-    """The packing with open sides and with a period, and the disks with a contact across it."""
+def _opened_and_closed(bare: Run) -> tuple[Run, Run, ArrayLike]:
+    """The run with open sides and with a period, and the disks with a contact across it."""
+    packing = bare.packing
     i, j, floor = packing.contacts.i, packing.contacts.j, packing.contacts.floor
     position = packing.position.copy()
     if packing.box_length is None:
@@ -292,8 +254,5 @@ def _opened_and_closed(packing: Packing) -> tuple[Packing, Packing, NDArray[np.b
     beyond = ~floor & (np.abs(position[i, 0] - position[j, 0]) > 0.5 * length)
     slip, low = packing.contacts.slip, packing.contacts.slip_low
     contacts = Contacts(i[~beyond], j[~beyond], slip[~beyond], None if low is None else low[~beyond])
-    return (
-        replace(packing, position=position, box_length=None, contacts=contacts),
-        replace(packing, position=position, box_length=length),
-        where(packing, np.concatenate([i[beyond], j[beyond]])),
-    )
+    opened = bare.of(position=position, box_length=None, contacts=contacts)
+    return opened, bare.of(position=position, box_length=length), np.concatenate([i[beyond], j[beyond]])

@@ -5,13 +5,12 @@ packing of them, `upper_layer` finds the layer that carries the load, `resting` 
 """
 
 from .disks import Disks, Slips, packing_of
-from .formats import WRITERS, format_of, is_hdf5, known_formats, read_disks, write_frames, write_packing
+from .formats import format_of, is_hdf5, read_disks, write_frames, write_packing
 from .frames import chosen_frames, frames_of
 from .layer import upper_layer
 from .quantities import Frame, ModeVectors
 
 __all__ = [
-    "WRITERS",
     "Disks",
     "Frame",
     "ModeVectors",
@@ -20,7 +19,6 @@ __all__ = [
     "format_of",
     "frames_of",
     "is_hdf5",
-    "known_formats",
     "packing_of",
     "read_disks",
     "upper_layer",

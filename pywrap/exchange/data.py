@@ -11,6 +11,7 @@ and the angle of a disk behind its line, since no density may give a mass to the
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import takewhile
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from ...analysis import Packing, PackingFileError
 from ..lammps.data_file import box_lines
 from . import quantities
 from .disks import Disks, of_columns, sphere_volume
-from .quantities import ModeVectors
+from .quantities import Frame, ModeVectors
 from .text import columns_of, lines_of, numbers_in, uncommented
 
 MARK = "# faultgouge"
@@ -78,8 +79,9 @@ def _header(path: Path, lines: list[str]) -> dict[str, list[float]]:
     return found
 
 
-def write_data(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
+def write_data(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
     """A data file that `read_data` takes back to the bit; what LAMMPS itself reads of it is returned in words."""
+    (packing,) = (frame.packing for frame in frames)
     density = densities(packing)
     sides = "f" if packing.box_length is None else "p"
     lines = [

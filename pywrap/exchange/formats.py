@@ -1,9 +1,12 @@
-"""Which module reads and writes which file, by its suffix; modules are imported when such a file is met."""
+"""The formats of other codes: what reads and writes which file, and what a format has no room for.
+
+A module is imported when a file of its format is met.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,70 +20,71 @@ NUMBER = re.compile(rb"[-+.\deE]+")
 
 
 class Format(NamedTuple):
-    """A format that is read.
+    """A format.
 
     Attributes
     ----------
     words : str
         What it is.
-    module, reader : str
-        The module of this package, and the function in it.
+    module : str
+        The module of this package.
+    suffixes : tuple of str
+        Of files that are read; a file that is written has the first. Of a format that the first line tells, what that
+        line is.
+    reader, writer : str
+        Functions in the module; empty for what is not done.
     frames : bool
-        Whether a file may hold several frames.
+        Whether a file that is read may hold several frames.
+    alone, film : bool
+        Whether one packing is written, and whether several frames are.
+    modes : bool
+        Whether a file has room for modes.
     """
 
     words: str
     module: str
-    reader: str
-    frames: bool
+    suffixes: tuple[str, ...]
+    reader: str = ""
+    writer: str = ""
+    frames: bool = False
+    alone: bool = True
+    film: bool = False
+    modes: bool = True
 
 
-DATA = Format("LAMMPS data (atom style sphere)", "data", "read_data", False)
-DUMP = Format("LAMMPS dump", "dump", "read_custom_dump", True)
-YADE = Format("YADE's text", "grains", "read_yade", False)
-MERCURY = Format("MercuryDPM's data", "grains", "read_mercury", True)
-RESTART = Format("LAMMPS restart", "restart", "read_restart", False)
-OTHER = Format("what MDAnalysis reads with radii", "universe", "read_universe", True)
+DATA = Format("LAMMPS data (atom style sphere)", "data", (".data",), "read_data", "write_data", modes=False)
+DUMP = Format("LAMMPS dump", "dump", (".dump", ".lammpstrj"), "read_custom_dump", frames=True)
+RESTART = Format("LAMMPS restart", "restart", (".restart",), "read_restart")
+YADE = Format("YADE's text", "grains", ("line 1 is #format x_y_z_r",), "read_yade")
+MERCURY = Format("MercuryDPM's data", "grains", (".data, line 1 is N time bounds",), "read_mercury", frames=True)
+OTHER = Format("what MDAnalysis reads with radii", "universe", (), "read_universe", frames=True)
 
-FORMATS: dict[str, Format] = {
-    ".disks": Format("dumps of the decks", "dump", "read_deck_dump", True),
-    ".data": DATA,
-    ".dump": DUMP,
-    ".lammpstrj": DUMP,
-    ".restart": RESTART,
-    ".csv": Format("CSV", "table", "read_table", False),
-    ".xyz": Format("extended XYZ", "xyz", "read_xyz", True),
-    ".extxyz": Format("extended XYZ", "xyz", "read_xyz", True),
-    ".json": Format("packing.json", "json_file", "read_json", False),
-    ".gsd": Format("GSD", "gsd_file", "read_gsd", True),
-}
-"""By suffix. LAMMPS has no suffixes of its own: data.NAME, dump.NAME and restart.NAME are known as well."""
+FORMATS = (
+    Format("VTK", "vtp", (".vtp",), writer="write_vtp"),
+    Format("dumps of the decks", "dump", (".disks",), "read_deck_dump", frames=True),
+    Format("extended XYZ", "xyz", (".xyz", ".extxyz"), "read_xyz", "write_xyz", frames=True, film=True),
+    DATA,
+    DUMP,
+    RESTART,
+    Format("CSV", "table", (".csv",), "read_table"),
+    Format("packing.json", "json_file", (".json",), "read_json"),
+    Format("GSD", "gsd_file", (".gsd",), "read_gsd", "write_gsd", frames=True, film=True),
+    Format("ParaView's list of frames", "vtp", (".pvd",), writer="write_pvd", alone=False, film=True),
+    YADE,
+    MERCURY,
+)
+"""LAMMPS has no suffixes of its own: data.NAME, dump.NAME and restart.NAME are known as well. YADE and MercuryDPM are
+told by the first line, whatever the name is; MercuryDPM's files have the suffix of LAMMPS's."""
 
-BY_BEGINNING: dict[str, Format] = {"line 1 is #format x_y_z_r": YADE, ".data, line 1 is N time bounds": MERCURY}
-"""What the first line tells, whatever the name is; MercuryDPM's files have the suffix of LAMMPS's."""
-
-WRITERS = {
-    ".vtp": ("vtp", "write_vtp"),
-    ".xyz": ("xyz", "write_xyz"),
-    ".data": ("data", "write_data"),
-    ".gsd": ("gsd_file", "write_gsd"),
-}
-"""Module of this package and function, by suffix."""
-
-FRAMES = {
-    ".xyz": ("xyz", "write_xyz_frames"),
-    ".gsd": ("gsd_file", "write_gsd_frames"),
-    ".pvd": ("vtp", "write_pvd"),
-}
-"""The same for files of several frames."""
+READ = {suffix: each for each in FORMATS if each.reader for suffix in each.suffixes}
+WRITTEN = {each.suffixes[0]: each for each in FORMATS if each.writer and each.alone}
+FILMS = {each.suffixes[0]: each for each in FORMATS if each.film}
+"""Formats by suffix, for reading, for writing, and for writing several frames."""
 
 
 def known_formats() -> str:
     """All formats that are read, in words."""
-    words: dict[str, list[str]] = {}
-    for suffix, each in {**FORMATS, **BY_BEGINNING}.items():
-        words.setdefault(each.words, []).append(suffix)
-    listed = [f"{what} ({', '.join(suffixes)})" for what, suffixes in words.items()]
+    listed = [f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS if each.reader]
     return ", ".join([*listed, "run.h5", f"and {OTHER.words} (pip install 'faultgouge[export]')"])
 
 
@@ -103,8 +107,8 @@ def format_of(path: Path) -> Format:
     begun = _by_beginning(path)
     if begun is not None:
         return begun
-    if path.suffix.lower() in FORMATS:
-        return FORMATS[path.suffix.lower()]
+    if path.suffix.lower() in READ:
+        return READ[path.suffix.lower()]
     begin = path.name.split(".")[0].lower()
     if is_restart(path):
         return RESTART
@@ -153,18 +157,18 @@ def read_disks(path: Path, frame: int | None = None) -> Disks:
     found = format_of(path)
     if not found.frames and frame not in (None, 0, -1):
         raise PackingFileError(f"{path} has one frame; there is no --frame {frame}.")
-    disks: Disks = _imported(found.module, found.reader)(path, *([frame] if found.frames else []))
+    disks: Disks = _imported(found, found.reader)(path, *([frame] if found.frames else []))
     return disks
 
 
-def _imported(module: str, function: str) -> Any:
-    return getattr(import_module(f".{module}", __package__), function)
+def _imported(format_: Format, function: str) -> Any:
+    return getattr(import_module(f".{format_.module}", __package__), function)
 
 
 def check_frames_writer(path: Path) -> None:
     """Refuse a name that no writer of several frames takes."""
-    if path.suffix not in FRAMES:
-        raise BadInputError(f"-o {path}: several frames go into {', '.join(FRAMES)}; give it one of these suffixes.")
+    if path.suffix not in FILMS:
+        raise BadInputError(f"-o {path}: several frames go into {', '.join(FILMS)}; give it one of these suffixes.")
 
 
 def write_frames(path: Path, frames: Iterable[Frame]) -> None:
@@ -180,21 +184,21 @@ def write_frames(path: Path, frames: Iterable[Frame]) -> None:
     Raises
     ------
     BadInputError
-        If the suffix is none of `FRAMES`.
+        If the suffix is none of `FILMS`.
     OutputError
         If the file cannot be written.
     """
     check_frames_writer(path)
-    _write(FRAMES, path, frames)
+    _write(FILMS[path.suffix], path, frames, [])
 
 
 def check_writer(path: Path, modes: bool = False) -> None:
     """Refuse a name that no writer takes, or modes in a format that has no room for them."""
     if path.suffix == ".pvd":
         raise BadInputError(f"-o {path}: a .pvd is a list of frames; add --frames all, or export a .vtp.")
-    if path.suffix not in WRITERS:
-        raise BadInputError(f"-o {path}: exports are {', '.join(WRITERS)}; give it one of these suffixes.")
-    if modes and path.suffix == ".data":
+    if path.suffix not in WRITTEN:
+        raise BadInputError(f"-o {path}: exports are {', '.join(WRITTEN)}; give it one of these suffixes.")
+    if modes and not WRITTEN[path.suffix].modes:
         raise BadInputError(f"-o {path}: LAMMPS data has no room for modes; leave --mode out, or export .vtp or .xyz.")
 
 
@@ -218,16 +222,16 @@ def write_packing(path: Path, packing: Packing, modes: Sequence[ModeVectors] = (
     Raises
     ------
     BadInputError
-        If the suffix is none of `WRITERS`, or the format has no modes.
+        If the suffix is none of `WRITTEN`, or the format has no modes.
     OutputError
         If the file cannot be written.
     """
     check_writer(path, bool(modes))
-    return str(_write(WRITERS, path, packing, list(modes)))
+    return _write(WRITTEN[path.suffix], path, [Frame(packing)], list(modes))
 
 
-def _write(writers: Mapping[str, tuple[str, str]], path: Path, *content: object) -> object:
+def _write(format_: Format, path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
     try:
-        return _imported(*writers[path.suffix])(path, *content)
+        return str(_imported(format_, format_.writer)(path, frames, modes))
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror}.") from error

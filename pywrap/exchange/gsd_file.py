@@ -64,32 +64,24 @@ def _disks(path: Path, frame: Any) -> Disks:
     return of_columns(str(path), columns, box_length=float(box[0]), remark=SINGLE)
 
 
-def write_gsd(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
-    """A GSD file with one frame; what is in it, in words."""
-    hoomd = needed_library("gsd.hoomd", path)
-    frame = _frame(hoomd, packing)
-    frame.log |= _forces(packing)
-    for mode in modes:
-        frame.log[f"particles/{mode.name}"] = np.ascontiguousarray(mode.displacement.real.T)
-        frame.log[f"particles/{mode.name}_imag"] = np.ascontiguousarray(mode.displacement.imag.T)
-    with hoomd.open(str(path), "w") as file:
-        file.append(frame)
-    return f"{SINGLE}; the logged quantities have all of the packing in float64, and import takes these"
-
-
-def write_gsd_frames(path: Path, frames: Iterable[Frame]) -> None:
-    """A GSD file of several frames."""
+def write_gsd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
+    """A GSD file of one frame or several; what is in it, in words."""
     hoomd = needed_library("gsd.hoomd", path)
     with hoomd.open(str(path), "w") as file:
         for number, each in enumerate(frames):
             frame = _frame(hoomd, each.packing)
             frame.configuration.step = number
-            frame.log["particles/displacement"] = quantities.in_space(each.displacement)
-            frame.log["particles/normal_force"] = quantities.disk_pressure(each.packing)
+            if each.displacement is not None:
+                frame.log["particles/displacement"] = quantities.in_space(each.displacement)
+                frame.log["particles/normal_force"] = quantities.disk_pressure(each.packing)
             frame.log |= {f"faultgouge/{key}": np.array([value]) for key, value in each.number.items()}
             if each.whole:
                 frame.log |= _forces(each.packing)
+            for mode in modes:
+                frame.log[f"particles/{mode.name}"] = np.ascontiguousarray(mode.displacement.real.T)
+                frame.log[f"particles/{mode.name}_imag"] = np.ascontiguousarray(mode.displacement.imag.T)
             file.append(frame)
+    return f"{SINGLE}; the logged quantities have all of the packing in float64, and import takes these"
 
 
 def _forces(packing: Packing) -> dict[str, np.ndarray]:

@@ -55,7 +55,7 @@ class ModeVectors:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A frame of a film of packings.
+    """A packing as it is written, alone or as a frame of a film.
 
     Attributes
     ----------
@@ -63,16 +63,16 @@ class Frame:
         The packing. Its contacts are those that touch, without slips, if it is not `whole`.
     time : float
         F_x of an equilibrium, or the time of an undamped run.
-    displacement : ndarray, shape (N, 2)
-        From the first frame, length.
+    displacement : ndarray, shape (N, 2), or None
+        From the first frame of a film, length.
     whole : bool
         Whether angles and slips, and so the forces, are known: an undamped run stores positions alone.
     """
 
     packing: Packing
-    time: float
-    displacement: Floats
-    whole: bool
+    time: float = 0.0
+    displacement: Floats | None = None
+    whole: bool = True
 
     @property
     def number(self) -> dict[str, float]:

@@ -28,13 +28,15 @@ FORCES = ("angle", "net_force", "torque_over_radius", "mobilised", "contact_forc
 SLIPS = ("contact_slip", "contact_mobilised")
 
 
-def write_vtp(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
+def write_vtp(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
     """A .vtp file; what is in it, in words."""
-    _tree(packing, modes).write(path, xml_declaration=True, encoding="utf-8")
+    (frame,) = frames
+    packing = frame.packing
+    _tree(frame, modes).write(path, xml_declaration=True, encoding="utf-8")
     return f"{len(packing)} disks and {len(packing.contacts)} contacts, in float64"
 
 
-def write_pvd(path: Path, frames: Iterable[Frame]) -> None:
+def write_pvd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
     """A .pvd file, ParaView's list of frames, and a folder of its name with a .vtp for each."""
     folder = path.with_suffix("")
     folder.mkdir(exist_ok=True)
@@ -42,18 +44,20 @@ def write_pvd(path: Path, frames: Iterable[Frame]) -> None:
     collection = ElementTree.SubElement(root, "Collection")
     for number, frame in enumerate(frames):
         name = f"{folder.name}/{number:05d}.vtp"
-        _tree(frame.packing, [], frame).write(path.parent / name, xml_declaration=True, encoding="utf-8")
+        _tree(frame, modes).write(path.parent / name, xml_declaration=True, encoding="utf-8")
         ElementTree.SubElement(collection, "DataSet", timestep=repr(float(frame.time)), part="0", file=name)
     ElementTree.ElementTree(root).write(path, xml_declaration=True, encoding="utf-8")
+    return "displacements and what is known of forces"
 
 
-def _tree(packing: Packing, modes: list[ModeVectors], frame: Frame | None = None) -> ElementTree.ElementTree:
+def _tree(frame: Frame, modes: list[ModeVectors]) -> ElementTree.ElementTree:
+    packing = frame.packing
     n, count = len(packing), len(packing.contacts)
     root = Element("VTKFile", type="PolyData", version="1.0", byte_order="LittleEndian", header_type="UInt64")
     data = ElementTree.SubElement(root, "PolyData")
     fields = ElementTree.SubElement(data, "FieldData")
     numbers = quantities.scalars(packing) | ({} if packing.box_length is None else {"box_length": packing.box_length})
-    numbers |= {} if frame is None else frame.number
+    numbers |= frame.number
     numbers |= {f"{mode.name}_eigenvalue": mode.eigenvalue.real for mode in modes}
     numbers |= {f"{mode.name}_eigenvalue_imag": mode.eigenvalue.imag for mode in modes}
     for name, value in numbers.items():
@@ -62,8 +66,8 @@ def _tree(packing: Packing, modes: list[ModeVectors], frame: Frame | None = None
     none = {"NumberOfStrips": 0, "NumberOfPolys": 0}
     piece = ElementTree.SubElement(data, "Piece", {key: str(value) for key, value in (sizes | none).items()})
     on_points = ElementTree.SubElement(piece, "PointData")
-    on_disks, unknown = _of_disks(packing, modes), () if frame is None or frame.whole else FORCES + SLIPS
-    if frame is not None:
+    on_disks, unknown = _of_disks(packing, modes), () if frame.whole else FORCES + SLIPS
+    if frame.displacement is not None:
         on_disks["displacement"] = quantities.in_space(frame.displacement)
     for name, values in on_disks.items():
         if name in unknown:

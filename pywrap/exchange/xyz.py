@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...analysis import Packing, PackingFileError
+from ...analysis import PackingFileError
 from . import quantities
 from .disks import Disks, of_columns
 from .quantities import Frame, ModeVectors
@@ -59,8 +59,9 @@ def _columns(properties: str) -> list[str | None]:
     return names
 
 
-def _written(packing: Packing, modes: list[ModeVectors], frame: Frame | None) -> list[tuple[str, str, np.ndarray]]:
+def _written(frame: Frame, modes: list[ModeVectors]) -> list[tuple[str, str, np.ndarray]]:
     """Names, kinds and numbers of what stands in a row for each disk."""
+    packing = frame.packing
     n, force = len(packing), quantities.disk_force(packing)
     columns: list[tuple[str, str, np.ndarray]] = [
         # first, for readers of plain XYZ
@@ -71,14 +72,14 @@ def _written(packing: Packing, modes: list[ModeVectors], frame: Frame | None) ->
         ("top", "I", packing.top.astype(int)),
         ("normal_force", "R", quantities.disk_pressure(packing)),
     ]
-    if frame is None or frame.whole:
+    if frame.whole:
         columns += [
             ("angle", "R", packing.angle),
             ("forces", "R", quantities.in_space(force[:, :2])),
             ("torque_over_radius", "R", force[:, 2]),
             ("mobilised", "R", quantities.disk_mobilised(packing)),
         ]
-    if frame is not None:
+    if frame.displacement is not None:
         columns.append(("displacement", "R", quantities.in_space(frame.displacement)))
     if packing.position_low is not None:
         columns += [("x_low", "R", packing.position_low[:, 0]), ("y_low", "R", packing.position_low[:, 1])]
@@ -86,32 +87,28 @@ def _written(packing: Packing, modes: list[ModeVectors], frame: Frame | None) ->
     return columns
 
 
-def write_xyz(path: Path, packing: Packing, modes: list[ModeVectors]) -> str:
-    """An extended XYZ file; what is in it, in words."""
-    path.write_text(_text(packing, modes))
+def write_xyz(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
+    """An extended XYZ file of one frame or several; what is in it, in words."""
+    with path.open("w") as stream:
+        stream.writelines(_text(frame, modes) for frame in frames)
     return "all of the packing is in it, to the bit"
 
 
-def write_xyz_frames(path: Path, frames: Iterable[Frame]) -> None:
-    """An extended XYZ file of several frames."""
-    with path.open("w") as stream:
-        stream.writelines(_text(frame.packing, [], frame) for frame in frames)
-
-
-def _text(packing: Packing, modes: list[ModeVectors], frame: Frame | None = None) -> str:
-    columns = _written(packing, modes, frame)
+def _text(frame: Frame, modes: list[ModeVectors]) -> str:
+    packing, columns = frame.packing, _written(frame, modes)
     rows = np.column_stack([array if array.ndim == 2 else array[:, None] for *_, array in columns])
     whole = np.concatenate([[kind == "I"] * (1 if a.ndim == 1 else a.shape[1]) for _, kind, a in columns])
     species = np.where(packing.top, "T", "B").tolist()
-    lines = [str(len(packing)), _head(packing, columns, frame)]
+    lines = [str(len(packing)), _head(frame, columns)]
     for name, row in zip(species, rows.tolist(), strict=True):
         words = (str(int(value)) if is_whole else repr(value) for value, is_whole in zip(row, whole, strict=True))
         lines.append(f"{name} " + " ".join(words))
     return "\n".join(lines) + "\n"
 
 
-def _head(packing: Packing, columns: list[tuple[str, str, np.ndarray]], frame: Frame | None) -> str:
+def _head(frame: Frame, columns: list[tuple[str, str, np.ndarray]]) -> str:
     """The second line."""
+    packing = frame.packing
     box = packing.box_length
     width = box if box is not None else 2 * np.ptp(packing.position[:, 0]) + 2 * packing.radius.max()
     height = (packing.position[:, 1] + packing.radius).max()
@@ -120,11 +117,9 @@ def _head(packing: Packing, columns: list[tuple[str, str, np.ndarray]], frame: F
         f'Lattice="{float(width)!r} 0.0 0.0 0.0 {float(height)!r} 0.0 0.0 0.0 {2 * float(packing.radius.max())!r}"',
         f'pbc="{"F" if box is None else "T"} F F"',
         f"Properties=species:S:1:{properties}",
-        *(f"{key}={float(value)!r}" for key, value in quantities.scalars(packing).items()),
+        *(f"{key}={float(value)!r}" for key, value in (quantities.scalars(packing) | frame.number).items()),
     ]
-    if frame is not None:
-        says += [f"{key}={float(value)!r}" for key, value in frame.number.items()]
-    if frame is None or frame.whole:
+    if frame.whole:
         numbers = " ".join(repr(value) for value in quantities.contact_rows(packing).ravel().tolist())
         says.append(f'contacts="{numbers}"')
     return " ".join(says)

@@ -4,14 +4,21 @@ pydantic finds what is wrong with a section; `sentence` says so in words of the 
 """
 
 import reprlib
+import sys
 from collections.abc import Mapping
 from difflib import get_close_matches
-from typing import Annotated, TypeAlias, TypeGuard, TypeVar
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias, TypeGuard, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ...analysis import BadInputError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Between these a number may be: LAMMPS reads no subnormal ones, and products of three stay finite."""
@@ -39,6 +46,16 @@ MISSING = {"friction.v_ss": ', and the paper gives no value: give a velocity, or
 
 class SceneError(BadInputError):
     """A scene that cannot be run: one sentence that says what is wrong, where, and what to do."""
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """What the TOML file of a scene or of a sweep holds; SceneError if it cannot be read, or is no TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SceneError(f"{path}: the {what} cannot be read ({error.strerror}): correct its path.") from None
+    except ValueError as error:  # bytes that are not UTF-8, or text that is not TOML
+        raise SceneError(f"{path}: the {what} is not valid TOML: {error}.") from None
 
 
 class Section(BaseModel):

@@ -21,7 +21,6 @@ the mass of a disk and the diameter of a small disk as units. Defaults are the p
 docstrings say where it does not.
 """
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, get_args
@@ -31,13 +30,8 @@ from pydantic import ValidationError, model_validator
 from .estimate import impossible
 from .keys import Keys
 from .packing_section import GeneratedPacking
-from .refusals import SceneError, Section, refusal, sentence
+from .refusals import SceneError, Section, read_toml, refusal, sentence
 from .units import real_units
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 
 class Scene(Keys):
@@ -91,12 +85,7 @@ class Scene(Keys):
             If the file cannot be read, is no TOML, or does not describe a scene that can be run.
         """
         path = Path(path)
-        try:
-            mapping = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise SceneError(f"{path}: the scene cannot be read ({error.strerror}): correct its path.") from None
-        except ValueError as error:  # bytes that are not UTF-8, or text that is not TOML
-            raise SceneError(f"{path}: the scene is not valid TOML: {error}.") from None
+        mapping = read_toml(path, "scene")
         return cls._checked(mapping if packing is None else mapping | {"packing": packing}, path.parent, str(path))
 
     @classmethod

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ...figures.series import few_decades, positive
-from ...figures.style import INK, save, styled
+from ...figures.style import INK, styled
 
 MARKERS = {"opens": "o", "slides": "s", "law": "D", "flows": "^", "cut off": "X", "stable": "."}
 WORDS = {
@@ -22,13 +21,6 @@ WORDS = {
     "cut off": "not over yet",
     "stable": "stable: no growth",
 }
-
-
-def figures(result: dict[str, Any], series: dict[float, dict[str, list[float]]], output: Path) -> None:
-    """Both figures, from what eruptions.json holds and the looks of the undamped runs by F_x."""
-    save(size_figure(result["runs"]), output / "sizes")
-    if series:
-        save(course_figure(series), output / "courses")
 
 
 @styled

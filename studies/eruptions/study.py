@@ -1,44 +1,44 @@
-"""The sizes of eruptions over the load, in the frame of a study."""
+"""The sizes of eruptions over the load, in the frame of a study, and as a task of a sweep."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from ...analysis import NoEquilibriumError
-from ...pywrap import Equilibrium, Scene, SceneError
+from ...pywrap import Scene, SceneError
 from ...pywrap.runs.path import loads
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.study_sections import Eruptions
 from ...pywrap.settling.bed import settle
-from ..frame import Result, Study, Work
+from ..frame import Figures, Result, Study, Work
 from ..packings import path_from
 from ..rows import Rows
-from . import draw
 from .compute import DECADES, OVER, QUIET, Start, erupt
+from .draw import WORDS, course_figure, size_figure
 
 
 def _compute(scene: Scene, work: Work) -> Result:
     """Every load of the scene until it is over; loads may be added."""
-    settings, rows, say = _checked(scene), work.rows, work.say
+    settings, rows = _checked(scene), work.rows
     wanted, time = sorted(settings.load), settings.time
     kinds = (False,) if scene.damping is None else (False, True)
     missing = [fx for fx in wanted if any(rows.find(fx=fx, longest=time, damped=kind) is None for kind in kinds)]
     flows_beyond = None
     if missing:
-        say(f"{len(wanted) - len(missing)} of {len(wanted)} loads are known; ramp up to F_x = {missing[-1]:g}")
+        work.say(f"{len(wanted) - len(missing)} of {len(wanted)} loads are known; ramp up to F_x = {missing[-1]:g}")
         # through the known loads as well: the path, and with it the last digits, is that of one run of the command
         starts, flows_beyond = _starts(scene, [fx for fx in wanted if fx <= missing[-1]], time)
         starts = [each for each in starts if rows.find(fx=each.packing.fx, longest=time, damped=each.damped) is None]
         if flows_beyond is not None:
-            say(f"no equilibrium beyond F_x = {flows_beyond:g}: the loads above are left out")
+            work.say(f"no equilibrium beyond F_x = {flows_beyond:g}: the loads above are left out")
         for found in work.progress(work.share(erupt, starts), len(starts)):
             rows.append(longest=time, **found)
-            say(
+            work.say(
                 f"F_x = {found['fx']:g}: D up to {found['msd']:.2g}, the layer slips by {found['slip']:.2g}, "
                 f"{found['lost']} contacts open; {found['ends']} after t = {found['time']:.4g}"
             )
@@ -49,32 +49,34 @@ def _compute(scene: Scene, work: Work) -> Result:
     return {"runs": [{key: value for key, value in row.items() if key not in leave_out} for row in runs]}
 
 
-def _runs(rows: Rows, wanted: tuple[float, ...] | list[float], time: float) -> list[dict[str, Any]]:
+def _runs(rows: Rows, wanted: Sequence[float], time: float) -> list[dict[str, Any]]:
     """The runs of that length at these loads."""
     runs = [row for row in rows.rows if row["fx"] in wanted and row["longest"] == time]
     return sorted(runs, key=lambda row: (row["fx"], row["damped"]))
 
 
-def _draw(result: Result, rows: Rows, output: Path) -> None:
+def _figures(result: Result, rows: Rows) -> Figures:
     asked = result["scene"]["eruptions"]
-    runs = _runs(rows, asked["load"], asked["time"])
-    draw.figures(result, {row["fx"]: row["series"] for row in runs if not row["damped"]}, output)
+    series = {row["fx"]: row["series"] for row in _runs(rows, asked["load"], asked["time"]) if not row["damped"]}
+    courses = {"courses": lambda: course_figure(series)} if series else {}
+    return {"sizes": lambda: size_figure(result["runs"])} | courses
 
 
 def _page(result: Result) -> Result:
     runs = result["runs"]
+    free = [run for run in runs if not run["damped"]]
     damped = {run["fx"]: run for run in runs if run["damped"]}
     damping = result["scene"].get("damping") or {}
-    grown = [run["msd"] for run in runs if run["ends"] != "stable" and not run["damped"]]
+    grown = [run["msd"] for run in free if run["ends"] != "stable"]
     return {
         "runs": runs,
         "fy": result["scene"]["load"]["fy"],
-        "words": draw.WORDS,
-        "beside": [(run, damped[run["fx"]]) for run in runs if not run["damped"] and run["fx"] in damped],
+        "words": WORDS,
+        "beside": [(run, damped[run["fx"]]) for run in free if run["fx"] in damped],
         "damping": ", ".join(f"{key} = {value:g}" for key, value in damping.items() if value),
         "decades": float(np.log10(max(grown) / min(grown))) if grown else 0.0,
         "noise": (min(run["noise"] for run in runs), max(run["noise"] for run in runs)),
-        "balance": max(run["balance"] for run in runs if not run["damped"]),
+        "balance": max(run["balance"] for run in free),
         "criterion": (OVER, DECADES, QUIET),
     }
 
@@ -106,11 +108,9 @@ def _checked(scene: Scene) -> Eruptions:
 
 def _starts(scene: Scene, wanted: list[float], time: float) -> tuple[list[Start], float | None]:
     """The equilibria at the loads that the packing bears, and the last load that it bears if there are more."""
-    assert scene.ramp is not None
-    first = settle(scene, communicator=MPI.COMM_SELF)
+    steps = loads(needed(scene.ramp, "ramp"))
     starts: list[Start] = []
-    steps = loads(scene.ramp)
-    with path_from(first, scene) as path:
+    with path_from(settle(scene, communicator=MPI.COMM_SELF), scene) as path:
         for fx in wanted:
             try:
                 for load in steps[(steps > path.kept[-1].fx) & (steps < fx)]:
@@ -118,11 +118,11 @@ def _starts(scene: Scene, wanted: list[float], time: float) -> tuple[list[Start]
                 packing = path(fx)
             except NoEquilibriumError:
                 return starts, path.kept[-1].fx
-            here: Equilibrium = path.kept[-1]
+            residual = path.kept[-1].residual
             free = replace(packing, law=replace(packing.law, cn=0.0, ct=0.0), drag_time=None)
-            starts.append(Start(free, here.residual, time))
+            starts.append(Start(free, residual, time))
             if scene.damping is not None:
-                starts.append(Start(packing, here.residual, time, damped=True))
+                starts.append(Start(packing, residual, time, damped=True))
     return starts, None
 
 
@@ -132,7 +132,7 @@ eruptions = Study(
     beside="eruptions",
     check=_checked,
     compute=_compute,
-    draw=_draw,
+    figures=_figures,
     page=_page,
 )
 """Runs every load of a scene with [ramp] and [eruptions] until it is over."""

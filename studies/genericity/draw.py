@@ -12,6 +12,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from ...analysis.packing.packing import Floats
 from ...figures.style import INK, styled
 from ..statistics import course
+from ..sweep.draw import draw_pairs
 from .numbers import STEPS
 from .sets import FRICTION
 from .tables import Table
@@ -42,13 +43,9 @@ def onsets_figure(onsets: Table, predicted: Floats) -> Figure:
         left.legend(fontsize=7)
     strong, weak = STEPS[0]
     rows = {row["packing.seed"]: row for row in onsets.where(law_mu=strong).settled.rows}
-    for row in onsets.where(law_mu=weak).settled.rows:
-        other = rows.get(row["packing.seed"])
-        if other is None or (row["ends"] != "onset" and other["ends"] != "onset"):
-            continue
-        marker = "o" if row["ends"] == other["ends"] else ">" if other["ends"] != "onset" else "^"
-        same = bool(row["ancestors"]) and row["ancestors"] == other["ancestors"]
-        right.plot(float(other["reach"]), float(row["reach"]), marker, color="C0", mfc="C0" if same else "none", ms=3.5)
+    others = [row for row in onsets.where(law_mu=weak).settled.rows if row["packing.seed"] in rows]
+    pairs = [(rows[row["packing.seed"]], row) for row in others]
+    draw_pairs(right, [(a, b, bool(b["ancestors"]) and a["ancestors"] == b["ancestors"]) for a, b in pairs], ms=3.5)
     for marker, face, label in (
         ("o", "C0", "the same two modes"),
         ("o", "none", "other modes"),
@@ -56,8 +53,7 @@ def onsets_figure(onsets: Table, predicted: Floats) -> Figure:
     ):
         right.plot([], [], marker, color="C0", mfc=face, ms=3.5, label=label)
     right.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1, handletextpad=0.2)
-    right.axline((0, 0), slope=1, color=INK, linewidth=0.6, linestyle=":")
-    right.set(xlabel=rf"$F_x^c(\mu = {strong:g})$", ylabel=rf"$F_x^c(\mu = {weak:g})$", aspect="equal")
+    right.set(xlabel=rf"$F_x^c(\mu = {strong:g})$", ylabel=rf"$F_x^c(\mu = {weak:g})$")
     right.set(xlim=(0, 0.0315), ylim=(0, 0.0315))
     return figure
 
@@ -67,7 +63,7 @@ def modes_figure(onsets: Table) -> Figure:
     """Which modes meet: participation over place in the spectrum, coloured by the share of rotation (mu = 1)."""
     figure = Figure(figsize=(3.4, 2.6), layout="constrained")
     axes = figure.add_subplot()
-    found = Table(tuple(row for row in onsets.where(law_mu=1.0).rows if row.get("rank")))
+    found = onsets.where(law_mu=1.0).having("rank")
     drawn = axes.scatter(
         found.numbers("rank") / found.numbers("modes"),
         found.numbers("participation"),

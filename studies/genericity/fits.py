@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis.packing.packing import Floats
-from ..statistics import Bools
+from ..statistics import Bools, between, resampled
 
 DRAWS = 300
 """Fits to resampled packings: the ends of an interval are then known to a tenth of its width."""
@@ -45,20 +45,14 @@ def shape(reach: Floats, found: Bools) -> dict[str, Any]:
 def _with_intervals(
     logs: Floats, reach: Floats, found: Bools, names: Mapping[str, tuple[int, float | None]]
 ) -> dict[str, Any]:
-    generator = np.random.default_rng(0)
     best = _fit(logs, reach, found)
     groups = [np.flatnonzero(logs == value) for value in np.unique(logs)]
-    draws = []
-    for _ in range(DRAWS):
-        chosen = np.concatenate([generator.choice(group, len(group)) for group in groups])
-        if found[chosen].sum() > len(groups):
-            draws.append(_fit(logs[chosen], reach[chosen], found[chosen], best))
+    chosen = map(np.concatenate, resampled(groups, DRAWS))
+    draws = np.array([_fit(logs[c], reach[c], found[c], best) for c in chosen if found[c].sum() > len(groups)])
     result = {}
     for name, (k, sign) in names.items():
-        values = np.array([draw[k] for draw in [best, *draws]])
-        values = np.exp(values) if sign is None else sign * values
-        low, high = np.quantile(values[1:], [0.025, 0.975])
-        result[name] = {"value": float(values[0]), "low": float(low), "high": float(high)}
+        value, *drawn = np.exp([best[k], *draws[:, k]]) if sign is None else sign * np.array([best[k], *draws[:, k]])
+        result[name] = between(value, drawn)
     return result
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...analysis.packing.packing import Floats
-from ..statistics import median_interval, quartiles, share
+from ...analysis.packing.packing import Floats, Indices
+from ..statistics import between, lowers, median_interval, quartiles, resampled, share
 from .fits import shape, size_law
 from .sets import FRICTION
 from .tables import Table
@@ -32,7 +31,7 @@ def read_tables(folder: Path) -> dict[str, Table]:
 
 def numbers(tables: dict[str, Table]) -> dict[str, Any]:
     """All numbers that the page states."""
-    empty = Table(())
+    empty = Table()
     onsets = tables.get("onsets", empty)
     reference = onsets.where(law_mu=1.0)
     return {
@@ -55,66 +54,51 @@ def of_friction(table: Table) -> dict[str, Any]:
     """How the ramps of one friction coefficient end."""
     good = table.settled
     reach, found = good.reach, good.found
-    ends = good.words("ends")
+    ends = good.column("ends")
     below = []
     for load in LOADS:
         known = (found & (reach <= load)) | (reach >= load * (1 - 1e-9))
         below.append({"load": load} | share(int(np.sum(found & (reach <= load))), int(np.sum(known))))
     return {
         "packings": len(table),
-        "failed": table.failures,
+        "failed": len(table.having("says")),
         "until": ends.count("until"),
         "flows": ends.count("flows"),
         "found": share(int(found.sum()), len(good)),
         "below": below,
         "median": median_interval(reach, found),
-        "quartiles": quartiles(reach, found) if len(good) else [None] * 3,
+        "quartiles": quartiles(reach, found),
     }
 
 
 def lowered(onsets: Table, strong: float, weak: float) -> dict[str, Any]:
     """Whether a smaller friction coefficient lowers the onset, and what is different where it does not."""
     first, second = (_by_seed(onsets.where(law_mu=mu)) for mu in (strong, weak))
-    decided: list[tuple[bool, bool, bool, float]] = []
-    unknown = 0
-    for seed in sorted(first.keys() & second.keys()):
-        a, b = first[seed], second[seed]
-        verdict = _lowers(a, b)
-        if verdict is None:
-            unknown += 1
-        else:
-            both = a["ends"] == b["ends"] == "onset"
-            alike = bool(both and a["ancestors"] and a["ancestors"] == b["ancestors"])
-            decided.append((verdict, both, alike, float(b["reach"]) / float(a["reach"]) if both else np.nan))
-    verdicts = [each[0] for each in decided]
-    pairs = [each for each in decided if each[1]]
-    same, other = [each for each in pairs if each[2]], [each for each in pairs if not each[2]]
+    both = [(first[seed], second[seed]) for seed in sorted(first.keys() & second.keys())]
+    decided = [(lower, a, b) for a, b in both if (lower := lowers(a, b)) is not None]
+    pairs = [each for each in decided if each[1]["ends"] == each[2]["ends"]]
+    same = [(lower, a, b) for lower, a, b in pairs if a["ancestors"] and a["ancestors"] == b["ancestors"]]
+    ends = [lower for lower, a, b in decided if a["ends"] != b["ends"]]
+    of_same, of_all = sum(lower for lower, *_ in same), sum(lower for lower, *_ in pairs)
     return {
-        "lowered": share(sum(verdicts), len(verdicts)),
-        "unknown": unknown,
+        "lowered": share(of_all + sum(ends), len(decided)),
+        "unknown": len(both) - len(decided),
         "same": share(len(same), len(pairs)),
-        "lowered_same": share(sum(each[0] for each in same), len(same)),
-        "lowered_other": share(sum(each[0] for each in other), len(other)),
-        "ratio_same": _known(np.array([each[3] for each in same])),
-        "appears": sum(not each[0] and not each[1] for each in decided),
-        "vanishes": sum(each[0] and not each[1] for each in decided),
+        "lowered_same": share(of_same, len(same)),
+        "lowered_other": share(of_all - of_same, len(pairs) - len(same)),
+        "ratio_same": _known(np.array([b["reach"] / a["reach"] for _, a, b in same])),
+        "appears": ends.count(False),
+        "vanishes": ends.count(True),
     }
 
 
-def _lowers(strong: dict[str, str], weak: dict[str, str]) -> bool | None:
-    reach_strong, reach_weak = float(strong["reach"]), float(weak["reach"])
-    if weak["ends"] == "onset" and reach_weak < reach_strong:
-        return True
-    return False if strong["ends"] == "onset" and reach_strong <= reach_weak else None
-
-
-def _by_seed(table: Table) -> dict[int, dict[str, str]]:
-    return {int(row["packing.seed"]): row for row in table.settled.rows}
+def _by_seed(table: Table) -> dict[int, dict[str, Any]]:
+    return {row["packing.seed"]: row for row in table.settled.rows}
 
 
 def kinds(onsets: Table) -> dict[str, Any]:
     """What begins the first window, of packings with one friction coefficient."""
-    words = [kind for kind in onsets.words("kind") if kind]
+    words = onsets.having("kind").column("kind")
     counts = {"sliding": onsets.numbers("sliding"), "changed": onsets.numbers("opened") + onsets.numbers("closed")}
     return {"coalescence": share(words.count("coalescence"), len(words))} | {
         name: share(int(np.sum(each > 0)), int(np.isfinite(each).sum())) for name, each in counts.items()
@@ -123,9 +107,9 @@ def kinds(onsets: Table) -> dict[str, Any]:
 
 def modes(onsets: Table) -> dict[str, Any]:
     """Which modes meet, in packings with one friction coefficient."""
-    found = Table(tuple(row for row in onsets.rows if row.get("rank")))
+    found = onsets.having("rank")
     place = found.numbers("rank") / found.numbers("modes")
-    neighbours = [int(pair[1]) - int(pair[0]) == 1 for pair in found.lists("ancestors")]
+    neighbours = [second - first == 1 for first, second in found.column("ancestors")]
     columns = {"place": place, "frequency": np.sqrt(found.numbers("lambda") / found.numbers("largest"))}
     columns |= {name: found.numbers(name) for name in ("participation", "rotation", "layer", "ancestry")}
     return {
@@ -144,11 +128,10 @@ def _known(values: Floats) -> dict[str, Any]:
 def settled_with_friction(table: Table) -> dict[str, Any]:
     """Packings that have settled with friction: complex pairs at rest."""
     good = table.settled
-    start = [kind == "start" for kind in good.words("kind")]
     return {
-        "packings": len(set(table.words("packing.seed"))),
+        "packings": len(set(table.column("packing.seed"))),
         "rows": len(good),
-        "start": share(sum(start), len(start)),
+        "start": share(good.column("kind").count("start"), len(good)),
     }
 
 
@@ -156,9 +139,7 @@ def halved(onsets: Table, finer: Table) -> dict[str, Any]:
     """Onsets with increments half as large."""
     known = {(row["packing.seed"], row["law.mu"]): row for row in onsets.settled.rows}
     both = [(known[key], row) for row in finer.settled.rows if (key := (row["packing.seed"], row["law.mu"])) in known]
-    off = np.array(
-        [abs(float(b["reach"]) / float(a["reach"]) - 1) for a, b in both if a["ends"] == b["ends"] == "onset"]
-    )
+    off = np.array([abs(b["reach"] / a["reach"] - 1) for a, b in both if a["ends"] == b["ends"] == "onset"])
     return {
         "rows": len(both),
         "ends": share(sum(a["ends"] == b["ends"] for a, b in both), len(both)),
@@ -171,7 +152,7 @@ def halved(onsets: Table, finer: Table) -> dict[str, Any]:
 def harmonic(onsets: Table, table: Table) -> list[dict[str, Any]]:
     """The onsets of the law with exponent 1 beside those of the same packings' seeds with 3/2."""
     result = []
-    for mu in sorted({float(cell) for cell in table.words("law.mu")}):
+    for mu in sorted(set(table.column("law.mu"))):
         own, other = table.where(law_mu=mu).settled, onsets.where(law_mu=mu).settled
         result.append({"mu": mu, "harmonic": of_friction(table.where(law_mu=mu)), "p": _logrank(own, other)})
     return result
@@ -179,15 +160,13 @@ def harmonic(onsets: Table, table: Table) -> list[dict[str, Any]]:
 
 def sizes(table: Table, reference: Table) -> dict[str, Any]:
     """The onset over the number of disks, in units of F_y; the packings of 100 disks are those of the first set."""
-    parts = {
-        int(disks): table.where(packing_disks=disks).settled for disks in sorted(set(table.words("packing.disks")))
-    }
+    parts = {disks: table.where(packing_disks=disks).settled for disks in set(table.column("packing.disks"))}
     rows, disks, reach, found = [], [], [], []
     for number, part in sorted([*parts.items(), (100, reference.settled)]):
         load = np.full(len(part), 3.0) if number == 100 else part.numbers("load.fy")
         scaled = part.reach / load
         row: dict[str, Any] = {"disks": number, "packings": len(part), "onsets": int(part.found.sum())}
-        row |= {"flows": part.words("ends").count("flows"), "median": median_interval(scaled, part.found)}
+        row |= {"flows": part.column("ends").count("flows"), "median": median_interval(scaled, part.found)}
         rows.append(row | {"doubtful": int(np.sum(part.numbers("doubtful") > 0))})
         disks.append(np.full(len(part), float(number)))
         reach.append(scaled)
@@ -240,41 +219,35 @@ def expected(f0: Floats, until: float = 0.03, draws: int = 10) -> dict[str, Any]
 def growth(table: Table) -> list[dict[str, Any]]:
     """Largest growth rate over the load, by number of disks: medians over packings at common loads."""
     result = []
-    for number in sorted({float(cell) for cell in table.words("packing.disks")}):
-        part = [
-            (np.array(json.loads(row["fx"])) / float(row["load.fy"]), np.array(json.loads(row["rate"])))
-            for row in table.where(packing_disks=number).rows
-            if row.get("fx")
-        ]
-        longest = max((len(each[0]) for each in part), default=0)
+    for number in sorted(set(table.column("packing.disks"))):
+        part = table.where(packing_disks=number).having("fx").rows
         points = []
-        for k in range(longest):
-            rates = [each[1][k] for each in part if len(each[0]) > k]
-            points.append(
-                {"load": float(next(x[0][k] for x in part if len(x[0]) > k)), "of": len(rates)} | _middle(rates)
-            )
-        result.append({"disks": int(number), "packings": len(part), "points": points})
+        for k in range(max((len(row["fx"]) for row in part), default=0)):
+            long = [row for row in part if len(row["fx"]) > k]
+            load = float(np.array(long[0]["fx"])[k] / long[0]["load.fy"])
+            low, median, high = np.quantile([row["rate"][k] for row in long], [0.25, 0.5, 0.75]).tolist()
+            points.append({"load": load, "of": len(long), "low": low, "median": median, "high": high})
+        result.append({"disks": number, "packings": len(part), "points": points})
     return result
 
 
 def surrogates(table: Table, reference: Table) -> dict[str, Any]:
     """Onsets of the surrogates beside those of the packings of the same seeds."""
-    seeds = set(table.words("packing.seed"))
+    seeds = set(table.column("packing.seed"))
     own = Table(tuple(row for row in reference.rows if row["packing.seed"] in seeds)).settled
     result: dict[str, Any] = {"packings": len(seeds), "own": _ends(own)}
-    mine = _by_seed(own)
     for name in ("linear", "random", "shuffled"):
-        rows = tuple(
-            {"packing.seed": row["packing.seed"], "ends": row[f"{name}.ends"], "reach": row[f"{name}.reach"]}
-            for row in table.rows
-            if row.get(f"{name}.ends")
+        part = Table(
+            tuple(
+                {"packing.seed": row["packing.seed"], "ends": row[f"{name}.ends"], "reach": row[f"{name}.reach"]}
+                for row in table.having(f"{name}.ends").rows
+            )
         )
-        part = Table(rows)
-        result[name] = _ends(part) | signs(mine, {int(row["packing.seed"]): row for row in part.rows})
+        result[name] = _ends(part) | signs(_by_seed(own), _by_seed(part))
     return result
 
 
-def signs(own: dict[int, dict[str, str]], other: dict[int, dict[str, str]]) -> dict[str, Any]:
+def signs(own: dict[int, dict[str, Any]], other: dict[int, dict[str, Any]]) -> dict[str, Any]:
     """The sign test of pairs, packing by packing: in how many the other has the lower onset, of how many that differ.
 
     Parameters
@@ -292,7 +265,7 @@ def signs(own: dict[int, dict[str, str]], other: dict[int, dict[str, str]]) -> d
 
     pairs = [(own[seed], other[seed]) for seed in sorted(own.keys() & other.keys())]
     differ = [pair for pair in pairs if pair[0]["reach"] != pair[1]["reach"]]
-    decided = [verdict for pair in differ if (verdict := _lowers(*pair)) is not None]
+    decided = [verdict for pair in differ if (verdict := lowers(*pair)) is not None]
     lower = sum(decided)
     return {"lower": lower, "of": len(decided), "p": binomtest(lower, len(decided)).pvalue if decided else None}
 
@@ -316,11 +289,6 @@ def _logrank(one: Table, other: Table) -> float | None:
     return float(logrank(*samples).pvalue)
 
 
-def _middle(values: list[float]) -> dict[str, float]:
-    low, median, high = np.quantile(values, [0.25, 0.5, 0.75])
-    return {"low": float(low), "median": float(median), "high": float(high)}
-
-
 def _mean(values: Floats) -> dict[str, float | None]:
     """The mean and half of its 95 % interval (Student's); no interval of a single value."""
     count = len(values)
@@ -335,13 +303,10 @@ def _slope(disks: Floats, values: Floats) -> dict[str, float] | None:
     sizes = np.unique(disks)
     if len(sizes) < 2:
         return None
-    generator = np.random.default_rng(0)
-    groups = [np.flatnonzero(disks == size) for size in sizes]
 
-    def fit(chosen: list[Any]) -> float:
+    def fit(chosen: list[Indices]) -> float:
         means = [float(np.mean(np.log(values[group]))) for group in chosen]
         return float(np.polyfit(np.log(sizes), means, 1)[0])
 
-    draws = [fit([generator.choice(group, len(group)) for group in groups]) for _ in range(1000)]
-    low, high = np.quantile(draws, [0.025, 0.975])
-    return {"value": fit(groups), "low": float(low), "high": float(high)}
+    groups = [np.flatnonzero(disks == size) for size in sizes]
+    return between(fit(groups), [fit(chosen) for chosen in resampled(groups, 1000)])

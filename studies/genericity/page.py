@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...analysis.files.wholefile import write_text
-from ...figures.pages import render
-from ...figures.style import save_as, spared
+from ..frame import leave, save_png
 from ..statistics import interval
 from .draw import mechanism_figure, modes_figure, onsets_figure, size_figure
 from .numbers import LOADS, numbers, read_tables
@@ -37,42 +34,26 @@ def write_page(folder: Path, say: Callable[[str], None] = print) -> Path:
     """
     tables = read_tables(folder)
     found = numbers(tables)
-    onsets = tables.get("onsets", Table(()))
-    predicted = np.array(
-        [3.0 * f0 for f0, disks in zip(found["levels"]["f0"], found["levels"]["disks"], strict=True) if disks == 100]
-    )
+    onsets, levels = tables.get("onsets", Table()), found["levels"]
+    predicted = 3.0 * np.array(levels["f0"])[np.array(levels["disks"]) == 100]
     figures = {
-        "onsets": partial(onsets_figure, onsets, predicted),
-        "modes": partial(modes_figure, onsets),
-        "size": partial(size_figure, found),
-        "mechanism": partial(mechanism_figure, found["surrogates"]),
+        "onsets": lambda: onsets_figure(onsets, predicted),
+        "modes": lambda: modes_figure(onsets),
+        "size": lambda: size_figure(found),
+        "mechanism": lambda: mechanism_figure(found["surrogates"]),
     }
-    for name, figure in figures.items():
-        with spared(f"{name}.png", say):
-            save_as(figure(), folder / f"{name}.png")
-    write_text(folder / "genericity.json", json.dumps(found, indent=1) + "\n")
-    made = json.loads((folder / "made.json").read_text()) if (folder / "made.json").exists() else {}
-    page = folder / "genericity.md"
-    write_text(
-        page,
-        render(
-            __package__ or "",
-            "genericity.md.j2",
-            **found,
-            loads=LOADS,
-            made=made,
-            planned=PACKINGS,
-            planned_sizes=SIZES,
-            percent=percent,
-            median=median,
-            between=between,
-            mean=mean,
-            predicted_share=[float(np.mean(1 - np.exp(-((load / predicted) ** 2)))) for load in LOADS]
-            if len(predicted)
-            else None,
-        ),
-    )
-    return page
+    made = folder / "made.json"
+    names = {
+        "loads": LOADS,
+        "made": json.loads(made.read_text()) if made.exists() else {},
+        "planned": PACKINGS,
+        "planned_sizes": SIZES,
+        "predicted_share": [float(np.mean(1 - np.exp(-((load / predicted) ** 2)))) for load in LOADS]
+        if len(predicted)
+        else None,
+    }
+    formats = {"percent": percent, "median": median, "between": between, "mean": mean}
+    return leave(folder, __package__ or "", "genericity", found, found | names | formats, figures, say, save_png)
 
 
 def percent(found: dict[str, Any]) -> str:

@@ -22,18 +22,16 @@ class Table:
     Attributes
     ----------
     rows : tuple of dict
-        Cells by column, as text; empty where there is none.
+        Cells by column: numbers, words and lists; None where there is nothing.
     """
 
-    rows: tuple[dict[str, str], ...]
+    rows: tuple[dict[str, Any], ...] = ()
 
     @classmethod
     def read(cls, path: Path) -> Table:
-        """The table of a file; without rows if there is no such file."""
-        if not path.exists():
-            return cls(())
+        """The table of a file."""
         with path.open(newline="") as file:
-            return cls(tuple(csv.DictReader(file)))
+            return cls(tuple({name: _cell(text) for name, text in row.items()} for row in csv.DictReader(file)))
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -41,29 +39,24 @@ class Table:
     def where(self, **values: Any) -> Table:
         """The rows with these values; `packing_disks` stands for packing.disks."""
         wanted = {name.replace("_", ".", 1): value for name, value in values.items()}
-        return Table(tuple(r for r in self.rows if all(_same(r[name], value) for name, value in wanted.items())))
+        return Table(tuple(row for row in self.rows if all(row[name] == value for name, value in wanted.items())))
+
+    def having(self, name: str) -> Table:
+        """The rows with something in a column."""
+        return Table(tuple(row for row in self.rows if row.get(name) is not None))
+
+    def column(self, name: str) -> list[Any]:
+        """A column, None where there is nothing."""
+        return [row.get(name) for row in self.rows]
 
     def numbers(self, name: str) -> Floats:
         """A column of numbers, nan where there is none."""
-        return np.array([float(row[name]) if row.get(name) else np.nan for row in self.rows])
-
-    def words(self, name: str) -> list[str]:
-        """A column of words."""
-        return [row.get(name, "") for row in self.rows]
-
-    def lists(self, name: str) -> list[Any]:
-        """A column of lists, None where there is none."""
-        return [json.loads(row[name]) if row.get(name) else None for row in self.rows]
+        return np.array(self.column(name), dtype=np.float64)
 
     @cached_property
     def settled(self) -> Table:
         """The rows that have a result."""
-        return Table(tuple(row for row in self.rows if row.get("ends", row.get("modes", ""))))
-
-    @property
-    def failures(self) -> int:
-        """Rows without a result."""
-        return sum(bool(row["says"]) for row in self.rows)
+        return self.having("ends" if self.rows and "ends" in self.rows[0] else "modes")
 
     @property
     def reach(self) -> Floats:
@@ -73,11 +66,12 @@ class Table:
     @property
     def found(self) -> Bools:
         """Whether that is the onset."""
-        return np.array([end == "onset" for end in self.words("ends")], dtype=bool)
+        return np.array([end == "onset" for end in self.column("ends")], dtype=bool)
 
 
-def _same(cell: str, value: Any) -> bool:
+def _cell(text: str) -> Any:
+    """What a cell holds: JSON, else a word."""
     try:
-        return float(cell) == float(value)
+        return json.loads(text) if text else None
     except ValueError:
-        return cell == str(value)
+        return text

@@ -27,6 +27,9 @@ NOT_COMPARED = ("random", "loss", "runs", "quartz", "thick")
 COMPARED = (0.03, 0.1, 0.2)
 """F_x/F_y at which kinds of packings, checks and switches of b are compared."""
 
+LAYERS = ("thick 50", "quartz 10 MPa", "thick 200", "thick 400")
+"""Packings of one width under one pressure."""
+
 
 def numbers(tables: Mapping[str, Table]) -> dict[str, Any]:
     """All numbers of the page.
@@ -35,18 +38,23 @@ def numbers(tables: Mapping[str, Table]) -> dict[str, Any]:
     -------
     dict
         sizes : by number of disks, medians of each quantity over the loads, and the load of the last equilibrium;
-        powers : exponents of N; random : shares of random matrices beside those of the packings; loss : what stops
-        the pairs, by number of disks; structural : share of packings that grow, for each quality factor; quartz :
-        as loss, of the shipped scenes; runs : growth with dashpots in LAMMPS beside the pencil's; sets : medians
-        at `COMPARED` of every set; switches : the same with b of some contacts; histories : with total slips and
-        with rescaled ones.
+        powers : exponents of N at a fixed force on each disk of the layer; pressure_powers : at a fixed pressure;
+        thickness_powers : of `LAYERS`; random : shares of random matrices beside those of the packings; loss : what
+        stops the pairs, by number of disks; structural : share of packings that grow, for each quality factor;
+        quartz : as loss, of the shipped scenes; runs : growth with dashpots in LAMMPS beside the pencil's; sets :
+        medians at `COMPARED` of every set; switches : the same with b of some contacts; histories : with total slips
+        and with rescaled ones.
     """
     by_size, randoms, lossy, runs = (_of_sizes(tables, kind) for kind in ("force", "random", "loss", "runs"))
+    pressed = dict(sorted((_of_sizes(tables, "pressure") | {n: by_size[n] for n in by_size if n == 100}).items()))
+    layers = {table.disks: table for name, table in tables.items() if name in LAYERS}
     quartz = {name: table for name, table in tables.items() if name.startswith(("quartz", "thick"))}
     counted = {name: table for name, table in tables.items() if name.split()[0] not in NOT_COMPARED}
     return {
         "sizes": {disks: to_the_end(table) for disks, table in by_size.items()},
         "powers": powers(by_size),
+        "pressure_powers": powers(pressed),
+        "thickness_powers": growth_powers(dict(sorted(layers.items()))),
         "sets": {name: compared(counted[name]) for name in sorted(counted, key=_place)},
         "random": {disks: against_random(table, by_size) for disks, table in randoms.items()},
         "loss": {disks: losses(table) for disks, table in lossy.items()},
@@ -161,6 +169,12 @@ def powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
             "by_size": {n: median(each) for n, each in known.items()},
             "power": power(known, list(known.values())) if len(known) > 1 else None,
         }
+    return found | growth_powers(by_size)
+
+
+def growth_powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
+    """How growth rates and least Q go with the number of disks."""
+    found: dict[str, Any] = {}
     for load in COMPARED:
         for name in ("growth_rate", "least_q"):
             samples = {n: table.at(load, name) for n, table in by_size.items()}

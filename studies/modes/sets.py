@@ -16,7 +16,8 @@ from math import ceil, sqrt
 from pathlib import Path
 from typing import Any
 
-from ..sweep.points import Sweep, read_toml
+from ...pywrap.scenes.refusals import read_toml
+from ..sweep.points import Sweep
 from ..sweep.tasks import TASKS
 
 SIZES = {50: 100, 100: 100, 200: 50, 400: 30, 1000: 15}
@@ -109,7 +110,7 @@ def _first(most: int, share: float) -> str:
 
 def quartz(depth: str, disks: int = 100) -> dict[str, Any]:
     """The shipped scene of quartz spheres under an overburden, such as "10 MPa", with so many disks."""
-    scene = read_toml(Path(str(files("faultgouge.scenes") / f"quartz_{depth.replace(' ', '')}.toml")))
+    scene = read_toml(Path(str(files("faultgouge.scenes") / f"quartz_{depth.replace(' ', '')}.toml")), "scene")
     scene["packing"]["disks"] = disks
     return scene
 

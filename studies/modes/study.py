@@ -10,8 +10,9 @@ from ...analysis.files.wholefile import write_text
 from ...figures.style import save, spared
 from ...figures.writers import write_film
 from ...pywrap import Scene, SceneError
+from ...pywrap.scenes.refusals import read_toml
 from ..sweep.compute import Progress, Row, Say, run_sweep
-from ..sweep.points import Sweep, read_toml
+from ..sweep.points import Sweep
 from ..sweep.table import write_csv
 from ..sweep.tasks import TASKS
 from .draw import PlaneFilm, over_load, plane
@@ -36,7 +37,7 @@ def wanted_of(path: Path) -> Sweep:
         If the file has neither.
     """
     try:
-        has_task = "task" in read_toml(path)
+        has_task = "task" in read_toml(path, "sweep")
     except SceneError:
         has_task = False  # the reader of scenes says what is wrong
     if has_task:

@@ -24,7 +24,6 @@ from ...pywrap.runs.undamped import perturb, time_step
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Perturb
 from ..triggering.compute import Triggering, equilibrium_at, trigger
-from ..triggering.compute import summary as triggering_summary
 
 EFOLDS = 48.0
 """Length of the undamped run in units of 1/rate: D grows by up to 20 decades in it."""
@@ -32,16 +31,17 @@ EFOLDS = 48.0
 LONGEST_RUN = 3_000_000
 """Steps of the undamped run, at the most: about 20 s for 100 disks."""
 
-NEAR_ONSET = np.concatenate(
-    [-np.geomspace(3e-2, 1e-3, 7)[:-1], -np.geomspace(1e-3, 1e-7, 13), [0.0], np.geomspace(1e-6, 1e-3, 9)]
+NEARBY = np.concatenate(
+    [
+        -np.geomspace(3e-2, 1e-3, 7)[:-1],
+        -np.geomspace(1e-3, 1e-7, 13),
+        [0.0],
+        np.geomspace(1e-6, 1e-3, 9),
+        np.linspace(0.0, 0.3, 76)[1:],
+    ]
 )
 """Distances from the onset at which there are further equilibria, in units of the ramp's last F_x: for figure 3, and
-below the onset for the response over the distance."""
-
-BEYOND_ONSET = np.linspace(0.0, 0.3, 76)[1:]
-"""The same beyond the onset, for figure 3 alone: there the pair turns sharply within one increment of the ramp."""
-
-NEARBY = np.concatenate([NEAR_ONSET, BEYOND_ONSET])
+below the onset for the response over the distance. Beyond it the pair turns sharply within one increment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,70 +72,37 @@ class GrowthRun:
     predicted: float
     measured: Growth | None
 
-    @property
-    def rate(self) -> str:
-        """The measured rate in words."""
-        return "none" if self.measured is None else f"{self.measured.rate:.6g}"
 
+def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering | str:
+    """A perturbation between the onsets of the weakened and of the static friction, or why there is nothing to trigger.
 
-@dataclass(frozen=True, eq=False)
-class TriggeringRun:
-    """What became of the attempt to trigger.
-
-    Attributes
-    ----------
-    scene : Scene
-        Of the packing.
-    onsets : list of OnsetRun
-        For each friction coefficient.
-    triggering : Triggering or None
-        The undamped runs; None where there is nothing to trigger.
-    says : str
-        Why there is nothing to trigger; empty otherwise.
+    The series go to run.h5.
     """
-
-    scene: Scene
-    onsets: list[OnsetRun]
-    triggering: Triggering | None = None
-    says: str = ""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Numbers for summary.json."""
-        return {"says": self.says} if self.triggering is None else triggering_summary(self.triggering)
-
-
-def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> TriggeringRun:
-    """A perturbation between the onsets of the weakened and of the static friction; the series go to run.h5."""
     run, fx, mu_ss = runs[0], needed(scene.perturb, "perturb").fx, needed(scene.friction, "friction").mu_ss
     # exact but for the product's rounding
     weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
     if weakened and fx <= weakened[0].onset.fx_c:
-        says = (
+        return (
             f"F_x = {fx:g} is below the onset {weakened[0].onset.fx_c:g} of the weakened friction, too: no "
             "window between the two, and nothing to erupt."
         )
-        return TriggeringRun(scene, runs, says=says)
     if fx >= run.onset.fx_c:
-        says = f"F_x = {fx:g} is above the onset {run.onset.fx_c:g}: nothing is stable there to be triggered."
-        return TriggeringRun(scene, runs, says=says)
+        return f"F_x = {fx:g} is above the onset {run.onset.fx_c:g}: nothing is stable there to be triggered."
     *_, start = reach(scene, fx)  # to the bit the one of `perturb`, and so is v_0
     lower = max(0.0, 2 * weakened[0].onset.fx_c - fx) if weakened else None
     control = None if lower is None else equilibrium_at(scene, run.equilibria, lower)
-    return TriggeringRun(scene, runs, trigger(scene, start, control, run, path))
+    return trigger(scene, start, control, run, path)
 
 
 def recorded_ramp(scene: Scene, mu: float, path: Path) -> OnsetRun:
     """Ramp and onset for one friction coefficient; every equilibrium goes to the file."""
     one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
+    near = NEARBY * needed(scene.ramp, "ramp").until
     path.unlink(missing_ok=True)
     with Record(path, one) as record:
-        run = onset_run(one, mu, reached=record.append, near_onset=NEARBY * _last_load(scene))
+        run = onset_run(one, mu, reached=record.append, near_onset=near)
         record.finish()
     return run
-
-
-def _last_load(scene: Scene) -> float:
-    return needed(scene.ramp, "ramp").until
 
 
 def growth_run(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
@@ -186,11 +153,6 @@ def _dominance(modes: Spectrum) -> float:
     """Growth rate of the fastest pair, less that of the second: how fast it gets ahead."""
     rates = sorted((pair.growth_rate for pair in modes.pairs), reverse=True)
     return rates[0] - (rates[1] if len(rates) > 1 else 0.0) if rates else 0.0
-
-
-def onsets_of(runs: list[OnsetRun]) -> list[dict[str, Any]]:
-    """The onset for each friction coefficient, for summary.json."""
-    return [{"mu": run.mu, "onset": run.onset.as_dict()} for run in runs]
 
 
 def summary_of(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> dict[str, Any]:

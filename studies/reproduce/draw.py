@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,16 +12,18 @@ from ...analysis.packing.packing import Floats
 from ...figures.packing import draw_packing
 from ...figures.pair import PairCurve, draw_pair
 from ...figures.series import begin_at_noise, draw_series, few_decades
-from ...figures.style import save, styled
+from ...figures.style import styled
+from ..frame import Figures
 from .compute import GrowthRun
 
 
-def figures(curves: Sequence[PairCurve], growth: GrowthRun, output: Path) -> None:
+def figures(curves: Sequence[PairCurve], growth: GrowthRun) -> Figures:
     """The paper's figures 1, 3 and, where D grew far enough to measure its rate, 4."""
-    save(draw_packing(growth.start.packing), output / "figure1")
-    save(draw_pair(curves), output / "figure3")
-    if growth.measured is not None:
-        save(growth_figure(growth.time, growth.msd, growth.predicted, growth.measured), output / "figure4")
+    fitted = growth.measured
+    first = {"figure1": lambda: draw_packing(growth.start.packing), "figure3": lambda: draw_pair(curves)}
+    if fitted is None:
+        return first
+    return first | {"figure4": lambda: growth_figure(growth.time, growth.msd, growth.predicted, fitted)}
 
 
 @styled

@@ -6,7 +6,6 @@ shares, intervals and distributions.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,12 +13,11 @@ from typing import Any
 import numpy as np
 
 from ...analysis.digits import with_uncertainty
-from ...analysis.files.wholefile import write_text
 from ...figures.pages import lines
-from ...figures.style import save, spared
 from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.refusals import needed
+from ..frame import draw_all, write_json
 from ..statistics import quartiles, share
 from ..sweep.compute import Progress, Row, Say, run_sweep
 from ..sweep.points import Sweep
@@ -29,6 +27,8 @@ from .ensemble_figure import ensemble_figure
 
 RISES = (5, 10)
 """Rises in decades whose shares are given; the paper's figure 5 has 12."""
+
+QUARTILES = (0.25, 0.5, 0.75)
 
 
 def ensemble(
@@ -75,9 +75,8 @@ def ensemble(
     if not rows:
         return {}
     result = summary(scene, rows)
-    write_text(output / "ensemble.json", json.dumps(result, indent=1) + "\n")
-    with spared(f"{output}/ensemble.png", say):
-        save(ensemble_figure([row["result"] for row in rows]), output / "ensemble")
+    write_json(output / "ensemble.json", result)
+    draw_all({"ensemble": lambda: ensemble_figure([row["result"] for row in rows])}, output, say)
     for line in lines(__package__ or "", "ensemble.j2", result=result):
         say(line)
     return result
@@ -96,32 +95,26 @@ def summary(scene: Scene, rows: list[Row]) -> dict[str, Any]:
     eruptions = [each["eruption"] for each in ramped if each["eruption"]]
     rises, controls = ([rise(each, of) for each in eruptions] for of in ("weakening", "control"))
     decided = [each["lowered"] for each in ramped if each["lowered"] is not None]
+
+    def at_least(values: list[float]) -> dict[str, Any]:
+        return {str(decades): share(sum(each >= decades for each in values), len(values)) for decades in RISES}
+
     return {
         "scene": scene.resolved(),
-        "seeds": sorted(map(_seed, rows)),
-        "failed": [{"seed": _seed(row), "says": row["says"]} for row in rows if row["says"] is not None],
+        "seeds": sorted(row["values"]["packing.seed"] for row in rows),
+        "failed": [
+            {"seed": row["values"]["packing.seed"], "says": row["says"]} for row in rows if row["says"] is not None
+        ],
         "onsets": [_onset_summary(ends) for ends in zip(*(each["ramps"] for each in ramped), strict=True)],
         "lowered": share(sum(decided), len(decided)),
         "lowered_unknown": len(ramped) - len(decided),
-        "rises": _rises(rises),
-        "control_rises": _rises(controls),
-        "rise_quartiles": _quartiles(rises),
-        "control_rise_quartiles": _quartiles(controls),
+        "rises": at_least(rises),
+        "control_rises": at_least(controls),
+        "rise_quartiles": np.quantile(rises, QUARTILES).tolist() if rises else None,
+        "control_rise_quartiles": np.quantile(controls, QUARTILES).tolist() if controls else None,
         "unstable_when_weakened": share(sum(each["rate"] > 0 for each in eruptions), len(eruptions)),
         "grows": share(sum(map(grows, eruptions)), len(eruptions)),
     }
-
-
-def _seed(row: Row) -> int:
-    return int(row["values"]["packing.seed"])
-
-
-def _rises(values: list[float]) -> dict[str, Any]:
-    return {str(decades): share(sum(each >= decades for each in values), len(values)) for decades in RISES}
-
-
-def _quartiles(values: list[float]) -> list[float] | None:
-    return np.quantile(values, [0.25, 0.5, 0.75]).tolist() if values else None
 
 
 def _onset_summary(ramps: Sequence[Row]) -> dict[str, Any]:
@@ -153,4 +146,4 @@ def sentence(row: Row) -> str:
         )
     if row["says"] is not None:
         parts.append(f"failed: {row['says']}")
-    return f"seed {_seed(row)}: {'; '.join(parts)} ({row['seconds']:.0f} s)"
+    return f"seed {row['values']['packing.seed']}: {'; '.join(parts)} ({row['seconds']:.0f} s)"

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ...figures.style import INK, STYLE
+from ...figures.style import styled
 from ..statistics import course
+from ..sweep.draw import draw_pairs
 from ..sweep.triggering import Row, grows, rise
 
 
-@matplotlib.rc_context(fname=STYLE)
+@styled
 def ensemble_figure(found: Sequence[Row]) -> Figure:
     """Onsets of an ensemble, both friction coefficients against each other, and the rise of D.
 
@@ -63,18 +63,11 @@ def ensemble_figure(found: Sequence[Row]) -> Figure:
 
 def _draw_pairs(axes: Axes, packings: list[Row]) -> None:
     """Onsets with the weakened friction over those with the first; triangles where one is known to lie beyond."""
-    most = 0.0
-    for each in packings:
-        strong, weak = each["ramps"][0], each["ramps"][-1]
-        known = [end["ends"] == "onset" for end in (strong, weak)]
-        if not any(known):
-            continue
-        most = max(most, strong["reach"], weak["reach"])
-        marker = "o" if all(known) else "^" if known[0] else ">"
-        face = "C0" if each["eruption"] and grows(each["eruption"]) else "none"
-        axes.plot(strong["reach"], weak["reach"], marker, color="C0", markerfacecolor=face, markeredgewidth=0.7)
-    axes.axline((0, 0), slope=1, color=INK, linewidth=0.6, linestyle=":")
-    axes.set(xlim=(0, 1.05 * most or 1), ylim=(0, 1.05 * most or 1), aspect="equal")
+    filled = [bool(each["eruption"]) and grows(each["eruption"]) for each in packings]
+    ramps = [(each["ramps"][0], each["ramps"][-1]) for each in packings]
+    draw_pairs(axes, [(*pair, fill) for pair, fill in zip(ramps, filled, strict=True)], markeredgewidth=0.7)
+    known = [end["reach"] for pair in ramps for end in pair if "onset" in (pair[0]["ends"], pair[1]["ends"])]
+    axes.set(xlim=(0, 1.05 * max(known, default=0) or 1), ylim=(0, 1.05 * max(known, default=0) or 1))
     if packings:
         strong, weak = packings[0]["ramps"][0], packings[0]["ramps"][-1]
         axes.set(xlabel=rf"$F_x^c(\mu = {strong['mu']:g})$", ylabel=rf"$F_x^c(\mu = {weak['mu']:g})$")

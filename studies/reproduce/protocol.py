@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from ...analysis.digits import with_uncertainty
 from ...analysis.files.wholefile import make_folder, write_text
-from ...figures.style import spared
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
+from ..frame import draw_all, write_json
+from ..triggering.compute import summary as triggering_summary
 from ..triggering.draw import figures as triggering_figures
-from .compute import growth_run, onsets_of, pair_curve, recorded_ramp, summary_of, triggering_run
+from .compute import growth_run, pair_curve, recorded_ramp, summary_of, triggering_run
 from .draw import figures
 from .page import report
 
@@ -44,32 +44,30 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     runs = _ramps(scene, output / "run.h5", say)
     say("undamped run above the onset")
     growth = growth_run(scene, runs[0], output / "run.h5")
-    say(f"growth rate of D: {growth.rate} measured, {growth.predicted:.6g} predicted")
-    summary, found = summary_of(scene, runs, growth), None
-    _write(summary, output)  # what follows may fail
-    with spared("a figure of the onset", say):
-        figures([pair_curve(run) for run in runs], growth, output)
-    shaken = triggered or scene
+    rate = "none" if growth.measured is None else f"{growth.measured.rate:.6g}"
+    say(f"growth rate of D: {rate} measured, {growth.predicted:.6g} predicted")
+    summary = summary_of(scene, runs, growth)
+    write_json(output / "summary.json", summary)  # what follows may fail
+    draw_all(figures([pair_curve(run) for run in runs], growth), output, say)
+    shaken, found, another = triggered or scene, None, None
     if shaken.perturb is not None and shaken.friction is not None:
+        path = output / ("run.h5" if triggered is None else "triggered.h5")
         if triggered is not None:
             say("the packing to be triggered")
-        path = output / ("run.h5" if triggered is None else "triggered.h5")
-        onsets = runs if triggered is None else _ramps(triggered, path, say)
+            another = _ramps(triggered, path, say)
         say(f"triggering at F_x = {shaken.perturb.fx:g}")
-        found = triggering_run(shaken, onsets, path)
-        if found.triggering is not None:
-            with spared("a figure of the triggering", say):
-                triggering_figures(found.triggering, output)
-        summary["triggering"] = found.as_dict()
-        if triggered is not None:
-            summary["triggering"] |= {"scene": triggered.resolved(), "onsets": onsets_of(onsets)}
-    _write(summary, output)
-    write_text(output / "report.md", report(scene, runs, growth, found))
+        found = triggering_run(shaken, another or runs, path)
+        if isinstance(found, str):
+            summary["triggering"] = {"says": found}
+        else:
+            draw_all(triggering_figures(found), output, say)
+            summary["triggering"] = triggering_summary(found)
+        if another is not None:
+            onsets = [{"mu": run.mu, "onset": run.onset.as_dict()} for run in another]
+            summary["triggering"] |= {"scene": shaken.resolved(), "onsets": onsets}
+    write_json(output / "summary.json", summary)
+    write_text(output / "report.md", report(scene, runs, growth, found, another))
     return summary
-
-
-def _write(summary: dict[str, Any], output: Path) -> None:
-    write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
 
 
 def _ramps(scene: Scene, path: Path, say: Say) -> list[OnsetRun]:

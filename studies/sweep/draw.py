@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...figures.style import save, spared, styled
+from ...figures.style import INK, save, spared, styled
 from ..statistics import course
 from .table import Row
 
@@ -40,6 +41,27 @@ def reach_of(row: Row) -> Reach | None:
     end = next(iter(result.get("ramps", [])), result)
     reach = end.get("reach", end.get("fx_c"))
     return None if reach is None else (float(reach), end["ends"] == "onset")
+
+
+def draw_pairs(axes: Axes, packings: Iterable[tuple[Row, Row, bool]], **style: Any) -> None:
+    """Onsets with a smaller friction coefficient over those with a larger one; triangles where one lies beyond.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where.
+    packings : iterable of (row, row, bool)
+        How the ramps with the larger and the smaller one end, "ends" and "reach", and whether the marker is filled.
+    **style
+        Of the markers.
+    """
+    for strong, weak, filled in packings:
+        known = [end["ends"] == "onset" for end in (strong, weak)]
+        if any(known):
+            marker, face = "o" if all(known) else "^" if known[0] else ">", "C0" if filled else "none"
+            axes.plot(strong["reach"], weak["reach"], marker, color="C0", markerfacecolor=face, **style)
+    axes.axline((0, 0), slope=1, color=INK, linewidth=0.6, linestyle=":")
+    axes.set_aspect("equal")
 
 
 @styled

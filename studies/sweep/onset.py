@@ -26,7 +26,7 @@ from scipy.linalg import eigh, eigvals
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ...analysis.onset import force_bearing, full_operator, seeks_all
-from ...analysis.packing.packing import Floats
+from ...analysis.packing.packing import Floats, Indices
 from ...analysis.spectrum.eigenpairs import eigenpairs
 from ...analysis.spectrum.spectrum import active_coordinates
 from ...pywrap import Scene, SceneError
@@ -120,14 +120,10 @@ def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
 
 def _among_all(packing: Packing, rest: Packing, eigenvalue: float, plane: Floats) -> dict[str, Any]:
     """Rank of the pair, and the modes of the packing at F_x = 0 that it has come from."""
-    operator = full_operator(packing)
-    active = active_coordinates(operator)
-    values = np.sort(eigvals(operator[active][:, active].toarray()).real)
+    values = np.sort(eigvals(_dense(packing)[0]).real)
     rank = int(np.count_nonzero(values < eigenvalue * (1 - 1e-6)))
     near = values[max(0, rank - 5) : rank + 7]
-    operator = full_operator(rest)
-    active = active_coordinates(operator)
-    dense = operator[active][:, active].toarray()
+    dense, active = _dense(rest)
     modes = eigh(0.5 * (dense + dense.T))[1]
     weight = np.sum((modes.T @ np.linalg.qr(plane[active])[0]) ** 2, axis=1)
     first, second = np.sort(np.argsort(weight)[-2:])
@@ -139,3 +135,10 @@ def _among_all(packing: Packing, rest: Packing, eigenvalue: float, plane: Floats
         "ancestors": [int(first), int(second)],
         "ancestry": float(0.5 * weight[[first, second]].sum()),
     }
+
+
+def _dense(packing: Packing) -> tuple[Floats, Indices]:
+    """A of the coordinates with stiffness, 1 / time^2, and their numbers."""
+    operator = full_operator(packing)
+    active = active_coordinates(operator)
+    return operator[active][:, active].toarray(), active

@@ -18,7 +18,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,11 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from ...pywrap import Scene, SceneError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from ...pywrap.scenes.refusals import read_toml
 
 MOST_POINTS = 1_000_000
 """Points of a sweep at the most: more is a slip of the pen."""
@@ -96,22 +91,9 @@ class Sweep:
 
     @classmethod
     def from_toml(cls, path: str | Path, tasks: Mapping[str, object]) -> Sweep:
-        """Read a sweep.
-
-        Parameters
-        ----------
-        path : str or Path
-            A TOML file.
-        tasks : mapping
-            Known tasks by name.
-
-        Raises
-        ------
-        SceneError
-            If the file cannot be read, is no TOML, or does not describe a sweep.
-        """
+        """Read a sweep of one of these tasks from a TOML file; SceneError if it cannot be read, or describes none."""
         path = Path(path)
-        return cls.from_mapping(read_toml(path), tasks, path.parent, str(path))
+        return cls.from_mapping(read_toml(path, "sweep"), tasks, path.parent, str(path))
 
     @classmethod
     def from_mapping(
@@ -171,16 +153,6 @@ class Sweep:
     def as_dict(self) -> dict[str, Any]:
         """The sweep as JSON holds it."""
         return {"task": self.task, "sweep": self.axes, "scene": self.scene}
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """What a TOML file holds; SceneError if it cannot be read, or is no TOML."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SceneError(f"{path}: the sweep cannot be read ({error.strerror}): correct its path.") from None
-    except ValueError as error:
-        raise SceneError(f"{path}: the sweep is not valid TOML: {error}.") from None
 
 
 def shard(points: tuple[Point, ...], part: tuple[int, int]) -> tuple[Point, ...]:

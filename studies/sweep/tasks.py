@@ -2,7 +2,7 @@
 
 A task takes the scene and a function that gives its settled packing for a friction coefficient, and returns one row:
 numbers, words, lists and dicts of these. A task that settles by itself leaves the function alone. What one task costs
-is a power of the number of disks (`Cost`), measured, for `sweep --dry-run`.
+is a power of the number of disks, measured, for `sweep --dry-run`.
 """
 
 from __future__ import annotations
@@ -28,22 +28,12 @@ from .onset import onset
 from .points import Point
 from .triggering import triggering
 
-Run = Callable[[Scene, Start], dict[str, Any]]
-
 
 @dataclass(frozen=True)
 class Task:
-    """A task.
+    """What is done with a scene, given its settled packings, and how many CPU seconds that takes, about."""
 
-    Attributes
-    ----------
-    run : callable
-        Scene and settled packing -> row.
-    seconds : callable
-        Scene -> CPU seconds that it will take, about.
-    """
-
-    run: Run
+    run: Callable[[Scene, Start], dict[str, Any]]
     seconds: Callable[[Scene], float]
 
 
@@ -56,13 +46,8 @@ def _increments(scene: Scene) -> float:
     return 1.0 if scene.ramp is None else scene.ramp.until / scene.ramp.step
 
 
-def settling_seconds(scene: Scene) -> float:
-    """CPU seconds of a settling: 0.3 s for 100 disks."""
-    return 0.3 * _disks(scene) ** 1.3
-
-
 def _onset(scene: Scene) -> float:
-    """CPU seconds of an onset, measured with 50 to 1,000 disks up to F_x = 0.01 F_y.
+    """An onset, measured with 50 to 1,000 disks up to F_x = 0.01 F_y.
 
     1 s for 100 disks and 30 increments, of which an increment costs as the number of disks to the power of 1.6
     (docs/benchmarks.md has exponents from 1.1 to 1.7).
@@ -74,11 +59,6 @@ def _triggering(scene: Scene) -> float:
     """The onsets for all friction coefficients, and four undamped runs of 8 s for 100 disks and t = 200."""
     runs = 0.0 if scene.perturb is None else 8.0 * scene.perturb.time / 200 * _disks(scene)
     return (len(scene.law.mus) + 1) * _onset(scene) + 4 * runs
-
-
-def _dense(scene: Scene) -> float:
-    """A dense decomposition: 0.1 s for 100 disks."""
-    return 0.1 * _disks(scene) ** 3
 
 
 def _trigger(scene: Scene) -> float:
@@ -93,20 +73,18 @@ def _eruptions(scene: Scene) -> float:
     return _onset(scene) + 40.0 * runs * time / 1000 * _disks(scene)
 
 
+def _loads(scene: Scene) -> int:
+    return len((scene.modes or Modes()).fx_over_fy)
+
+
 def _modes(scene: Scene) -> float:
     """Complex pairs along a ramp: 2 s for 100 disks and 12 loads, 100 s for 1,000."""
-    loads = len((scene.modes or Modes()).fx_over_fy)
-    return 0.02 * loads * _disks(scene) ** 2.7 + 3e-3 * _increments(scene) * _disks(scene)
+    return 0.02 * _loads(scene) * _disks(scene) ** 2.7 + 3e-3 * _increments(scene) * _disks(scene)
 
 
 def _loss(scene: Scene) -> float:
     """Pencils along a ramp: 8 s for 100 disks and 5 loads."""
-    return 1.6 * len((scene.modes or Modes()).fx_over_fy) * _disks(scene) ** 2.3
-
-
-def _yield(scene: Scene) -> float:
-    """The path to static yield, fifteen runs from equilibria and four with a load that rises: 60 s for 100 disks."""
-    return 60.0 * _disks(scene)
+    return 1.6 * _loads(scene) * _disks(scene) ** 2.3
 
 
 TASKS: Mapping[str, Task] = {
@@ -118,9 +96,11 @@ TASKS: Mapping[str, Task] = {
     "loss": Task(loss, _loss),
     "lossy runs": Task(lossy_runs, _loss),
     "random matrices": Task(random_matrices, lambda scene: 3 * _modes(scene)),
-    "yield": Task(yielding, _yield),
-    "levels": Task(levels, _dense),
-    "growth": Task(growth, lambda scene: _increments(scene) * _dense(scene)),
+    # the path to static yield, fifteen runs from equilibria and four with a load that rises
+    "yield": Task(yielding, lambda scene: 60.0 * _disks(scene)),
+    # dense decompositions
+    "levels": Task(levels, lambda scene: 0.1 * _disks(scene) ** 3),
+    "growth": Task(growth, lambda scene: 0.1 * _increments(scene) * _disks(scene) ** 3),
     "surrogates": Task(surrogates, lambda scene: 3 * _onset(scene)),
 }
 
@@ -130,7 +110,7 @@ def estimate(task: str, points: Sequence[Point]) -> list[str]:
     scenes = [point.scene for point in points if point.scene is not None]
     seconds = [TASKS[task].seconds(scene) for scene in scenes]
     settlings = {point.settling: point.scene for point in points if point.scene is not None}
-    settling = sum(settling_seconds(scene) for scene in settlings.values())
+    settling = sum(0.3 * _disks(scene) ** 1.3 for scene in settlings.values())  # 0.3 s for 100 disks
     refused = len(points) - len(scenes)
     return [
         f"{len(scenes)} scenes to compute, {len(settlings)} packings to settle",

@@ -35,6 +35,7 @@ from ...pywrap.runs.undamped import perturb
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction, Perturb
 from ..packings import Start
+from ..statistics import lowers
 from ..triggering.compute import GROWTH_FACTOR, calibrated, equilibrium_at, jump, largest
 from .onset import first_window
 
@@ -136,14 +137,6 @@ def economical(scene: Scene) -> Scene:
     if scene.perturb is not None:
         changes["perturb"] = scene.perturb.model_copy(update={"time": min(scene.perturb.time, LONGEST_TIME)})
     return scene.model_copy(update=changes)
-
-
-def lowers(strong: Row, weak: Row) -> bool | None:
-    """Whether the onset with weakened friction is the lower one; None if both may be."""
-    if weak["ends"] == "onset" and weak["reach"] < strong["reach"]:
-        return True
-    # the weak one has none up to there, or a later one
-    return False if strong["ends"] == "onset" and strong["reach"] <= weak["reach"] else None
 
 
 def eruption(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,15 +10,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ...analysis.packing.packing import Floats
-from ...figures.style import INK, save, styled
+from ...figures.style import INK, styled
 
 WAVE = {"layer": "amplitude of the force $a$", "floor": "acceleration of the floor $a$"}
-
-
-def figures(result: dict[str, Any], output: Path) -> None:
-    """Both figures, from what trigger.json holds."""
-    save(map_figure(result), output / "map")
-    save(threshold_figure(result), output / "thresholds")
 
 
 @styled

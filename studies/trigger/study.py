@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping
+
+from ...analysis import Packing
 from ...analysis.digits import with_uncertainty
 from ...pywrap import Scene
 from ...pywrap.scenes.refusals import needed
@@ -9,7 +12,6 @@ from ...pywrap.scenes.units import real_units
 from ..frame import Result, Study, Work
 from ..packings import Start
 from ..sweep.onset import onset
-from . import draw
 from .compute import (
     Row,
     bisected,
@@ -23,6 +25,7 @@ from .compute import (
     threshold,
     waves,
 )
+from .draw import map_figure, threshold_figure
 
 
 def _check(scene: Scene) -> None:
@@ -98,10 +101,7 @@ def _predicted(scene: Scene, fx_c: float, work: Work) -> list[Row]:
     distances = sorted(settings(scene).distance, reverse=True)
     missing = [d for d in distances if work.rows.find(kind="predicted", distance=d) is None]
     packings = equilibria(scene, [fx_c * (1 - d) for d in distances]) if missing else {}
-    omegas = frequencies(packings[fx_c * (1 - distances[0])], settings(scene)) if missing else None
-    for distance in missing:
-        assert omegas is not None
-        found = predictions(scene, packings[fx_c * (1 - distance)], distance, omegas)
+    for distance, found in _mapped(scene, packings, fx_c, missing):
         work.rows.append(kind="predicted", distance=distance, found=found)
         least = min(found, key=lambda each: each["predicted"])
         work.say(
@@ -109,6 +109,16 @@ def _predicted(scene: Scene, fx_c: float, work: Work) -> list[Row]:
         )
     known = [row for row in work.rows.rows if row["kind"] == "predicted" and row["distance"] in distances]
     return [each for row in known for each in row["found"]]
+
+
+def _mapped(
+    scene: Scene, packings: Mapping[float, Packing], fx_c: float, distances: Iterable[float]
+) -> Iterator[tuple[float, list[Row]]]:
+    """The predictions at each distance, the largest first; frequencies are those of the largest distance of all."""
+    if packings:
+        omegas = frequencies(packings[min(packings)], settings(scene))
+        for distance in sorted(distances, reverse=True):
+            yield distance, predictions(scene, packings[fx_c * (1 - distance)], distance, omegas)
 
 
 def _measured(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
@@ -143,9 +153,7 @@ def trigger(scene: Scene, start: Start) -> Row:
     if first["ends"] != "onset":
         return {"ends": first["ends"], "fx_c": None, "map": [], "measured": []}
     packings = equilibria(scene, [first["fx_c"] * (1 - each) for each in wave.distance])
-    by_distance = {each: packings[first["fx_c"] * (1 - each)] for each in sorted(wave.distance, reverse=True)}
-    omegas = frequencies(next(iter(by_distance.values())), wave)
-    predicted = [row for each, packing in by_distance.items() for row in predictions(scene, packing, each, omegas)]
+    predicted = [row for _, rows in _mapped(scene, packings, first["fx_c"], wave.distance) for row in rows]
     measured = [bisected(each) for each in waves(scene, packings, chosen(predicted, wave.runs))]
     return {
         "ends": "onset",
@@ -161,7 +169,7 @@ trigger_map = Study(
     beside="output",
     check=_check,
     compute=_compute,
-    draw=lambda result, _, output: draw.figures(result, output),
+    figures=lambda result, _: {"map": lambda: map_figure(result), "thresholds": lambda: threshold_figure(result)},
     page=_page,
 )
 """Predicts and measures critical amplitudes; of a scene with [ramp], and [friction] with a number v0."""

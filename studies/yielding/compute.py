@@ -7,10 +7,15 @@ flows. A layer that throws a disk out of the box *bursts*. Otherwise the disks a
 under the same load, and the equilibrium that they reach is compared with the first: D, slip of the layer, contacts that
 are lost and gained.
 
-**Finite rates.** With dashpots of restitution 0.9 the load rises as F_x = rate t from zero, at the rates `RATES` of F_y
-per unit of time, up to the static yield. The distance from the quasi-static path is the root of D from the equilibrium
-of the same load (between kept ones, by straight lines). The load is given at which this distance first exceeds each
-of `BOUNDS`, and the load at which the layer bursts, if it does.
+**Finite rates.** With dashpots the load rises as F_x = rate t from zero up to the static yield, for each pair of rate
+(F_y per unit of time) and restitution in `LOADINGS`. The distance from the quasi-static path is the root of D from the
+equilibrium of the same load (between kept ones, by straight lines). The load is given at which this distance first
+exceeds each of `BOUNDS`, and the load at which the layer *flows*: its slip exceeds a diameter of the largest disk, or a
+disk leaves the box. A layer that flows at the same load with any loss has come to the end of its own branch of
+equilibria. A layer that flows with little loss alone has been shaken off.
+
+**The path.** Where a branch of equilibria ends, a layer that moves may come to rest in another configuration than
+damped dynamics finds. The static yield is therefore computed with other increments, too, `INCREMENTS`.
 """
 
 from __future__ import annotations
@@ -43,10 +48,19 @@ TIME = 50.0
 """Length of a dynamic run, time."""
 
 LOOKS = 50
-"""Looks at the disks in a run."""
+"""Looks at the disks in a dynamic run."""
 
-RATES = (10.0, 1.0, 0.1, 0.01, 0.001)
-"""Rates of loading, F_y per unit of time."""
+LOADING_LOOKS = 200
+"""Looks at the disks while the load rises."""
+
+CONTROLLED = 0.01
+"""Rate of loading, F_y per unit of time, at which layers with more loss are looked at, too."""
+
+LOADINGS = ((10.0, 0.9), (1.0, 0.9), (0.1, 0.9), (CONTROLLED, 0.9), (CONTROLLED, 0.5), (CONTROLLED, 0.1), (0.001, 0.9))
+"""Rates of loading with the restitution."""
+
+INCREMENTS = (0.005, 0.02)
+"""Increments of F_x with which the static yield is computed again, in units of F_y."""
 
 BOUNDS = (1e-3, 1e-2)
 """Distances from the quasi-static path, in diameters of a small disk."""
@@ -54,24 +68,31 @@ BOUNDS = (1e-3, 1e-2)
 
 def yielding(scene: Scene, start: Start) -> dict[str, Any]:
     """One row: the static yield, the dynamic runs, the runs at finite rates."""
-    path = branch(start(scene.law.mus[0]))
+    settled = start(scene.law.mus[0])
+    path = branch(settled)
     fy, last = scene.load.fy, path.kept[-1].fx
     result: dict[str, Any] = {
         "newton": path.newton / fy,
         "static": last / fy,
+        "static_by_increment": [[step, branch(settled, step).kept[-1].fx / fy] for step in INCREMENTS],
         "jumps": [[fx / fy, moved] for fx, moved in path.jumps],
         "dynamic": [],
     }
-    dashpots = {each: dashpot(scene.law.kn, each, 1.0, impact_velocity(scene)) for each in LOSSES}
+
+    def dashpots(restitution: float) -> float:
+        return dashpot(scene.law.kn, restitution, 1.0, impact_velocity(scene))
+
     for share in SHARES:
         try:
             here = path.at(share * last)
         except FailedError:
             continue  # between two loads that are borne
-        for loss, cn in dashpots.items():
-            run = dynamic(here, cn, scene.packing.model_dump().get("seed", 0))
+        for loss in LOSSES:
+            run = dynamic(here, dashpots(loss), scene.packing.model_dump().get("seed", 0))
             result["dynamic"].append({"share": share, "restitution": loss, "fx_over_fy": here.fx / fy} | run)
-    result["loading"] = [{"rate": rate} | loaded(path, dashpots[0.9], rate) for rate in RATES]
+    result["loading"] = [
+        {"rate": rate, "restitution": loss} | loaded(path, dashpots(loss), rate) for rate, loss in LOADINGS
+    ]
     return result
 
 
@@ -126,31 +147,31 @@ def _rested(engine: Engine, packing: Packing, slip: float, residual: float) -> d
 
 
 def loaded(path: Branch, cn: float, rate: float) -> dict[str, Any]:
-    """The load rises at a rate up to the static yield: loads at which the layer leaves the quasi-static path."""
-    packing = with_dashpots(path.kept[0].packing, cn)
+    """The load rises at a rate up to the static yield: where the layer leaves the quasi-static path, where it flows."""
+    before = packing = with_dashpots(path.kept[0].packing, cn)
     fy, last = packing.fy, path.kept[-1].fx
     duration = last / (rate * fy)
     dt = time_step(packing)
-    looks = min(LOOKS, int(duration / dt))
+    looks = min(LOADING_LOOKS, int(duration / dt))
     left: dict[float, float | None] = dict.fromkeys(BOUNDS)
-    distances, bursts = [0.0], None
-    with (
-        Engine(packing) as engine,
-        engine.undamped(dt, signal=Signal(np.array([0.0, 2 * duration]), np.array([0.0, 2 * last]))) as dynamics,
-    ):
+    slip, largest, flows = 0.0, 0.0, None
+    signal = Signal(np.array([0.0, 2 * duration]), np.array([0.0, 2 * last]))
+    with Engine(packing) as engine, engine.undamped(dt, signal=signal) as dynamics:
         for look in range(1, looks + 1):
-            fx = last * look / looks
-            if not _advanced(dynamics, int(duration / dt * look / looks) - int(duration / dt * (look - 1) / looks)):
-                bursts = fx / fy
+            steps = int(duration / dt * look / looks) - dynamics.steps
+            if not _advanced(dynamics, steps):
+                flows = flows or last * look / looks / fy
                 break
-            fx = dynamics.steps * dt * rate * fy
-            off = _off(path, fx, engine.packing)
-            distances.append(off)
+            now, fx = engine.packing, dynamics.steps * dt * rate * fy
+            slip, before = slip + layer_slip(before, now), now
+            if flows is None and abs(slip) > 2 * packing.radius.max():
+                flows = fx / fy
+            off = _off(path, fx, now)
+            largest = max(largest, off)
             for bound in BOUNDS:
                 if left[bound] is None and off > bound:
                     left[bound] = fx / fy
-    reached = {"largest": max(distances), "last": distances[-1], "bursts": bursts}
-    return {"left": [left[each] for each in BOUNDS]} | reached
+    return {"left": [left[each] for each in BOUNDS], "largest": largest, "slip": slip, "flows": flows}
 
 
 def _off(path: Branch, fx: float, now: Packing) -> float:

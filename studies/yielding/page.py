@@ -13,7 +13,7 @@ from ...figures.pages import render
 from ...figures.style import save, styled
 from ..modes.tables import median
 from ..statistics import interval, share
-from .compute import LOSSES, RATES, SHARES
+from .compute import CONTROLLED, LOADINGS, LOSSES, SHARES
 
 FLOWING = ("flows", "bursts", "fails at rest")
 """How a run ends after which the layer does not rest."""
@@ -36,7 +36,8 @@ def numbers(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "static": median([row["static"] for row in rows]),
         "dynamic": [_of_runs(rows, load, loss) for load in SHARES for loss in LOSSES],
         "yields": [yields(rows, loss) for loss in LOSSES],
-        "loading": [_rising(rows, rate) for rate in RATES],
+        "spread": median([np.ptp([row["static"], *(each[1] for each in row["static_by_increment"])]) for row in rows]),
+        "loading": [_rising(rows, *each) for each in LOADINGS],
     }
 
 
@@ -70,20 +71,32 @@ def _of_runs(rows: list[dict[str, Any]], load: float, loss: float) -> dict[str, 
     }
 
 
-def _rising(rows: list[dict[str, Any]], rate: float) -> dict[str, Any]:
-    """In how many packings the load rose at a rate, where they left the path, and how many of them burst."""
-    runs = [run for row in rows for run in row["loading"] if run["rate"] == rate]
-    columns = [
-        [value for value in column if value is not None] for column in zip(*(run["left"] for run in runs), strict=True)
-    ]
-    left = [float(np.median(column)) if column else None for column in columns]
-    return {"rate": rate, "of": len(runs), "left": left, "bursts": sum(run.get("bursts") is not None for run in runs)}
+def _rising(rows: list[dict[str, Any]], rate: float, loss: float) -> dict[str, Any]:
+    """Packings whose load rose at a rate: where they left the path, and where those flowed that did.
+
+    "flows" are their loads over the static yield, in the order of the packings; "branch" is how many of them flow
+    beyond the end of Newton's branch, and "lower" beyond the least of their static yields.
+    """
+    runs = [(row, run) for row in rows for run in row["loading"] if (run["rate"], run["restitution"]) == (rate, loss)]
+    columns = zip(*(run["left"] for _, run in runs), strict=True)
+    known = [[value for value in column if value is not None] for column in columns]
+    flowing = [(row, run["flows"]) for row, run in runs if run["flows"] is not None]
+    return {
+        "rate": rate,
+        "restitution": loss,
+        "of": len(runs),
+        "left": [float(np.median(column)) if column else None for column in known],
+        "flows": [load / row["static"] for row, load in flowing],
+        "branch": sum(load > row["newton"] for row, load in flowing),
+        "lower": sum(load > min(each[1] for each in row["static_by_increment"]) for row, load in flowing),
+    }
 
 
 def text(found: dict[str, Any], packings: int, failed: int) -> str:
     """The page."""
     flow = [share(each["flow"], packings) for each in found["yields"]]
     names = {"packings": packings, "failed": failed, "flow": flow, "interval": interval, "percent": _percent}
+    names["slow"] = [row for row in found["loading"] if row["rate"] == CONTROLLED]
     return render(__package__ or "", "yield.md.j2", **found, **names)
 
 

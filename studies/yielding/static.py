@@ -12,7 +12,6 @@ not come to rest within `LONGEST`. The static yield F_s lies between the last lo
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,18 +71,17 @@ class Branch:
         return below if below.fx == fx else following(below, fx)[0]
 
 
-def branch(start: Equilibrium, say: Callable[[str], None] = lambda _: None) -> Branch:
-    """Follow a packing from its first equilibrium to its static yield."""
+def branch(start: Equilibrium, increment: float = STEP) -> Branch:
+    """Follow a packing from its first equilibrium to its static yield, in increments of F_x in units of F_y."""
     kept = [start]
     jumps: list[tuple[float, float]] = []
     newton: float | None = None
-    step = STEP * start.packing.fy
+    step = increment * start.packing.fy
     while True:
         last = kept[-1]
         try:
             found, moved = following(last, len(kept) * step)
-        except FailedError as error:
-            say(str(error))
+        except FailedError:
             return Branch(kept, last.fx if newton is None else newton, jumps)
         if moved is not None:
             newton = last.fx if newton is None else newton

@@ -38,22 +38,6 @@ def test_sum_of_outer_products(damped):
     np.testing.assert_allclose(matrix, expected, rtol=0, atol=2e-15 * np.abs(expected).max())
 
 
-def test_symmetric_and_positive_semidefinite(damped):
-    for packing in (damped, replace(damped, drag_time=None)):
-        matrix = damping_matrix(packing).toarray()
-        scale = np.abs(matrix).max()
-        np.testing.assert_allclose(matrix, matrix.T, rtol=0, atol=4e-16 * scale)
-        assert np.linalg.eigvalsh(matrix).min() > -1e-14 * scale
-
-
-def test_contacts_at_the_bound_have_no_tangential_dashpot(damped):
-    packing = replace(damped, drag_time=None, law=replace(damped.law, cn=0.0))
-    limit = packing.law.slip_limit(packing.geometry.overlap)
-    sliding = np.abs(packing.contacts.slip) >= limit
-    assert sliding.any()
-    assert np.linalg.matrix_rank(damping_matrix(packing).toarray()) == (~sliding).sum()
-
-
 def test_parts(damped):
     """Normal dashpots, tangential ones and drag add up; without any of them nothing is left."""
     law = damped.law

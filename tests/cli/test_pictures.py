@@ -25,7 +25,6 @@ def folder(tmp_path_factory, faultgouge_in):
     (made / "scene.toml").write_text(BEYOND_ITS_ONSET + "[output]\ntrajectory = true\n")
     for command in ("ramp", "perturb"):
         done = faultgouge_in(made, command, "scene.toml", "-o", f"{command}.h5")
-        assert done.returncode == 0, done.stderr
     assert "at most" in done.stderr
     return made
 
@@ -34,7 +33,6 @@ def folder(tmp_path_factory, faultgouge_in):
 @pytest.mark.slow
 def test_a_packing(folder, suffix, faultgouge_in):
     done = faultgouge_in(folder, "draw", "ramp.h5", "--frame", "2", "-o", f"packing.{suffix}")
-    assert done.returncode == 0, done.stderr
     assert "F_x = 0.012, F_y = 3: 100 disks" in done.stderr
     assert (folder / f"packing.{suffix}").stat().st_size > 10_000
 
@@ -42,10 +40,8 @@ def test_a_packing(folder, suffix, faultgouge_in):
 @pytest.mark.slow
 def test_the_pair_before_and_after_the_onset(folder, faultgouge_in):
     before = faultgouge_in(folder, "draw", "ramp.h5", "--frame", "3", "--mode", "pair", "-o", "before.png")
-    assert before.returncode == 0, before.stderr
     assert len(re.findall(r"mode \d+: lambda = [\d.]+, participation", before.stderr)) == 2
     after = faultgouge_in(folder, "draw", "ramp.h5", "--mode", "pair", "-o", "after.png")
-    assert after.returncode == 0, after.stderr
     assert re.search(r"mode \d+: lambda = [\d.]+ \+- [\d.]+ i, participation ratio 0\.\d+, rotation", after.stderr)
 
 
@@ -53,8 +49,7 @@ def test_the_pair_before_and_after_the_onset(folder, faultgouge_in):
 def test_films_of_a_run_a_ramp_and_a_mode(folder, faultgouge_in):
     for name, more in (("perturb", ()), ("ramp", ()), ("ramp", ("--mode", "pair"))):
         command = ("movie", f"{name}.h5", *more, "--seconds", "1", "--rate", "5", "--dots", "50", "-o", "film.gif")
-        done = faultgouge_in(folder, *command)
-        assert done.returncode == 0, done.stderr
+        faultgouge_in(folder, *command)
         with Image.open(folder / "film.gif") as gif:
             assert gif.n_frames == 5
 
@@ -73,15 +68,13 @@ def test_films_of_a_run_a_ramp_and_a_mode(folder, faultgouge_in):
 )
 @pytest.mark.slow
 def test_bad_input_is_refused_in_a_sentence(folder, command, says, faultgouge_in):
-    done = faultgouge_in(folder, *command)
-    assert done.returncode == 2
+    done = faultgouge_in(folder, *command, code=2)
     assert says in " ".join(done.stderr.split())
-    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.slow
 def test_init_writes_a_scene_that_holds_every_key(faultgouge, tmp_path):
-    assert faultgouge("init").returncode == 0
+    faultgouge("init")
     text = (tmp_path / "scene.toml").read_text()
     assert Scene.from_toml(tmp_path / "scene.toml").law.kn == 2e5
     # without the signs of comments every key is there, and the scene is still one
@@ -92,7 +85,7 @@ def test_init_writes_a_scene_that_holds_every_key(faultgouge, tmp_path):
         models = [each for each in (section, *getattr(section, "__args__", ())) if hasattr(each, "model_fields")]
         missing = set(models[0].model_fields) - set(keys[name])
         assert not missing, f"{name}: {missing}"
-    assert faultgouge("init").returncode == 2
+    faultgouge("init", code=2)
 
 
 def test_version_in_both_ways():

@@ -41,10 +41,16 @@ def test_the_sentences_about_bounds_hold():
 
 
 def test_counts_in_slices_are_within_their_errors():
+    off = []
     for row in rows("slices.jsonl"):
         assert abs(row["sliced"] - row["pairs"]) <= row["error"]
-        named = f"| {row['disks']} | {row['seed']} | {row['fx_over_fy']:g} |"
-        assert f"{named} {row['pairs']} | {row['sliced']} ± {row['error']} |" in PAGE
+        numbers = [row[name + way] for name in ("growth_rate", "least_q") for way in ("", "_sliced")]
+        off += [abs(numbers[1] / numbers[0] - 1), abs(numbers[3] / numbers[2] - 1)]
+        cells = f"{row['seed']} | {row['fx_over_fy']:g} | {row['pairs']} | {row['sliced']} ± {row['error']}"
+        assert f"| {cells} | {' | '.join(f'{each:.3g}' for each in numbers)} |" in PAGE
+    stated = re.search(r"Growth rates and least Q from slices are within ([\d.]+) %", PAGE)
+    assert stated
+    assert max(off) < float(stated[1]) / 100 < 1.2 * max(off)
 
 
 def test_packings_that_bear_more_are_no_others_from_the_start():

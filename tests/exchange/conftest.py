@@ -39,8 +39,7 @@ def refusal(faultgouge_here) -> Callable[..., str]:
     """Runs a command that is refused in one sentence, and gives the sentence."""
 
     def run(*words: object, code: int = 2) -> str:
-        done = faultgouge_here(*words)
-        assert done.returncode == code, done.stderr
+        done = faultgouge_here(*words, code=code)
         assert len(done.stderr.strip().splitlines()) == 1
         return done.stderr
 

@@ -42,20 +42,6 @@ def dump(packing, step=0, columns="id type x y z radius", count=None, z=0.0):
     return "\n".join([*head, *rows]) + "\n"
 
 
-@pytest.mark.slow
-def test_csv_with_slips_is_the_same_packing(tmp_path, faultgouge, sheared):
-    (tmp_path / "packing.csv").write_text(csv(sheared))
-    (tmp_path / "slips.csv").write_text(slips(sheared.contacts))
-    law = ("--kn", "2e5", "--kt", sheared.law.kt, "--fx", sheared.fx, "--fy", "3", "--inertia", "0.5")
-    words = ("packing.csv", "--width", sheared.box_length, "--contacts", "slips.csv", *law)
-    done = faultgouge("import", *words, "-o", "packing.h5")
-    assert done.returncode == 0, done.stderr
-    with RunFile(tmp_path / "packing.h5") as file:
-        found = file.packing()
-    np.testing.assert_array_equal(found.contacts.slip, sheared.contacts.slip)
-    np.testing.assert_array_equal(found.net_force, sheared.net_force)
-
-
 @pytest.mark.parametrize("names", ["x,y,radius", "radius,y,x,top"])
 @pytest.mark.parametrize("mark", [";", "\t", " "])
 def test_csv_as_others_write_it(tmp_path, sheared, names, mark):
@@ -169,7 +155,7 @@ def test_what_mdanalysis_reads_with_radii(tmp_path, sheared):
 
 
 @pytest.mark.slow
-def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packing):
+def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge_here, reference_packing):
     """Numbers with five digits: a hundredth of an overlap, and forces of the order of the load."""
     packing = reference_packing(1.0)
     (tmp_path / "rough.csv").write_text(
@@ -180,13 +166,11 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packi
         )
     )
     words = ("import", "rough.csv", "--width", packing.box_length, *LAW, "-o", "rest.h5")
-    done = faultgouge(*words)
-    assert done.returncode == 2
+    done = faultgouge_here(*words, code=2)
     assert "not in balance under fy = 3" in done.stderr
     assert "--relax" in done.stderr
     assert not (tmp_path / "rest.h5").exists()
-    done = faultgouge(*words, "--relax")
-    assert done.returncode == 0, done.stderr
+    done = faultgouge_here(*words, "--relax")
     assert "brought to rest" in done.stderr
     with RunFile(tmp_path / "rest.h5") as file:
         rest = file.packing()
@@ -210,7 +194,6 @@ def test_disks_with_slips_come_to_rest_with_friction_on_any_number_of_ranks(tmp_
     found = []
     for name, ranks in (("one.h5", None), ("two.h5", 2)):
         done = faultgouge(*words, "--relax", "-o", name, ranks=ranks)
-        assert done.returncode == 0, done.stderr
         assert "brought to rest" in done.stderr
         with RunFile(tmp_path / name) as file:
             found.append(file.packing())

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from faultgouge.analysis import PackingFileError, RunFile, mean_square_displacement, nearest_image
+from faultgouge.analysis import PackingFileError, RunFile
 from faultgouge.pywrap import Record, Scene, SceneError, reach
 
 pytestmark = pytest.mark.skipif(
@@ -66,44 +66,6 @@ def test_mdanalysis_steps_through_it(run):
         assert frame.dimensions[0] == np.float32(packing.box_length)
         assert frame.data["fx"] == packing.fx
         np.testing.assert_array_equal(frame.positions[:, :2], place[k].astype(np.float32))
-
-
-@pytest.mark.slow
-def test_its_mean_square_displacement_is_ours(run):
-    from MDAnalysis.analysis.msd import EinsteinMSD
-
-    path, packing = run
-    found = (
-        EinsteinMSD(opened(path, len(packing)), select="all", msd_type="xy", fft=False).run(0, 150).results.timeseries
-    )
-    with RunFile(path) as file:
-        place = np.insert(file.series("trajectory")["position"], 0, packing.position, axis=0)[:150]
-    lags = (1, 10, len(place) - 1)
-    ours = [
-        np.mean([mean_square_displacement(place[k + lag], place[k]) for k in range(len(place) - lag)]) for lag in lags
-    ]
-    # float32 is 5e-7 of a coordinate of 10; the displacements are 1e-2
-    np.testing.assert_allclose(found[list(lags)], ours, rtol=1e-2, atol=1e-13)
-    assert ours[-1] > 1e-9
-
-
-@pytest.mark.slow
-def test_its_radial_distribution_is_ours(run):
-    from MDAnalysis.analysis.rdf import InterRDF
-
-    path, packing = run
-    universe = opened(path, len(packing))
-    disks = universe.atoms
-    found = InterRDF(disks, disks, nbins=40, range=(0.5, 4.5), norm="none").run(0, 50)
-    with RunFile(path) as file:
-        place = np.insert(file.series("trajectory")["position"], 0, packing.position, axis=0)[:50]
-    counts = np.zeros(40)
-    for each in place:
-        apart = np.hypot(*np.moveaxis(nearest_image(each[:, None] - each, packing.box_length), -1, 0))
-        counts += np.histogram(apart[~np.eye(len(packing), dtype=bool)], 40, (0.5, 4.5))[0]
-    # a distance on the edge of a bin may fall on either side of it in float32
-    np.testing.assert_allclose(np.asarray(found.results.count), counts, atol=4 * len(place))
-    assert counts.sum() > 1e4
 
 
 @pytest.mark.slow

@@ -63,10 +63,16 @@ def test_matrix_is_the_derivative_of_the_forces_over_velocities(reference_packin
 
 @exponents
 @arithmetics
-@pytest.mark.parametrize(("cn", "ct", "mu"), [*itertools.product([0.0, 40.0], [0.0, 25.0], [0.0, 0.8])])
-def test_two_disks_and_the_floor_in_motion(exponent, compensated, cn, ct, mu):
-    """The law in ten lines, within Coulomb's bound and beyond it, sliding on and sliding back."""
-    overlap, radius = 1e-3, np.array([0.5, 0.7])
+@pytest.mark.parametrize(
+    ("cn", "ct", "mu", "overlap"),
+    [
+        *itertools.product([0.0, 40.0], [0.0, 25.0], [0.0, 0.8], [1e-3]),
+        *itertools.product([0.0], [0.0], [0.0, 1e-6, 10.0], [1e-7, 0.1]),
+    ],
+)
+def test_two_disks_and_the_floor_in_motion(exponent, compensated, cn, ct, mu, overlap):
+    """The law in ten lines, within Coulomb's bound and beyond it, sliding on and sliding back; and at rest."""
+    radius = np.array([0.5, 0.7])
     position = np.array([[1.0, 0.5 - overlap], [1.0 + 0.9, 0.0]])
     position[1, 1] = position[0, 1] + np.sqrt((1.2 - overlap) ** 2 - 0.81)
     law = MindlinLaw(KN, KT, mu, exponent, cn, ct)
@@ -77,14 +83,15 @@ def test_two_disks_and_the_floor_in_motion(exponent, compensated, cn, ct, mu):
     bare = damped(bare, exponent, cn, ct, compensated)
     with Engine(bare) as engine:
         run = Moving(engine)
-        for share, scale in itertools.product([-1.0, -0.5, 0.0, 0.9, 1.0], [0.0, 1e-3, 1.0]):
+        for share, scale in itertools.product([-1.0, -0.5, 0.0, 0.9, 1.0, 3.0], [0.0, 1e-3, 1.0]):
             packing = replace(bare, contacts=Contacts(found.i, found.j, share * limit))
             velocity = scale * rng.standard_normal(6)
             engine.restore(packing)
             force = run.force(velocity).reshape(3, 2)
             expected = forces_of_moving_contacts(packing, ((0, 1), (0, -1)), *velocity.reshape(3, 2))
-            # overlaps are known to 1e-16 of a coordinate, 1e-13 of themselves
-            np.testing.assert_allclose(force, expected, rtol=0, atol=5e-13 * np.abs(expected).max())
+            # overlaps are known to 1e-16 of a coordinate
+            known = 5e-16 / overlap if not compensated else 0.0
+            np.testing.assert_allclose(force, expected, rtol=0, atol=(5e-13 + known) * np.abs(expected).max())
 
 
 def forces_of_moving_contacts(packing, pairs, x, y, u):
@@ -97,7 +104,9 @@ def forces_of_moving_contacts(packing, pairs, x, y, u):
         v = np.array([x[i], y[i]]) - (np.array([x[j], y[j]]) if j >= 0 else 0)
         rolling = u[i] + (u[j] if j >= 0 else 0)
         normal = KN * d**p - law.cn * d ** (p - 1) * (n @ v)
-        s = abs(slip) / (law.mu * KN / KT * d) if law.mu else 0.0
+        limit = law.mu * KN / KT * d
+        slip = min(max(slip, -limit), limit)
+        s = abs(slip) / limit if law.mu else 0.0
         tangential = -KT * d ** (p - 1) * (1 + s - s * s) * slip - law.ct * d ** (p - 1) * (tau @ v - rolling)
         tangential = min(max(tangential, -law.mu * KN * d**p), law.mu * KN * d**p)
         expected[:, i] += *(normal * n + tangential * tau), -tangential
@@ -138,36 +147,6 @@ def test_second_order_in_the_time_step(exponent, parts):
     found = [after(packing, dt, 0.064) for dt in (1e-3, 5e-4, 2.5e-4)]
     coarse, fine = (np.linalg.norm(found[k] - found[k + 1]) for k in (0, 1))
     assert 3.7 < coarse / fine < 4.3
-
-
-@pytest.mark.slow
-def test_energy_falls_as_the_matrix_says(reference_packing):
-    """Without friction there is an energy; what it loses is the integral of v C v, to second order in the step."""
-    start, errors = reference_packing(0.0), []
-    packing = damped(start, cn=20.0, ct=0.0, drag_time=3.0, fy=3.3)  # the load is raised at the start
-    n, time = len(packing), 0.064
-
-    def energy_and_loss(position, velocity):
-        now = replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
-        v = np.concatenate([*velocity.T, np.zeros(n)])
-        height = packing.fy * position[packing.top, 1].sum()
-        stored = now.law.normal_energy(now.geometry.overlap).sum() + height + 0.5 * packing.mass @ (velocity**2).sum(1)
-        return stored, v @ damping_matrix(now) @ v
-
-    assert not packing.top[packing.rattlers].any()
-    for dt in (5e-4, 2.5e-4, 1.25e-4):
-        rows = [energy_and_loss(packing.position, np.zeros((n, 2)))]
-        with Engine(packing) as engine, engine.undamped(dt) as dynamics:
-            for _ in range(round(time / dt)):
-                motion = dynamics.advance(1)
-                rows.append(energy_and_loss(motion.position, motion.velocity))
-        energy, loss = np.array(rows).T
-        lost = dt * (loss.sum() - 0.5 * (loss[0] + loss[-1]))
-        assert lost > 0.1 * np.abs(energy[0] - energy[-1]) > 0
-        errors.append(abs(energy[-1] - energy[0] + lost) / lost)
-    assert errors[2] < 1e-3
-    assert 3.4 < errors[0] / errors[1] < 4.6
-    assert 3.4 < errors[1] / errors[2] < 4.6
 
 
 MODEL = """
@@ -273,11 +252,8 @@ MOVE = "\nfix move all nve/disc 1.0\n"
         ),
     ],
 )
-@pytest.mark.slow
-def test_what_is_refused(lmp, extra, says):
-    done = lmp(MODEL.format(decks=DECKS, fx=0.0, precision="double", extra=extra) + "run 1\n")
-    assert done.returncode != 0
-    assert says in done.stdout
+def test_what_is_refused(said_against, extra, says):
+    assert says in said_against(MODEL.format(decks=DECKS, fx=0.0, precision="double", extra=extra) + "run 1\n")
 
 
 @pytest.mark.slow

@@ -42,11 +42,10 @@ def with_slips(packing, fractions):
 
 
 @pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
-@pytest.mark.parametrize("mu", [1.0, 0.3])
 @pytest.mark.parametrize(
-    "fractions",
-    [[0.0], [0.1, -0.3, 0.02, 0.4], [0.999, -0.99, 0.9], [1.0, -1.0], [-1.0, 0.0, 0.5, 0.99, 1.0, -0.2, 0.1]],
-    ids=["no slip", "sticking", "nearly sliding", "sliding", "all kinds"],
+    ("mu", "fractions"),
+    [(1.0, [0.1, -0.3, 0.02, 0.4]), (1.0, [-1.0, 0.0, 0.5, 0.99, 1.0, -0.2, 0.1]), (0.3, [1.0, -1.0])],
+    ids=["sticking", "all kinds", "sliding"],
 )
 def test_consistent_form_is_the_derivative_of_the_forces(reference_packing, mu, fractions, exponent):
     packing = reference_packing(mu)
@@ -57,13 +56,3 @@ def test_consistent_form_is_the_derivative_of_the_forces(reference_packing, mu, 
     # the extrapolation adds two differences. Of harmonic disks every contact is as stiff as the stiffest one.
     tolerance = 1e-7 if exponent > 1 else 2e-7
     assert np.abs(central_differences(packing) - matrix).max() < tolerance * np.abs(matrix).max()
-
-
-def test_papers_form_misses_the_turning_of_the_tangent(reference_packing):
-    packing = with_slips(reference_packing(1.0), [0.3, -0.7, 0.999])
-    measured = central_differences(packing)
-    paper, consistent = (stiffness_matrix(packing, form=form).toarray() for form in ("paper", "consistent"))
-    missing = consistent - paper
-    scale = np.abs(consistent).max()
-    assert np.abs(missing).max() > 1e-4 * scale  # a thousand times the error of the differences
-    np.testing.assert_allclose(measured - paper, missing, atol=1e-7 * scale)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, read_dump, stiffness_matrix
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix
 from faultgouge.analysis.spectrum.spectrum import mass_weighted
 from faultgouge.pywrap import Scene, perturb, ramp
 from faultgouge.pywrap.lammps.engine import Engine
@@ -67,28 +67,6 @@ def test_slipping_and_pressing_at_once_is_second_order_in_the_step(start):
         errors.append(abs(packing.contacts.slip[0] - exact))
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.05)
-
-
-@arithmetics
-def test_closed_cycle_gives_no_energy_and_the_total_slip_does(compensated):
-    """Slip out, press, slip back, release: the work of the tangential force on the disks."""
-    work = {}
-    for rescaled in (True, False):
-        packing = on_floor(1e-3, 0.0, replace(LAW, rescaled=rescaled), compensated)
-        steps = [moved(packing, turned=1e-6)] * 100 + [moved(packing, 1e-5)] * 100
-        steps += [-step for step in steps]
-        total = 0.0
-        with Engine(packing) as engine:
-            force = np.zeros(3)
-            for step in steps:
-                packing = engine.displace(packing, step)
-                total += 0.5 * (force[2] + engine.net_force[2]) * step[2]
-                force = engine.net_force
-        work[rescaled] = total
-        assert packing.geometry.overlap[0] == pytest.approx(1e-3, abs=1e-15)
-    scale = 0.5 * KT * np.sqrt(1e-3) * 1e-4**2  # what the contact stores
-    assert work[True] < -0.2 * scale
-    assert work[False] > 0.2 * scale
 
 
 SCRIPT = """
@@ -178,13 +156,6 @@ def test_matrix_is_the_one_sided_derivative(reference_packing, mu, sign):
     assert np.abs(difference - closing).max() > 1e-3 * np.abs(matrix).max()
     total = stiffness_matrix(replace(packing, law=replace(law, rescaled=False))).toarray()
     np.testing.assert_allclose(parting, total, rtol=0, atol=4e-16 * np.abs(matrix).max())  # b is summed otherwise
-
-
-def test_dumps_keep_the_history(tmp_path):
-    packing = two_disks(1e-3, 2e-4)
-    with Engine(packing) as engine:
-        engine.dump(tmp_path / "packing")
-    assert read_dump(tmp_path / "packing.disks").law == LAW
 
 
 @pytest.mark.slow

@@ -35,12 +35,6 @@ def test_equilibria_are_the_same_to_the_bit(runs):
         assert np.array_equal(a.packing.contacts.slip, b.packing.contacts.slip)
 
 
-def test_packings_know_their_damping(runs):
-    (_, plain, _), (_, damped, _) = runs
-    assert all((e.packing.law.cn, e.packing.law.ct, e.packing.drag_time) == (30.0, 20.0, 0.2) for e in damped)
-    assert all(damping_matrix(e.packing).nnz == 0 for e in plain)
-
-
 def test_runs_are_damped(runs):
     (_, _, plain), (_, _, damped) = runs
     late = [np.mean([sample.kinetic_energy for sample in run[-20:]]) for run in (plain, damped)]

@@ -1,11 +1,13 @@
 """Where a ramp to a given load ends."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from faultgouge.pywrap import Scene, ramp, reach
+from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate, ramp, reach
+from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 SCENE = {
@@ -49,3 +51,25 @@ def test_increments_that_meet_a_contact_that_hardly_opens_reach_the_end():
     assert len(bearing) > 80
     # units in the last place of coordinates up to 12
     assert np.abs((fine.position - coarse.position)[bearing]).max() < 1e-13
+
+
+class Overhanging(Engine):
+    """LAMMPS with a load that Newton's method reaches from above alone."""
+
+    def displaced(self, base, displacement):
+        trial = super().displaced(base, displacement)
+        from_below = trial.fx == 2e-3 and base.fx < 2e-3
+        return replace(trial, force=np.full(3 * len(base), 1e3)) if from_below else trial
+
+
+def test_a_load_that_is_not_reached_from_below_is_reached_from_above(reference_packing):
+    packing = reference_packing(1.0)
+    with Overhanging(packing) as engine:
+        start = equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), 0.0)
+        last = equilibrate(engine, start, 1e-3)
+        with pytest.raises(NoEquilibriumError, match=r"beyond F_x = 0\.001999"):
+            equilibrate(engine, last, 2e-3)
+        found = equilibrate(engine, last, 2e-3, onward=True)
+    assert found.way == "a larger increment and back from F_x = 0.001"
+    assert found.fx == 2e-3
+    assert found.residual < 10 * found.floor

@@ -1,4 +1,4 @@
-"""The first window of complex eigenvalues of settled packings of hundreds of disks, against LAPACK."""
+"""Windows of settled packings: the first one of hundreds of disks, against LAPACK, and one where contacts change."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from faultgouge.analysis import find_onset
 from faultgouge.analysis.onset import full_operator
 from faultgouge.analysis.spectrum.spectrum import unit_rounding
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.runs.path import EquilibriumPath
+from faultgouge.pywrap.runs.path import EquilibriumPath, loads
 
 
 @pytest.mark.slow
@@ -33,3 +33,22 @@ def test_no_pair_is_complex_below_the_first_window():
     # A double eigenvalue is uncertain by the root of u |A| times its coupling, which is of order 1.
     noise = 10 * np.sqrt(unit_rounding(matrix.data))
     assert max(imaginary[:-1]) < noise < imaginary[-1]
+
+
+def test_a_window_beside_a_contact_that_begins_to_slide_is_found_between_loads_far_apart():
+    """The contact slides from 0.0246 on and bends the levels: seen from both ends they seem to stay apart."""
+    scene = Scene.from_mapping(
+        {
+            "precision": "compensated",
+            "packing": {"disks": 30, "seed": 98},
+            "law": {"kn": 2e3, "kt": "kn", "mu": 0.07},
+            "load": {"fy": 3.0},
+            "ramp": {"step": 4e-4, "until": 0.028},
+        }
+    )
+    with Engine((start := settle(scene)).packing) as engine:
+        path = EquilibriumPath(engine, start, scene)
+        for fx in loads(scene.ramp)[1:]:
+            path(float(fx))
+        (window,) = find_onset(path, [0.024, 0.028]).windows
+    assert (window.fx_onset, window.fx_end) == pytest.approx((0.0241548556, 0.0244768428), abs=1e-9)

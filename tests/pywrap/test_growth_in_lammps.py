@@ -69,18 +69,6 @@ def test_rounding_noise_grows_by_fifteen_decades(loaded):
     assert growth.rate == pytest.approx(spectrum(packing).growth_rate(time_step(packing)), rel=5e-3)
 
 
-@pytest.mark.slow
-def test_nothing_grows_below_the_onset(loaded):
-    """A million steps at F_x = 0.0205, F_x^c = 0.0218: the rounding of each step adds to D, which grows as the time."""
-    packing = loaded(0.0205, 5e-4)
-    assert spectrum(packing).pairs == ()
-    _, msd, _ = run(packing, packing, 456.0, 500)
-    early, late = (np.median(part) for part in (msd[50:100], msd[-50:]))
-    # a random walk of seven times the length; the beat of the pair near its coalescence is allowed as much again
-    assert late < 14 * early
-    assert msd.max() < 1e-23
-
-
 def test_rattlers_are_held_still(loaded):
     packing = loaded(1e-3)
     falling = replace(packing, top=packing.top | np.isin(np.arange(len(packing)), packing.rattlers[:1]))

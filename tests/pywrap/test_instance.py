@@ -14,8 +14,7 @@ def refusal(faultgouge, tmp_path, monkeypatch):
         # where the LAMMPS of an earlier test found plugins: its module tells all processes that follow
         monkeypatch.delenv("LAMMPS_PLUGIN_PATH", raising=False)
         (tmp_path / "scene.toml").write_text(SCENE)
-        done = faultgouge("settle", "scene.toml", "-o", "run.h5")
-        assert done.returncode == 1
+        done = faultgouge("settle", "scene.toml", "-o", "run.h5", code=1)
         (line,) = (line for line in done.stderr.splitlines() if line.startswith("Error:"))
         assert "build the plugin for this LAMMPS" in line
         assert "FAULTGOUGE_PLUGIN" in line

@@ -5,19 +5,15 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from resource import RUSAGE_CHILDREN, getrusage
 
 import h5py
 import numpy as np
 import pytest
-from mpi4py import MPI
 
-from faultgouge.analysis import MindlinLaw, PackingFileError, read_dump, spectrum, stiffness_matrix, touching
+from faultgouge.analysis import MindlinLaw, PackingFileError, read_dump, touching
 from faultgouge.analysis.files.dumps import dump_frames
-from faultgouge.analysis.spectrum.spectrum import dynamical_matrix
 from faultgouge.assessment.left_out.switches import Loaded
-from faultgouge.pywrap import Engine, EngineError, Equilibrium, Scene, equilibrate, settle
-from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+from faultgouge.pywrap import Engine, EngineError
 from faultgouge.pywrap.lammps.decks import DECKS, Decks
 from faultgouge.pywrap.lammps.dynamics import Weakening
 
@@ -149,26 +145,6 @@ def test_the_same_motion_with_and_without(reference_packing, law, other_law, opt
     assert_same_motion(one, other)
 
 
-def test_open_sides_compute_what_a_wide_period_computes(reference_packing):
-    packing = opened(reference_packing(1.0))
-    wide = replace(packing, position=packing.position + np.array([2.0, 0.0]), box_length=20.0)
-    narrow = replace(packing, position=packing.position + np.array([2.0, 0.0]))
-    assert_same_motion(motion_of(narrow, steps=50), motion_of(wide, steps=50))
-
-
-def test_without_friction_the_matrix_has_no_rotations(reference_packing):
-    packing = with_law(reference_packing(1.0), mu=0.0)
-    n, matrix = len(packing), stiffness_matrix(packing)
-    assert matrix.shape == (3 * n, 3 * n)
-    assert matrix.nnz > 0
-    assert max(matrix.indices.max(), matrix.tocoo().row.max()) < 2 * n
-    assert np.all(matrix.data != 0)
-    assert len(spectrum(packing).eigenvalues) == len(dynamical_matrix(packing)[1]) == 2 * (n - len(packing.rattlers))
-    # what is left is the x, y block of a matrix with friction whose tangential terms vanish
-    faint = stiffness_matrix(with_law(packing, mu=1.0, kt=1e-300)).toarray()
-    np.testing.assert_array_equal(matrix.toarray()[: 2 * n, : 2 * n], faint[: 2 * n, : 2 * n])
-
-
 def test_dumps_without_friction_have_no_slips_and_no_angles(reference_packing, tmp_path):
     packing = with_law(reference_packing(1.0), mu=0.0)
     with Engine(packing) as engine:
@@ -184,21 +160,6 @@ def test_dumps_without_friction_have_no_slips_and_no_angles(reference_packing, t
     assert again.law == packing.law
     with pytest.raises(PackingFileError, match="no column theta or d_theta"):
         read_dump(tmp_path / "smooth.disks", law=MindlinLaw(2e5, 1e5, 1.0))
-
-
-def test_newton_without_friction_leaves_the_angles(reference_packing):
-    packing = with_law(reference_packing(1.0), mu=0.0)
-    turned = replace(packing, angle=np.linspace(0.0, 1.0, len(packing)))
-    rng = np.random.default_rng(1)
-    # out of balance by some 1e-3: far above what rounding leaves
-    moved = replace(turned, position=turned.position + 1e-8 * rng.standard_normal(turned.position.shape))
-    start = Equilibrium(moved, moved.residual, rounding_floor(moved), 0)
-    assert start.residual > 1e4 * start.floor
-    with Engine(moved) as engine:
-        found = equilibrate(engine, start, 0.0)
-        assert np.all(engine.net_force[2 * len(packing) :] == 0)
-    assert found.residual < 1.5 * found.floor
-    assert np.array_equal(found.packing.angle, turned.angle)
 
 
 SCENE = """
@@ -250,22 +211,6 @@ def test_a_spectrum_needs_no_lammps(tmp_path):
     assert run_command(tmp_path, "spectrum", "run.h5") == ["numpy", "scipy", "h5py"]
 
 
-@pytest.mark.slow
-def test_help_costs_little_more_than_the_library_that_prints_it():
-    """0.12 s on an idle machine; here a ratio of processor times, which a busy one leaves as it is."""
-
-    def seconds(*command):
-        before = getrusage(RUSAGE_CHILDREN)
-        subprocess.run(command, capture_output=True, check=True)
-        after = getrusage(RUSAGE_CHILDREN)
-        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-    library = (sys.executable, "-c", "import typer")
-    turns = [(seconds(BIN / "faultgouge", "--help"), seconds(*library)) for _ in range(5)]
-    # 1.7 times; with NumPy it would be 2.9
-    assert min(help_time for help_time, _ in turns) < 2.3 * min(bare for _, bare in turns)
-
-
 def datasets(path):
     found = {}
     with h5py.File(path) as file:
@@ -295,16 +240,3 @@ def test_what_stops_a_run_is_what_is_said(reference_packing):
     engine = Engine(packing)
     with pytest.raises(EngineError, match="Unknown command: nonsense"), engine.undamped(1e-4):
         Decks(engine.lammps).command("nonsense")
-
-
-def test_frictionless_scene_settles_to_the_start_of_the_frictional_one():
-    """A packing settles without friction: mu = 0 and mu = 1 have one packing at F_x = 0, up to its last polish."""
-    scenes = [
-        Scene.from_mapping({"packing": {"seed": 9}, "law": {"kn": 2e5, "mu": mu}, "load": {"fy": 3.0}})
-        for mu in (0.0, 1.0)
-    ]
-    smooth, rough = (settle(scene, communicator=MPI.COMM_SELF).packing for scene in scenes)
-    assert np.array_equal(smooth.contacts.i, rough.contacts.i)
-    assert np.array_equal(smooth.contacts.j, rough.contacts.j)
-    # Newton's last step of 1e-12 knows of friction or does not
-    assert np.abs(smooth.position - rough.position).max() < 1e-10

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix, touching
 from faultgouge.analysis.operators.stiffness import contact_terms
-from faultgouge.pywrap import Engine
+from faultgouge.pywrap import Engine, Equilibrium, equilibrate
+from faultgouge.pywrap.equilibria.newton import iterated
 from faultgouge.pywrap.equilibria.newton_matrix import AFLOAT, factored
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 from faultgouge.pywrap.lammps.contact_graph import ContactGraph
-from faultgouge.pywrap.lammps.contact_rows import ContactRows
 from faultgouge.pywrap.lammps.trial import Trial
 
 
@@ -114,30 +114,6 @@ def test_a_trial_is_its_packing(reference_packing):
     assert trial.residual == pytest.approx(packing.residual, rel=1e-6)
 
 
-@pytest.mark.parametrize("compensated", [False, True])
-def test_contacts_through_rows(reference_packing, compensated):
-    packing = reference_packing(1.0)
-    rng = np.random.default_rng(7)
-    slip, low = rng.standard_normal((2, len(packing.contacts)))
-    contacts = packing.contacts.slipped(slip, low if compensated else None)
-    packing = replace(packing, contacts=contacts)
-    rows = ContactRows(packing.radius, compensated)
-    graph, again, again_low = rows.read(rows.slips(packing), rows.floor(packing))
-    assert np.array_equal(graph.i, contacts.i)
-    assert np.array_equal(graph.j, contacts.j)
-    assert np.array_equal(again, slip)
-    assert (np.array_equal(again_low, low)) if compensated else again_low is None
-    # the same graph as long as the contacts are the same, and another one when they are not
-    other = replace(packing, contacts=contacts.slipped(-slip, low if compensated else None))
-    assert rows.read(rows.slips(other), rows.floor(other))[0] is graph
-    fewer = Contacts(contacts.i[1:], contacts.j[1:], slip[1:], low[1:] if compensated else None)
-    fewer = replace(packing, contacts=fewer)
-    changed = rows.read(rows.slips(fewer), rows.floor(fewer))
-    assert changed[0] is not graph
-    assert np.array_equal(changed[0].i, contacts.i[1:])
-    assert np.array_equal(changed[1], slip[1:])
-
-
 def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
     """A change of forces from changed displacements, and back: with what K knows of new contacts, and without."""
     base = reference_packing(1.0)
@@ -157,11 +133,63 @@ def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
     assert errors[0] < 0.03 < 0.3 < errors[1]
 
 
-def test_which_contacts_are_old(reference_packing):
-    contacts, radius = reference_packing(1.0).contacts, reference_packing(1.0).radius
-    graph = ContactGraph(contacts, radius)
-    kept = np.arange(len(contacts)) % 5 > 0
-    fewer = ContactGraph(Contacts(contacts.i[kept], contacts.j[kept], contacts.slip[kept]), radius)
-    assert np.array_equal(graph.old(fewer), kept)
-    assert fewer.old(graph) is None
-    assert graph.old(graph) is None
+class _Seen(Exception):  # noqa: N818, no error
+    """A displacement that was asked for."""
+
+
+def without(packing, disk, kept):
+    """The packing in which a disk has no more than some of its contacts."""
+    c = packing.contacts
+    mine = np.flatnonzero((c.i == disk) | (c.j == disk))
+    rest = np.setdiff1d(np.arange(len(c)), mine[kept:])
+    return replace(packing, contacts=Contacts(c.i[rest], c.j[rest], c.slip[rest]))
+
+
+def test_expelled_are_disks_with_one_contact_and_with_two_new_ones(reference_packing):
+    whole = reference_packing(1.0)
+    one, two, new = np.flatnonzero((ContactGraph(whole.contacts, whole.radius).degree > 2) & ~whole.top)[[0, 30, 60]]
+    trial = without(without(without(whole, one, 1), two, 2), new, 2)
+    since = without(trial, new, 0).contacts
+    expelled = factored(trial_of(trial), 0.0, ContactGraph(since, whole.radius)).expelled
+    assert expelled[one]
+    assert not expelled[two]
+    assert expelled[new]
+
+
+def test_a_disk_between_two_new_contacts_takes_a_longer_step(reference_packing):
+    """The force goes as delta^(3/2), and a root of that order is met by so many times Newton's step."""
+    there = reference_packing(1.0)
+    disk = int(np.flatnonzero((ContactGraph(there.contacts, there.radius).degree == 3) & ~there.top)[0])
+    there, place, other = without(there, disk, 2), there.position.copy(), int(np.flatnonzero(there.top)[0])
+    place[disk] = place[other] + [0.0, there.radius[disk] + there.radius[other] - 1e-4]
+    start = replace(there, position=place, contacts=touching(place, there.radius, there.box_length))
+    trial = trial_of(there, 1e-6 * np.random.default_rng(8).standard_normal(300))
+    asked = []
+
+    def displaced(base, displacement):
+        asked.append(displacement)
+        if len(asked) > 1:
+            raise _Seen
+        return trial
+
+    with pytest.raises(_Seen):
+        iterated(displaced, Trial.of(start))
+    expected = factored(trial, trial.floor, ContactGraph(start.contacts, start.radius)).solve(trial.force)
+    expected[[disk, 100 + disk, 200 + disk]] *= 1.5
+    np.testing.assert_array_equal(asked[1], expected)
+
+
+def test_a_rattler_that_a_neighbour_runs_into_is_moved_out_of_the_way(reference_packing):
+    packing = reference_packing(1.0)
+    rattler, others = packing.rattlers[0], np.delete(np.arange(100), packing.rattlers[0])
+    branch = packing.position[others] - packing.position[rattler]
+    distance = np.hypot(*branch.T)
+    gap = distance - packing.radius[others] - packing.radius[rattler]
+    near = np.argsort(gap)[2]
+    position = packing.position.copy()
+    position[rattler] += (gap[near] - 1e-9) * branch[near] / distance[near]
+    packing = replace(packing, position=position)
+    start = Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
+    with Engine(packing) as engine:
+        found = equilibrate(engine, equilibrate(engine, start, 0.0), 1e-2)
+    assert rattler in found.packing.rattlers

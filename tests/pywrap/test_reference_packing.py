@@ -61,22 +61,20 @@ def test_newton_ramp(reference, reference_packing, number, increment):
     assert max(each.residual for each in reached) < 1.5 * reached[-1].floor
 
 
-@pytest.mark.parametrize("number", [0, 1])
 @pytest.mark.slow
-def test_overdamped_ramp(reference, reference_packing, number):
-    case = reference["cases"][number]
+def test_overdamped_ramp(reference, reference_packing):
+    case = reference["cases"][1]
     compare(ramped(reference_packing(case["mu"]), "overdamped", 1e-3)[-1].packing, case, rtol=1e-6, rtol_asymmetry=1e-6)
 
 
-@pytest.mark.parametrize(("mu", "sliding"), [(1.0, False), (0.05, True)])
 @pytest.mark.slow
-def test_newton_and_overdamped_dynamics_agree(reference_packing, mu, sliding):
-    """With and without contacts at the bound: on a monotonic ramp they slide one way, whatever the path in a step."""
-    newton, overdamped = (ramped(reference_packing(mu), method, 2e-3)[-1] for method in ("newton", "overdamped"))
+def test_newton_and_overdamped_dynamics_agree(reference_packing):
+    """With contacts at the bound: on a monotonic ramp they slide one way, whatever the path in a step."""
+    newton, overdamped = (ramped(reference_packing(0.05), method, 2e-3)[-1] for method in ("newton", "overdamped"))
     packing = newton.packing
     # the limit is taken at the overlap as Python rounds it
     at_bound = np.abs(packing.contacts.slip) > (1 - 1e-9) * packing.law.slip_limit(packing.geometry.overlap)
-    assert at_bound.any() == sliding
+    assert at_bound.any()
     # Late in a relaxation a step is shorter than the last place of a coordinate: positions stand and slips still creep.
     # Each increment adds about 1e-11 to the difference by that; the tolerance of 1e-10 over the softest mode as much.
     assert np.abs(packing.position - overdamped.packing.position).max() < 1e-10
@@ -109,11 +107,10 @@ def test_packing_that_flows_says_where(reference_packing):
     assert 0.05 < state.fx < 1.0
 
 
-@pytest.mark.parametrize("increment", [1e-3, 2.5e-4])
 @pytest.mark.parametrize("number", [0, 1])
 @pytest.mark.slow
-def test_onset(reference, reference_packing, number, increment):
-    case = reference["cases"][number]
+def test_onset(reference, reference_packing, number):
+    case, increment = reference["cases"][number], 1e-3
     packing = reference_packing(case["mu"])
     start = Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
     with Engine(packing) as engine:
@@ -122,21 +119,6 @@ def test_onset(reference, reference_packing, number, increment):
     assert onset.fx_c == pytest.approx(case["onset_fx"], rel=1e-9)
     assert abs(onset.fx_c - case["onset_fx"]) < 3 * onset.error
     assert onset.windows[0].kind == "coalescence"
-
-
-def test_state_put_back_is_the_state_that_was_saved(reference_packing):
-    packing = ramped(reference_packing(1.0), "newton", 5e-3)[-1].packing
-    rng = np.random.default_rng(0)
-    with Engine(packing) as engine:
-        before = engine.displace(packing, np.zeros(3 * len(packing)))
-        force = engine.net_force
-        engine.displace(packing, 1e-3 * rng.standard_normal(3 * len(packing)))
-        after = engine.displace(packing, np.zeros(3 * len(packing)))
-        assert np.array_equal(engine.net_force, force)
-    for state in (before, after):
-        assert np.array_equal(state.position, packing.position)
-        assert np.array_equal(state.contacts.slip, packing.contacts.slip)
-        assert np.array_equal(state.angle, packing.angle)
 
 
 def test_rattler_on_which_a_contact_slides_is_not_thrown(reference_packing):

@@ -88,12 +88,6 @@ def test_damping_reaches_the_scene():
     assert Scene.from_mapping(merged({"damping.tau": 2.0})).resolved()["damping"] == {"cn": 0, "ct": 0, "tau": 2.0}
 
 
-def test_a_scene_cannot_be_changed():
-    scene = Scene.from_mapping(LEAST)
-    with pytest.raises(ValueError, match="frozen"):
-        scene.law.kn = 1.0
-
-
 @pytest.mark.parametrize(
     ("kt", "number"),
     [
@@ -155,14 +149,12 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
     [
         # law and damping
         ({"law.exponent": 2.0}, "law.exponent = 2 is refused: give 1.5 (Hertz) or 1 (harmonic disks)"),
-        ({"law.exponent": "one"}, "law.exponent = 'one' is refused: give a number"),
         ({"law.history": "whole"}, "law.history = 'whole' is refused"),
         (
             {"law.history": "rescaled", "law.exponent": 1},
             'law.history = "rescaled" needs law.exponent = 1.5: harmonic disks have one stiffness',
         ),
         ({"damping.cn": -1.0}, "damping.cn = -1.0 is refused: give a number of at least 0"),
-        ({"damping.ct": float("inf")}, "damping.ct = inf is refused: give a finite number"),
         ({"damping.tau": 0.0}, "damping.tau = 0.0 is refused: give a number above 0"),
         ({"damping": {}}, "damping has nothing in it: give cn, ct or tau, or leave the section out"),
         ({"damping.cm": 1.0}, "damping.cm is no key of [damping]: the nearest is damping.c"),
@@ -173,7 +165,6 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ),
         # names
         ({"packing.dsks": 10}, "packing.dsks is no key of [packing]: the nearest is packing.disks."),
-        ({"law.my": 1.0}, "law.my is no key of [law]: the nearest is law.mu."),
         ({"packing.kn": 1.0}, "packing.kn is no key of [packing]: the nearest is law.kn."),
         ({"kn": 200000.0}, "kn stands outside of its section: move it below [law]."),
         ({"precison": "double"}, "precison is no key of a scene: the nearest is precision."),
@@ -192,34 +183,25 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"packing.radii": 0.5}, "packing.radii = 0.5 is refused: give a list of numbers."),
         ({"packing.periodic": 1}, "packing.periodic = 1 is refused: give true or false."),
         ({"law.kn": math.nan}, "law.kn = nan is refused: give a finite number."),
-        ({"law.kn": math.inf}, "law.kn = inf is refused: give a finite number."),
         ({"law.kn": -1.0}, "law.kn = -1.0 is refused: give a number above 0."),
         ({"law.kn": -1.0, "law.kt": "2/7 kn"}, "law.kn = -1.0 is refused: give a number above 0."),
         ({"law.kn": "2e5"}, "law.kn = '2e5' is refused: give a number."),
         ({"law.kt": -1.0}, "law.kt = -1.0 is refused: give a number of at least 0."),
-        ({"law.mu": -0.1}, "law.mu = -0.1 is refused: give a number of at least 0, or a list"),
         ({"law.mu": [1.0, math.nan]}, "law.mu = [1.0, nan] is refused"),
         ({"law.mu": []}, "law.mu = [] is refused"),
         ({"law.mu": 10**400}, "is refused: give a number of at least 0, or a list"),
         ({"law.mu": [1.0, 1]}, "law.mu = [1.0, 1] names one value twice: give each once."),
         ({"load.fy": 0.0}, "load.fy = 0.0 is refused: give a number above 0."),
-        ({"ramp.until": 0.0}, "ramp.until = 0.0 is refused: give a number above 0."),
         ({"ramp.until": 1.0, "ramp.force_tolerance": 0}, "ramp.force_tolerance = 0 is refused: give a number above 0."),
         ({"relax.damping": 0.0}, "relax.damping = 0.0 is refused: give a number above 0."),
-        (
-            {"perturb.fx": 0.1, "perturb.time": 1.0, "perturb.omega": "slow"},
-            "perturb.omega = 'slow' is refused: give a number.",
-        ),
         ({"perturb.fx": 0.1, "perturb.time": 1.0, "perturb.amplitude": math.nan}, "perturb.amplitude = nan is refused"),
         # choices
         ({"precision": "single"}, "precision = 'single' is refused: give 'double' or 'compensated'."),
         ({"ramp.until": 1.0, "ramp.method": "fire"}, "ramp.method = 'fire' is refused: give 'newton' or 'overdamped'."),
         ({"perturb.fx": 0.0, "perturb.time": 1.0, "perturb.target": "floor"}, "perturb.target = 'floor' is refused"),
         ({"perturb.fx": 0.0, "perturb.time": 1.0, "perturb.target": [-1]}, "perturb.target = [-1] is refused"),
-        ({"law.kt": "2/7 k"}, 'law.kt = "2/7 k" is no share of kn'),
         ({"law.kt": "2/0 kn"}, 'law.kt = "2/0 kn" is no share of kn'),
         ({"law.kt": "-1 kn"}, 'law.kt = "-1 kn" is no share of kn'),
-        ({"friction.v_ss": "10 v"}, "friction.v_ss = '10 v' is refused"),
         ({"friction.v_ss": "0 v0"}, "friction.v_ss = '0 v0' is refused"),
         ({"friction.v_ss": 1.0, "friction.v0": "measured"}, "friction.v0 = 'measured' is refused"),
         # what does not go together

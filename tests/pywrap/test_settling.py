@@ -67,13 +67,6 @@ def test_disk_on_top_of_another_rolls_down():
     assert lowest(packing)[0] > -1e-6
 
 
-def test_minimum_is_not_left(frictionless):
-    found, _ = minimized(frictionless)
-    again, at_floor = minimized(found)
-    assert at_floor
-    assert np.abs(again.position - found.position).max() < 1e-9
-
-
 @pytest.fixture(scope="module")
 def settled():
     """A packing that is too large for dynamics alone."""
@@ -87,7 +80,7 @@ def test_larger_packing_settles_to_the_floor(settled):
     assert not settled.packing.top[settled.packing.rattlers].any()
 
 
-@pytest.mark.parametrize("seed", [2, 3, 4, 5])
+@pytest.mark.parametrize("seed", [2, 3])
 @pytest.mark.slow
 def test_layer_of_a_tenth_comes_to_rest(seed):
     packing = settle(Scene.from_mapping(SCENE | {"packing": SCENE["packing"] | {"seed": seed}})).packing

@@ -37,7 +37,7 @@ def test_record_moves_the_packing_as_linear_response_says(packing, on, scale):
             rows.append(motion.velocity[packing.top, 0].mean())
     times = dt * every * np.arange(1, len(rows) + 1)
     force = layer_force(packing, 1.0) if on == "layer" else floor_force(packing)
-    predicted = sampled_response(packing, acting, times, force, dt=dt).layer_velocity
+    predicted = sampled_response(packing, acting, times, force).layer_velocity
     assert np.abs(rows).max() > 1e-8  # four decades above the noise
     assert np.abs(np.array(rows) - predicted).max() < 1e-2 * np.abs(rows).max()
 
@@ -64,7 +64,6 @@ def test_deck_takes_a_table_and_is_the_same_on_two_ranks(lmp, tmp_path):
         ("0 1\n1 nan\n", "something else than two numbers, time and value, in line 2"),
         ("0 1\n2 1\n1 1\n", "not later than the one before in line 3"),
         ("0 1\n", "fewer than two rows"),
-        ("0 1\n1 two\n", "something else than two numbers"),
     ],
 )
 @pytest.mark.slow

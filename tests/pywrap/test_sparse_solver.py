@@ -40,14 +40,6 @@ def fill(matrix, order):
     return splu(csc_array(matrix), **options).nnz
 
 
-def test_order_is_a_permutation_that_keeps_disks_together(packing, pairs):
-    coordinates = np.flatnonzero(np.arange(3 * len(packing)) % 7)  # some are no unknowns
-    order = elimination_order(*pairs, len(packing), coordinates)
-    assert np.array_equal(np.sort(order), np.arange(len(coordinates)))
-    disks = coordinates[order] % len(packing)
-    assert np.count_nonzero(np.diff(disks)) == len(packing) - 1
-
-
 def test_fill_is_no_more_than_that_of_minimum_degree_on_the_matrix(packing, matrix, pairs):
     order = elimination_order(*pairs, len(packing), np.arange(3 * len(packing)))
     # on a crystal, where entries vanish by symmetry, it is little more than half
@@ -89,17 +81,6 @@ def test_factors_of_a_matrix_nearby_solve(matrix, pairs, solver):
     force[gone] = 0.0
     assert not step[gone].any()
     assert np.linalg.norm(other @ step - force) <= ACCURATE * np.linalg.norm(force)
-
-
-def test_factors_of_a_matrix_with_fewer_coordinates_solve(matrix, pairs):
-    other, _ = changed(matrix, [1234, 17, 2100])
-    fewer, force = SparseSolver(other, *pairs), np.random.default_rng(3).standard_normal(matrix.shape[0])
-    fewer.solve(force)
-    more = SparseSolver(matrix, *pairs, fewer)
-    step = more.solve(force)
-    assert fewer.own
-    assert not more.own
-    assert np.linalg.norm(matrix @ step - force) <= ACCURATE * np.linalg.norm(force)
 
 
 @pytest.mark.slow

@@ -8,8 +8,10 @@ CASES = [case for case in read() if case.counts]
 
 
 @pytest.mark.parametrize("kind", ["undamped", "damped"])
-def test_all_but_a_few_are_covered(kind):
-    shares = sorted(case.share for case in CASES if case.kind == kind)
+@pytest.mark.parametrize("fresh", [False, True])
+def test_all_but_a_few_are_covered(kind, fresh):
+    """Of the draws on which the rule was made, and of those that came later."""
+    shares = sorted(case.share for case in CASES if case.kind == kind and case.fresh == fresh)
     assert len(shares) >= 28
     assert sum(share > 1 for share in shares) <= 0.05 * len(shares)
     assert shares[-1] <= 1.5

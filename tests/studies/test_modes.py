@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from reference_layer import toml
 
 from faultgouge.analysis import spectrum, stiffness_matrix
 from faultgouge.analysis.onset import LIMITS
@@ -65,10 +66,8 @@ def test_without_b_no_pair_is_complex(loaded):
 
 @pytest.mark.slow
 def test_the_command_leaves_rows_pictures_and_a_film(faultgouge, tmp_path):
-    text = "".join(f"[{name}]\n" + "".join(f"{k} = {v}\n" for k, v in part.items()) for name, part in SCENE.items())
-    (tmp_path / "scene.toml").write_text(text)
-    done = faultgouge("modes", "scene.toml", "-o", "out")
-    assert done.returncode == 0, done.stderr
+    (tmp_path / "scene.toml").write_text(toml(SCENE))
+    faultgouge("modes", "scene.toml", "-o", "out")
     result = json.loads((tmp_path / "out/modes.json").read_text())
     assert [row["fx_over_fy"] for row in result["rows"]] == [0.02, 0.1, 0.2]
     assert all(row["disks"] == 60 and row["seed"] == 77 for row in result["rows"])

@@ -38,9 +38,35 @@ def test_the_load_of_a_share_falls_as_the_root_of_the_number_of_disks(found):
         assert low > -0.65
 
 
-def test_nothing_saturates_in_these_sizes(found):
+def test_growth_rises_with_the_size_at_a_fixed_force_and_is_not_known_to_at_a_fixed_pressure(found):
     assert found["powers"]["growth_rate at 0.1"]["power"][1] > 0
     assert found["powers"]["least_q at 0.1"]["power"][2] < 0
+    for kind in ("pressure_powers", "thickness_powers"):
+        _, low, high = found[kind]["growth_rate at 0.1"]["power"]
+        assert low < 0 < high
+    for level in ("0.1", "0.3"):
+        assert found["pressure_powers"][f"load of share {level}"]["power"][2] < 0
+
+
+def test_spacings_and_couplings_have_the_powers_that_the_page_says(found):
+    page = (DOCS / "modes.md").read_text()
+    exponents = json.loads((DOCS.parent / "genericity" / "genericity.json").read_text())["levels"]["exponents"]
+    spacing, coupling = (exponents[name]["value"] for name in ("spacing", "coupling"))
+    for stated in (spacing, coupling, coupling - spacing):
+        assert f"$N^{{{stated:.2f}}}$" in page
+    _, low, high = found["powers"]["load of share 0.1"]["power"]
+    assert low < spacing - coupling < high
+
+
+def test_other_packings_have_as_many_complex_modes_or_more(found):
+    usual, harmonic, stiff, rough = (
+        found["sets"][name] for name in ("force 100", "harmonic", "stiff tangent", "settled with friction")
+    )
+    assert harmonic["0.1"]["share"][1] > usual["0.1"]["share"][2]
+    assert stiff["0.1"]["share"][1] < usual["0.1"]["share"][0] < stiff["0.1"]["share"][2]
+    largest = found["sizes"]["1000"]
+    assert rough["0.03"]["share"][1] > largest["share"][largest["loads"].index(0.03)][2]
+    assert rough["end"][0] < usual["end"][1]
 
 
 def test_without_b_there_is_no_pair_and_sliding_contacts_make_the_strong_growth(found):
@@ -109,9 +135,23 @@ def test_units_says_what_the_table_of_quartz_says(found):
         course = found["quartz"][name]
         assert course["critical_restitution"][course["loads"].index(0.1)][0] == pytest.approx(middle, abs=0.006)
         assert course["least_q"][place[name]][0] < 50
-    omega = [course["omega"][course["loads"].index(0.1)][0] for course in found["sizes"].values()]
-    assert min(omega) > 80 / 1.2
-    assert max(omega) < 80 * 1.2
+
+
+def test_the_fastest_pair_does_not_change_with_the_thickness(found):
+    page = (DOCS.parent / "units.md").read_text()
+    fastest = ("omega", "growth_rate", "least_q", "critical_restitution")
+    intervals = {name: [] for name in fastest}
+    for disks, name in ((50, "thick 50"), (100, "quartz 10 MPa"), (200, "thick 200"), (400, "thick 400")):
+        course, real = found["quartz"][name], real_units(Scene.from_mapping(quartz("10 MPa", disks)))
+        k = course["loads"].index(0.1)
+        megahertz = [f"{real.frequency(course[key][k][0]) / 1e6:.2g}" for key in ("slowest", "omega")]
+        grows = f"{1e6 * real.time / course['growth_rate'][k][0]:.2g}"
+        stops = (interval(course["least_q"][k]), critical(course["critical_restitution"][k]))
+        assert f"| {disks} | {course['count'][k]} | {' | '.join((*megahertz, grows, *stops))} |" in page
+        for each in fastest:
+            intervals[each].append(course[each][k])
+    for each in intervals.values():
+        assert max(low for _, low, _ in each) < min(high for *_, high in each)
 
 
 def test_checks_agree_with_the_same_packings(found):

@@ -1,47 +1,31 @@
 """What commands say in SI: the numbers of the scene, times the units that tests/pywrap/test_units.py works out."""
 
 import json
-import subprocess
 
 import pytest
-import tomllib
-from reference_layer import BIN, UNITS
+from reference_layer import UNITS, toml
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.scenes.units import real_units
 from faultgouge.studies.reproduce import reproduce
 
-SCENE = """
-[packing]
-disks = 30
-seed = 4
-[law]
-kn = 2e5
-[load]
-fy = 3.0
-[ramp]
-step = 4e-3
-until = 0.012
-[perturb]
-fx = 0.011
-time = 1.0
-amplitude = 5e-10
-omega = 0.01
-[friction]
-v_ss = "10 v0"
-"""
-SCENE += UNITS
+SECTIONS = {
+    "packing": {"disks": 30, "seed": 4},
+    "law": {"kn": 2e5},
+    "load": {"fy": 3.0},
+    "ramp": {"step": 4e-3, "until": 0.012},
+    "perturb": {"fx": 0.011, "time": 1.0, "amplitude": 5e-10, "omega": 0.01},
+    "friction": {"v_ss": "10 v0"},
+}
+SCENE = toml(SECTIONS) + UNITS
 
 
 @pytest.mark.parametrize("damping", ["", "[damping]\ncn = 1.0\n"])
 @pytest.mark.slow
-def test_onset_in_si(tmp_path, damping):
+def test_onset_in_si(faultgouge_here, tmp_path, damping):
     (tmp_path / "scene.toml").write_text(SCENE + damping)
-    done = subprocess.run(
-        [BIN / "faultgouge", "onset", "scene.toml", "--json"], cwd=tmp_path, capture_output=True, text=True, timeout=120
-    )
-    assert done.returncode == 0, done.stderr
+    done = faultgouge_here("onset", "scene.toml", "--json")
     found = json.loads(done.stdout)
     real = real_units(Scene.from_toml(tmp_path / "scene.toml"))
     window = found["windows"][0]
@@ -59,7 +43,7 @@ def test_another_packing_may_be_the_one_that_is_triggered(tmp_path):
 
     Slow because of ten figures.
     """
-    triggered = Scene.from_mapping(tomllib.loads(SCENE))
+    triggered = Scene.from_mapping(SECTIONS)
     scene = triggered.model_copy(update={"perturb": None, "friction": None})
     summary = reproduce(scene, tmp_path, say=lambda _: None, triggered=triggered)
     assert summary["triggering"]["scene"] == triggered.resolved()
@@ -73,6 +57,6 @@ def test_another_packing_may_be_the_one_that_is_triggered(tmp_path):
 @pytest.mark.slow
 def test_a_ramp_that_steps_over_the_window_is_refused(tmp_path):
     """It is narrow: from 0.01159 to 0.01217."""
-    (tmp_path / "scene.toml").write_text(SCENE.replace("step = 4e-3\nuntil = 0.012", "step = 1e-2\nuntil = 0.02"))
+    scene = Scene.from_mapping(SECTIONS | {"ramp": {"step": 1e-2, "until": 0.02}})
     with pytest.raises(SceneError, match="no load of the ramp lies in a window"):
-        reproduce(Scene.from_toml(tmp_path / "scene.toml"), tmp_path / "out", say=lambda _: None)
+        reproduce(scene, tmp_path / "out", say=id)

@@ -42,8 +42,8 @@ TROUBLE = [
     Case("a", "too large", lambda: measured(2.0, 1.0, "twice")),
     Case("a", "no number", lambda: measured(float("nan"), 1.0, "what should hold")),
     Case("b", "crash", crash),
-    Case("b", "refused", lambda: refused(lambda: int("x"), ValueError, "invalid literal")),
-    Case("b", "not refused", lambda: refused(lambda: int("1"), ValueError, "invalid literal")),
+    Case("b", "refused", lambda: refused(lambda: int("x"), "invalid literal")),
+    Case("b", "not refused", lambda: refused(lambda: int("1"), "invalid literal")),
     Case("b", "last", lambda: measured(0.0, 0.0, "nothing at all")),
 ]
 
@@ -114,9 +114,7 @@ def test_outcome_of_a_refusal():
 @pytest.mark.long
 def test_same_table_on_two_ranks(faultgouge, tmp_path):
     one = faultgouge("stability", "--quick", "-o", "one", "--json")
-    two = faultgouge("stability", "--quick", "-o", "two", ranks=2)
-    assert one.returncode == 0, one.stderr
-    assert two.returncode == 0, two.stderr
+    faultgouge("stability", "--quick", "-o", "two", ranks=2)
     assert (tmp_path / "one" / "stability.json").read_text() == (tmp_path / "two" / "stability.json").read_text()
     assert json.loads(one.stdout) == json.loads((tmp_path / "one" / "stability.json").read_text())
     assert len(json.loads(one.stdout)["cases"]) == len(QUICK)
@@ -129,7 +127,7 @@ def test_error_of_one_rank_ends_the_others(faultgouge, tmp_path):
     (tmp_path / "scene.toml").write_text(
         "packing = { disks = 24, top = 5, width = 5.95, seed = 2 }\nlaw = { kn = 2e5 }\nload = { fy = 2e4 }\n"
     )
-    done = faultgouge("settle", "scene.toml", ranks=2)
+    done = faultgouge("settle", "scene.toml", ranks=2, code=None)
     assert done.returncode != 0
     assert "where the contact law does not hold: lower the load" in done.stderr
     assert ".cpp" not in done.stderr

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from reference_layer import LAYER, REFERENCE
+from reference_layer import REFERENCE, toml
 
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.studies.eruptions import eruptions
@@ -29,7 +29,7 @@ def cut_off(folder, lines, name):
 def test_prediction_is_what_lammps_bisects(tmp_path):
     trigger = {"distance": [0.1, 1e-3], "omega": [1.0, 14.0], "time": 4.0, "runs": 2}
     scene = Scene.from_mapping({**BASE, "friction": {"v0": 1e-7, "v_ss": "10 v0"}, "trigger": trigger})
-    result = trigger_map(scene, tmp_path / "out", say=lambda _: None)
+    result = trigger_map(scene, tmp_path / "out", say=id)
     assert result["fx_c"] == pytest.approx(0.021833056408, rel=1e-9)
     assert len(result["map"]) == 4
     runs = [row for row in result["map"] if row["measured"] is not None]
@@ -38,9 +38,9 @@ def test_prediction_is_what_lammps_bisects(tmp_path):
         assert row["below"] < row["measured"] < row["above"] < 1.011 * row["below"]
         assert row["predicted"] == pytest.approx(row["measured"], rel=0.05)
     lines = (tmp_path / "out/trigger.jsonl").read_text()
-    assert trigger_map(scene, tmp_path / "out", say=lambda _: None) == result
+    assert trigger_map(scene, tmp_path / "out", say=id) == result
     assert (tmp_path / "out/trigger.jsonl").read_text() == lines  # nothing was computed again
-    assert trigger_map(scene, cut_off(tmp_path, lines, "trigger.jsonl"), say=lambda _: None) == result
+    assert trigger_map(scene, cut_off(tmp_path, lines, "trigger.jsonl"), say=id) == result
     assert {"map.png", "thresholds.png", "trigger.md"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
@@ -50,7 +50,7 @@ def test_distances_count_from_the_onset_with_dissipation(tmp_path):
     trigger = {"distance": [0.1], "omega": [14.0], "time": 1.0, "runs": 1}
     more = {"damping": {"cn": 1.0}, "friction": {"v0": 1e-7, "v_ss": "10 v0"}, "trigger": trigger}
     scene = Scene.from_mapping({**BASE, "ramp": {"step": 5.5e-3, "until": 0.022}, **more})
-    result = trigger_map(scene, tmp_path / "out", say=lambda _: None)
+    result = trigger_map(scene, tmp_path / "out", say=id)
     assert result["fx_c"] == pytest.approx(0.0218328368, abs=1e-10)
     assert result["undamped_fx_c"] == pytest.approx(0.021833056408, rel=1e-9)
     (row,) = result["map"]
@@ -75,10 +75,10 @@ def test_eruptions_that_were_cut_off_are_those_of_one_run(tmp_path):
     """To the bit, though the loads that are known are not run again."""
     small = {"packing": {"disks": 30, "seed": 4}, "ramp": {"step": 0.02, "until": 0.3}}
     scene = Scene.from_mapping({**BASE, **small, "eruptions": {"load": [0.05, 0.25], "time": 10.0}})
-    whole = eruptions(scene, tmp_path / "whole", say=lambda _: None)
+    whole = eruptions(scene, tmp_path / "whole", say=id)
     lines = (tmp_path / "whole/eruptions.jsonl").read_text()
     assert len(lines.splitlines()) == 2
-    assert eruptions(scene, cut_off(tmp_path, lines, "eruptions.jsonl"), say=lambda _: None) == whole
+    assert eruptions(scene, cut_off(tmp_path, lines, "eruptions.jsonl"), say=id) == whole
 
 
 @pytest.mark.ranks
@@ -86,18 +86,10 @@ def test_eruptions_that_were_cut_off_are_those_of_one_run(tmp_path):
 @pytest.mark.long
 def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(faultgouge, tmp_path):
     """Above the onset, 0.0218, D grows, but not to its end in the time that is given; with strong drag nothing does."""
-    text = f"""{LAYER}[ramp]
-step = 1e-3
-until = 0.025
-[eruptions]
-load = [0.024]
-time = 60.0
-[damping]
-tau = 0.5
-"""
-    (tmp_path / "scene.toml").write_text(text)
-    scene = Scene.from_toml(tmp_path / "scene.toml")
-    one = eruptions(scene, tmp_path / "one", say=lambda _: None)
+    sections = BASE | {"eruptions": {"load": [0.024], "time": 60.0}, "damping": {"tau": 0.5}}
+    (tmp_path / "scene.toml").write_text(toml(sections))
+    scene = Scene.from_mapping(sections)
+    one = eruptions(scene, tmp_path / "one", say=id)
     free, dragged = one["runs"]
     assert (free["damped"], free["ends"]) == (False, "cut off")
     assert (dragged["damped"], dragged["ends"], dragged["rate"]) == (True, "stable", 0.0)
@@ -107,5 +99,4 @@ tau = 0.5
     # rounding alone: 1e-25 after a hundred time units
     assert all(run["noise"] < 1e-25 for run in one["runs"])
     done = faultgouge("eruptions", "scene.toml", "-o", "two", "--json", ranks=2)
-    assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == one == json.loads((tmp_path / "two/eruptions.json").read_text())

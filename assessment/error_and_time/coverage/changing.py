@@ -5,7 +5,9 @@
 Scenes are drawn at random: seeds, numbers of disks, friction, stiffness and exponent of the law, dashpots, increments,
 both arithmetics. Those count that have an onset on their ramp and contacts that change before it. The truth is the
 onset on a ramp whose increments are `FINER` times smaller; one with twice these increments tells how good the truth is.
-Each draw is a row, written as it is known; the same command goes on where it was cut off.
+Windows are looked for in each of these small increments: between loads farther apart a window that a change of contacts
+ends may be missed. The rule of the stated errors was made on the first draws of the table; those that say `fresh` were
+drawn afterwards. Each draw is a row, written as it is known; the same command goes on where it was cut off.
 """
 
 from __future__ import annotations
@@ -78,6 +80,8 @@ class Case:
         The onset and the error that it states, force; None where there is none.
     limit, uncertain : float or None
         The onset on the finest ramp and its difference from the one with increments twice as large, force.
+    fresh : bool
+        Whether the scene was drawn after the rule was made by which errors are stated.
     """
 
     kind: Kind
@@ -91,6 +95,7 @@ class Case:
     stated: float | None = None
     limit: float | None = None
     uncertain: float | None = None
+    fresh: bool = False
 
     @property
     def counts(self) -> bool:
@@ -161,19 +166,18 @@ class FirstOnset:
     def found(self, finer: int = 1, beyond: float = 0.0) -> tuple[EquilibriumPath, Window | DampedWindow] | None:
         """The ramp with increments so many times smaller, and the first window on it, without the error of the path.
 
-        None where there is none before the ramp's end or that of the equilibria. Windows are looked for between the
-        loads of the scene's own ramp, beyond a load.
+        None where there is none before the ramp's end or that of the equilibria, or none beyond a load.
         """
         path = EquilibriumPath(self._engine, self._start, self._scene, onward=True)
         for first in range(0, len(self._wanted) - 1, AT_ONCE):
             part = self._wanted[first : first + AT_ONCE + 1]
-            between = [np.linspace(a, b, finer + 1)[1:] for a, b in pairwise(part)]
+            fine = np.concatenate([part[:1], *(np.linspace(a, b, finer + 1)[1:] for a, b in pairwise(part))])
             try:
-                for fx in np.concatenate(between):
+                for fx in fine[1:]:
                     path(float(fx))
             except NoEquilibriumError:
                 return None
-            window = self._window(path, part) if part[-1] > beyond else None
+            window = self._window(path, fine) if part[-1] > beyond else None
             if window is not None:
                 return path, window
         return None
@@ -213,7 +217,7 @@ def computed(number: int) -> list[Case]:
     bare = scene.model_copy(update={"damping": None})
     step = needed(scene.ramp, "ramp").step
     undamped, damped = (
-        Case(kind, number, getattr(scene.packing, "disks", 100), scene.law.mus[0], scene.precision, step)
+        Case(kind, number, getattr(scene.packing, "disks", 100), scene.law.mus[0], scene.precision, step, fresh=True)
         for kind in get_args(Kind)
     )
     try:

@@ -42,14 +42,23 @@ def coverage_figure(cases: Sequence[Covered]) -> Figure:
 
 @matplotlib.rc_context(fname=STYLE)
 def changing_figure(cases: Sequence[Case]) -> Figure:
-    """The same of scenes in which contacts change before the onset, a colour a kind of onset."""
+    """The same of scenes in which contacts change before the onset, a colour a kind of onset.
+
+    Scenes that were drawn after the rule of the stated errors was made are open markers.
+    """
     figure = Figure(figsize=(4.6, 3.6), layout="constrained")
     axes = figure.subplots()
     smallest = _framed(axes, [(case.true, case.stated or 0.0) for case in cases])
     for number, kind in enumerate(dict.fromkeys(case.kind for case in cases)):
-        of_it = [case for case in cases if case.kind == kind]
-        at = [(max(case.true, smallest), case.stated or smallest) for case in of_it]
-        axes.plot(*zip(*at, strict=True), MARKERS[number], color=f"C{number}", label=kind, markersize=4, clip_on=False)
+        for fresh in (False, True):
+            of_it = [case for case in cases if case.kind == kind and case.fresh == fresh]
+            at = [(max(case.true, smallest), case.stated or smallest) for case in of_it]
+            x, y = zip(*at, strict=True) if at else ((), ())
+            fill = "none" if fresh else "full"
+            label = f"{kind}, {'drawn later' if fresh else 'first draws'}"
+            axes.plot(
+                x, y, MARKERS[number], fillstyle=fill, color=f"C{number}", label=label, markersize=4, clip_on=False
+            )
     axes.legend(loc="lower right")
     return figure
 

@@ -18,15 +18,12 @@ import numpy as np
 
 from ....analysis import Packing, RunFile, read_dump, stiffness_matrix, touching
 from ....analysis.operators.damping import coordinate_mass
-from ....analysis.packing.contacts import Contacts
-from ....analysis.packing.packing import Floats
 from ....analysis.spectrum.spectrum import Complexes
 from ....pywrap import Engine
-from .study import Settings, Study, Theory, study_of
-from .timing import Run, timed_points
+from .study import Run, Settings, Study, Theory, study_of, timed_points
 
-METHODS = ("text", "HDF5 (run.h5)", "float32 trajectory, slips kept", "positions in doubles, slips lost")
-TEXT, HDF5, SINGLE, NO_SLIPS = METHODS
+TEXT, HDF5 = "text", "HDF5 (run.h5)"
+SINGLE, NO_SLIPS = "float32 trajectory, slips kept", "positions in doubles, slips lost"
 G = 6
 """Digits of %g."""
 
@@ -44,7 +41,7 @@ def loss(found: Packing, exact: Complexes) -> float:
     return float(apart[linear_sum_assignment(apart)].max() / np.abs(exact).max())
 
 
-def through_text(packing: Packing, stem: Path, digits: int, folder: Path) -> tuple[Packing, int]:
+def through_text(stem: Path, digits: int, folder: Path) -> tuple[Packing, int]:
     """The deck's dumps with another number of digits, read back, and their bytes.
 
     A format of LAMMPS's and one of Python's write the same digits.
@@ -69,9 +66,13 @@ def through_hdf5(packing: Packing, folder: Path) -> tuple[Packing, int]:
 
 
 def through_trajectory(packing: Packing) -> tuple[Packing, int]:
-    """Positions in float32, as MDAnalysis hands them out; angles and contacts from elsewhere."""
+    """Positions in float32, as MDAnalysis hands them out; angles and slips from elsewhere, new contacts have none."""
     positions = np.column_stack([packing.position, np.zeros(len(packing))]).astype(np.float32)
-    return _moved(packing, positions[:, :2].astype(np.float64)), positions.nbytes
+    position, known = positions[:, :2].astype(np.float64), packing.contacts
+    found = touching(position, packing.radius, packing.box_length)
+    slips = {(i, j): slip for i, j, slip in zip(known.i, known.j, known.slip, strict=True)}
+    slip = [slips.get(pair, 0.0) for pair in zip(found.i, found.j, strict=True)]
+    return replace(packing, position=position, contacts=found.slipped(slip)), positions.nbytes
 
 
 def without_slips(packing: Packing) -> tuple[Packing, int]:
@@ -104,23 +105,24 @@ def _study(settings: Settings, packing: Packing, folder: Path) -> Study:
         points=points,
         reference_error=float(np.finfo(float).eps),
         theory=(Theory("rounding of the coordinates", tuple(expected), tuple(sizes)),),
-        disks=len(packing),
-        fx=packing.fx,
-        coarse=next(point.error for point in points if (point.method, point.parameter) == (TEXT, G)),
-        overlap=overlap.min(),
-        furthest=furthest,
+        numbers={
+            "disks": len(packing),
+            "fx": packing.fx,
+            "coarse": next(point.error for point in points if (point.method, point.parameter) == (TEXT, G)),
+            "overlap": overlap.min(),
+            "furthest": furthest,
+        },
     )
 
 
 def _runs(packing: Packing, folder: Path, digits: Sequence[int]) -> list[Run[Packing]]:
     """The ways through a file: method, digits, and what takes the packing through it."""
-    runs: list[Run[Packing]] = [
-        (TEXT, n, partial(through_text, packing, folder / "packing", n, folder)) for n in digits
+    return [
+        *((TEXT, n, partial(through_text, folder / "packing", n, folder)) for n in digits),
+        (HDF5, None, partial(through_hdf5, packing, folder)),
+        (SINGLE, None, partial(through_trajectory, packing)),
+        (NO_SLIPS, None, partial(without_slips, packing)),
     ]
-    runs.append((HDF5, None, partial(through_hdf5, packing, folder)))
-    runs.append((SINGLE, None, partial(through_trajectory, packing)))
-    runs.append((NO_SLIPS, None, partial(without_slips, packing)))
-    return runs
 
 
 def _rounded(text: str, digits: int) -> str:
@@ -129,15 +131,3 @@ def _rounded(text: str, digits: int) -> str:
     first = next(k for k, line in enumerate(lines) if line.startswith(("ITEM: ATOMS", "ITEM: ENTRIES"))) + 1
     rows = [" ".join(f"{float(word):.{digits}g}" for word in line.split()) for line in lines[first:]]
     return "\n".join([*lines[:first], *rows]) + "\n"
-
-
-def _moved(packing: Packing, position: Floats) -> Packing:
-    """Other positions, with the slips of contacts that are closed still; new ones have none."""
-    known = dict(zip(_pairs(packing.contacts), packing.contacts.slip, strict=True))
-    found = touching(position, packing.radius, packing.box_length)
-    slip = np.array([known.get(pair, 0.0) for pair in _pairs(found)])
-    return replace(packing, position=position, contacts=replace(found, slip=slip))
-
-
-def _pairs(contacts: Contacts) -> list[tuple[int, int]]:
-    return list(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True))

@@ -21,8 +21,7 @@ from ....analysis.spectrum.spectrum import Complexes
 from ....pywrap import Engine, equilibrate
 from .extended import refined_near
 from .onset import Ways
-from .study import Settings, Study, Theory, study_of
-from .timing import Run, timed_points
+from .study import Run, Settings, Study, Theory, study_of, timed_points
 
 COUNT = 6
 """Eigenvalues that shift-invert is asked for: the pair and its neighbours."""
@@ -33,8 +32,7 @@ APART = 1e-9
 FAR = 0.011
 """F_x far from it."""
 
-METHODS = ("dense (LAPACK)", "shift-invert (ARPACK)", "dense, refined")
-DENSE, ARPACK, REFINED = METHODS
+DENSE, ARPACK, REFINED = "dense (LAPACK)", "shift-invert (ARPACK)", "dense, refined"
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,10 +136,12 @@ def _near(settings: Settings) -> tuple[Packing, float]:
 
 def _study(name: str, settings: Settings, packing: Packing, pair: float) -> Study:
     target = Target.of(packing, 1.001 * pair)
-    runs: list[Run[Complexes]] = [(DENSE, None, target.dense)]
-    for tolerance in np.logspace(-1, -15, 5 if settings.quick else 15).tolist():
-        runs.append((ARPACK, tolerance, partial(target.shift_invert, tolerance)))
-    runs.append((REFINED, None, target.refined))
+    tolerances = np.logspace(-1, -15, 5 if settings.quick else 15).tolist()
+    runs: list[Run[Complexes]] = [
+        (DENSE, None, target.dense),
+        *((ARPACK, tolerance, partial(target.shift_invert, tolerance)) for tolerance in tolerances),
+        (REFINED, None, target.refined),
+    ]
     points = timed_points(runs, settings, target.off)
     last = {point.method: point for point in points}  # shift-invert's with the smallest tolerance
     coordinates, mean = target.coordinates
@@ -149,18 +149,20 @@ def _study(name: str, settings: Settings, packing: Packing, pair: float) -> Stud
         name,
         "a few eigenvalues",
         points=points,
+        numbers={
+            "count": COUNT,
+            "apart": APART,
+            "target": target,
+            "disks": len(packing),
+            "fx": packing.fx,
+            "dense": last[DENSE],
+            "sparse": last[ARPACK],
+            "coordinates": coordinates,
+            "mean": mean,
+        },
         reference_error=target.error,
         theory=(
             Theory("u |A| kappa", (target.attainable,)),
             Theory("one unit in the last place of the coordinates", (coordinates,)),
         ),
-        count=COUNT,
-        apart=APART,
-        target=target,
-        disks=len(packing),
-        fx=packing.fx,
-        dense=last[DENSE],
-        sparse=last[ARPACK],
-        coordinates=coordinates,
-        mean=mean,
     )

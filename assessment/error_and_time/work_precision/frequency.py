@@ -8,29 +8,23 @@ velocity Verlet makes of a frequency is known exactly,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
 from ....analysis import discrete_frequency
+from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium
 from .mode import Mode
-from .precision import compensated
-from .study import Point, Settings, Study, Theory, fit_order, study_of
-from .timing import timed
+from .study import Point, Settings, Study, Theory, compensated, fit_order, study_of, timed
 
 SHARES = (0.8, 0.4, 0.2, 0.1, 0.05, 0.025)
 """Time steps in units of the limit 2/omega_max."""
 
-METHODS = (
-    "run",
-    "run, compensated",
-    "run, dispersion taken out",
-    "run, dispersion taken out, compensated",
-    "eigenvalue of K, no run",
-)
-RUN, CAREFUL_RUN, CORRECTED, COMPENSATED, SPECTRUM = METHODS
+RUN, CORRECTED, SPECTRUM = "run", "run, dispersion taken out", "eigenvalue of K, no run"
+CAREFUL = ", compensated"
+"""Ends the name of a method in compensated arithmetic."""
 
 
 def corrected(frequency: complex, dt: float) -> complex:
@@ -53,74 +47,63 @@ def growth(settings: Settings) -> Study:
     return _study("growth", settings, equilibrium, Mode.of(equilibrium.packing, growing=True), time, time)
 
 
-Measured = tuple[Mode, Sequence[tuple[complex, float]]]
-"""A mode, and the frequency and the seconds of each run."""
-
-
 def _study(name: str, settings: Settings, equilibrium: Equilibrium, mode: Mode, length: float, time: float) -> Study:
     """Runs of a time, which is called a length in the words, over the time step."""
-    exact = mode.exact
-    steps = [share * mode.limit for share in SHARES[: len(SHARES) - settings.quick]]
+    steps = mode.limit * np.array(SHARES[: len(SHARES) - settings.quick])
     fine_mode = Mode.of(compensated(equilibrium).packing, mode.growing)
-    *runs, (alone, seconds_alone) = _measured(settings, mode, fine_mode, steps, time)
-    plain, careful = runs[: len(steps)], runs[len(steps) :]
-    points = _points((mode, plain), (fine_mode, careful), steps, time)
-    own = max(abs(alone / exact - 1), float(np.finfo(float).eps))
-    points.append(Point(SPECTRUM, None, own, seconds_alone, None))
-    noise, careful_noise = (_typical(points, method) for method in (CORRECTED, COMPENSATED))
-    order = fit_order(points, CAREFUL_RUN, 2, least=10 * careful_noise, most=0.01)
+    points = _points(settings, mode, fine_mode, steps, time)
+    noise, careful_noise = (
+        float(np.median([point.error for point in points if point.method == method]))
+        for method in (CORRECTED, CORRECTED + CAREFUL)
+    )
+    numbers = {
+        "mode": mode,
+        "fine_mode": fine_mode,
+        "disks": len(mode.packing),
+        "length": length,
+        "coarse": SHARES[1],
+        "noise": noise,
+        "careful_noise": careful_noise,
+        "default": points[SHARES.index(0.05)].error,
+        "raw": points[1].error,
+        "spectrum": max(points[-1].error, mode.resolution),
+        "slower": 2 / mode.limit / abs(np.sqrt(mode.eigenvalue)),
+    }
     return study_of(
         name,
         "one mode",
         points=points,
+        numbers=numbers,
         reference_error=mode.resolution,
-        orders=(order,),
+        orders=(fit_order(points, RUN + CAREFUL, 2, least=10 * careful_noise, most=0.01),),
         theory=(_dispersion(mode, steps), Theory("rounding of K", (mode.resolution,))),
-        mode=mode,
-        fine_mode=fine_mode,
-        disks=len(mode.packing),
-        length=length,
-        coarse=SHARES[1],
-        noise=noise,
-        careful_noise=careful_noise,
-        default=points[SHARES.index(0.05)].error,
-        raw=points[1].error,
-        spectrum=max(own, mode.resolution),
-        slower=2 / mode.limit / abs(np.sqrt(mode.eigenvalue)),
     )
 
 
-def _measured(
-    settings: Settings, mode: Mode, fine_mode: Mode, steps: Sequence[float], time: float
-) -> list[tuple[complex, float]]:
-    """Frequency and seconds of the runs in doubles, of those in compensated arithmetic, and of K's eigenvalue."""
+def _points(settings: Settings, mode: Mode, fine_mode: Mode, steps: Floats, time: float) -> tuple[Point, ...]:
+    """The runs in both arithmetics, as they are and with the dispersion taken out, and K's eigenvalue."""
     with Engine(mode.packing) as engine, Engine(fine_mode.packing) as fine_engine:
-        jobs: list[Callable[[], complex]] = [partial(mode.measured, engine, dt, time) for dt in steps]
-        jobs += [partial(fine_mode.measured, fine_engine, dt, time) for dt in steps]
-        return timed([*jobs, mode.from_spectrum], settings.repeats, settings.progress)
+        runs = [(RUN, mode, engine, dt) for dt in steps.tolist()]
+        runs += [(RUN + CAREFUL, fine_mode, fine_engine, dt) for dt in steps.tolist()]
+        jobs: list[Callable[[], complex]] = [partial(one.measured, on, dt, time) for _, one, on, dt in runs]
+        (*found, alone), seconds = timed([*jobs, mode.from_spectrum], settings)
+    plain, out = [], []
+    for (method, one, _, dt), value, spent in zip(runs, found, seconds[:-1], strict=True):
+        work = spent, int(time / dt)
+        plain.append(Point(method, dt, _off(one, one.quantity(value)), *work))
+        out.append(
+            Point(CORRECTED + method.removeprefix(RUN), dt, _off(one, one.quantity(corrected(value, dt))), *work)
+        )
+    return *plain, *out, Point(SPECTRUM, None, _off(mode, alone.real), seconds[-1], None)
 
 
-def _typical(points: Sequence[Point], method: str) -> float:
-    return float(np.median([point.error for point in points if point.method == method]))
+def _off(mode: Mode, quantity: float) -> float:
+    """Relative error, no less than the rounding of a number."""
+    return max(abs(quantity / mode.exact - 1), float(np.finfo(float).eps))
 
 
-def _points(plain: Measured, careful: Measured, steps: Sequence[float], time: float) -> list[Point]:
-    """The runs in both arithmetics, as they are and with the dispersion taken out."""
-    points = []
-    for method, one, found_at, change in (
-        (RUN, *plain, lambda found, _: found),
-        (CAREFUL_RUN, *careful, lambda found, _: found),
-        (CORRECTED, *plain, corrected),
-        (COMPENSATED, *careful, corrected),
-    ):
-        for dt, (found, seconds) in zip(steps, found_at, strict=True):
-            off = max(abs(one.quantity(change(found, dt)) / one.exact - 1), float(np.finfo(float).eps))
-            points.append(Point(method, dt, off, seconds, int(time / dt)))
-    return points
-
-
-def _dispersion(mode: Mode, steps: Sequence[float]) -> Theory:
+def _dispersion(mode: Mode, steps: Floats) -> Theory:
     """What velocity Verlet makes of a mode of a frozen K."""
-    fine = np.geomspace(steps[-1], steps[0], 60)
+    fine = np.geomspace(steps[-1], steps[0], 60).tolist()
     predicted = [abs(mode.quantity(complex(discrete_frequency(mode.eigenvalue, dt))) / mode.exact - 1) for dt in fine]
-    return Theory("velocity Verlet on a frozen K", tuple(map(float, predicted)), tuple(map(float, fine)))
+    return Theory("velocity Verlet on a frozen K", tuple(map(float, predicted)), tuple(fine))

@@ -18,17 +18,10 @@ from ....analysis import Packing, stiffness_matrix
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine
 from .forces import central_differences, complex_step
-from .study import Settings, Study, Theory, best_of, study_of
-from .timing import Run, timed_points
+from .study import Run, Settings, Study, Theory, best_of, study_of, timed_points
 
-METHODS = (
-    "analytic",
-    "analytic, paper's form",
-    "complex step",
-    "central differences",
-    "central differences in LAMMPS",
-)
-ANALYTIC, PAPER, COMPLEX, DIFFERENCES, LAMMPS = METHODS
+ANALYTIC, PAPER, COMPLEX = "analytic", "analytic, paper's form", "complex step"
+DIFFERENCES, LAMMPS = "central differences", "central differences in LAMMPS"
 
 
 def in_lammps(engine: Engine, packing: Packing, step: float) -> Floats:
@@ -46,32 +39,30 @@ def in_lammps(engine: Engine, packing: Packing, step: float) -> Floats:
 def jacobian(settings: Settings) -> Study:
     """The study, on a packing under shear, so that slips are not zero."""
     packing = settings.at(0.02).packing
-    with Engine(packing) as engine:
-        return _study(settings, engine, packing)
-
-
-def _study(settings: Settings, engine: Engine, packing: Packing) -> Study:
     exact = complex_step(packing, np.clongdouble)
     scale = np.abs(exact).max()
     steps = np.logspace(-11, -5, 5 if settings.quick else 13)
-    runs = _runs(engine, packing, steps)
-    points = timed_points(runs, settings, lambda matrix: float(np.abs(matrix - exact).max() / scale))
+    with Engine(packing) as engine:
+        runs = _runs(engine, packing, steps)
+        points = timed_points(runs, settings, lambda matrix: float(np.abs(matrix - exact).max() / scale))
     own, analytic = (_rounding(packing, number) / float(scale) for number in (np.longdouble, np.float64))
     fine = np.geomspace(steps[0], steps[-1], 60)
     truncation, rounding = _difference_errors(packing, float(scale), fine)
     return study_of(
         "jacobian",
         points=points,
+        numbers={
+            "fx": packing.fx,
+            "disks": len(packing),
+            "size": 3 * len(packing),
+            "milliseconds": best_of(points)[ANALYTIC].seconds * 1e3,
+            "overlap": packing.geometry.overlap.min(),
+        },
         reference_error=own,
         theory=(
             Theory("truncation + rounding", tuple((truncation + rounding).tolist()), tuple(fine.tolist())),
             Theory("overlaps as plain differences", (analytic,)),
         ),
-        disks=len(packing),
-        fx=packing.fx,
-        size=3 * len(packing),
-        milliseconds=best_of(points)[ANALYTIC].seconds * 1e3,
-        overlap=packing.geometry.overlap.min(),
     )
 
 

@@ -12,7 +12,6 @@ product linearly, and the pair is believed from :math:`50\, u |A|_F` on.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -24,12 +23,10 @@ from ....pywrap.onset.path_error import with_path_error
 from ....pywrap.runs.path import EquilibriumPath
 from ..coverage.changing import read, restated
 from ..coverage.covered import INCREMENTS, coverage
-from .precision import compensated
-from .study import Settings, Study, Theory, study_of
-from .timing import Run, timed_points
+from .study import Run, Settings, Study, Theory, compensated, study_of, timed_points
 
-METHODS = ("scan, overdamped", "scan, Newton", "bisection", "root of the discriminant")
-OVERDAMPED, SCAN, BISECTION, ROOT = METHODS
+OVERDAMPED, SCAN = "scan, overdamped", "scan, Newton"
+BISECTION, ROOT = "bisection", "root of the discriminant"
 
 BEYOND = 1e-5
 """Distance beyond the onset, force, at which the pair's imaginary part and overlap are measured for the floor."""
@@ -75,25 +72,23 @@ class Ways:
     def root(self, increment: float, beyond: float) -> tuple[float, int]:
         """The onset by the root of the discriminant on a ramp to the first increment beyond a force, and the number of
         equilibria."""
-        found, computed = self.solved(increment, beyond)
+        found, _, computed = self.solved(increment, beyond)
         return found.fx_c, computed
 
-    def solved(self, increment: float, beyond: float) -> tuple[Onset, int]:
-        """The same, with the error that it states."""
-        path, computed = self._path("newton"), 0
+    def solved(self, increment: float, beyond: float) -> tuple[Onset, EquilibriumPath, int]:
+        """The same with the error that it states, and the path."""
+        path, asked = self._path("newton"), list[float]()
 
         def equilibrium(fx: float) -> Packing:
-            nonlocal computed
-            computed += 1
+            asked.append(fx)
             return path(fx)
 
         found = find_onset(equilibrium, increment * np.arange(np.ceil(beyond / increment) + 1))
-        return found, computed
+        return found, path, len(asked)
 
     def whole(self, increment: float, beyond: float) -> Onset:
         """The same with the error of the path in it."""
-        path = self._path("newton")
-        found = find_onset(path, increment * np.arange(np.ceil(beyond / increment) + 1))
+        found, path, _ = self.solved(increment, beyond)
         return with_path_error(found, self._engine, path, self._scene)
 
     def beyond(self, onset: float) -> tuple[float, float]:
@@ -121,15 +116,15 @@ def onset(settings: Settings) -> Study:
     start = settings.ramp[0]
     exact_start = compensated(start)
     with Engine(start.packing) as engine, Engine(exact_start.packing) as exact_engine:
-        exact = Ways(exact_engine, exact_start, settings.scene)
-        return _study(settings, Ways(engine, start, settings.scene), exact)
+        reference = Ways(exact_engine, exact_start, settings.scene)
+        return _study(settings, Ways(engine, start, settings.scene), reference)
 
 
 def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     quick = settings.quick
     check, finest = (2e-3, 1e-3) if quick else (5e-4, 2.5e-4)
     guess = ways.scan(1e-3)[0] + 0.5e-3
-    found, _ = reference.solved(finest, guess)
+    found, *_ = reference.solved(finest, guess)
     exact = found.fx_c
     reference_error = found.error + abs(reference.root(check, guess)[0] - exact)
     whole = {"doubles": partial(ways.whole, beyond=guess), "compensated": partial(reference.whole, beyond=guess)}
@@ -140,37 +135,39 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     changing = [case for case in read() if case.counts]
     small = [case for case in changing if case.disks <= SMALL]
     few = small[:: max(1, len(small) // (2 if quick else 6))]
-    found_anew = [restated(case) for case in few]
-    study = study_of(
+    numbers = {
+        "exact": exact,
+        "disks": len(settings.ramp[0].packing),
+        "finest": finest,
+        "check": check,
+        "beyond": BEYOND,
+        "overlap": overlap,
+        "residual": max(each.residual for each in settings.ramp),
+        "resolution": resolution,
+    }
+    return study_of(
         "onset",
         points=points,
+        numbers=numbers,
         reference_error=reference_error,
         theory=(_half_an_increment(exact), Theory("pair lost in rounding", (lost,))),
         covered=coverage(whole, INCREMENTS[:2] if quick else INCREMENTS),
-        exact=exact,
-        disks=len(settings.ramp[0].packing),
-        finest=finest,
-        check=check,
-        beyond=BEYOND,
-        overlap=overlap,
-        residual=max(each.residual for each in settings.ramp),
-        resolution=resolution,
+        changing=tuple(changing),
+        again=tuple(restated(case) for case in few),
     )
-    return replace(study, changing=tuple(changing), again=tuple(found_anew))
 
 
 def _runs(ways: Ways, quick: bool, exact: float) -> list[Run[float]]:
     """What finds the onset, by increments."""
-    runs: list[Run[float]] = []
-    for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
-        runs.append((OVERDAMPED, increment, partial(ways.scan, increment, "overdamped")))
-    for increment in (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4):
-        runs.append((SCAN, increment, partial(ways.scan, increment)))
-    for halvings in (5, 25) if quick else (2, 5, 10, 20, 30):
-        runs.append((BISECTION, 1e-3 * 2.0**-halvings, partial(ways.bisect, 1e-3, halvings)))
-    for increment in (4e-3,) if quick else (4e-3, 2e-3, 1e-3):
-        runs.append((ROOT, increment, partial(ways.root, increment, exact)))
-    return runs
+    coarse = (4e-3,) if quick else (4e-3, 2e-3, 1e-3)
+    fine = (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4)
+    halvings = (5, 25) if quick else (2, 5, 10, 20, 30)
+    return [
+        *((OVERDAMPED, increment, partial(ways.scan, increment, "overdamped")) for increment in coarse),
+        *((SCAN, increment, partial(ways.scan, increment)) for increment in fine),
+        *((BISECTION, 1e-3 * 2.0**-n, partial(ways.bisect, 1e-3, n)) for n in halvings),
+        *((ROOT, increment, partial(ways.root, increment, exact)) for increment in coarse),
+    ]
 
 
 def _half_an_increment(exact: float) -> Theory:

@@ -13,6 +13,7 @@ power :math:`F \cdot v`. LAMMPS's own minimizers advance no slips and are refuse
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -22,16 +23,13 @@ from ....analysis import Packing, dynamical_matrix
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium, equilibrate
 from ....pywrap.equilibria.quasistatic import rounding_floor
-from .fire import fire
-from .precision import compensated
-from .study import Settings, Study, Theory, study_of
-from .timing import Run, timed_points
+from .study import Run, Settings, Study, Theory, compensated, study_of, timed_points
 
 FROM, TO = 0.010, 0.011
 """F_x before and after: an increment far from the onset."""
 
-METHODS = ("overdamped, step of the decks", "overdamped", "FIRE", "Verlet with drag", "Newton")
-DECKS, OVERDAMPED, FIRE, VERLET, NEWTON = METHODS
+DECKS, OVERDAMPED, FIRE = "overdamped, step of the decks", "overdamped", "FIRE"
+VERLET, NEWTON = "Verlet with drag", "Newton"
 COMPENSATED = ", compensated"
 """Ends the name of a method in compensated arithmetic."""
 
@@ -100,6 +98,46 @@ class Increment:
         return found.packing, found.evaluations
 
 
+def fire(
+    force: Callable[[Floats], Floats], start: Floats, longest: float, tolerance: float, most: int = 20_000
+) -> tuple[Floats, int]:
+    """A root of F by the fast inertial relaxation engine, unit masses, with the parameters of its authors.
+
+    Parameters
+    ----------
+    force : callable
+        F(q), shape (n,) to (n,).
+    start : ndarray, shape (n,)
+        Where to begin, at rest.
+    longest : float
+        Longest time step; a tenth of it is the first.
+    tolerance : float
+        Largest component of F to end at.
+    most : int
+        Evaluations after which it ends in any case.
+
+    Returns
+    -------
+    tuple of ndarray and int
+        q, and the number of evaluations of F.
+    """
+    position, velocity = start.copy(), np.zeros_like(start)
+    step, mixing, downhill = 0.1 * longest, 0.1, 0
+    now, evaluations = force(position), 1
+    while np.abs(now).max() > tolerance and evaluations < most:
+        if velocity @ now > 0:
+            velocity = (1 - mixing) * velocity + mixing * np.linalg.norm(velocity) / np.linalg.norm(now) * now
+            downhill += 1
+            if downhill > 5:
+                step, mixing = min(1.1 * step, longest), 0.99 * mixing
+        else:
+            velocity[:], step, mixing, downhill = 0.0, 0.5 * step, 0.1, 0
+        velocity = velocity + step * now
+        position = position + step * velocity
+        now, evaluations = force(position), evaluations + 1
+    return position, evaluations
+
+
 def _low(packing: Packing) -> Floats:
     return np.zeros_like(packing.position) if packing.position_low is None else packing.position_low
 
@@ -110,40 +148,25 @@ def relaxation(settings: Settings) -> Study:
     careful = compensated(plain)
     with Engine(plain.packing) as engine, Engine(careful.packing) as careful_engine:
         end = equilibrate(careful_engine, careful, TO)
-        return _study(
-            settings,
-            Increment(engine, plain, end.packing),
-            Increment(careful_engine, careful, end.packing),
-            end,
-        )
-
-
-def _study(settings: Settings, plain: Increment, careful: Increment, end: Equilibrium) -> Study:
-    matrix, _ = dynamical_matrix(end.packing)
-    values = np.linalg.eigvals(matrix.toarray()).real
-    slowest, fastest = float(values.min()), float(values.max())
-    # errors of the forces as independent ones on all coordinates, through K^-1
-    softness = float(np.sqrt(np.mean(values**-2.0)))
-    rounding = rounding_floor(plain.start.packing) * softness
-    relax_step, verlet_step, drag = STABLE * 2 / fastest, STABLE * 2 / np.sqrt(fastest), 2 * np.sqrt(slowest)
-    runs = _runs(plain, careful, (relax_step, verlet_step, drag), settings.quick)
-    reference_error = end.floor * softness
-    # both increments end at the same packing
-    points = timed_points(runs, settings, lambda packing: plain.distance(packing) or reference_error)
-    first = plain.distance(plain.start.packing)
-    many = np.geomspace(10, 3e4, 100)
+        values = np.linalg.eigvals(dynamical_matrix(end.packing)[0].toarray()).real
+        slowest, fastest = float(values.min()), float(values.max())
+        dynamics = STABLE * 2 / fastest, STABLE * 2 / np.sqrt(fastest), 2 * np.sqrt(slowest)
+        increment = Increment(engine, plain, end.packing)
+        runs = _runs(increment, Increment(careful_engine, careful, end.packing), dynamics, settings.quick)
+        # errors of the forces as independent ones on all coordinates, through K^-1
+        softness = float(np.sqrt(np.mean(values**-2.0)))
+        reference_error = end.floor * softness
+        # both increments end at the same packing
+        points = timed_points(runs, settings, lambda packing: increment.distance(packing) or reference_error)
+    first, (relax_step, verlet_step, drag) = increment.distance(plain.packing), dynamics
     decay = {OVERDAMPED: slowest * relax_step, VERLET: 0.5 * drag * verlet_step}
-    theory = [_decay(f"slowest mode, {name}", first, rate, many) for name, rate in decay.items()]
+    theory = [_decay(f"slowest mode, {name}", first, rate, np.geomspace(10, 3e4, 100)) for name, rate in decay.items()]
     return study_of(
         "relaxation",
         points=points,
+        numbers={"disks": len(end.packing), "start": FROM, "to": TO, "slowest": slowest, "fastest": fastest},
         reference_error=reference_error,
-        theory=(*theory, Theory("rounding of doubles", (rounding,))),
-        disks=len(end.packing),
-        start=FROM,
-        to=TO,
-        slowest=slowest,
-        fastest=fastest,
+        theory=(*theory, Theory("rounding of doubles", (rounding_floor(plain.packing) * softness,))),
     )
 
 

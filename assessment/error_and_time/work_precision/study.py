@@ -1,20 +1,22 @@
 r"""What a work-precision study consists of: points of error and cost, orders of convergence, and advice.
 
-An order p of a method is the slope of :math:`\log(\text{error}) = p \log(\text{parameter}) + \text{const}`, by least
-squares, with the standard error of the slope from the scatter about the line.
+An order p of a method is the exponent of error(parameter), by least squares in the logarithms.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from ....pywrap import Equilibrium, Scene
+from ....analysis.motion.power_law import fit_power_law
+from ....pywrap import Engine, Equilibrium, Scene, equilibrate
+from ...timing import Progress, in_turns
 from ..coverage.changing import Case
 from ..coverage.covered import Covered
 
@@ -27,7 +29,9 @@ WORDS = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding=
 """What is said of each study."""
 
 T = TypeVar("T")
-Progress = Callable[[Sequence[T]], Iterable[T]]
+
+Run = tuple[str, float | None, Callable[[], tuple[T, int | None]]]
+"""A method, its parameter, and what it computes: a result, and the evaluations that it took."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ class Settings:
     ramp: tuple[Equilibrium, ...]
     quick: bool = False
     repeats: int = 3
-    progress: Progress = lambda items: items
+    progress: Progress = iter
 
     def at(self, fx: float) -> Equilibrium:
         """The equilibrium of the ramp nearest to a load."""
@@ -190,24 +194,25 @@ class Study:
         """Names of the methods, in the order of the points."""
         return list(dict.fromkeys(point.method for point in self.points))
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain numbers, strings, lists and dicts, for JSON."""
-        return asdict(self)
-
 
 def best_of(points: Iterable[Point]) -> dict[str, Point]:
     """The point of least error of each method."""
     return {point.method: point for point in sorted(points, key=lambda each: each.error)[::-1]}
 
 
+def compensated(equilibrium: Equilibrium) -> Equilibrium:
+    """The same equilibrium, its coordinates with low parts and its forces balanced to the floor of that arithmetic."""
+    packing = replace(equilibrium.packing, position_low=np.zeros_like(equilibrium.packing.position))
+    with Engine(packing) as engine:
+        return equilibrate(engine, replace(equilibrium, packing=packing), packing.fx)
+
+
 def study_of(
     *sections: str,
-    points: Sequence[Point],
-    reference_error: float,
-    orders: Sequence[Order] = (),
-    theory: Sequence[Theory] = (),
-    covered: Sequence[Covered] = (),
-    **numbers: Any,
+    points: tuple[Point, ...],
+    numbers: Mapping[str, Any],
+    orders: tuple[Order, ...] = (),
+    **results: Any,
 ) -> Study:
     """A study with its words.
 
@@ -215,57 +220,44 @@ def study_of(
     ----------
     *sections : str
         Of words.toml: the study's own, and one that it shares with others.
-    points, reference_error, orders, theory, covered
+    points, orders, **results
         As of `Study`.
-    **numbers
-        What the words name; `points`, `orders` and the `best` of the points are known to them.
+    numbers : mapping
+        What the words name; `orders` and the `best` of the points are known to them.
     """
-    known = numbers | {"points": points, "orders": orders, "best": best_of(points)}
+    known = {"orders": orders, "best": best_of(points), **numbers}
     words = {name: text for section in sections for name, text in WORDS[section].items()}
     said: dict[str, Any] = {
         name: text.format(**known) if isinstance(text, str) else tuple(line.format(**known) for line in text)
         for name, text in words.items()
     }
-    return Study(
-        **said,
-        points=tuple(points),
-        reference_error=reference_error,
-        orders=tuple(orders),
-        theory=tuple(theory),
-        covered=tuple(covered),
+    return Study(**said, points=points, orders=orders, **results)
+
+
+def timed(jobs: Sequence[Callable[[], T]], settings: Settings) -> tuple[list[T], list[float]]:
+    """Results of jobs that are run in turn, in one thread, and the median of the seconds of each."""
+    with threadpool_limits(1):
+        results, seconds = in_turns(jobs, settings.repeats, progress=settings.progress)
+    return results, np.median(seconds, axis=0).tolist()
+
+
+def timed_points(runs: Sequence[Run[T]], settings: Settings, error: Callable[[T], float]) -> tuple[Point, ...]:
+    """The points of runs, each with the error of its result."""
+    results = zip(runs, *timed([run for *_, run in runs], settings), strict=True)
+    return tuple(
+        Point(method, parameter, error(found), seconds, evaluations)
+        for (method, parameter, _), (found, evaluations), seconds in results
     )
 
 
 def fit_order(points: Iterable[Point], method: str, expected: float, least: float = 0.0, most: float = np.inf) -> Order:
     """The order of a method from its points with errors between two bounds.
 
-    Parameters
-    ----------
-    points : iterable of Point
-        Of any methods.
-    method : str
-        Which.
-    expected : float
-        What theory says.
-    least, most : float
-        Errors below `least` are those of the floor or of the reference, errors above `most` are not yet asymptotic.
-
-    Returns
-    -------
-    Order
-
-    Raises
-    ------
-    ValueError
-        If fewer than three points are left.
+    Errors below `least` are those of the floor or of the reference, errors above `most` are not yet asymptotic. If
+    fewer than three points are left, the error is a ValueError.
     """
     chosen = [p for p in points if p.method == method and p.parameter and least < p.error < most]
     if len(chosen) < 3:
         raise ValueError(f"{len(chosen)} points of {method} are between {least:.1e} and {most:.1e}: an order needs 3")
-    x = np.log([point.parameter or np.nan for point in chosen])
-    y = np.log([point.error for point in chosen])
-    x, y = x - x.mean(), y - y.mean()
-    slope = float(x @ y / (x @ x))
-    scatter = y - slope * x
-    error = float(np.sqrt(scatter @ scatter / (len(chosen) - 2) / (x @ x)))
-    return Order(method, slope, error, expected, len(chosen))
+    law = fit_power_law([point.parameter or np.nan for point in chosen], [point.error for point in chosen])
+    return Order(method, law.exponent, law.error, expected, len(chosen))

@@ -11,7 +11,6 @@ that *forms* during the run would: its slip begins with zero at the end of a ste
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -19,9 +18,8 @@ import numpy as np
 from ....analysis import MindlinLaw, Packing, touching
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine
-from .study import Point, Settings, Study, Theory, fit_order, study_of
-from .timing import timed
-from .verlet import Tangent, Verlet
+from .study import Point, Settings, Study, Theory, fit_order, study_of, timed
+from .verlet import Tangent, verlet
 
 TIME = 2.0
 """Length of the run: two swings of the overlaps."""
@@ -30,6 +28,7 @@ COARSEST = 200
 """Steps of the coarsest run: 60 to a period of the fastest mode."""
 
 LAMMPS, MIDPOINT, END = "LAMMPS, tangent at the middle", "NumPy, tangent at the middle", "NumPy, tangent at the end"
+TANGENTS: dict[str, Tangent] = {MIDPOINT: "midpoint", END: "end"}
 
 
 def three_disks() -> Packing:
@@ -55,12 +54,7 @@ def in_lammps(engine: Engine, packing: Packing, steps: int) -> Floats:
     return np.array([*end.position.T, end.scaled_angle])
 
 
-def in_numpy(packing: Packing, tangent: Tangent, steps: int) -> Floats:
-    """The same by the reference integrator."""
-    return Verlet(packing, tangent).run(TIME / steps, steps)
-
-
-def reference(engine: Engine, packing: Packing, finest: int) -> tuple[Floats, float]:
+def _reference(engine: Engine, packing: Packing, finest: int) -> tuple[Floats, float]:
     """Richardson's extrapolation of LAMMPS's runs with `finest` and half as many steps, and the error of it."""
     runs = [in_lammps(engine, packing, steps) for steps in (finest // 4, finest // 2, finest)]
     coarse, fine = ((4 * runs[k + 1] - runs[k]) / 3 for k in (0, 1))
@@ -70,38 +64,32 @@ def reference(engine: Engine, packing: Packing, finest: int) -> tuple[Floats, fl
 def trajectory(settings: Settings) -> Study:
     """The study: LAMMPS and NumPy with the tangent at the middle of the step, NumPy with the tangent at its end."""
     packing = three_disks()
-    with Engine(packing) as engine:
-        return _study(settings, engine, packing)
-
-
-def _study(settings: Settings, engine: Engine, packing: Packing) -> Study:
-    exact, reference_error = reference(engine, packing, 204_800 if settings.quick else 819_200)
     fine, coarse = (8, 5) if settings.quick else (10, 7)
-    runs: list[tuple[str, int, Callable[[], Floats]]] = []
-    runs += [(LAMMPS, n, partial(in_lammps, engine, packing, n)) for n in _steps(fine)]
-    runs += [(MIDPOINT, n, partial(in_numpy, packing, "midpoint", n)) for n in _steps(coarse)]
-    runs += [(END, n, partial(in_numpy, packing, "end", n)) for n in _steps(coarse)]
-    results = timed([run for _, _, run in runs], settings.repeats, settings.progress)
+    with Engine(packing) as engine:
+        exact, reference_error = _reference(engine, packing, 204_800 if settings.quick else 819_200)
+        jobs = {(LAMMPS, n): partial(in_lammps, engine, packing, n) for n in _steps(fine)}
+        for method, tangent in TANGENTS.items():
+            jobs |= {(method, n): partial(verlet, packing, tangent, TIME / n, n) for n in _steps(coarse)}
+        found, seconds = timed([*jobs.values()], settings)
+    ends = dict(zip(jobs, found, strict=True))
     points = tuple(
-        Point(method, TIME / steps, float(np.abs(end - exact).max()), seconds, steps)
-        for (method, steps, _), (end, seconds) in zip(runs, results, strict=True)
-    )
-    ends = {(method, steps): end for (method, steps, _), (end, _) in zip(runs, results, strict=True)}
-    apart = max(float(np.abs(ends[MIDPOINT, n] - ends[LAMMPS, n]).max()) for n in _steps(coarse))
-    orders = tuple(
-        fit_order(points, method, expected, least=100 * reference_error)
-        for method, expected in ((LAMMPS, 2), (MIDPOINT, 2), (END, 1))
+        Point(method, TIME / steps, float(np.abs(end - exact).max()), spent, steps)
+        for ((method, steps), end), spent in zip(ends.items(), seconds, strict=True)
     )
     same = min(point.error for point in points if point.method == END)
+    numbers = {
+        "apart": max(float(np.abs(ends[MIDPOINT, n] - ends[LAMMPS, n]).max()) for n in _steps(coarse)),
+        "needed": next(p for p in points if p.method == MIDPOINT and p.error < same).evaluations,
+        "finest": _steps(coarse)[-1],
+    }
+    expected = {LAMMPS: 2, MIDPOINT: 2, END: 1}
     return study_of(
         "trajectory",
         points=points,
+        numbers=numbers,
         reference_error=reference_error,
-        orders=orders,
+        orders=tuple(fit_order(points, name, order, least=100 * reference_error) for name, order in expected.items()),
         theory=_slopes(fine),
-        apart=apart,
-        needed=next(p for p in points if p.method == MIDPOINT and p.error < same).evaluations,
-        finest=_steps(coarse)[-1],
     )
 
 

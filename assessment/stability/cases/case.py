@@ -61,28 +61,34 @@ class Case:
             if getattr(error, "one_rank", False):
                 raise
             lines = str(error).strip().splitlines()
-            return Outcome("fails", None, None, f"{type(error).__name__}: {lines[0] if lines else 'no reason given'}")
+            return failed(f"{type(error).__name__}: {lines[0] if lines else 'no reason given'}")
+
+
+def failed(says: str) -> Outcome:
+    """The outcome of something that went wrong otherwise than by its figure."""
+    return Outcome("fails", None, None, says)
 
 
 def measured(figure: float, bound: float, says: str) -> Outcome:
     """The outcome of a measurement: it holds if the figure is a number within its bound."""
     figure = float(figure)
-    known = isfinite(figure)
-    status: Status = "holds" if known and figure <= bound else "fails"
-    return Outcome(status, figure if known else None, float(bound), says if known else f"not a number; {says}")
+    if not isfinite(figure):
+        return Outcome("fails", None, float(bound), f"not a number; {says}")
+    return Outcome("holds" if figure <= bound else "fails", figure, float(bound), says)
 
 
 def refusal(sentence: str, words: str) -> Outcome:
     """The outcome of something that must not be done: refused if the sentence is one line and says the words."""
     sentence = sentence.strip()
-    good = words in sentence and "\n" not in sentence and "Traceback" not in sentence
-    return Outcome("refused" if good else "fails", None, None, sentence or f"nothing was said, expected: {words}")
+    if words in sentence and "\n" not in sentence and "Traceback" not in sentence:
+        return Outcome("refused", None, None, sentence)
+    return failed(sentence or f"nothing was said, expected: {words}")
 
 
-def refused(attempt: Callable[[], Any], error: type[Exception], words: str) -> Outcome:
+def refused(attempt: Callable[[], Any], words: str, error: type[Exception] = ValueError) -> Outcome:
     """The outcome of an attempt that must raise an error of this type."""
     try:
         attempt()
     except error as reason:
         return refusal(str(reason), words)
-    return Outcome("fails", None, None, f"it was not refused, expected: {words}")
+    return failed(f"it was not refused, expected: {words}")

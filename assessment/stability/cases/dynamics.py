@@ -87,7 +87,7 @@ def _below_the_limit(share: float, count: int) -> Outcome:
 def _over_the_limit() -> Outcome:
     packing = _smooth()
     limit = stable_timestep(spectrum(packing).omega_max)
-    return refused(lambda: time_step(packing, 1.01 * limit), SceneError, "over the limit 2/omega_max")
+    return refused(lambda: time_step(packing, 1.01 * limit), "over the limit 2/omega_max", SceneError)
 
 
 def _limit_is_sharp() -> Outcome:

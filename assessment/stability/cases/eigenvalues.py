@@ -32,7 +32,7 @@ from ....analysis.onset import Modes, full_operator
 from ....analysis.spectrum.spectrum import SAFETY, unit_rounding
 from ....pywrap import Scene
 from ....pywrap.onset.undamped import OnsetRun, onset_run
-from .case import Case, Outcome, measured
+from .case import Case, Outcome, failed, measured
 from .packings import bed, crystal, law, sheared, with_rattlers
 
 GROUP = "eigenvalues"
@@ -66,7 +66,7 @@ def _near_defective(eps: float, sign: int) -> Outcome:
     rounding = unit_rounding(matrix)
     believed = modes.partner[first] >= 0
     if believed and sign < 0:
-        return Outcome("fails", None, None, "a real pair is reported as complex")
+        return failed("a real pair is reported as complex")
     values = eigvals(matrix)
     one, other = values[np.argsort(np.abs(values - 1))[:2]]
     return measured(
@@ -92,7 +92,7 @@ def _near_an_onset(distance: float) -> Outcome:
         modes = Modes.of(fx, full_operator(run.between[fx]))
         first, second = np.argsort(np.abs(modes.values - run.onset.windows[0].eigenvalue))[:2]
         if (modes.partner[first] >= 0) != (fx > run.onset.fx_c):
-            return Outcome("fails", None, None, f"the pair is real above the onset, or complex below it, at {fx!r}")
+            return failed(f"the pair is real above the onset, or complex below it, at {fx!r}")
         discriminants.append(modes.pair((int(first), int(second))).discriminant)
         split = abs(modes.values[first] - modes.values[second])
     below, above = discriminants
@@ -114,7 +114,7 @@ def _rattlers() -> Outcome:
     both = with_rattlers(settled, hovering, top=False)
     alone, found = spectrum(settled), spectrum(both)
     if len(found.eigenvalues) != len(alone.eigenvalues):
-        return Outcome("fails", None, None, f"{len(found.eigenvalues)} eigenvalues instead of {len(alone.eigenvalues)}")
+        return failed(f"{len(found.eigenvalues)} eigenvalues instead of {len(alone.eigenvalues)}")
     return measured(
         np.abs(found.eigenvalues - alone.eigenvalues).max() / alone.rounding,
         0.0,

@@ -36,7 +36,7 @@ def _flows() -> Outcome:
     start = at_rest(bed(law(mu=0.0)))
     packing = start.packing
     with Engine(packing) as engine:
-        return refused(lambda: equilibrate(engine, start, 1e-3 * packing.fy), NoEquilibriumError, "flows")
+        return refused(lambda: equilibrate(engine, start, 1e-3 * packing.fy), "flows", NoEquilibriumError)
 
 
 def _tolerance_below_the_floor() -> Outcome:
@@ -50,38 +50,25 @@ def _tolerance_below_the_floor() -> Outcome:
     return balance(found)
 
 
-def _both(name: str, make: Make, quick: bool = False) -> list[Case]:
-    return [
-        Case(GROUP, f"{name}: equilibrium", partial(_balance, make), quick),
-        Case(GROUP, f"{name}: K", partial(_derivative, make), quick),
-    ]
-
+MADE: dict[str, tuple[Make, bool]] = {
+    **{f"k_n = 1e{n}": (partial(bed, law(10.0**n)), n in (2, 12)) for n in (2, 4, 6, 8, 10, 12)},
+    **{
+        f"load {load:g} k_n, a crystal": (partial(crystal, 3, 2, law(), load, True), load in (1e-12, 0.1))
+        for load in (1e-12, 1e-9, 1e-6, 1e-3, 0.1)
+    },
+    **{f"load {load:g} k_n, a bed": (partial(bed, law(), load, seed=2), False) for load in (1e-6, 1e-2)},
+    **{f"mu = {mu:g}": (partial(bed, law(mu=mu)), mu <= 1e-6) for mu in (0.0, 1e-6, 1e-3, 10.0)},
+    **{f"k_t = {share:g} k_n": (partial(bed, law(kt_share=share)), share == 10) for share in (0.0, 1e-3, 1.0, 10.0)},
+    **{f"sizes 1 : {ratio}": (partial(arches, ratio), ratio == 50) for ratio in (10, 50)},
+}
+"""Packings by what is extreme in them, and whether they belong to the small part."""
 
 CASES = [
     *(
-        case
-        for exponent in (2, 4, 6, 8, 10, 12)
-        for case in _both(f"k_n = 1e{exponent}", partial(bed, law(10.0**exponent)), exponent in (2, 12))
+        Case(GROUP, f"{name}: {what}", partial(criterion, make), quick)
+        for name, (make, quick) in MADE.items()
+        for what, criterion in (("equilibrium", _balance), ("K", _derivative))
     ),
-    *(
-        case
-        for load in (1e-12, 1e-9, 1e-6, 1e-3, 0.1)
-        for case in _both(
-            f"load {load:g} k_n, a crystal", partial(crystal, 3, 2, law(), load, True), load in (1e-12, 0.1)
-        )
-    ),
-    *(case for load in (1e-6, 1e-2) for case in _both(f"load {load:g} k_n, a bed", partial(bed, law(), load, seed=2))),
-    *(
-        case
-        for mu in (0.0, 1e-6, 1e-3, 10.0)
-        for case in _both(f"mu = {mu:g}", partial(bed, law(mu=mu)), mu in (0.0, 1e-6))
-    ),
-    *(
-        case
-        for share in (0.0, 1e-3, 1.0, 10.0)
-        for case in _both(f"k_t = {share:g} k_n", partial(bed, law(kt_share=share)), share == 10)
-    ),
-    *(case for ratio in (10, 50) for case in _both(f"sizes 1 : {ratio}", partial(arches, ratio), ratio == 50)),
     Case(GROUP, "f_min = 1e-15 in doubles", _tolerance_below_the_floor, True),
     Case(GROUP, "F_x without friction", _flows, True),
     Case(

@@ -17,8 +17,9 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ....analysis import Contacts, MindlinLaw, Packing, touching
+from ....analysis import MindlinLaw, Packing, touching
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 from ....pywrap.equilibria.quasistatic import rounding_floor
@@ -48,18 +49,8 @@ def crystal(
         overlap = law.overlap_of_force(0.5 * load * law.kn * (1.0 - overlap) / rise)
     row, column = np.divmod(np.arange(rows * columns), columns)
     position = np.column_stack([spacing * (column + 0.5 * (row % 2) + 0.25), 0.5 - reach + rise * row])
-    radius = np.full(rows * columns, 0.5)
-    box = columns * spacing
-    return Packing(
-        position=position,
-        position_low=np.zeros_like(position) if compensated else None,
-        radius=radius,
-        contacts=touching(position, radius, box),
-        law=law,
-        box_length=box,
-        top=row == rows - 1,
-        fy=load * law.kn,
-    )
+    packing = _loaded(position, np.full(rows * columns, 0.5), columns * spacing, row == rows - 1, law, load)
+    return replace(packing, position_low=np.zeros_like(position)) if compensated else packing
 
 
 def arches(ratio: float, law: MindlinLaw = PAPERS, load: float = 1e-6) -> Packing:
@@ -75,15 +66,15 @@ def arches(ratio: float, law: MindlinLaw = PAPERS, load: float = 1e-6) -> Packin
         ]
     )
     radius = np.repeat([1.0, small], [3, 6])
-    return Packing(
-        position=position,
-        radius=radius,
-        contacts=touching(position, radius, 6.15),
-        law=law,
-        box_length=6.15,
-        top=radius == 1.0,
-        fy=load * law.kn,
-    )
+    return _loaded(position, radius, 6.15, radius == 1.0, law, load)
+
+
+def _loaded(
+    position: Floats, radius: Floats, box: float, top: NDArray[np.bool_], law: MindlinLaw, load: float
+) -> Packing:
+    """A periodic packing without slips; load is F_y / k_n."""
+    contacts, fy = touching(position, radius, box), load * law.kn
+    return Packing(position=position, radius=radius, contacts=contacts, law=law, box_length=box, top=top, fy=fy)
 
 
 @cache
@@ -101,26 +92,21 @@ def bed(law: MindlinLaw = PAPERS, load: float = LOAD, seed: int = 1) -> Packing:
 
 def slipped(packing: Packing, shares: Sequence[float]) -> Packing:
     """The packing with slips in several states, by their shares of the limit, over and over."""
-    c = packing.contacts
-    slip = np.resize(shares, len(c)) * packing.law.slip_limit(packing.geometry.overlap)
-    return replace(packing, contacts=Contacts(c.i, c.j, slip))
+    slip = np.resize(shares, len(packing.contacts)) * packing.law.slip_limit(packing.geometry.overlap)
+    return replace(packing, contacts=packing.contacts.slipped(slip))
 
 
 def with_low_parts(packing: Packing) -> Packing:
     """The same packing in compensated arithmetic."""
     if packing.compensated:
         return packing
-    c = packing.contacts
-    return replace(
-        packing,
-        position_low=np.zeros_like(packing.position),
-        contacts=Contacts(c.i, c.j, c.slip, np.zeros(len(c))),
-    )
+    contacts = packing.contacts.slipped(packing.contacts.slip, np.zeros(len(packing.contacts)))
+    return replace(packing, position_low=np.zeros_like(packing.position), contacts=contacts)
 
 
 def with_rattlers(packing: Packing, position: Floats, top: bool) -> Packing:
     """The packing with small disks that touch nothing at further positions, shape (n, 2), in the upper layer or not."""
-    c, extra = packing.contacts, len(position)
+    extra = len(position)
     return replace(
         packing,
         position=np.vstack([packing.position, position]),
@@ -128,7 +114,6 @@ def with_rattlers(packing: Packing, position: Floats, top: bool) -> Packing:
         angle=np.append(packing.angle, np.zeros(extra)),
         mass=np.append(packing.mass, np.ones(extra)),
         top=np.append(packing.top, np.full(extra, top)),
-        contacts=Contacts(c.i, c.j, c.slip),
     )
 
 

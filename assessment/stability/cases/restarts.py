@@ -71,28 +71,23 @@ def _state(engine: Engine) -> list[np.ndarray]:
     return [packing.position, packing.angle, c.i, c.j, c.slip, *low, *slip_low, *velocities]
 
 
-def _cases(name: str, make: Make, quick: bool = False) -> list[Case]:
-    return [
-        Case(
-            GROUP,
-            f"{name}, {'compensated' if compensated else 'doubles'}",
-            partial(_same_after_restart, make, compensated),
-            quick,
-        )
-        for compensated in (False, True)
-    ]
-
+MADE: dict[str, tuple[Make, bool]] = {
+    "k_n = 1e2": (partial(bed, law(1e2)), False),
+    "k_n = 1e12": (partial(bed, law(1e12)), True),
+    "load 1e-12 k_n": (partial(crystal, 3, 2, law(), 1e-12), False),
+    "load 0.1 k_n": (partial(crystal, 4, 2, law(), 0.1), False),
+    "mu = 0": (partial(bed, law(mu=0.0)), False),
+    "mu = 1e-6": (partial(bed, law(mu=1e-6)), True),
+    "mu = 10": (partial(bed, law(mu=10.0)), False),
+    "k_t = 10 k_n": (partial(bed, law(kt_share=10.0)), False),
+    "sizes 1 : 50": (partial(arches, 50.0), True),
+    "box 3 wide": (partial(crystal, 3), False),
+    "box 100 wide": (partial(crystal, 100), False),
+}
+"""Packings by what is extreme in them, and whether they belong to the small part."""
 
 CASES = [
-    *_cases("k_n = 1e2", partial(bed, law(1e2))),
-    *_cases("k_n = 1e12", partial(bed, law(1e12)), True),
-    *_cases("load 1e-12 k_n", partial(crystal, 3, 2, law(), 1e-12)),
-    *_cases("load 0.1 k_n", partial(crystal, 4, 2, law(), 0.1)),
-    *_cases("mu = 0", partial(bed, law(mu=0.0))),
-    *_cases("mu = 1e-6", partial(bed, law(mu=1e-6)), True),
-    *_cases("mu = 10", partial(bed, law(mu=10.0))),
-    *_cases("k_t = 10 k_n", partial(bed, law(kt_share=10.0))),
-    *_cases("sizes 1 : 50", partial(arches, 50.0), True),
-    *_cases("box 3 wide", partial(crystal, 3)),
-    *_cases("box 100 wide", partial(crystal, 100)),
+    Case(GROUP, f"{name}, {arithmetic}", partial(_same_after_restart, make, arithmetic == "compensated"), quick)
+    for name, (make, quick) in MADE.items()
+    for arithmetic in ("doubles", "compensated")
 ]

@@ -105,7 +105,7 @@ def report(
     from faultgouge.assessment.error_and_time import report as run_studies
 
     keeps(f"{output} has the studies that were finished; the same command begins anew and replaces them")
-    run_studies(output, quick, say, lambda runs, name: progress(runs, name, len(runs)))
+    run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
     say(f"written: {output}/report.md")
 
 

@@ -1,9 +1,8 @@
-"""What one way of doing a thing costs beside another, times of the two taken in turns; and the line that says so.
+"""What one way of doing a thing costs beside another, and the line that says so.
 
-The ratio is taken within a turn, and every other turn begins with the other of the two, so that what else the machine
-does falls on both alike. Work of one thread is timed by the processor time of this process, which leaves out the pauses
-that others make it take; work of several by the clock on the wall. Of the turns, medians and quartiles are kept: a mean
-would tell of the slowest.
+The ratio is taken within a turn. Work of one thread is timed by the processor time of this process, which leaves out
+the pauses that others make it take; work of several by the clock on the wall. Of the turns, medians and quartiles are
+kept: a mean would tell of the slowest.
 """
 
 from collections.abc import Callable
@@ -13,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis.packing.packing import Floats
 from ...pywrap.lammps.dynamics import Motion
+from ..timing import in_turns
 
 TURNS, FEW = 11, 5
 """Turns of a comparison: quartiles of fewer jump; and turns of what may take long."""
@@ -22,7 +23,7 @@ SHARE = 10e-3
 """Seconds that one of the two takes in a turn, if it can be chosen: far above the clock and the call."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cost:
     """Times of a thing without and with a feature.
 
@@ -30,65 +31,58 @@ class Cost:
     ----------
     per : str
         What was done once: a step, an equilibrium, ...
-    without, with_it : tuple of float
-        Time of one, in each turn, s.
+    seconds : ndarray, shape (turns, 2)
+        Time of one without and with it, in each turn.
     """
 
     per: str
-    without: tuple[float, ...]
-    with_it: tuple[float, ...]
+    seconds: Floats
+
+    @classmethod
+    def of(
+        cls,
+        per: str,
+        without: Callable[[], object],
+        with_it: Callable[[], object],
+        count: int = 1,
+        turns: int = TURNS,
+        parallel: bool = False,
+    ) -> "Cost":
+        """Time the work without and with a feature in turns, after one that is not counted.
+
+        Parameters
+        ----------
+        per : str
+            What a call does `count` times.
+        without, with_it : callable
+            The work.
+        count : int
+            Times are divided by it.
+        turns : int
+            How often both are called.
+        parallel : bool
+            Whether the work is that of several threads or processes.
+        """
+        _, seconds = in_turns((without, with_it), turns + 1, perf_counter if parallel else process_time)
+        return cls(per, seconds[1:] / count)
 
     @property
     def medians(self) -> tuple[float, float]:
         """Times without and with it, s."""
-        return float(np.median(self.without)), float(np.median(self.with_it))
+        without, with_it = np.median(self.seconds, axis=0).tolist()
+        return without, with_it
 
     @property
     def ratio(self) -> tuple[float, float, float]:
         """Time with it over time without it: lower quartile, median, upper quartile of the turns."""
-        low, middle, high = np.quantile(np.divide(self.with_it, self.without), (0.25, 0.5, 0.75))
-        return float(low), float(middle), float(high)
+        low, middle, high = np.quantile(self.seconds[:, 1] / self.seconds[:, 0], (0.25, 0.5, 0.75)).tolist()
+        return low, middle, high
 
     def as_dict(self) -> dict[str, object]:
         """Medians in seconds and the ratio with its quartiles, for JSON."""
         low, middle, high = self.ratio
         without, with_it = self.medians
         return {"per": self.per, "without": without, "with": with_it, "ratio": middle, "quartiles": [low, high]}
-
-
-def in_turns(
-    per: str,
-    without: Callable[[], object],
-    with_it: Callable[[], object],
-    count: int = 1,
-    turns: int = TURNS,
-    parallel: bool = False,
-) -> Cost:
-    """Time two callables in turns.
-
-    Parameters
-    ----------
-    per : str
-        What a call does `count` times.
-    without, with_it : callable
-        The work without and with the feature.
-    count : int
-        Times are divided by it.
-    turns : int
-        How often both are called, after one call that is not timed.
-    parallel : bool
-        Whether the work is that of several threads or processes.
-    """
-    clock = perf_counter if parallel else process_time
-    times: tuple[list[float], list[float]] = [], []
-    for turn in range(turns + 1):
-        both = list(zip((without, with_it), times, strict=True))
-        for work, record in both if turn % 2 else both[::-1]:
-            start = clock()
-            work()
-            if turn:
-                record.append((clock() - start) / count)
-    return Cost(per, tuple(times[0]), tuple(times[1]))
 
 
 @dataclass(frozen=True)
