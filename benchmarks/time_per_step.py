@@ -2,8 +2,8 @@
 
 A hexagonal packing with six contacts a disk; or a disordered one, of 1,000 disks of two radii that `settle` has
 brought to rest, repeated along x. Stirred a little so that contacts live: the same positions, radii, velocities,
-neighbour settings and time step for every style. Styles take turns, so that what else the machine does falls on all
-alike; medians and the spread of several turns are printed, and ratios within one turn.
+neighbour settings and time step for every style. Times are processor times, and styles take turns, so that what else
+the machine does falls on all alike; medians and the spread of several turns are printed, and ratios within one turn.
 
     python benchmarks/time_per_step.py [--packing hexagonal disordered] [--disks 100 10000] [--ranks 1 2]
 """
@@ -11,6 +11,7 @@ alike; medians and the spread of several turns are printed, and ratios within on
 import argparse
 import itertools
 import platform
+import re
 import statistics
 import subprocess
 import sys
@@ -91,7 +92,7 @@ def settled(folder: Path) -> Path:
 
 
 def microseconds_per_step(style: str, disks: int, ranks: int, data: Path | None = None) -> float:
-    """Loop time of one run over its steps, in microseconds; of the hexagonal packing, or of a data file repeated."""
+    """Processor time of a step, microseconds; of the hexagonal packing, or of a data file repeated."""
     steps = max(200, 2_000_000 // disks)
     pair, coefficients, integrator = STYLES[style]
     deck = DECK.format(
@@ -108,10 +109,11 @@ def microseconds_per_step(style: str, disks: int, ranks: int, data: Path | None 
         script.write_text(deck)
         command = [BIN / "mpiexec", "-n", str(ranks), BIN / "lmp", "-in", script, "-log", "none"]
         done = subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
-    loops = [line.split() for line in done.stdout.splitlines() if line.startswith("Loop time of")]
+    loops = re.findall(r"^Loop time of (\S+) .*?^([\d.]+)% CPU use", done.stdout, re.S | re.M)
     if done.returncode or len(loops) != 2:
         sys.exit(f"{style} did not run: {done.stdout[-500:]}")
-    return 1e6 * float(loops[1][3]) / float(loops[1][8])
+    seconds, percent = map(float, loops[1])
+    return 1e6 * seconds * percent / 100 / steps
 
 
 def table(title: str, turns: list[dict[tuple[str, int], float]], all_ranks: list[int]) -> None:
@@ -128,8 +130,9 @@ def table(title: str, turns: list[dict[tuple[str, int], float]], all_ranks: list
                 f"  {style:30s}{statistics.median(times):12.2f} {f'[{min(times):.2f}, {max(times):.2f}]':24s}"
                 f"{ratio:10.2f}{gain:20.2f}"
             )
-        cost = sorted(turn["mindlin/smooth, compensated", ranks] / turn["mindlin/smooth", ranks] for turn in turns)
-        print(f"  compensated of double {statistics.median(cost):.2f} [{cost[0]:.2f}, {cost[-1]:.2f}]")
+        for what in ("compensated", "energy"):
+            cost = sorted(turn[f"mindlin/smooth, {what}", ranks] / turn["mindlin/smooth", ranks] for turn in turns)
+            print(f"  {what} of plain {statistics.median(cost):.2f} [{cost[0]:.2f}, {cost[-1]:.2f}]")
 
 
 def main() -> None:

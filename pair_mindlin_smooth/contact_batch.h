@@ -1,5 +1,5 @@
 // One batch of contacts: the columns that the kernel works on, and the steps from branch vectors to forces. Each step
-// is a loop without branches. No LAMMPS types. Included by contact_kernel.cpp alone.
+// is a loop without branches. No LAMMPS types. Included by contact_loop.h alone.
 
 #ifndef FAULTGOUGE_CONTACT_BATCH_H
 #define FAULTGOUGE_CONTACT_BATCH_H
