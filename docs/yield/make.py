@@ -1,8 +1,10 @@
-"""The page of the study of yield from its table: python docs/yield/make.py."""
+"""The pages of the study of yield from their tables: python docs/yield/make.py."""
 
 from pathlib import Path
 
+from faultgouge.studies.yielding.lasting import write_lasting
 from faultgouge.studies.yielding.page import write_page
 
 if __name__ == "__main__":
-    print(write_page(Path(__file__).parent))
+    folder = Path(__file__).parent
+    print(write_page(folder), write_lasting(folder), sep="\n")

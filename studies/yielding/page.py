@@ -95,12 +95,13 @@ def _rising(rows: list[dict[str, Any]], rate: float, loss: float) -> dict[str, A
 def text(found: dict[str, Any], packings: int, failed: int) -> str:
     """The page."""
     flow = [share(each["flow"], packings) for each in found["yields"]]
-    names = {"packings": packings, "failed": failed, "flow": flow, "interval": interval, "percent": _percent}
+    names = {"packings": packings, "failed": failed, "flow": flow, "interval": interval, "percent": percent}
     names["slow"] = [row for row in found["loading"] if row["rate"] == CONTROLLED]
     return render(__package__ or "", "yield.md.j2", **found, **names)
 
 
-def _percent(part: dict[str, Any]) -> str:
+def percent(part: dict[str, Any]) -> str:
+    """A share with its interval, "3 of 20 (5 to 36 %)"; "-" of nothing."""
     if part["share"] is None:
         return "-"
     return f"{part['count']} of {part['of']} ({100 * part['low']:.0f} to {100 * part['high']:.0f} %)"

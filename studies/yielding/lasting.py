@@ -1,0 +1,92 @@
+"""The page on layers that are left to themselves, from its tables: which rest, with which history of the slip."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from scipy.stats import binomtest
+
+from ...figures.pages import render
+from ..statistics import share
+from .page import FLOWING, percent, rows_of
+
+Row = dict[str, Any]
+
+LASTS = 0.5
+"""Share of its early kinetic energy from which on a layer vibrates without slowing down; the others lose 57 % and more
+in the same time."""
+
+
+def write_lasting(folder: Path) -> Path:
+    """further.md of a folder with tables/lasting.jsonl, quartz_100.jsonl and quartz_400.jsonl."""
+    tables = folder / "tables"
+    rows, large = (
+        [json.loads(line) for line in (tables / f"{name}.jsonl").read_text().splitlines()]
+        for name in ("lasting", "quartz_400")
+    )
+    lossy = [row for row in rows if row["restitution"] < 1]
+    page = render(
+        __package__,
+        "further.md.j2",
+        percent=percent,
+        lossy=lossy,
+        **_lasting(lossy),
+        free=_without_loss(rows, tables / "quartz_100.jsonl"),
+        large=large,
+        large_flow=[_flowing(large, loss) for loss in (1.0, 0.9)],
+    )
+    (folder / "further.md").write_text(page)
+    return folder / "further.md"
+
+
+def lasts(row: Row) -> bool:
+    """Whether a layer vibrates without slowing down."""
+    return bool(row["late"] > LASTS * row["early"])
+
+
+def _lasting(lossy: list[Row]) -> Row:
+    """Who vibrates with either history, and the test of signs of the packings in which the histories differ."""
+    most = {
+        history: {row["seed"]: lasts(row) for row in lossy if (row["history"], row["restitution"]) == (history, 0.9)}
+        for history in ("total", "rescaled")
+    }
+    differ = [total for seed, total in most["total"].items() if total != most["rescaled"][seed]]
+    vibrating = [row for row in lossy if lasts(row)]
+    return {
+        **{history: share(sum(found.values()), len(found)) for history, found in most.items()},
+        "chance": binomtest(sum(differ), len(differ)).pvalue,
+        "seeds": sorted({row["seed"] for row in vibrating}),
+        "energies": sorted(row["late"] for row in vibrating),
+        "moves": max(row["moves"] for row in vibrating),
+        "quiet": max(row["late"] for row in lossy if row["history"] == "rescaled"),
+        "slowest": max((row for row in lossy if not lasts(row)), key=lambda row: row["late"] / row["early"]),
+    }
+
+
+def _without_loss(rows: list[Row], table: Path) -> Row:
+    """Runs without loss, those with total slips and with rescaled ones from the same states, and how many flow."""
+    results, _ = rows_of(table)
+    seeds = [json.loads(line)["values"]["packing.seed"] for line in table.read_text().splitlines()]
+    total = {
+        (seed, run["share"]): run
+        for seed, result in zip(seeds, results, strict=True)
+        for run in result["dynamic"]
+        if run["restitution"] == 1
+    }
+    runs = [row | {"total": total[row["seed"], row["share"]]} for row in rows if row["restitution"] == 1]
+    flow = {}
+    for load in (0.97, 0.9):
+        here = [row for row in runs if row["share"] == load]
+        flow[load] = [
+            share(sum(each["ends"] in FLOWING for each in ends), len(ends))
+            for ends in ([row["total"] for row in here], here)
+        ]
+    return {"runs": runs, "flow": flow}
+
+
+def _flowing(large: list[Row], restitution: float) -> Row:
+    """Packings that flow at a load below their static yield."""
+    flow = [any(run["ends"] in FLOWING for run in row["dynamic"] if run["restitution"] == restitution) for row in large]
+    return share(sum(flow), len(flow))
