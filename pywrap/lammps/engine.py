@@ -310,3 +310,5 @@ class Engine:
             self._displacing.begin()
             self._decks.command("run 0 post no")  # makes the fixes slips and low
             self.restore(packing)
+        else:
+            self._wire.clear_forces()

@@ -54,6 +54,10 @@ class Wire:
         """The masses of the packing."""
         self._disks.scatter("rmass", self._static.mass)
 
+    def clear_forces(self) -> None:
+        """Forces of zero, until the first run: LAMMPS leaves in their place what was in memory."""
+        self._disks.scatter("f", np.zeros((len(self._static), 3)))
+
     def write(self, packing: Packing, velocity: Floats | None = None) -> None:
         """Positions, angles and slips of a packing, and velocities (v_x, v_y, omega), shape (N, 3), or none; they take
         effect at the next run's setup."""

@@ -240,3 +240,9 @@ def test_what_stops_a_run_is_what_is_said(reference_packing):
     engine = Engine(packing)
     with pytest.raises(EngineError, match="Unknown command: nonsense"), engine.undamped(1e-4):
         Decks(engine.lammps).command("nonsense")
+
+
+def test_forces_without_friction_are_zero_until_the_first_run(reference_packing):
+    """LAMMPS does not set them; with MALLOC_PERTURB_ in the environment they would be numbers of any size."""
+    with Engine(with_law(reference_packing(1.0), mu=0.0)) as engine:
+        assert not engine.net_force.any()
