@@ -11,7 +11,8 @@ divided where such a pair is not recognised at both ends, changes more than plai
 way; until nothing wider than `Family.narrowest` is left to doubt. Whether one of two modes meets a third shows in the
 product :math:`(\lambda_1 - \lambda)(\lambda_2 - \lambda) = (\bar\lambda - \lambda)^2 - D / 4`, which is smooth where
 the two coalesce. An increment in which contacts change bends the levels: it is divided, too, if something may hide as
-the levels go on from the increment before.
+the levels go on from the increment before. So is one on which two modes change order though their slopes at both ends
+say that they do not meet.
 """
 
 from collections.abc import Iterator, Sequence
@@ -276,16 +277,22 @@ class Step:
         if len(p) == 0:
             return []
 
+        gaps = [
+            modes.values.real[names][p] - modes.values.real[names][q]
+            for modes, names in zip(self.ends, (known, image), strict=True)
+        ]
+
         def wide(*drifts: Floats) -> NDArray[np.bool_]:
             numbers: list[Floats] = []
-            for modes, drift, names in zip(self.ends, drifts, (known, image), strict=True):
-                values, rates = modes.values.real[names], drift[names]
-                gap = values[p] - values[q]
+            for gap, drift, names in zip(gaps, drifts, (known, image), strict=True):
+                rates = drift[names]
                 numbers += [gap**2, 2 * gap * (rates[p] - rates[q])]
             d0, s0, d1, s1 = numbers
             return deepest_dip(d0, s0, d1, s1, family.limits.bend)[0] * self.span > family.narrowest
 
         near = wide(*self.drifts)
+        if np.any((gaps[0] * gaps[1] < 0) & ~near):  # they meet, and their slopes do not say so
+            return None
         if self.arrival is not None and np.any(wide(_sensitivity(here, self.arrival).real, self.drifts[1]) & ~near):
             return None
         found: list[Ends] = []

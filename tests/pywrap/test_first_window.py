@@ -52,3 +52,20 @@ def test_a_window_beside_a_contact_that_begins_to_slide_is_found_between_loads_f
             path(float(fx))
         (window,) = find_onset(path, [0.024, 0.028]).windows
     assert (window.fx_onset, window.fx_end) == pytest.approx((0.0241548556, 0.0244768428), abs=1e-9)
+
+
+def test_a_window_of_a_level_that_bends_across_another_is_found_between_loads_far_apart():
+    """A rattling mode falls from 690 to 289 through four others; its slopes at both ends are those of flat levels."""
+    scene = Scene.from_mapping(
+        {
+            "packing": {"disks": 100, "width": 11.9, "top": 10, "seed": 9},
+            "law": {"kn": 2e5, "mu": 0.2},
+            "load": {"fy": 3.0},
+            "ramp": {"step": 2e-3, "until": 0.012},
+        }
+    )
+    with Engine((start := settle(scene)).packing) as engine:
+        path = EquilibriumPath(engine, start, scene)
+        onset = find_onset(path, loads(scene.ramp))
+    (window,) = onset.windows
+    assert (window.fx_onset, window.fx_end) == pytest.approx((0.011169096612, 0.011204647041), abs=1e-10)
