@@ -53,6 +53,23 @@ def test_counts_in_slices_are_within_their_errors():
     assert max(off) < float(stated[1]) / 100 < 1.2 * max(off)
 
 
+def test_shares_of_3000_disks_are_those_that_the_law_of_smaller_packings_tells():
+    smaller = [json.loads(line) for line in (DOCS / "tables" / "force_1000.jsonl").read_text().splitlines()]
+    for load in (0.03, 0.1):
+        at, told = load * 3**0.53, []
+        for row in smaller:
+            loads, shares = zip(*((each["fx_over_fy"], each["share"]) for each in row["loads"]), strict=True)
+            if loads[-1] >= at:
+                told.append(np.interp(at, loads, shares))
+        words = f"{np.median(told):.2f} ({min(told):.2f} to {max(told):.2f}, {len(told)} packings)"
+        assert words in " ".join(PAGE.split())
+        for row in rows("slices_3000.jsonl"):
+            if row["fx_over_fy"] == load:
+                share, error = 2 * row["sliced"] / row["modes"], 2 * row["error"] / row["modes"]
+                assert min(told) - error <= share <= max(told) + error
+                assert f"| {load:g} | {row['sliced']} ± {row['error']} | {row['modes']} | {share:.2f} |" in PAGE
+
+
 def test_packings_that_bear_more_are_no_others_from_the_start():
     """Share and rate at 0.1 of those that bear 0.2, and of those that do not."""
     found = []
