@@ -139,6 +139,7 @@ def test_spectrum_from_run_file_and_from_memory(faultgouge, faultgouge_here, tmp
 
 @pytest.mark.ranks
 @pytest.mark.slow
+@pytest.mark.long
 def test_spectrum_of_a_decks_dumps(faultgouge, lmp, tmp_path):
     done = lmp(DECKS / "ramp.in", "-var", "decks", str(DECKS), "-var", "until", "2e-3", ranks=2)
     assert done.returncode == 0, done.stdout[-2000:]

@@ -81,7 +81,7 @@ def settled(faultgouge_in, tmp_path_factory):
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize(("ranks", "rank"), [(1, -1), (2, -1), (2, 0), (2, 1)])
+@pytest.mark.parametrize(("ranks", "rank"), [(1, -1), pytest.param(2, -1, marks=pytest.mark.long), (2, 0), (2, 1)])
 @pytest.mark.parametrize("call", [1, 30])
 @pytest.mark.slow
 def test_its_sentence_reaches_the_command(scene, ranks, rank, call):

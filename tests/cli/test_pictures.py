@@ -35,6 +35,7 @@ def test_the_pair_before_and_after_the_onset(beyond, faultgouge_in):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_films_of_a_run_a_ramp_and_a_mode(beyond, faultgouge_in):
     for name, more in (("perturb", ()), ("ramp", ()), ("ramp", ("--mode", "pair"))):
         command = ("movie", f"{name}.h5", *more, "--seconds", "1", "--rate", "5", "--dots", "50", "-o", "film.gif")

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-@pytest.fixture(scope="module", params=["double", "compensated"])
+@pytest.fixture(scope="module", params=["double", pytest.param("compensated", marks=pytest.mark.long)])
 def run(tmp_path_factory, request):
     """perturb.h5 of a strong push: displacements that float32 still tells."""
     from tests.conftest import REFERENCE

@@ -8,7 +8,7 @@ SHORT = {"settle.in": (), "ramp.in": ("-var", "until", "2e-3"), "perturb.in": ("
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize("precision", ["double", "compensated"])
+@pytest.mark.parametrize("precision", ["double", pytest.param("compensated", marks=pytest.mark.long)])
 @pytest.mark.parametrize("deck", SHORT)
 @pytest.mark.slow
 def test_deck_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path, deck, precision):

@@ -83,7 +83,7 @@ def unchanged(trajectory, request, known):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"ranks": 2},
+        pytest.param({"ranks": 2}, marks=pytest.mark.long),
         {"newton": "off", "sort": "0"},
         {"newton": "off", "sort": "50", "ranks": 2},
         {
@@ -100,7 +100,7 @@ def test_same_trajectory(trajectory, unchanged, changes):
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.slow
 def test_restart_in_the_same_process(trajectory, unchanged, defaults, ranks):
     again = (
@@ -118,7 +118,7 @@ fix             move all nve/disc 1.0 {drag} ${{compensated}}
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.slow
 def test_restart_in_a_new_process(trajectory, unchanged, defaults, lmp, tmp_path, ranks):
     straight = trajectory(ranks=ranks, middle="write_restart middle.restart")

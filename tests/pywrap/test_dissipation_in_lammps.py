@@ -23,6 +23,7 @@ def displacement(packing, reference):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_the_worst_start_grows_as_predicted(loaded):
     """A start of 1e-8 along it, below the onset at 0.02183: far below the slip limits, and far above rounding."""
     packing = loaded(0.0205, 0.0205 / 20)

@@ -40,6 +40,7 @@ def frequency(time, signal):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_growth_rate_and_frequency_are_those_of_the_spectrum(loaded):
     """Over six decades of D, from a small start along the pair that coalesces first."""
     packing = loaded(0.024)

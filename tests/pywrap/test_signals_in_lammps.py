@@ -44,6 +44,7 @@ def test_record_moves_the_packing_as_linear_response_says(packing, on, scale):
 
 @pytest.mark.ranks
 @pytest.mark.slow
+@pytest.mark.long
 def test_deck_takes_a_table_and_is_the_same_on_two_ranks(lmp, tmp_path):
     time = np.linspace(0.0, 0.3, 31)
     table = tmp_path / "record.txt"

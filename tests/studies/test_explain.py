@@ -66,6 +66,7 @@ def test_what_is_in(paper, frictionless):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_what_each_part_brings(paper, frictionless):
     low = BROUGHT["compensated coordinates"]
     for explanation, compensated in ((paper, low | {"array f_slips (25 columns)"}), (frictionless, low)):
@@ -74,6 +75,7 @@ def test_what_each_part_brings(paper, frictionless):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_what_is_left_out_is_not_loaded(frictionless):
     loaded = set(frictionless.loaded.everything)
     for name in ("tangential history", "dynamic friction", "dashpots", "drag", "perturbation"):
@@ -82,6 +84,7 @@ def test_what_is_left_out_is_not_loaded(frictionless):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_what_both_compute_agrees_to_the_bit(paper, frictionless):
     for explanation in (paper, frictionless):
         for part in explanation.parts:

@@ -25,6 +25,7 @@ def found():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_the_page_comes_out_of_the_tables(tmp_path):
     write_page(DOCS / "tables", tmp_path)
     for name in (*PAGES, "modes.json"):

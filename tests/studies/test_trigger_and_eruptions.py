@@ -26,6 +26,7 @@ def cut_off(folder, lines, name):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_prediction_is_what_lammps_bisects(tmp_path):
     trigger = {"distance": [0.1, 1e-3], "omega": [1.0, 14.0], "time": 4.0, "runs": 2}
     scene = Scene.from_mapping({**BASE, "friction": {"v0": 1e-7, "v_ss": "10 v0"}, "trigger": trigger})
@@ -71,6 +72,7 @@ def test_trigger_needs_a_threshold(tmp_path, friction, says):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_eruptions_that_were_cut_off_are_those_of_one_run(tmp_path):
     """To the bit, though the loads that are known are not run again."""
     small = {"packing": {"disks": 30, "seed": 4}, "ramp": {"step": 0.02, "until": 0.3}}
