@@ -7,7 +7,9 @@ Of more than 1,000 disks the slices stand alone.
 
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from bounds import at_loads
 
@@ -19,7 +21,7 @@ PACKINGS = {1000: 5, 3000: 5}
 LOADS = (0.03, 0.1)
 
 
-def rows(disks: int, seed: int):
+def rows(disks: int, seed: int) -> Iterator[dict[str, Any]]:
     """The counts of one packing at each load that it bears."""
     for load, packing in at_loads(disks, seed, LOADS):
         row = {"disks": disks, "seed": seed, "fx_over_fy": load}

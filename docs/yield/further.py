@@ -30,7 +30,7 @@ LARGE = {"disks": 400, "width": 23.8, "top": 20}
 
 def scene(seed: int, **packing: Any) -> Scene:
     """The scene of the sweep with another seed and other packings."""
-    given = read_toml(SCENE)["scene"]
+    given = read_toml(SCENE, "sweep")["scene"]
     given["packing"] |= {"seed": seed} | packing
     return Scene.from_mapping(given)
 
