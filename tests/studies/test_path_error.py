@@ -11,10 +11,18 @@ import faultgouge
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset, spectrum
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.onset.damped import damped_onset_run
-from faultgouge.pywrap.onset.path_error import OtherPaths, meeting, with_path_error
+from faultgouge.pywrap.onset.path_error import OtherPaths, PathError, meeting, with_path_error
 from faultgouge.pywrap.runs.path import EquilibriumPath
 
 SHIPPED = Path(faultgouge.__file__).parent / "scenes" / "paper.toml"
+
+
+@pytest.mark.parametrize(("coarser", "weight"), [(1.04, 3.0), (1.0025, -0.75)], ids=["doubled", "halved"])
+def test_the_correction_leads_to_the_limit_of_small_increments(coarser, weight):
+    """Onsets 1 + 0.01 (h'/h)^2 of increments h' on the ramp, with increments twice and half as large."""
+    error = PathError(coarser - 1.01, 0.0, (), weight, False, 1e-9, 1e-2)
+    assert 1.01 + error.correction == pytest.approx(1.0, abs=1e-12)
+    assert error.error >= 0.01
 
 
 def ramp_scene(precision, increment):
