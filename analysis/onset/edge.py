@@ -187,7 +187,7 @@ class Family:
 
         def follow(nearest: list[Pair], fx: float) -> Pair:
             place = self.at(fx)
-            guess = nearest[0].towards(nearest[1], fx) if len(nearest) > 1 else None
+            guess = nearest[0].extrapolated(nearest[1], fx) if len(nearest) > 1 else None
             image = None if guess is None else continued(guess, fx, place.matrix, self.limits)
             return image if image and image.same_planes(nearest[0]) else self.followed(nearest[0], place)
 

@@ -48,7 +48,8 @@ from .limits import LIMITS, Limits
 Planes = tuple[Floats, Floats]
 
 FAR = 2.0
-"""Distance of a load from one of two others, in units of theirs, up to which planes are extrapolated."""
+"""Distance of a load from the nearer of two others up to which planes are extrapolated, in units of the distance of
+these two from each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +122,8 @@ class Pair:
         # The planes turn in first order, which changes invariants of the block in second order only.
         return float(2 * (b[0, 0] - b[1, 1]) * (db[0, 0] - db[1, 1]) + 4 * (db[0, 1] * b[1, 0] + b[0, 1] * db[1, 0]))
 
-    def towards(self, other: "Pair", fx: float) -> "Pair | None":
-        """A guess of the pair at another load: its planes in proportion; None if the load is too far from both."""
+    def extrapolated(self, other: "Pair", fx: float) -> "Pair | None":
+        """A guess of the pair at the load fx, force: planes on the line through those at two loads; None beyond FAR."""
         share = (fx - self.fx) / (other.fx - self.fx)
         if abs(share) > FAR:
             return None

@@ -101,7 +101,7 @@ def _others(rows: Floats, pairs: tuple[Indices, Indices]) -> Floats:
 
 Screening = Callable[[csr_array, csr_array, int], list[Floats] | None]
 """Who names the pairs that may meet between two operators, by orthonormal bases, shape (n, 2), of their planes; None if
-they are more than a few, or not known. So many pairs are known to be complex at the first of the two."""
+they are more than a few, or not known. The number is that of the pairs that are complex at the first operator."""
 
 
 class Screen:

@@ -30,7 +30,21 @@ def nearby_root(
     """The load nearest to fx, known to a share of its distance, at which a function changes its sign, and its slope.
 
     By the slope of the function on another path, if that is known and the load is near; else by secants or, where the
-    function jumps there, by halving. nan beyond the reach.
+    function jumps there, by halving.
+
+    Parameters
+    ----------
+    function : callable
+        Takes a load, force.
+    fx, rounding, reach : float
+        Where to begin, how uncertain the root is from rounding, and how far it may be, force.
+    slope : float or None
+        Of the function on another path, its unit / force.
+
+    Returns
+    -------
+    tuple of float and float or None
+        The load, nan beyond the reach; and the slope, None at a jump.
     """
     at = cache(function)
     if slope and abs(at(fx) / slope) < STRAIGHT * reach:

@@ -10,7 +10,7 @@ from scipy.stats import binomtest
 
 from ...figures.pages import render
 from ..statistics import share
-from .page import FLOWING, percent, rows_of
+from .page import FLOWING, percent
 
 Row = dict[str, Any]
 
@@ -67,12 +67,11 @@ def _lasting(lossy: list[Row]) -> Row:
 
 def _without_loss(rows: list[Row], table: Path) -> Row:
     """Runs without loss, those with total slips and with rescaled ones from the same states, and how many flow."""
-    results, _ = rows_of(table)
-    seeds = [json.loads(line)["values"]["packing.seed"] for line in table.read_text().splitlines()]
     total = {
-        (seed, run["share"]): run
-        for seed, result in zip(seeds, results, strict=True)
-        for run in result["dynamic"]
+        (row["values"]["packing.seed"], run["share"]): run
+        for row in map(json.loads, table.read_text().splitlines())
+        if row["result"]
+        for run in row["result"]["dynamic"]
         if run["restitution"] == 1
     }
     runs = [row | {"total": total[row["seed"], row["share"]]} for row in rows if row["restitution"] == 1]
