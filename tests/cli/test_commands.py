@@ -204,8 +204,10 @@ def test_bad_file_is_refused(faultgouge_here, arguments, says):
 @pytest.mark.slow
 def test_every_command_has_help_with_an_example(faultgouge, faultgouge_here):
     commands = ["settle", "ramp", "perturb", "onset", "spectrum", "explain", "report", "stability", "reproduce"]
+    commands += ["import", "export", "movie", "view", "sweep", "modes", "eruptions"]
     overview = faultgouge("--help").stdout
     for command in commands:
         assert command in overview
         done = faultgouge_here(command, "--help")
         assert "Example" in done.stdout
+        assert "\\" not in done.stdout  # plain text escapes no brackets

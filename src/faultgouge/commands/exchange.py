@@ -119,7 +119,7 @@ def export(
     Disks with radii, net forces and mobilised friction; contacts with forces and
     slips (in .vtp as lines); modes as vectors (not in .data). `faultgouge import`
     takes .xyz, .data and .gsd back to the bit. A .gsd needs pip install
-    'faultgouge\\[export]'. With --frames a film of displacements: a .pvd for ParaView
+    'faultgouge[export]'. With --frames a film of displacements: a .pvd for ParaView
     comes with a folder of .vtp.
     """
     from faultgouge.pywrap.exchange.formats import check_writer, write_packing

@@ -100,7 +100,7 @@ def movie(
     displacements times a power of ten that is written on the film and falls in
     steps, and D(t) beside it. With --mode: the motion of a mode, growth left out. Of
     run.h5: the ramp, and F_x over the displacement of the upper layer. An .mp4 needs
-    pip install 'faultgouge\\[movie]'.
+    pip install 'faultgouge[movie]'.
     """
     from faultgouge.figures.writers import check_name, write_film
 
@@ -136,7 +136,7 @@ def view(
 
     The page has the packing with its force chains, the plane of eigenvalues, in which
     two meet, both over F_x, and D(t) if the file has it. The modes of the pair move.
-    It needs pip install 'faultgouge\\[view]'.
+    It needs pip install 'faultgouge[view]'.
     """
     if output.suffix.lower() != ".html":
         raise typer.BadParameter(f"-o {output}: a page is an .html")

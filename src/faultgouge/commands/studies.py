@@ -134,7 +134,7 @@ def trigger(scene: ScenePath, output: Folder = Path("trigger"), as_json: AsJson 
 
 @app.command(epilog="Example: mpiexec -n 3 faultgouge eruptions eruptions.toml -o eruptions")
 def eruptions(scene: ScenePath, output: Folder = Path("eruptions"), as_json: AsJson = False) -> None:
-    """How large: undamped runs from rest at each load of \\[eruptions], until they are over, and what ended the growth.
+    """How large: undamped runs from rest at each load of [eruptions], until they are over, and what ended the growth.
 
     Of several ranks one hands out the loads.
     """

@@ -29,9 +29,9 @@ def sweep(
 ) -> None:
     """One task for every scene of a product of keys: results.jsonl, the table results.csv, and a picture.
 
-    A sweep names a task (onset, triggering, ...); below \\[sweep] lists of values
+    A sweep names a task (onset, triggering, ...); below [sweep] lists of values
     or ranges for any keys of a scene, as in "packing.seed" = "1:200"; and below
-    \\[scene.SECTION] what all scenes share. Every result is written as it ends,
+    [scene.SECTION] what all scenes share. Every result is written as it ends,
     and the same command goes on where it was cut off. A scene that fails
     is a result, too, with its sentence. Of several ranks, on several machines
     perhaps, one hands out the work: mpiexec -n 5 keeps 4 cores busy.
@@ -120,7 +120,7 @@ def modes(
 ) -> None:
     """Complex modes along the ramp: how many, how fast they grow, and which loss would stop them.
 
-    At each load of the section \\[modes], all eigenvalues: the share of complex
+    At each load of the section [modes], all eigenvalues: the share of complex
     ones, the largest growth rate, and the least Q, the quality factor below which
     dissipation stops all growth. Leaves modes.json, modes.csv, pictures over the
     load and of the plane of frequencies, and a film of that plane. Of a sweep,
