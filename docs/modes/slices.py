@@ -1,6 +1,6 @@
 """Pairs counted in slices of the spectrum, beside those of all eigenvalues.
 
-python docs/modes/slices.py FOLDER [DISKS]     rows of slices.jsonl: five packings of 1,000 disks, or those of DISKS
+python docs/modes/slices.py FOLDER [DISKS [SEED ...]]     rows of slices.jsonl: five packings of 1,000 disks, or of DISKS
 
 Of more than 1,000 disks the slices stand alone.
 """
@@ -17,13 +17,13 @@ from faultgouge.analysis import dynamical_matrix, eigenvalues
 from faultgouge.studies.modes.compute import ALL, Counted
 from faultgouge.studies.modes.sliced import sliced
 
-PACKINGS = {1000: 5, 3000: 5}
-LOADS = (0.03, 0.1)
+PACKINGS = {1000: 5, 3000: 5, 10_000: 2}
+LOADS = {1000: (0.03, 0.1), 3000: (0.03, 0.1), 10_000: (0.01, 0.03, 0.06)}
 
 
 def rows(disks: int, seed: int) -> Iterator[dict[str, Any]]:
     """The counts of one packing at each load that it bears."""
-    for load, packing in at_loads(disks, seed, LOADS):
+    for load, packing in at_loads(disks, seed, LOADS[disks]):
         row = {"disks": disks, "seed": seed, "fx_over_fy": load}
         if disks <= ALL:
             every = Counted.of(eigenvalues(packing))
@@ -36,8 +36,9 @@ def rows(disks: int, seed: int) -> Iterator[dict[str, Any]]:
 
 if __name__ == "__main__":
     disks = int(sys.argv[2]) if len(sys.argv) > 2 else 1000
+    seeds = [int(each) for each in sys.argv[3:]] or range(1, PACKINGS[disks] + 1)
     with (Path(sys.argv[1]) / "slices.jsonl").open("a") as file:
-        for seed in range(1, PACKINGS[disks] + 1):
+        for seed in seeds:
             for row in rows(disks, seed):
                 file.write(json.dumps(row) + "\n")
                 file.flush()

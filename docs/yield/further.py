@@ -19,7 +19,7 @@ from faultgouge.pywrap.scenes.units import dashpot
 from faultgouge.studies.modes.loss import impact_velocity, with_dashpots
 from faultgouge.studies.packings import distance, shake
 from faultgouge.studies.sweep.points import read_toml
-from faultgouge.studies.yielding.compute import NOISE, dynamic
+from faultgouge.studies.yielding.compute import LOSSES, NOISE, SHARES, dynamic
 from faultgouge.studies.yielding.static import FailedError, branch, layer_slip
 
 SCENE = Path(__file__).parents[2] / "scenes" / "sweeps" / "yield.toml"
@@ -89,12 +89,12 @@ def large(seed: int) -> Iterator[dict[str, Any]]:
     path = branch(settle(given))
     fy, last = given.load.fy, path.kept[-1].fx
     runs = []
-    for share in (0.75, 0.9, 0.97):
+    for share in SHARES:
         try:
             here = path.at(share * last)
         except FailedError:
             continue
-        for restitution in (1.0, 0.9):
+        for restitution in LOSSES:
             run = dynamic(here, dashpot(given.law.kn, restitution, 1.0, impact_velocity(given)), seed)
             runs.append({"share": share, "restitution": restitution, "fx_over_fy": here.fx / fy} | run)
     yield {"seed": seed, "newton": path.newton / fy, "static": last / fy, "dynamic": runs}
