@@ -1,6 +1,6 @@
 """Pairs counted in slices of the spectrum, beside those of all eigenvalues.
 
-python docs/modes/slices.py FOLDER [DISKS [SEED ...]]     rows of slices.jsonl: five packings of 1,000 disks, or of DISKS
+python docs/modes/slices.py FOLDER [DISKS [SEED ...]]     rows of slices.jsonl: packings of 1,000 disks, or of DISKS
 
 Of more than 1,000 disks the slices stand alone.
 """

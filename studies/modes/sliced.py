@@ -39,8 +39,8 @@ STEPS = 2
 
 
 PIVOTING = 1e-4
-"""Share of a column's largest entry that suffices for a pivot on the diagonal. Pivots of 1, the default of SuperLU, leave
-the symmetric pattern: of 10,000 disks the factors then take 1,000 times as long, and a solution 50 times."""
+"""Share of a column's largest entry that suffices for a pivot on the diagonal. Pivots of 1, the default of SuperLU,
+leave the symmetric pattern: of 10,000 disks the factors then take 1,000 times as long, and a solution 50 times."""
 
 
 @dataclass(frozen=True, eq=False)
