@@ -30,10 +30,10 @@ class OnsetError(FaultgougeError):
         """The sentence for some modes, or all, up to the last load."""
         which = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
         if not doubtful:
-            return cls(f"No pair of eigenvalues{which} becomes complex up to fx = {last:.17g}: raise the largest load.")
+            return cls(f"No pair of eigenvalues{which} is complex up to F_x = {last:.10g}: raise the largest load.")
         below, above = doubtful[0]
         return cls(
-            f"No pair of eigenvalues{which} was found to become complex up to fx = {last:.17g}, but one was expected "
+            f"No pair of eigenvalues{which} was found to become complex up to F_x = {last:.10g}, but one was expected "
             f"between {below:.10g} and {above:.10g}: take smaller increments, or raise the largest load."
         )
 

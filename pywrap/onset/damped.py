@@ -259,7 +259,7 @@ def _nothing_grows(last: float, flows: bool) -> DampedOnsetError | NoEquilibrium
             f"no motion grows up to F_x = {last:.10g}, and no equilibrium was found beyond: the packing flows before "
             "an onset"
         )
-    return DampedOnsetError(f"No motion grows up to fx = {last:.10g}: raise ramp.until.")
+    return DampedOnsetError(f"No motion grows up to F_x = {last:.10g}: raise ramp.until.")
 
 
 def inside(windows: Iterable[Window]) -> list[float]:

@@ -134,7 +134,7 @@ def _gain(packing: Packing, cn: float, drag: float) -> Row:
 def _first_window(ramp: Ramped) -> Window:
     window = ramp.first_window()
     if window is None:
-        raise OnsetError(f"No pair of eigenvalues becomes complex up to fx = {ramp.forces[-1]:.17g}: raise ramp.until.")
+        raise OnsetError(f"No pair of eigenvalues is complex up to F_x = {ramp.forces[-1]:.10g}: raise ramp.until.")
     return window
 
 

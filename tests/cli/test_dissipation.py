@@ -58,8 +58,8 @@ def test_onset_with_dissipation_as_json(faultgouge, tmp_path):
 @pytest.mark.parametrize(
     ("more", "arguments", "code", "says"),
     [
-        ("", (), 1, "No pair of eigenvalues becomes complex up to fx = 0.004"),
-        ("[damping]\ncn = 1.0", (), 1, "No motion grows up to fx = 0.004"),
+        ("", (), 1, "No pair of eigenvalues is complex up to F_x = 0.004"),
+        ("[damping]\ncn = 1.0", (), 1, "No motion grows up to F_x = 0.004"),
         ("[damping]", (), 2, "damping"),
         ("[damping]\nct = 1.0", ("--modes", "0:10"), 2, "--modes goes without [damping]"),
     ],

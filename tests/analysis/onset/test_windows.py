@@ -201,7 +201,7 @@ def test_a_scan_of_the_spectra_agrees_within_its_increment(ramp):
 
 def test_no_onset_is_said_so(ramp):
     path = ramp(1.0, 1e-3, 22)
-    with pytest.raises(OnsetError, match=r"up to fx = 0\.0030"):
+    with pytest.raises(OnsetError, match=r"up to F_x = 0\.003:"):
         find_onset(path, path.grid[:4])
 
 
