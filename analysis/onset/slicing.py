@@ -197,8 +197,11 @@ class _Spectrum:
         size = self.matrix.shape[0]
         start = np.random.default_rng(0).standard_normal(size)
         top = float(eigsh(self.matrix, k=1, which="LA", tol=1e-3, v0=start, return_eigenvectors=False)[0])
-        places = np.array([-self.bound, -1e-9 * self.bound, 1.01 * top])
-        numbers = np.array([0, *self.counted(pool, places[1:2]), size])
+        places, numbers = np.array([-1e-9 * self.bound, 1.01 * top]), np.array([0, size])
+        numbers[0] = self.counted(pool, places[:1])[0]
+        while numbers[0] > 0 and places[0] > -self.bound:  # a few negative ones are close to zero, the bound is far away
+            places = np.insert(places, 0, 10 * places[0])
+            numbers = np.insert(numbers, 0, self.counted(pool, places[:1])[0] if places[0] > -self.bound else 0)
         while True:
             wanted = (numbers[1:] > first) & (numbers[:-1] < stop)
             wide = np.flatnonzero(wanted & (np.diff(numbers) > self.limits.coarse) & (np.diff(places) > 1e-6 * top))

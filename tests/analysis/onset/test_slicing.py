@@ -79,6 +79,15 @@ def test_part_of_the_spectrum(modes):
 
 
 @pytest.mark.slow
+def test_a_negative_eigenvalue_is_found_with_those_next_to_zero():
+    """As of a symmetric part that is about to lose its stability; the bound of the spectrum is far away."""
+    expected = np.concatenate([[-1.3], np.linspace(1, 2000, 1250), np.geomspace(3e3, 1e5, 50)])
+    found = slices(csc_array(np.diag(expected)), 20, modes=(0, 300))
+    values = np.concatenate([part.values[part.own] for part in found])
+    np.testing.assert_allclose(values, expected[:300], rtol=0, atol=1e-4 * 2000 / 1250)
+
+
+@pytest.mark.slow
 def test_degenerate_eigenvalues_are_all_found():
     """A square lattice on a torus, stiffer along one side: most eigenvalues are fourfold."""
     along = 2 * np.eye(34) - np.roll(np.eye(34), 1, axis=0) - np.roll(np.eye(34), -1, axis=0)
