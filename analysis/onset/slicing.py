@@ -199,7 +199,7 @@ class _Spectrum:
         top = float(eigsh(self.matrix, k=1, which="LA", tol=1e-3, v0=start, return_eigenvectors=False)[0])
         places, numbers = np.array([-1e-9 * self.bound, 1.01 * top]), np.array([0, size])
         numbers[0] = self.counted(pool, places[:1])[0]
-        while numbers[0] > 0 and places[0] > -self.bound:  # a few negative ones are close to zero, the bound is far away
+        while numbers[0] > 0 and places[0] > -self.bound:  # a few negative ones lie next to zero, far from the bound
             places = np.insert(places, 0, 10 * places[0])
             numbers = np.insert(numbers, 0, self.counted(pool, places[:1])[0] if places[0] > -self.bound else 0)
         while True:
