@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from scipy.stats import binomtest
 
 from ...figures.pages import render
-from ..statistics import share
-from .page import FLOWING, percent
+from ..modes.tables import median
+from ..statistics import interval, share
+from .compute import LOSSES, SHARES
+from .page import FLOWING, of_runs, percent, read_rows
 
 Row = dict[str, Any]
 
@@ -22,10 +23,7 @@ in the same time."""
 def write_lasting(folder: Path) -> Path:
     """further.md of a folder with tables/lasting.jsonl, quartz_100.jsonl and quartz_400.jsonl."""
     tables = folder / "tables"
-    rows, large = (
-        [json.loads(line) for line in (tables / f"{name}.jsonl").read_text().splitlines()]
-        for name in ("lasting", "quartz_400")
-    )
+    rows, large = (read_rows(tables / f"{name}.jsonl") for name in ("lasting", "quartz_400"))
     lossy = [row for row in rows if row["restitution"] < 1]
     page = render(
         __package__,
@@ -34,8 +32,9 @@ def write_lasting(folder: Path) -> Path:
         lossy=lossy,
         **_lasting(lossy),
         free=_without_loss(rows, tables / "quartz_100.jsonl"),
-        large=large,
-        large_flow=[_flowing(large, loss) for loss in (1.0, 0.9)],
+        large=[of_runs(large, load, loss) for load in SHARES for loss in LOSSES],
+        large_flow=[_flowing(large, loss) for loss in LOSSES],
+        large_static=interval(median([row["static"] for row in large])),
     )
     (folder / "further.md").write_text(page)
     return folder / "further.md"
@@ -69,7 +68,7 @@ def _without_loss(rows: list[Row], table: Path) -> Row:
     """Runs without loss, those with total slips and with rescaled ones from the same states, and how many flow."""
     total = {
         (row["values"]["packing.seed"], run["share"]): run
-        for row in map(json.loads, table.read_text().splitlines())
+        for row in read_rows(table)
         if row["result"]
         for run in row["result"]["dynamic"]
         if run["restitution"] == 1

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...analysis.packing.packing import Floats
 from ...figures.pages import render
-from ...figures.style import save, styled
+from ...figures.style import INK, save, styled
 from ..modes.tables import median
 from ..statistics import interval, share
 from .compute import CONTROLLED, LOADINGS, LOSSES, SHARES
@@ -22,9 +23,14 @@ ELSEWHERE = 1e-8
 """D beyond which the layer rests in another equilibrium: a ten-thousandth of a small disk's diameter, squared."""
 
 
+def read_rows(table: Path) -> list[dict[str, Any]]:
+    """The rows of a table."""
+    return [json.loads(line) for line in table.read_text().splitlines()]
+
+
 def rows_of(table: Path) -> tuple[list[dict[str, Any]], int]:
     """The results of the packings that settled, and how many did not."""
-    rows = [json.loads(line) for line in table.read_text().splitlines()]
+    rows = read_rows(table)
     good = [row["result"] for row in rows if row["result"]]
     return good, len(rows) - len(good)
 
@@ -34,7 +40,7 @@ def numbers(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "newton": median([row["newton"] for row in rows]),
         "static": median([row["static"] for row in rows]),
-        "dynamic": [_of_runs(rows, load, loss) for load in SHARES for loss in LOSSES],
+        "dynamic": [of_runs(rows, load, loss) for load in SHARES for loss in LOSSES],
         "yields": [yields(rows, loss) for loss in LOSSES],
         "spread": median([np.ptp([row["static"], *(each[1] for each in row["static_by_increment"])]) for row in rows]),
         "loading": [_rising(rows, *each) for each in LOADINGS],
@@ -59,7 +65,13 @@ def yields(rows: list[dict[str, Any]], loss: float) -> dict[str, Any]:
     }
 
 
-def _of_runs(rows: list[dict[str, Any]], load: float, loss: float) -> dict[str, Any]:
+def static_and_dynamic(rows: list[dict[str, Any]]) -> tuple[list[float], Floats]:
+    """Medians of F_x/F_y with intervals: the static yield, and the dynamic one for each of `LOSSES`, shape (3, 3)."""
+    return median([row["static"] for row in rows]), np.array([yields(rows, loss)["least"] for loss in LOSSES])
+
+
+def of_runs(rows: list[dict[str, Any]], load: float, loss: float) -> dict[str, Any]:
+    """How the dynamic runs at a share of the static yield end with a restitution."""
     runs = [run for row in rows for run in row["dynamic"] if (run["share"], run["restitution"]) == (load, loss)]
     rest = [run for run in runs if run["ends"] not in FLOWING]
     return {
@@ -109,15 +121,18 @@ def percent(part: dict[str, Any]) -> str:
 
 @styled
 def figure(found: dict[str, Any]) -> Figure:
-    """Static and dynamic yield over loss; share of packings that flow over the load, for each restitution."""
+    """Static and dynamic yield over loss, of either size; share of layers of 100 disks that flow over the load."""
     drawn = Figure(figsize=(7, 3), layout="constrained")
     left, axes = drawn.subplots(1, 2)
-    middle, low, high = found["static"]
-    left.axhspan(low, high, color="0.9")
-    left.axhline(middle, color="black", linestyle="--", label="static yield")
-    least = np.array([each["least"] for each in found["yields"]])
-    bars = [least[:, 0] - least[:, 1], least[:, 2] - least[:, 0]]
-    left.errorbar(range(len(LOSSES)), least[:, 0], yerr=bars, fmt="o", capsize=3, label="dynamic yield")
+    for k, (disks, (static, least)) in enumerate(found["sizes"].items()):
+        middle, low, high = static
+        place, colour = np.arange(len(LOSSES)) + 0.16 * (k - 0.5), (INK, "C4")[k]
+        left.axhspan(low, high, color=colour, alpha=0.12, linewidth=0)
+        left.axhline(middle, color=colour, linestyle="--", label=f"static yield, {disks} disks")
+        bars = [least[:, 0] - least[:, 1], least[:, 2] - least[:, 0]]
+        left.errorbar(
+            place, least[:, 0], yerr=bars, fmt="os"[k], color=colour, capsize=3, label=f"dynamic, {disks} disks"
+        )
     left.set(xlabel="restitution", ylabel="$F_x/F_y$", ylim=(0, None), xlim=(-0.5, len(LOSSES) - 0.5))
     left.set_xticks(range(len(LOSSES)), ["1 (undamped)", *map(str, LOSSES[1:])])
     left.legend(loc="lower right")
@@ -138,6 +153,8 @@ def write_page(folder: Path) -> Path:
     """The page and the picture of a folder with a table; the path of the page."""
     rows, failed = rows_of(folder / "tables" / "quartz_100.jsonl")
     found = numbers(rows)
+    sizes = {100: rows, 400: read_rows(folder / "tables" / "quartz_400.jsonl")}
+    found["sizes"] = {disks: static_and_dynamic(each) for disks, each in sizes.items()}
     save(figure(found), folder / "yield")
     page = folder / "yield.md"
     page.write_text(text(found, len(rows), failed))
