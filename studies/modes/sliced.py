@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh, eigvals, qr, solve
@@ -53,12 +53,7 @@ class _Part:
     shift: float
 
 
-LARGE = replace(LIMITS, one_basis=9000)
-"""All eigenvectors of S at once up to 3,000 disks: two minutes and 1.5 GB. Slices of fewer take no less, and where many
-modes lie close to zero a Krylov space of the largest size may not hold them: beyond, that is an error."""
-
-
-def sliced(packing: Packing, limits: Limits = LARGE) -> tuple[Complexes, int]:
+def sliced(packing: Packing, limits: Limits = LIMITS) -> tuple[Complexes, int]:
     """The complex pairs of a packing, from slices of the spectrum.
 
     Parameters

@@ -60,7 +60,7 @@ def test_a_page_is_run(tmp_path):
         pytest.param("README.md", 4, 0, marks=[pytest.mark.ranks, pytest.mark.long]),
         pytest.param("docs/decks.md", 4, 0, marks=[pytest.mark.ranks, pytest.mark.long]),
         pytest.param("docs/tutorial.md", None, 5, marks=pytest.mark.long),
-        ("docs/api.md", None, 1),
+        pytest.param("docs/api.md", None, 1, marks=pytest.mark.long),
     ],
 )
 def test_a_page_shows_what_its_commands_print(tmp_path, page, count, pictures):

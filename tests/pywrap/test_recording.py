@@ -72,10 +72,8 @@ def test_the_way_to_an_equilibrium_is_kept(tmp_path, equilibria):
         assert ways_of(run) == {1: found[1].way}
 
 
-@pytest.mark.parametrize(
-    "share", [1e-9, pytest.param(math.inf, marks=pytest.mark.long)], ids=["saved at the end", "saved at once"]
-)
-@pytest.mark.slow
+@pytest.mark.parametrize("share", [1e-9, math.inf], ids=["saved at the end", "saved at once"])
+@pytest.mark.long
 def test_what_is_said_is_what_is_stored(tmp_path, monkeypatch, begun, equilibria, share):
     monkeypatch.setattr(sealedfile, "SHARE_OF_SAVING", share)
     path, counts, number, interrupted = tmp_path / "run.h5", set(), 0, True

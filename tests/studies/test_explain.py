@@ -95,6 +95,7 @@ def test_what_both_compute_agrees_to_the_bit(paper, frictionless):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_costs_are_ratios_with_their_spread(paper):
     for part in paper.parts:
         low, middle, high = part.cost.ratio
@@ -107,6 +108,7 @@ def test_costs_are_ratios_with_their_spread(paper):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_json_holds_everything(paper):
     copy = json.loads(json.dumps(paper.as_dict()))
     assert [part["name"] for part in copy["parts"]] == list(BROUGHT)

@@ -51,6 +51,7 @@ def kill_a_worker():
     workers[0].kill()
 
 
+@pytest.mark.long
 def test_a_killed_worker_takes_nothing_with_it(sweep, rows):
     found = []
     with hands(2) as pool:

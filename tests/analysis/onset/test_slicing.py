@@ -31,7 +31,7 @@ def network(size, seed):
     return csc_array(matrix)
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.long), 2])
 @pytest.mark.slow
 def test_slices_are_the_whole_spectrum(workers):
     matrix = network(34, 1)
