@@ -81,7 +81,9 @@ def settled(faultgouge_in, tmp_path_factory):
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize(("ranks", "rank"), [(1, -1), (2, 1), *(pytest.param(2, k, marks=pytest.mark.long) for k in (-1, 0))])
+@pytest.mark.parametrize(
+    ("ranks", "rank"), [(1, -1), (2, 1), *(pytest.param(2, k, marks=pytest.mark.long) for k in (-1, 0))]
+)
 @pytest.mark.parametrize("call", [1, pytest.param(30, marks=pytest.mark.long)])
 @pytest.mark.slow
 def test_its_sentence_reaches_the_command(scene, ranks, rank, call):
@@ -96,7 +98,9 @@ def test_its_sentence_reaches_the_command(scene, ranks, rank, call):
 
 @pytest.mark.ranks
 @pytest.mark.parametrize("search", [[], ["--modes", "0:39"]], ids=["all_windows", "slices"])
-@pytest.mark.parametrize(("ranks", "stride"), [(1, 6), *(pytest.param(*each, marks=pytest.mark.long) for each in ((1, 1), (2, 6)))])
+@pytest.mark.parametrize(
+    ("ranks", "stride"), [(1, 6), *(pytest.param(n, k, marks=pytest.mark.long) for n, k in ((1, 1), (2, 6)))]
+)
 @pytest.mark.slow
 def test_no_call_is_taken_for_a_missing_onset(settled, ranks, stride, search):
     """At every call on one rank; two ranks call the same, and every sixth call shows that both hear of it."""
