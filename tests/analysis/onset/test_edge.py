@@ -1,11 +1,13 @@
 """Edges of a pair that has a third mode close by, and of one whose equilibrium jumps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
 from faultgouge.analysis.onset import Family, Limits, LostPairError, Modes, Pair
-from faultgouge.analysis.onset.edge import edge_from_inside, locate, sign_change
+from faultgouge.analysis.onset.edge import edge_from_inside, load_error, locate, sign_change
 from faultgouge.analysis.onset.pair import continued
 
 BASIS = np.eye(12) + 0.1 * np.random.default_rng(2).normal(size=(12, 12))
@@ -97,3 +99,9 @@ def test_a_jump_is_no_root():
     assert not jump.smooth
     assert abs(jump.fx - 0.3) <= jump.error < 1e-9
     assert jump.loads[0] <= 0.3 < jump.loads[1]
+
+
+def test_what_is_out_of_balance_is_the_load_by_which_it_is_off(ramp):
+    packing = ramp(1.0, 1e-3, 22)(0.02)
+    assert load_error(packing) < 1e-9
+    assert load_error(replace(packing, fx=packing.fx + 1e-6)) == pytest.approx(1e-6, rel=1e-3)
