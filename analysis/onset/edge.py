@@ -126,7 +126,10 @@ class Window:
 
 
 def load_error(packing: Packing) -> float:
-    """r / n^(1/2) of a residual r with n top disks, force: what is out of balance by r is exact at other loads."""
+    """r / n^(1/2) of a residual r with n top disks, force per disk: what is out of balance is exact at another load.
+
+    Rounding leaves forces of r or less at random on the disks, and their mean over n disks is that of a load.
+    """
     return packing.residual / float(np.sqrt(max(1, packing.top.sum())))
 
 
