@@ -17,8 +17,8 @@ from faultgouge.analysis import dynamical_matrix, eigenvalues
 from faultgouge.studies.modes.compute import ALL, Counted
 from faultgouge.studies.modes.sliced import sliced
 
-PACKINGS = {1000: 5, 3000: 5, 10_000: 2}
-LOADS = {1000: (0.03, 0.1), 3000: (0.03, 0.1), 10_000: (0.01, 0.03, 0.06)}
+PACKINGS = {1000: 5, 3000: 5, 10_000: 1}
+LOADS = {1000: (0.03, 0.1), 3000: (0.01, 0.03, 0.1), 10_000: (0.01, 0.03)}
 
 
 def rows(disks: int, seed: int) -> Iterator[dict[str, Any]]:

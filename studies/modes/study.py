@@ -20,7 +20,7 @@ from .draw import PlaneFilm, over_load, plane
 from .numbers import along
 from .tables import Table
 
-COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q")
+COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q", "pairs_error")
 
 PANELS = 4
 """Loads whose frequencies are drawn side by side."""

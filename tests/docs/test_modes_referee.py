@@ -53,21 +53,40 @@ def test_counts_in_slices_are_within_their_errors():
     assert max(off) < float(stated[1]) / 100 < 1.2 * max(off)
 
 
-def test_shares_of_3000_disks_are_those_that_the_law_of_smaller_packings_tells():
-    smaller = [json.loads(line) for line in (DOCS / "tables" / "force_1000.jsonl").read_text().splitlines()]
-    for load in (0.03, 0.1):
-        at, told = load * 3**0.53, []
-        for row in smaller:
-            loads, shares = zip(*((each["fx_over_fy"], each["share"]) for each in row["loads"]), strict=True)
-            if loads[-1] >= at:
-                told.append(np.interp(at, loads, shares))
-        words = f"{np.median(told):.2f} ({min(told):.2f} to {max(told):.2f}, {len(told)} packings)"
-        assert words in " ".join(PAGE.split())
-        for row in rows("slices_3000.jsonl"):
-            if row["fx_over_fy"] == load:
-                share, error = 2 * row["sliced"] / row["modes"], 2 * row["error"] / row["modes"]
-                assert min(told) - error <= share <= max(told) + error
-                assert f"| {load:g} | {row['sliced']} ± {row['error']} | {row['modes']} | {share:.2f} |" in PAGE
+def shares_told(load, ratio, power=0.53):
+    """Shares of packings of 1,000 disks at the load that the law of sizes names for packings `ratio` times larger."""
+    found = []
+    for line in (DOCS / "tables" / "force_1000.jsonl").read_text().splitlines():
+        loads, shares = zip(*((each["fx_over_fy"], each["share"]) for each in json.loads(line)["loads"]), strict=True)
+        if loads[-1] >= load * ratio**power:
+            found.append(np.interp(load * ratio**power, loads, shares))
+    return found
+
+
+def test_shares_of_larger_packings_are_those_that_the_law_of_smaller_ones_tells():
+    def words(shares):
+        spread = f" ({min(shares):.2f} to {max(shares):.2f}, {len(shares)} packings)" if len(shares) > 1 else ""
+        return f"{np.median(shares):.2f}{spread}"
+
+    counted = {}
+    for row in rows("slices_large.jsonl"):
+        share = 2 * row["sliced"] / row["modes"]
+        counted.setdefault((row["disks"], row["fx_over_fy"]), []).append(share)
+        cells = f"{row['disks']} | {row['seed']} | {row['fx_over_fy']:g} | {row['sliced']} ± {row['error']}"
+        assert f"| {cells} | {row['modes']} | {share:.2f} | {row['growth_rate_sliced']:.3g} |" in PAGE
+    for (disks, load), shares in counted.items():
+        told, at = shares_told(load, disks / 1000), load * (disks / 1000) ** 0.53
+        probability = mannwhitneyu(shares, told).pvalue
+        assert probability > 0.05
+        cells = f"{disks} | {load:g} | {at:.3f} | {words(told)} | {words(shares)}"
+        assert f"| {cells} | {f'{probability:.2f}' if len(shares) > 1 else '-'} |" in PAGE
+
+
+def test_powers_that_a_rank_test_leaves():
+    shares = [2 * row["sliced"] / row["modes"] for row in rows("slices_large.jsonl") if row["fx_over_fy"] == 0.03]
+    shares = shares[:4]  # of 3,000 disks
+    left = [k / 100 for k in range(120) if mannwhitneyu(shares, shares_told(0.03, 3, k / 100)).pvalue >= 0.05]
+    assert f"at 0.03 from {min(left):.2f} to {max(left):.2f}" in " ".join(PAGE.split())
 
 
 def test_packings_that_bear_more_are_no_others_from_the_start():

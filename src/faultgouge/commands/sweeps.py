@@ -143,7 +143,7 @@ def modes(
     if is_root():
         _show_modes(result["rows"])
         failed = [each["says"] for each in result["packings"] if each["says"] is not None]
-        say(f"{len(result['packings'])} packings, {len(failed)} of them failed; written: {output}/modes.json")
+        say(f"packings: {len(result['packings'])}, failed: {len(failed)}; written: {output}/modes.json")
         for sentence in failed[:1]:
             say(f"the first that failed: {sentence}")
 
@@ -154,7 +154,8 @@ def _show_modes(rows: list[dict[str, Any]]) -> None:
     lines = []
     for row in first:
         least = "" if row["least_q"] is None else f"{row['least_q']:.4g}"
-        numbers = f"{row['pairs']}", f"{row['share']:.3f}", f"{row['growth_rate']:.4g}", least
+        pairs = f"{row['pairs']} ± {row['pairs_error']}" if row.get("pairs_error") else f"{row['pairs']}"
+        numbers = pairs, f"{row['share']:.3f}", f"{row['growth_rate']:.4g}", least
         lines.append((f"{row['fx_over_fy']:g}", *numbers))
     if lines:
         show_table(("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q"), lines)
