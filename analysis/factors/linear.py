@@ -28,10 +28,9 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..operators.stiffness import SIGNS
+from ..packing.packing import Floats, Indices
 from .sparse_lu import Factors, SingularMatrixError, minimum_degree, symmetric_lu
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 ACCURATE = 1e-2

@@ -25,7 +25,7 @@ from typing import TextIO
 
 import numpy as np
 
-from ..packing.compensated import normalized
+from ..packing.compensated import exact_sum
 from ..packing.contacts import FLOOR, Contacts
 from ..packing.geometry import nearest_image
 from ..packing.law import MindlinLaw
@@ -169,7 +169,7 @@ def _places(disk: Mapping[str, Floats]) -> tuple[Floats, Floats | None]:
     position = np.column_stack([disk["x"], disk["y"]])
     if "x_low" not in disk:
         return position, None
-    return normalized(position, np.column_stack([disk["x_low"], disk["y_low"]]))
+    return exact_sum(position, np.column_stack([disk["x_low"], disk["y_low"]]))
 
 
 def _numbers(ids: Floats, partners: Floats, disks: Path, contacts: Path) -> Indices:

@@ -9,6 +9,7 @@ its length. One flipped byte anywhere is then noticed. HDF5 looks for its superb
 import hashlib
 import json
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from ..errors import OutputError, PackingFileError
@@ -49,12 +50,12 @@ def write_whole(path: Path, *parts: bytes) -> None:
         with part.open("wb") as stream:
             stream.writelines(parts)
         os.replace(part, target)
-    except OSError as error:
-        _remove(part)
+    except BaseException as error:
+        with suppress(OSError):  # a folder that does not exist, or may not be written to, has no part
+            part.unlink(missing_ok=True)
+        if not isinstance(error, OSError):
+            raise
         raise OutputError(f"{path} cannot be written: {error.strerror}; what it held before is kept.") from error
-    except BaseException:
-        _remove(part)
-        raise
 
 
 def write_text(path: Path, text: str) -> None:
@@ -126,10 +127,3 @@ def is_sealed(path: Path) -> bool:
 def _header(digest: str, size: int) -> bytes:
     words = MAGIC + f"sha256 {digest}\nbytes {size}\nHDF5 from byte {HEADER_SIZE} on\n".encode()
     return words.ljust(HEADER_SIZE - 1) + b"\n"
-
-
-def _remove(part: Path) -> None:
-    try:
-        part.unlink(missing_ok=True)
-    except OSError:  # a folder that does not exist, or may not be written to: then there is no part
-        return

@@ -68,14 +68,14 @@ class ImpulseResponse:
 
     def transfer(self, omega: ArrayLike) -> Complexes:
         """H(omega): amplitude and phase of the stationary velocity under the force cos(omega t), of omega's shape."""
-        quotient = self.weight / self._detuning(self._off_resonance(omega)[..., None])
+        quotient = self.weight / (1j * self._off_resonance(omega)[..., None] - self.rate)
         return np.sum(quotient, axis=-1)
 
     def velocity(self, omega: float, time: ArrayLike) -> Floats:
         """v(t) under the force cos(omega t) from rest at t = 0, shape of `time`."""
         t = np.asarray(time, dtype=np.float64)
         apart = float(self._off_resonance(omega))
-        part = self.weight / self._detuning(np.array([apart]))
+        part = self.weight / (1j * apart - self.rate)
         return np.real(np.exp(1j * apart * t) * part.sum() - np.exp(np.multiply.outer(t, self.rate)) @ part)
 
     def largest(self, omega: ArrayLike, duration: float) -> tuple[Floats, Floats]:
@@ -96,7 +96,7 @@ class ImpulseResponse:
         fastest = max(np.abs(self.rate.imag).max(), omegas.max())
         count = int(np.ceil(duration * fastest / (2 * np.pi) * A_PERIOD)) + 1
         step = duration / (count - 1)
-        part = (self.weight / self._detuning(omegas[:, None])).T
+        part = (self.weight / (1j * omegas[:, None] - self.rate)).T
         stationary = part.sum(axis=0)
         largest, where = np.zeros((2, len(omegas)))
         motion = np.exp(np.multiply.outer(step * np.arange(min(CHUNK, count)), self.rate))
@@ -113,9 +113,6 @@ class ImpulseResponse:
             v = np.abs(self.velocity(float(each), near))
             where[k], largest[k] = near[v.argmax()], v.max()
         return largest, where
-
-    def _detuning(self, omega: Floats) -> Complexes:
-        return 1j * omega - self.rate
 
     def _off_resonance(self, omega: ArrayLike) -> Floats:
         """The frequencies, each moved by a few `RESONANT` if it is that of a motion."""

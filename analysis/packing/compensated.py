@@ -12,9 +12,10 @@ an error kept are pairs of arrays, (high, low), and stand for their sum.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from .arrays import Floats
+
 Pair = tuple[Floats, Floats]
 
 SPLITTER = 2.0**27 + 1
@@ -22,7 +23,7 @@ SPLITTER = 2.0**27 + 1
 
 
 def exact_sum(a: ArrayLike, b: ArrayLike) -> Pair:
-    """The sum of two doubles and its rounding error."""
+    """The sum of two doubles and its rounding error; of a pair, its sum with the closest double as the high part."""
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     total = a + b
     part = total - a
@@ -37,12 +38,6 @@ def exact_product(a: ArrayLike, b: ArrayLike) -> Pair:
     b_high = SPLITTER * b - (SPLITTER * b - b)
     a_low, b_low = a - a_high, b - b_high
     return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
-
-
-def normalized(high: Floats, low: Floats) -> Pair:
-    """The same sum with the closest double as its high part."""
-    total, error = exact_sum(high, low)
-    return total, error
 
 
 def separation(
@@ -76,7 +71,7 @@ def separation(
         error = error + low
     if other_low is not None:
         error = error - other_low
-    return normalized(difference, error)
+    return exact_sum(difference, error)
 
 
 def overlap_and_distance(branch: Pair, reach: Pair) -> tuple[Pair, Floats]:
@@ -104,7 +99,7 @@ def overlap_and_distance(branch: Pair, reach: Pair) -> tuple[Pair, Floats]:
         total, more = exact_sum(gap[0], -square)
         gap = total, gap[1] + (more - error)
     cross = 2 * c * c_low - 2 * np.sum(high * low, axis=1)
-    gap = normalized(gap[0], gap[1] + (cross + (c_low * c_low - np.sum(low * low, axis=1))))
+    gap = exact_sum(gap[0], gap[1] + (cross + (c_low * c_low - np.sum(low * low, axis=1))))
     overlap = gap[0] / (c + distance)
     # gap = overlap (2 c - overlap): what the approximation lacks
     other, other_low = exact_sum(2 * c, -overlap)
@@ -112,4 +107,4 @@ def overlap_and_distance(branch: Pair, reach: Pair) -> tuple[Pair, Floats]:
     lacks = (gap[0] - product) + (gap[1] - error) - overlap * (other_low + 2 * c_low)
     with np.errstate(divide="ignore", invalid="ignore"):
         correction = np.where(distance > 0, lacks / (2 * distance), 0.0)
-    return normalized(overlap, correction), distance
+    return exact_sum(overlap, correction), distance

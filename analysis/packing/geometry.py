@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from .arrays import Floats, floats
-from .compensated import Pair, exact_sum, normalized, overlap_and_distance, separation
+from .compensated import Pair, exact_sum, overlap_and_distance, separation
 from .contacts import FLOOR, Contacts
 
 
@@ -57,7 +57,7 @@ def measured(
     overlap, distance = overlap_and_distance(branch, reach)
     distance[floor] = branch[0][floor, 1]  # signed: a centre below the floor is pushed up all the same
     height = exact_sum(radius[i[floor]], -distance[floor])
-    overlap[0][floor], overlap[1][floor] = normalized(height[0], height[1] - branch[1][floor, 1])
+    overlap[0][floor], overlap[1][floor] = exact_sum(height[0], height[1] - branch[1][floor, 1])
     if np.any(distance[~floor] == 0):
         k = np.flatnonzero(~floor & (distance == 0))[0]
         raise ValueError(f"Disks {i[k]} and {j[k]} have the same centre, so that their contact has no direction.")

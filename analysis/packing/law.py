@@ -94,11 +94,9 @@ from math import isfinite, prod
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .arrays import settle
-
-Floats = NDArray[np.float64]
+from .arrays import Floats, settle
 
 AT_THE_BOUND = 1 - 1e-8
 """Share of its limit from which on a slip is at Coulomb's bound. A slip that LAMMPS has clamped differs from the limit
@@ -257,7 +255,8 @@ class MindlinLaw:
             f_t = -kt overlap^(p-1) (1 + x - x^2) slip: it opposes the slip.
         """
         overlap = _closed(overlap)
-        slip, x = self._reduced(overlap, slip)
+        slip = self.clamped(overlap, slip)
+        x = _ratio(np.abs(slip), self.slip_limit(overlap))
         return -self.kt * self._powers(overlap)[0] * (1 + x - x * x) * slip
 
     def _overlap_factor(self, x: Floats, parting: ArrayLike) -> Floats:
@@ -328,11 +327,6 @@ class MindlinLaw:
         """overlap^(p-1) and overlap^(2-p) of overlaps that are not negative."""
         growth = self.growth(overlap)
         return growth, overlap if self.exponent == 1 else growth
-
-    def _reduced(self, overlap: Floats, slip: ArrayLike) -> tuple[Floats, Floats]:
-        """The slip within its bound and x = |slip| / t*."""
-        slip = self.clamped(overlap, slip)
-        return slip, _ratio(np.abs(slip), self.slip_limit(overlap))
 
 
 def _closed(overlap: ArrayLike) -> Floats:

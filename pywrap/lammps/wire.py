@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing, touching
-from ...analysis.packing.compensated import normalized
+from ...analysis.packing.compensated import exact_sum
 from .contact_graph import ContactGraph
 from .contact_rows import ContactRows
 from .decks import Decks
@@ -171,4 +171,4 @@ class Wire:
     @staticmethod
     def _split(state: Floats, low: Floats | None) -> tuple[Floats, Floats | None]:
         """Coordinates and their low parts, if there are any, as packings have them."""
-        return (state[:, POSITION], None) if low is None else normalized(state[:, POSITION], low[:, :2])
+        return (state[:, POSITION], None) if low is None else exact_sum(state[:, POSITION], low[:, :2])

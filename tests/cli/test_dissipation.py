@@ -21,6 +21,7 @@ def _scene(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_spectrum_says_how_far_a_stable_packing_moves(faultgouge, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE.replace(f'file = "{REFERENCE}"', "disks = 30\nseed = 4"))
     faultgouge("ramp", "scene.toml")

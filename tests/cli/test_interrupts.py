@@ -229,6 +229,7 @@ def test_what_a_library_ends_is_said(tmp_path, ends, code, says):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_the_work_ends_with_its_guard_and_goes_on_to_the_bit(faultgouge, tmp_path):
     (tmp_path / "scene.toml").write_text(LAYER + toml({"ramp": {"step": 1e-3, "until": 0.024}}))
     killed, command = tmp_path / "killed.h5", [BIN / "faultgouge", "ramp", "scene.toml", "-o", "killed.h5"]

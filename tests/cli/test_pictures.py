@@ -18,7 +18,7 @@ else:
     import tomli as tomllib
 
 
-@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+@pytest.mark.parametrize("suffix", ["png", *(pytest.param(s, marks=pytest.mark.long) for s in ("svg", "pdf"))])
 @pytest.mark.slow
 def test_a_packing(beyond, suffix, faultgouge_in):
     done = faultgouge_in(beyond, "draw", "ramp.h5", "--frame", "2", "-o", f"packing.{suffix}")
@@ -27,6 +27,7 @@ def test_a_packing(beyond, suffix, faultgouge_in):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_the_pair_before_and_after_the_onset(beyond, faultgouge_in):
     before = faultgouge_in(beyond, "draw", "ramp.h5", "--frame", "3", "--mode", "pair", "-o", "before.png")
     assert len(re.findall(r"mode \d+: lambda = [\d.]+, participation", before.stderr)) == 2

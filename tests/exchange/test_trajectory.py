@@ -91,6 +91,7 @@ def test_a_universe_of_the_file_has_radii_masses_and_layer(run):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_d_of_t_in_mdanalysis_is_that_of_the_run(run):
     import MDAnalysis
 
