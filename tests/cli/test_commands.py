@@ -55,6 +55,7 @@ def test_ramp_as_json(faultgouge, tmp_path):
         assert json.loads(file.attributes["scene"])["ramp"]["until"] == 4e-3
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_a_ramp_says_which_way_it_took(faultgouge, tmp_path):
     """Of this packing, halved increments end before 0.0785; the same command again reads the way from the file."""
