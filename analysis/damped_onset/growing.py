@@ -11,17 +11,14 @@ is not recognised, is divided, up to `DEPTH` times.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import csr_array
 
-from ..errors import FaultgougeError, NoEquilibriumError
-from ..onset.edge import LostPairError, track
+from ..errors import NoEquilibriumError
+from ..onset.edge import LostPairError, LostTrackError, track
 from ..onset.modes import matched
-from ..onset.walk import Oracle, between, walk
+from ..onset.walk import between, walk
 from .edge import Crossing, DampedWindow, solved, window_of
 from .modes import DampedMode, DampedModes, Pencil
 from .screening import Cluster, Screen
@@ -45,109 +42,52 @@ BEYOND = 0.05
 increment where modes begin to grow. What grows there is looked at with the operator, too."""
 
 
-class LostTrackError(FaultgougeError):
-    """The motions that grow at a load are not those that were known to."""
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """A load, the pencil there, and all of its modes as soon as somebody asks for them."""
-
-    pencil: Pencil
-
-    @property
-    def fx(self) -> float:
-        return self.pencil.fx
-
-    @property
-    def matrix(self) -> csr_array:
-        """A."""
-        return self.pencil.stiffness
-
-    @property
-    def matrices(self) -> tuple[csr_array, csr_array]:
-        """A and G."""
-        return self.pencil.stiffness, self.pencil.damping
-
-    @cached_property
-    def modes(self) -> DampedModes:
-        """All modes, by LAPACK."""
-        return DampedModes.of(self.pencil)
-
-
-Crossings = dict[tuple[int, int], Crossing]
-"""Where modes, by their numbers at both ends of an increment, cross the axis."""
-
 Open = list[tuple[DampedMode, Crossing]]
 """Modes that grow at a load, and where each has begun to."""
 
 
-@dataclass(frozen=True, eq=False)
-class Followed:
-    """An increment of which the few modes that grow were followed: those that do at its end, and the windows closed."""
+Course = tuple[Open, list[DampedWindow]]
+"""An increment: the modes that grow at its end, and the windows that end on it."""
 
-    open: Open
-    closed: list[DampedWindow]
-
-
-Announced = Followed | float | None
+Announced = Course | float | None
 """What the few modes do, or a load at which more is to be seen of them, or neither."""
-
-Sure = Followed | tuple[Step, Crossings]
-"""What is known of an increment."""
 
 
 class Growing:
-    """The oracle of growing motion; it is sure of a step and its crossings, or of the few modes that were followed."""
+    """The oracle of growing motion; it is sure of the course of an increment."""
 
     finished = False
 
     def __init__(self, pencil: Callable[[float], Pencil], narrowest: float, screen: Screen | None) -> None:
-        self.pencil, self.narrowest, self.screen = pencil, narrowest, screen
+        self.at, self.narrowest, self.screen = pencil, narrowest, screen
         self.open: Open | None = None  # at the load reached so far
         self.closed: list[DampedWindow] = []
 
-    def at(self, fx: float) -> Place:
-        """The pencil at a load."""
-        return Place(self.pencil(fx))
-
-    def over(self, here: Place, there: Place) -> None:
-        """Walk over an increment."""
-        oracle: Oracle[Place, Announced, Sure] = self
-        walk(oracle, [here, there])
-
-    @property
-    def onsets(self) -> list[Crossing]:
-        """Where the windows begin that are open."""
-        return [onset for _, onset in self.open or []]
-
     def windows(self) -> tuple[DampedWindow, ...]:
         """All windows by increasing onset."""
-        still = [window_of(onset, None) for onset in self.onsets]
+        still = [window_of(onset, None) for _, onset in self.open or []]
         return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
 
     # A few modes
 
-    def candidates(self, places: Sequence[Place], depth: int) -> Iterator[Announced]:
+    def candidates(self, places: Sequence[Pencil], depth: int) -> Iterator[Announced]:
         """What the few modes do that may grow, or where to look for that; None where all modes have to tell."""
         for here, there in pairwise(places):
-            few = self.screen is not None and depth <= DEPTH
-            clusters = self.screen(here.pencil, there.pencil) if self.screen is not None and few else None
+            clusters = self.screen(here, there) if self.screen and depth <= DEPTH else None
             if self.open is None:  # where no mode is a suspect, none grows
                 self.open = [] if clusters == [] else self.started(here)
-            most = max(1, MOST * here.pencil.stiffness.shape[0] ** 2) / 2**depth
+            most = max(1, MOST * here.stiffness.shape[0] ** 2) / 2**depth
             if clusters is not None and len(clusters) > most:
                 clusters = None
-            course = None if clusters is None else self.followed(clusters, here.pencil, there.pencil)
+            course = None if clusters is None else self.followed(clusters, here, there)
             yield None if depth == DEPTH and isinstance(course, float) else course
 
-    def started(self, here: Place) -> Open:
+    def started(self, here: Pencil) -> Open:
         """The modes that grow at the smallest load."""
-        modes = here.modes
-        rates = [(int(k), float(modes.rates[k].imag)) for k in modes.growing]
-        return [(modes.mode(k), Crossing(here.fx, 0.0, frequency, "start")) for k, frequency in rates]
+        growing = [here.modes.mode(k) for k in here.modes.growing]
+        return [(mode, Crossing(here.fx, 0.0, mode.rate.imag, "start")) for mode in growing]
 
-    def followed(self, clusters: list[Cluster], here: Pencil, there: Pencil) -> Followed | float:
+    def followed(self, clusters: list[Cluster], here: Pencil, there: Pencil) -> Course | float:
         """The modes that grow at either load, solved for; else a load in between, at which more is to be seen."""
         before, middle = self.open or [], 0.5 * (here.fx + there.fx)
         announced = [announcement(cluster, here.fx, there.fx) for cluster in clusters]
@@ -180,13 +120,15 @@ class Growing:
             if begin is None:
                 return middle
             now.append((mode, begin))
-        return Followed(now, closed)
+        return now, closed
 
     # All modes
 
-    def confirm(self, candidates: Announced, here: Place, there: Place, depth: int) -> tuple[Sure | None, list[Place]]:
+    def confirm(
+        self, candidates: Announced, here: Pencil, there: Pencil, depth: int
+    ) -> tuple[Course | None, list[Pencil]]:
         """What the few modes do, else the crossings of all, once nothing can hide in the increment any more."""
-        if isinstance(candidates, Followed):
+        if isinstance(candidates, tuple):
             return candidates, []
         if candidates is not None:
             divide = between(self.at, here.fx, candidates, there.fx)
@@ -196,7 +138,7 @@ class Growing:
         middle = 0.5 * (here.fx + there.fx)
         divisible = there.fx - here.fx > self.narrowest
         look = None if not divisible else middle if step.lost else self.unclear(step)
-        crossings: Crossings = {}
+        crossings: dict[tuple[int, int], Crossing] = {}
         for pair in [] if look is not None else step.edges:
             crossing = self.crossing(here.modes.mode(pair[0]), there.modes.mode(pair[1]))
             if crossing is not None:
@@ -205,7 +147,7 @@ class Growing:
                 look = middle
                 break
         divide = [] if look is None else between(self.at, here.fx, look, there.fx)
-        return (None if divide else (step, crossings)), divide
+        return (None if divide else self.carried(step, crossings)), divide
 
     def unclear(self, step: Step) -> float | None:
         """A load at which all modes have to be looked at, as a pair grows there or cannot be followed; else None."""
@@ -226,7 +168,7 @@ class Growing:
             return None
         fx = here[0].fx + float(at) * span
         try:
-            pencil = self.pencil(fx)
+            pencil = self.at(fx)
         except NoEquilibriumError:
             return fx
         found = [mode.at(pencil) for mode in (here if at < 0.5 else there)]
@@ -242,7 +184,7 @@ class Growing:
         """Where a mode crosses the axis between two loads; None if it cannot be followed or jumps."""
 
         def follow(nearest: list[DampedMode], fx: float) -> DampedMode:
-            pencil = self.pencil(fx)
+            pencil = self.at(fx)
             for mode in nearest:
                 found = mode.at(pencil)
                 if found is not None:
@@ -254,33 +196,28 @@ class Growing:
         except (LostPairError, NoEquilibriumError):
             return None
 
-    def record(self, sure: Sure) -> None:
-        """Carry the windows over an increment.
+    def carried(self, step: Step, crossings: dict[tuple[int, int], Crossing]) -> Course:
+        """The open windows over an increment, by where modes, by their numbers at both ends, cross the axis.
 
         Raises
         ------
         LostTrackError
             If the modes that grow at its beginning are not those of the open windows.
         """
-        if isinstance(sure, Followed):
-            self.open = sure.open
-            self.closed += sure.closed
-            return
-        step, crossings = sure
-        onsets = self._numbered(step.here)
         growing = set(step.there.growing.tolist())
         now: dict[int, Crossing] = {}
-        for k, onset in onsets.items():
+        closed: list[DampedWindow] = []
+        for k, onset in self._numbered(step.here).items():
             image = int(step.forward[k])
             if image in growing:
                 now[image] = onset
             else:
-                self.closed.append(window_of(onset, crossings.get((k, image)) or _halfway(step, step.here, k)))
+                closed.append(window_of(onset, crossings.get((k, image)) or _halfway(step, step.here, k)))
         for image in growing - set(now):
             before = np.flatnonzero(step.forward == image)
             known = crossings.get((int(before[0]), image)) if len(before) else None
             now[image] = known or _halfway(step, step.there, image)
-        self.open = [(step.there.mode(k), onset) for k, onset in now.items()]
+        return [(step.there.mode(k), onset) for k, onset in now.items()], closed
 
     def _numbered(self, here: DampedModes) -> dict[int, Crossing]:
         """The onsets of the open windows by the numbers of their modes."""
@@ -292,6 +229,11 @@ class Growing:
         )
         places = matched(1 / (distances + np.finfo(float).tiny))
         return {int(here.growing[place]): onset for place, (_, onset) in zip(places, known, strict=True)}
+
+    def record(self, sure: Course) -> None:
+        """Take down the course of an increment."""
+        self.open, closed = sure
+        self.closed += closed
 
 
 def announcement(cluster: Cluster, below: float, above: float) -> list[DampedMode] | float:
@@ -306,11 +248,11 @@ def announcement(cluster: Cluster, below: float, above: float) -> list[DampedMod
     return [cluster.lifted(mode) for mode in nearly_growing(cluster, there.modes)]
 
 
-def searched(cluster: Cluster, below: float, above: float) -> tuple[Growing, Place]:
+def searched(cluster: Cluster, below: float, above: float) -> tuple[Growing, Pencil]:
     """The oracle of a cluster after its walk from one load to another, and the place there."""
     oracle = Growing(cluster.pencil, CLUSTER * (above - below), None)
     here, there = oracle.at(below), oracle.at(above)
-    oracle.over(here, there)
+    walk(oracle, [here, there])
     return oracle, there
 
 

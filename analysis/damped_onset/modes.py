@@ -77,10 +77,22 @@ class Pencil:
         a, g = (mass_weighted(each(bearing), bearing) for each in (stiffness_matrix, damping_matrix))
         return cls(packing.fx, a, g, load_error(packing))
 
+    @property
+    def matrices(self) -> tuple[csr_array, csr_array]:
+        """All that describes it."""
+        return self.stiffness, self.damping
+
+    @cached_property
+    def modes(self) -> "DampedModes":
+        """All modes, by LAPACK."""
+        return DampedModes.of(self)
+
     def towards(self, other: "Pencil", share: float) -> "Pencil":
         """The pencil at a share of the straight line to another one."""
-        pairs = (self.stiffness, other.stiffness), (self.damping, other.damping)
-        a, g = (csr_array((1 - share) * one + share * another) for one, another in pairs)
+        a, g = (
+            csr_array((1 - share) * one + share * another)
+            for one, another in zip(self.matrices, other.matrices, strict=True)
+        )
         return Pencil((1 - share) * self.fx + share * other.fx, a, g, max(self.balance, other.balance))
 
     @cached_property

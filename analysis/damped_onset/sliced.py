@@ -18,7 +18,7 @@ import numpy as np
 from scipy.sparse.linalg import ArpackError
 
 from ..onset.basis import Basis, Levels
-from ..onset.edge import DoubtError, LostPairError, track
+from ..onset.edge import DoubtError, LostPairError, LostTrackError, track
 from ..onset.found import Border, Candidate, Found
 from ..onset.limits import LIMITS, Limits
 from ..onset.ranks import ALONE, Ranks
@@ -26,7 +26,7 @@ from ..onset.sliced import Increments, Sliced, Watch, first_along
 from ..packing.packing import Floats
 from ..spectrum.spectrum import active_coordinates
 from .edge import Crossing, DampedWindow, solved, window_of
-from .growing import LostTrackError, Place, nearly_growing, searched
+from .growing import nearly_growing, searched
 from .modes import DampedMode, Pencil, growing_near
 from .screening import Cluster, Reduced, changed, clusters, cores_of, may_grow, reduced
 
@@ -79,10 +79,10 @@ def first_growing(
     tuple of (float, float)
         Increments on which clusters announce a growing mode that the operator was not seen to have.
     """
-    return first_along(SlicedGrowing(lambda fx: Place(pencil(fx)), None, watch, ranks, folder, limits), loads)
+    return first_along(SlicedGrowing(pencil, None, watch, ranks, folder, limits), loads)
 
 
-class SlicedGrowing(Sliced[Place, DampedWindow]):
+class SlicedGrowing(Sliced[Pencil, DampedWindow]):
     """The oracle of growing motion."""
 
     _borne: Floats | None = None  # |A - A^T| up to which each mode of the spectrum is left out
@@ -90,13 +90,21 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
     _lost: float | None = None  # frequency of the motion that is in doubt
     _passing = False  # whether bases are not kept
 
+    @property
+    def off(self) -> float:
+        """Any distance: small differences of large couplings tell where weak dashpots begin to feed a mode.
+
+        So clusters know that a mode is about to grow, and not where. The operator follows all modes to there.
+        """
+        return np.inf
+
     def ahead(self, done: int) -> int:
         """More and more of them, as dissipation may put off the onset by much; each costs a tenth of the bases."""
         return min(done + 1, MOST_AHEAD)
 
     # What clusters announce
 
-    def candidates(self, places: Sequence[Place], depth: int) -> list[list[Candidate]]:
+    def candidates(self, places: Sequence[Pencil], depth: int) -> list[list[Candidate]]:
         """The modes that begin to grow in clusters of the slices that are looked at.
 
         Of parts of an increment, while bases pass by, these are the slices about the motion that is in doubt.
@@ -108,7 +116,7 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
             if about:
                 self.bases.narrow((about[0].modes[0], about[-1].modes[1]))
                 return super().candidates(places, depth)
-        count = len(active_coordinates(places[0].matrix))
+        count = len(active_coordinates(places[0].stiffness))
         if self._borne is None or len(self._borne) != count:
             self._borne = np.zeros(count)
         feed = max(antisymmetric(place) for place in places)
@@ -119,10 +127,10 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
             feed *= BEFOREHAND
         loud = np.flatnonzero(self._borne <= feed)
         self.bases.narrow((int(loud[0]), int(loud[-1]) + 1))
-        self._passing = not self.bases.keeps(places[0].matrix)
+        self._passing = not self.bases.keeps(places[0].stiffness)
         return super().candidates(places, depth)
 
-    def _found_by_all(self, places: Sequence[Place]) -> list[Found]:
+    def _found_by_all(self, places: Sequence[Pencil]) -> list[Found]:
         found = super()._found_by_all(places)
         self._borders = [each.border for each in found]
         if self._borne is not None:
@@ -130,33 +138,32 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
                 self._borne[slice(*each.border.modes)] = TRUSTED * each.bears
         return found
 
-    def _seen(self, basis: Basis, levels: Levels, places: Sequence[Place]) -> Found:
-        here, found = reduced(basis, levels, places[0].pencil), []
+    def _seen(self, basis: Basis, levels: Levels, places: Sequence[Pencil]) -> Found:
+        here, found = reduced(basis, levels, places[0]), []
         for before, after in pairwise(places):
-            there = changed(basis, before.pencil, here, after.pencil)
+            there = changed(basis, before, here, after)
             found.append(list(self._announced(basis, (before, here), (after, there))))
             here = there
         return Found(basis.border, found, here.bears * antisymmetric(places[-1]))
 
     def _announced(
-        self, basis: Basis, here: tuple[Place, Reduced], there: tuple[Place, Reduced]
+        self, basis: Basis, here: tuple[Pencil, Reduced], there: tuple[Pencil, Reduced]
     ) -> Iterator[Candidate]:
         """The modes of a basis that grow in their clusters, or nearly do so."""
         named = may_grow(here[1], there[1])
         cores = cores_of(named[(named >= basis.own.start) & (named < basis.own.stop)])
-        ends = (here[0].pencil, here[1]), (there[0].pencil, there[1])
-        for cluster in clusters(basis, *ends, cores):
+        for cluster in clusters(basis, here, there, cores):
             if not cluster.quiet:
                 yield from grown(cluster)
 
     # What the operator has
 
-    def _confirmed(self, candidate: Candidate, there: Place, first: DampedWindow | None) -> DampedWindow | None:
+    def _confirmed(self, candidate: Candidate, there: Pencil, first: DampedWindow | None) -> DampedWindow | None:
         self.watch(f"a motion that grows from about F_x = {candidate.onset:.6g}: its onset")
         place = there if candidate.inside == there.fx else self.at(candidate.inside)
-        guess = announced_by(candidate, place.pencil)
+        guess = announced_by(candidate, place)
         self._lost = guess.rate.imag
-        mode = guess.at(place.pencil, guess.rate)
+        mode = guess.at(place, guess.rate)
         announced = candidate.onset < there.fx  # else the mode nearly grows
         if mode is None and announced:
             mode = self._beside(guess, place, there)
@@ -164,25 +171,14 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
             mode = self._most(mode, there)
         if mode is None or not mode.growing or (first is not None and self._later(mode, first)):
             return None
-        above = followed(mode, there.pencil)
+        above = followed(mode, there)
         end = None if above.growing else self._edge(above, mode)
         for passed in reversed(self._passed):
-            below = followed(mode, passed.pencil)
+            below = followed(mode, passed)
             if not below.growing:
                 return window_of(self._edge(below, mode), end)
             mode = below
         return window_of(Crossing(mode.fx, 0.0, mode.rate.imag, "start"), end)
-
-    def _beyond(self, candidate: Candidate, first: DampedWindow, start: float) -> bool:
-        """Never: small differences of large couplings tell where weak dashpots begin to feed a mode.
-
-        So clusters, which know that a mode is about to grow, may be off by much in where. All are looked at.
-        """
-        return False
-
-    def _elsewhere(self, candidate: Candidate, window: DampedWindow, increment: float) -> bool:
-        """Never: the operator has followed the mode to where it begins to grow."""
-        return False
 
     def _edge(self, outside: DampedMode, inside: DampedMode) -> Crossing:
         """Where a mode begins or ends to grow between a load where it does not and one where it does.
@@ -198,66 +194,62 @@ class SlicedGrowing(Sliced[Place, DampedWindow]):
                     return solved(self._tracked(outside, inside), *sorted((outside.fx, inside.fx)))
                 except LostPairError:
                     pass
-            middle = followed(inside, self.at(0.5 * (outside.fx + inside.fx)).pencil)
+            middle = followed(inside, self.at(0.5 * (outside.fx + inside.fx)))
             outside, inside = (outside, middle) if middle.growing else (middle, inside)
         middle_fx, half = 0.5 * (outside.fx + inside.fx), 0.5 * abs(inside.fx - outside.fx)
         return Crossing(middle_fx, half, inside.rate.imag, "contact change")
 
     def _tracked(self, *known: DampedMode) -> Callable[[float], DampedMode]:
         """A mode at any load, from loads at which it is known."""
-        return track({mode.fx: mode for mode in known}, lambda near, fx: followed(near[0], self.at(fx).pencil))
+        return track({mode.fx: mode for mode in known}, lambda near, fx: followed(near[0], self.at(fx)))
 
     def _later(self, mode: DampedMode, first: DampedWindow) -> bool:
         """Whether a mode does not grow yet where the first window so far opens."""
         if mode.fx <= first.fx_onset:
             return False
-        return not followed(mode, self.at(first.fx_onset).pencil).growing
+        return not followed(mode, self.at(first.fx_onset)).growing
 
-    def _most(self, mode: DampedMode, there: Place) -> DampedMode | None:
-        """The mode where it grows on an increment; None if it is seen to lose energy on all of it."""
-        try:
-            return self._climbed(mode, there)
-        except LostPairError as error:  # nothing is lost but what a cluster has announced
-            raise DoubtError from error
-
-    def _beside(self, guess: DampedMode, *places: Place) -> DampedMode | None:
+    def _beside(self, guess: DampedMode, *places: Pencil) -> DampedMode | None:
         """A motion that grows at one of some loads, about the frequency at which one was announced; None if none does.
 
         Where contacts change, a cluster does not know the shapes of modes any more, and announces what there is not.
         """
         try:
             for place in places:
-                growing = growing_near(place.pencil, guess.rate.imag, NEAREST)
+                growing = growing_near(place, guess.rate.imag, NEAREST)
                 if growing:
                     return min(growing, key=lambda each: abs(each.rate - guess.rate))
         except ArpackError as error:
             raise DoubtError from error
         return None
 
-    def _climbed(self, mode: DampedMode, there: Place) -> DampedMode | None:
-        """The same, by parabolas through Re s; a LostPairError if the mode cannot be followed."""
+    def _most(self, mode: DampedMode, there: Pencil) -> DampedMode | None:
+        """The mode where it grows on an increment, by parabolas through Re s; None if it is seen to lose energy."""
         here = self._passed[-1]
-        ends = [followed(mode, place.pencil) for place in (here, there)]
-        at = self._tracked(mode, *ends)
-        known = {each.fx: each for each in (mode, *ends)}
-        if len(known) < 3:
-            middle = 0.5 * (here.fx + there.fx)
-            known[middle] = at(middle)
-        for _ in range(LOOKS):
-            best = max(known.values(), key=lambda each: each.rate.real)
-            if best.growing:
-                return best
-            fx = vertex(sorted(known.values(), key=lambda each: abs(each.fx - best.fx))[:3])
-            fx = float(np.clip(fx, here.fx, there.fx))
-            if min(abs(fx - load) for load in known) < SETTLED * (there.fx - here.fx):
-                return None
-            known[fx] = at(fx)
+        try:
+            ends = [followed(mode, place) for place in (here, there)]
+            at = self._tracked(mode, *ends)
+            known = {each.fx: each for each in (mode, *ends)}
+            if len(known) < 3:
+                middle = 0.5 * (here.fx + there.fx)
+                known[middle] = at(middle)
+            for _ in range(LOOKS):
+                best = max(known.values(), key=lambda each: each.rate.real)
+                if best.growing:
+                    return best
+                fx = vertex(sorted(known.values(), key=lambda each: abs(each.fx - best.fx))[:3])
+                fx = float(np.clip(fx, here.fx, there.fx))
+                if min(abs(fx - load) for load in known) < SETTLED * (there.fx - here.fx):
+                    return None
+                known[fx] = at(fx)
+        except LostPairError as error:  # nothing is lost but what a cluster has announced
+            raise DoubtError from error
         raise DoubtError
 
 
-def antisymmetric(place: Place) -> float:
+def antisymmetric(place: Pencil) -> float:
     """|A - A^T|, 1 / time^2: what feeds motion."""
-    return float(np.linalg.norm((place.matrix - place.matrix.T).data))
+    return float(np.linalg.norm((place.stiffness - place.stiffness.T).data))
 
 
 def grown(cluster: Cluster) -> Iterator[Candidate]:
@@ -266,7 +258,7 @@ def grown(cluster: Cluster) -> Iterator[Candidate]:
     try:
         oracle, there = searched(cluster, below, above)
     except LostTrackError:  # its windows are not told apart: what grows at its ends has to do
-        oracle, there = None, Place(cluster.pencil(above))
+        oracle, there = None, cluster.pencil(above)
     windows = () if oracle is None else oracle.windows()
     for window in windows:
         if oracle is not None and window.fx_end is not None and cluster.owns(window.frequency):

@@ -72,11 +72,6 @@ def imbalance(packing: Packing, pair: Pair) -> float:
     return float(np.trace(g) ** 2 * pair.discriminant - 4 * np.trace(n @ g) ** 2)
 
 
-def drag_excess(pair: Pair, drag_time: float) -> float:
-    """-D/4 - m/tau^2 of a pair, 1 / time^4: positive where it grows in spite of the drag."""
-    return -0.25 * pair.discriminant - pair.mean / drag_time**2
-
-
 def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, window: Window) -> WeakLimit | None:
     """The limit of the damped onset as the dissipation tends to zero, from one undamped pair.
 
@@ -148,7 +143,9 @@ def drag_onset(
     below = window.fx_onset
 
     def excess(fx: float) -> float:
-        return drag_excess(pair_at(fx), drag_time)
+        """-D/4 - m/tau^2, 1 / time^4: positive where the pair grows."""
+        pair = pair_at(fx)
+        return -0.25 * pair.discriminant - pair.mean / drag_time**2
 
     for above in [*loads[(loads > below) & (loads < last)], last]:
         if excess(float(above)) > 0:

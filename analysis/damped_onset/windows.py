@@ -27,11 +27,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import FaultgougeError, NoEquilibriumError
+from ..onset.edge import LostTrackError
 from ..onset.limits import LIMITS
-from ..onset.walk import increasing
+from ..onset.walk import increasing, walk
 from ..packing.packing import Floats, Packing
 from .edge import DampedWindow
-from .growing import Growing, LostTrackError
+from .growing import Growing
 from .modes import Pencil
 from .screening import Screen
 
@@ -133,7 +134,7 @@ def walked(
             if load in loads:
                 raise
             continue
-        oracle.over(here, there)
+        walk(oracle, [here, there])
         here, windows = there, oracle.windows()
         known(windows, here.fx)
         if first and windows:

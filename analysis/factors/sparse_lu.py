@@ -93,17 +93,12 @@ def symmetric_lu(
     SingularMatrixError
         If a pivot is zero.
     """
-    if mumps and uses_mumps(matrix.shape[0]):
+    if mumps and matrix.shape[0] >= MUMPS_FROM and _mumps() is not None:
         return MumpsFactors(matrix, symmetric)
     compiled = library() if ordered and symmetric and pivoting == 0 else None
     # where a pivot is zero SuperLU takes another one
     factors = SymmetricFactors.of(matrix, compiled) if compiled is not None else None
     return factors or SuperLUFactors(_superlu(matrix, "NATURAL" if ordered else "MMD_AT_PLUS_A", pivoting))
-
-
-def uses_mumps(size: int) -> bool:
-    """Whether a matrix of so many coordinates is one for MUMPS, and it is there."""
-    return size >= MUMPS_FROM and _mumps() is not None
 
 
 def minimum_degree(matrix: csc_array) -> Indices:

@@ -14,9 +14,8 @@ Stepping with ``expm`` of the first-order system would be as stable, but it take
 wanted, of a matrix of twice the size, and rounds in each of them.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,18 +39,21 @@ TOGETHER^NODES."""
 NODES = 16
 """Points on the circle."""
 
-Function = Callable[[Complexes, Floats], Any]
-"""(eigenvalues, times) -> a named tuple of arrays, entire in the eigenvalue."""
+Function = Callable[[Complexes, Floats], Sequence[Complexes]]
+"""(eigenvalues, times) -> some arrays, entire in the eigenvalue."""
+
+Reach = Callable[[complex, Floats], Floats]
+"""(eigenvalue, times) -> how far the eigenvalue may move while its motion grows by no more than a factor e."""
 
 
 def second_order(middle: complex, time: Floats) -> Floats:
-    """How far an eigenvalue lambda of x'' = -lambda x may move while its motion grows by no more than a factor e."""
+    """The reach of an eigenvalue lambda of x'' = -lambda x."""
     inverse = 1 / np.where(time > 0, time, 1.0)  # frequencies on this circle differ by 1/t from that of its centre
     return np.asarray(inverse * (2 * np.sqrt(abs(middle)) + inverse))
 
 
 def first_order(middle: complex, time: Floats) -> Floats:
-    """The same for an eigenvalue s of x' = s x."""
+    """The reach of an eigenvalue s of x' = s x."""
     return np.asarray(1 / np.where(time > 0, time, 1.0))
 
 
@@ -67,21 +69,26 @@ class Modes:
         Eigenvalues, 1 / time^2, in the order of the columns of X.
     blocks : dict of int to ndarray of complex, shape (2, 2)
         Upper triangular blocks of coalescing pairs, by the first of their two columns.
+    reach : callable
+        Radius of Cauchy's circle, `second_order` or `first_order`: what the eigenvalues are to a motion.
     """
 
     basis: Complexes
     inverse: Complexes
     values: Complexes
     blocks: dict[int, Complexes]
+    reach: Reach = second_order
 
     @classmethod
-    def of(cls, matrix: ArrayLike) -> "Modes":
+    def of(cls, matrix: ArrayLike, reach: Reach = second_order) -> "Modes":
         """Decompose a square matrix.
 
         Parameters
         ----------
         matrix : array_like, shape (n, n)
             A, real or complex, 1 / time^2.
+        reach : callable
+            `first_order` for the matrix of a first-order system, 1 / time.
 
         Returns
         -------
@@ -117,59 +124,44 @@ class Modes:
             values[done : done + 2] = np.diag(block)
             blocks[done] = block
             done += 2
-        return cls(basis, inverse, values, blocks)
+        return cls(basis, inverse, values, blocks, reach)
 
     def apply(
-        self,
-        function: Function,
-        time: Floats,
-        vector: Floats,
-        observed: Floats | None = None,
-        reach: Callable[[complex, Floats], Floats] = second_order,
-    ) -> Any:
+        self, function: Function, time: Floats, vector: Floats, observed: Floats | None = None
+    ) -> list[Complexes]:
         """f(A, t) b for every time.
 
         Parameters
         ----------
         function : callable
-            (lambda, t) -> named tuple of arrays, entire in lambda.
+            (lambda, t) -> some arrays, entire in lambda.
         time : ndarray, shape (T,)
             Times.
         vector : ndarray, shape (n,)
             b.
         observed : ndarray, shape (m, n), optional
             Only O f(A, t) b is wanted, which is cheaper; all n coordinates by default.
-        reach : callable
-            Radius of Cauchy's circle, `second_order` or `first_order`.
 
         Returns
         -------
-        named tuple
-            What function returns, with arrays of shape (T, m) or (T, n); real to rounding if A, b and O are.
+        list of ndarray, shape (T, m) or (T, n)
+            Of what the function returns; real to rounding if A, b and O are.
         """
         weight = self.inverse @ vector
-        motion = function(self.values, time[:, None])
-        parts = [part * weight for part in motion]
-        for column, cores in self._cores(function, time, reach):
+        parts = [part * weight for part in function(self.values, time[:, None])]
+        for column, cores in self._cores(function, time):
             pair = slice(column, column + 2)
             for part, core in zip(parts, cores, strict=True):
                 part[:, pair] = core @ weight[pair]
         basis = self.basis if observed is None else observed @ self.basis
-        return motion._make(part @ basis.T for part in parts)
+        return [part @ basis.T for part in parts]
 
-    def between(
-        self,
-        function: Function,
-        time: Floats,
-        left: Complexes,
-        right: Complexes,
-        reach: Callable[[complex, Floats], Floats] = second_order,
-    ) -> Complexes:
+    def between(self, function: Function, time: Floats, left: Complexes, right: Complexes) -> Complexes:
         """L F(t) R of f(A, t) = X F(t) X^(-1) for every time, shape (T, a, b).
 
         Parameters
         ----------
-        function, time, reach
+        function, time
             As of `apply`; of what the function returns, the first array is taken.
         left : ndarray, shape (a, n)
             L, a column for each column of X.
@@ -180,7 +172,7 @@ class Modes:
         for column in self.blocks:
             factor[:, column : column + 2] = 0.0
         found = (factor[:, None, :] * left) @ right
-        for column, cores in self._cores(function, time, reach):
+        for column, cores in self._cores(function, time):
             pair = slice(column, column + 2)
             found += left[:, pair] @ cores[0] @ right[pair]
         return np.asarray(found)
@@ -188,7 +180,7 @@ class Modes:
     def some(self, columns: Indices) -> "Modes":
         """Some of the columns of X and rows of its inverse, in ascending order, both of a pair or none."""
         blocks = {int(np.searchsorted(columns, k)): block for k, block in self.blocks.items() if k in columns}
-        return Modes(self.basis[:, columns], self.inverse[columns], self.values[columns], blocks)
+        return Modes(self.basis[:, columns], self.inverse[columns], self.values[columns], blocks, self.reach)
 
     def oscillating(self) -> "Modes":
         """The modes of the system (z, z')' = ((0, 1), (-A, 0)) (z, z'), which has the rates +-i sqrt(A)."""
@@ -208,25 +200,19 @@ class Modes:
             0.5 * inward,
             np.concatenate([root, -root]),
             blocks | {column + size: -block for column, block in blocks.items()},
+            first_order,
         )
 
-    def _cores(
-        self, function: Function, time: Floats, reach: Callable[[complex, Floats], Floats]
-    ) -> Iterator[tuple[int, list[Complexes]]]:
+    def _cores(self, function: Function, time: Floats) -> Iterator[tuple[int, list[Complexes]]]:
         """The functions of each 2 x 2 block, shape (T, 2, 2), by its first column."""
         unit = np.eye(2)
         for column, block in self.blocks.items():
             first, second = np.diag(block)
             traceless = block - 0.5 * (first + second) * unit
             mean = [0.5 * part for part in map(np.add, function(first, time), function(second, time))]
-            slope = _divided_difference(function, first, second, time, reach)
-            yield (
-                column,
-                [
-                    np.multiply.outer(a, unit) + np.multiply.outer(b, traceless)
-                    for a, b in zip(mean, slope, strict=True)
-                ],
-            )
+            slope = _divided_difference(function, first, second, time, self.reach(0.5 * (first + second), time))
+            parts = zip(mean, slope, strict=True)
+            yield column, [np.multiply.outer(a, unit) + np.multiply.outer(b, traceless) for a, b in parts]
 
 
 def _root(block: Complexes) -> Complexes:
@@ -253,15 +239,10 @@ def _split(
 
 
 def _divided_difference(
-    function: Function,
-    first: complex,
-    second: complex,
-    time: Floats,
-    reach: Callable[[complex, Floats], Floats],
+    function: Function, first: complex, second: complex, time: Floats, radius: Floats
 ) -> list[Complexes]:
-    """f[first, second] of all that the function returns, at every time."""
+    """f[first, second] of all that the function returns, at every time; with the radius of Cauchy's circle."""
     middle, half = 0.5 * (first + second), 0.5 * abs(first - second)
-    radius = reach(middle, time)
     offset = radius[:, None] * np.exp(2j * np.pi * np.arange(NODES) / NODES)
     near = half <= TOGETHER * radius
     safe = first - second if first != second else 1.0

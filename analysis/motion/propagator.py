@@ -1,7 +1,7 @@
 """The propagator of small motion by its modes, and where it is large (:mod:`.transient`)."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from scipy.linalg import eigh
@@ -10,7 +10,7 @@ from scipy.sparse.linalg import svds
 from ..errors import FaultgougeError
 from ..packing.packing import Floats, Indices, Packing
 from ..spectrum.spectrum import Complexes
-from .matrix_functions import WELL_CONDITIONED, Modes, first_order, second_order
+from .matrix_functions import WELL_CONDITIONED, Function, Modes, second_order
 from .oscillator import Oscillator
 from .response import LinearMotion
 from .state_space import released
@@ -79,8 +79,7 @@ class Propagator:
     modes: Modes
     outward: Complexes
     inward: Complexes
-    function: Any
-    reach: Any
+    function: Function
     twofold: bool = False
     """Whether each motion is the sum of two mirror images, of half its size."""
     mirrored: bool = False
@@ -93,23 +92,23 @@ class Propagator:
         root, size = system.root_mass, len(system.active)
         if not motion.dissipative and norm == "displacement":
             outward, inward = modes.basis / root[:, None], modes.inverse * root
-            return cls(modes, outward, inward, Oscillator().released, second_order)
+            return cls(modes, outward, inward, Oscillator().released)
         if not motion.dissipative:
             modes = modes.oscillating()
             outward = np.concatenate([system.weight @ modes.basis[:size], modes.basis[size:]])
             inward = np.concatenate([modes.inverse[:, :size] @ system.unweight, modes.inverse[:, size:]], axis=1)
-            return cls(modes, outward, inward, released, first_order, mirrored=True)
+            return cls(modes, outward, inward, released, mirrored=True)
         outward, inward = modes.basis, modes.inverse
         if norm == "displacement":
             outward = (system.unweight / root[:, None]) @ outward[:size]
             inward = inward[:, :size] @ (system.weight * root)
-        return cls(modes, outward, inward, released, first_order, norm == "displacement")
+        return cls(modes, outward, inward, released, norm == "displacement")
 
     @property
     def frequency(self) -> Floats:
         """Of each mode, radian / time."""
         values = self.modes.values
-        return np.abs(np.sqrt(values).real) if self.reach is second_order else np.abs(values.imag)
+        return np.abs(np.sqrt(values).real) if self.modes.reach is second_order else np.abs(values.imag)
 
     def kept(self) -> Indices:
         """The columns of the modes that are sampled: the most oblique ones, and pairs that are kept together."""
@@ -141,7 +140,7 @@ class Propagator:
 
     def end(self, bound: float) -> float:
         """A time beyond which the dissipation leaves no gain, time; inf without dissipation."""
-        slowest = 0.0 if self.reach is second_order else -float(self.modes.values.real.max(initial=-np.inf))
+        slowest = 0.0 if self.modes.reach is second_order else -float(self.modes.values.real.max(initial=-np.inf))
         return 0.5 * float(np.log(bound)) / slowest if slowest > 0 else np.inf
 
     def candidates(self, columns: Indices, window: float) -> list[tuple[float, float]]:
@@ -152,7 +151,7 @@ class Propagator:
         some, back = self.modes.some(columns), right.conj().T
         size = np.concatenate(
             [
-                np.linalg.norm(some.between(self.function, part, left, back, self.reach), 2, (1, 2))
+                np.linalg.norm(some.between(self.function, part, left, back), 2, (1, 2))
                 for part in np.array_split(time, len(time) // CHUNK + 1)
             ]
         )
@@ -178,7 +177,7 @@ class Propagator:
         """P(t), shape (T, a, b)."""
         first = np.arange(len(self.modes.values) // (1 + self.mirrored))
         modes, outward, inward = self.modes.some(first), self.outward[:, first], self.inward[first]
-        part = modes.between(self.function, time, outward, inward, self.reach).real
+        part = modes.between(self.function, time, outward, inward).real
         return np.ascontiguousarray(2 * part if self.mirrored else part)
 
     def on(self, left: Floats, right: Floats) -> "Propagator":

@@ -85,7 +85,9 @@ class LinearMotion:
     def of(cls, packing: Packing) -> "LinearMotion":
         """Decompose a packing; errors as of `linear_response`."""
         system = StateSpace.of(packing)
-        return cls(packing, system, Modes.of(system.matrix if _dissipative(packing) else system.stiffness))
+        if _dissipative(packing):
+            return cls(packing, system, Modes.of(system.matrix, first_order))
+        return cls(packing, system, Modes.of(system.stiffness))
 
     @property
     def dissipative(self) -> bool:
@@ -122,13 +124,13 @@ class LinearMotion:
         """Displacement and velocity of rows of the mass-weighted coordinates, under a force or from a displacement."""
         if not self.dissipative:
             second = oscillator.driven if forced else oscillator.released
-            motion = self.modes.apply(second, time, vector, observed)
-            return motion.displacement.real, motion.velocity.real
+            displacement, velocity = self.modes.apply(second, time, vector, observed)
+            return displacement.real, velocity.real
         system, rest, size = self.system, np.zeros_like(vector), len(observed)
         start = system.state(rest, vector) if forced else system.state(vector, rest)
         rows = np.block([[observed @ system.unweight, 0 * observed], [0 * observed, observed]])
         first = partial(driven, oscillator.omega) if forced else released
-        (value,) = self.modes.apply(first, time, start, rows, first_order)
+        (value,) = self.modes.apply(first, time, start, rows)
         return value[:, :size].real, value[:, size:].real
 
 

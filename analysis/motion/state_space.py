@@ -19,7 +19,6 @@ in the norm of the energy. What Z is beyond that, K's antisymmetric part has don
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
@@ -33,12 +32,6 @@ from ..spectrum.spectrum import Complexes, active_coordinates, mass_weighted
 SOFTEST = 1e-6
 """Eigenvalues of the symmetric part below this share of the largest weigh as much: a mode without a restoring force has
 no energy of its own."""
-
-
-class State(NamedTuple):
-    """Of a first-order system at some times."""
-
-    value: Complexes
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,15 +99,15 @@ class StateSpace:
         return np.concatenate([self.weight @ displacement, velocity])
 
 
-def released(rate: Complexes, time: Floats) -> State:
+def released(rate: Complexes, time: Floats) -> tuple[Complexes]:
     """x' = s x from x = 1."""
-    return State(np.exp(rate * time))
+    return (np.exp(rate * time),)
 
 
-def driven(omega: float, rate: Complexes, time: Floats) -> State:
+def driven(omega: float, rate: Complexes, time: Floats) -> tuple[Complexes]:
     """x' = s x + cos(omega t) from x = 0: the mean of (exp(i omega t) - exp(s t)) / (i omega - s) and its mirror."""
     rate = np.asarray(rate, dtype=np.complex128)
-    return State(0.5 * (_quotient(rate, 1j * omega, time) + _quotient(rate, -1j * omega, time)))
+    return (0.5 * (_quotient(rate, 1j * omega, time) + _quotient(rate, -1j * omega, time)),)
 
 
 def _quotient(a: Complexes, b: complex, time: Floats) -> Complexes:

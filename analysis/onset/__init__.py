@@ -11,7 +11,7 @@
 
 from .edge import Family, LostPairError, Window
 from .limits import LIMITS, Limits
-from .modes import Modes, Place, force_bearing, full_operator
+from .modes import Modes, force_bearing, full_operator
 from .pair import Pair
 from .ranks import Ranks
 from .search import Onset, OnsetError, complex_windows, find_onset, seeks_all
@@ -27,7 +27,6 @@ __all__ = [
     "Onset",
     "OnsetError",
     "Pair",
-    "Place",
     "Ranks",
     "Window",
     "complex_windows",

@@ -18,7 +18,7 @@ from scipy.sparse import csc_array, csr_array
 
 from ..packing.packing import Floats, Indices
 from ..spectrum.spectrum import active_coordinates
-from .found import NEW_PASS, Border, Pass
+from .found import NEW_PASS, Pass, Slice
 from .limits import LIMITS, Limits
 from .ranks import Ranks
 
@@ -83,29 +83,14 @@ class Levels:
 
 
 @dataclass(frozen=True, eq=False)
-class Basis:
-    """Eigenvectors of the symmetric part of an operator with `size` coordinates, all or neighbouring ones.
+class Basis(Slice):
+    """Eigenvectors of the symmetric part of an operator, 1 / time^2, with `size` coordinates: a slice, or all of them.
 
-    Attributes
-    ----------
-    active : ndarray of int, shape (E,)
-        Coordinates whose rows are not zero.
-    values : ndarray, shape (M,)
-        Eigenvalues of the symmetric part, increasing; 1 / time^2.
-    vectors : ndarray, shape (E, M)
-        Orthonormal eigenvectors in columns.
-    own : slice
-        The modes that belong to this basis, and to that of no other slice; the rest are margins.
-    first : int
-        Number in the whole spectrum of the first of `values`.
+    `active`, shape (E,), are the coordinates whose rows are not zero.
     """
 
     size: int
     active: Indices = field(repr=False)
-    values: Floats = field(repr=False)
-    vectors: Floats = field(repr=False)
-    own: slice
-    first: int = 0
     limits: Limits = field(default=LIMITS, repr=False)
 
     @classmethod
@@ -116,12 +101,7 @@ class Basis:
         dense += dense.T.copy()
         dense *= 0.5
         values, vectors = eigh(dense, driver="evd", overwrite_a=True, check_finite=False)
-        return cls(matrix.shape[0], active, values, vectors, slice(0, len(values)), limits=limits)
-
-    @property
-    def border(self) -> Border:
-        """What the bases of neighbouring slices must agree on."""
-        return Border.of(self.first, self.values, self.own)
+        return cls(0, values, vectors, slice(0, len(values)), matrix.shape[0], active, limits)
 
     @property
     def clusters(self) -> list[Cluster]:
@@ -247,4 +227,4 @@ class Bases:
         inner = matrix[active][:, active]
         symmetric, margin = csc_array(0.5 * (inner + inner.T)), limits.margin + limits.beyond
         for part in slices(symmetric, margin, self.range(matrix), limits, ranks=self.ranks, known=known):
-            yield Basis(matrix.shape[0], active, part.values, part.vectors, part.own, part.first, limits)
+            yield Basis(part.first, part.values, part.vectors, part.own, matrix.shape[0], active, limits)

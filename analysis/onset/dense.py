@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ..errors import FaultgougeError, NoEquilibriumError
+from ..errors import NoEquilibriumError
 from ..packing.packing import Floats, Indices
 from ..spectrum.spectrum import Complexes
-from .edge import DoubtError, Edge, Family, LostPairError, Window, locate, other_sign
+from .edge import DoubtError, Edge, Family, LostPairError, LostTrackError, Window, locate, other_sign
 from .modes import Members, Modes, Place, assign
 from .pair import Pair, continued, deepest_dip, dip_between
 from .screening import Screen, Screening
@@ -40,10 +40,6 @@ Course = tuple[Pair | None, Pair | None, tuple[Edge, ...]]
 
 Fate = tuple[Pair | None, Pair | None, Ends | None]
 """A pair at the lower and at the upper load where it is complex there, and at both loads if recognised at both."""
-
-
-class LostTrackError(FaultgougeError):
-    """The complex pairs of one increment are not those of the increment before."""
 
 
 class Dense:

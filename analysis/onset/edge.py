@@ -37,6 +37,10 @@ class LostPairError(FaultgougeError):
         )
 
 
+class LostTrackError(FaultgougeError):
+    """The complex pairs, or growing motions, at the begin of an increment are not those at the end of the last one."""
+
+
 class DoubtError(FaultgougeError):
     """What a pair is expected to do the operator does not surely have."""
 

@@ -14,7 +14,7 @@ import fcntl
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
@@ -80,6 +80,34 @@ class Border(NamedTuple):
         return cls(modes, float(values[own.start]), beyond, float(np.ptp(near)) / len(near))
 
 
+@dataclass(frozen=True, eq=False)
+class Slice:
+    """A run of neighbouring eigenvalues.
+
+    Attributes
+    ----------
+    first : int
+        Number in the whole spectrum of the first of `values`.
+    values : ndarray, shape (M,)
+        Eigenvalues, increasing: first those of a margin, then the slice's own ones, then another margin. Those farther
+        out in the margins are not converged.
+    vectors : ndarray, shape (E, M)
+        Orthonormal eigenvectors in columns.
+    own : slice
+        Which of the M belong to this slice and to no other.
+    """
+
+    first: int
+    values: Floats = field(repr=False)
+    vectors: Floats = field(repr=False)
+    own: slice
+
+    @property
+    def border(self) -> Border:
+        """What its neighbours must agree on."""
+        return Border.of(self.first, self.values, self.own)
+
+
 class Looked(Protocol):
     """A load that was looked at, and the operator there."""
 
@@ -88,12 +116,8 @@ class Looked(Protocol):
         """The load, force per top disk."""
 
     @property
-    def matrix(self) -> csr_array:
-        """The operator, 1 / time^2."""
-
-    @property
     def matrices(self) -> tuple[csr_array, ...]:
-        """All matrices on which the result depends."""
+        """All matrices on which the result depends, first that of which the eigenbasis is taken, 1 / time^2."""
 
 
 @dataclass(frozen=True, eq=False)

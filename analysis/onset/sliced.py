@@ -108,13 +108,10 @@ class Sliced(ABC, Generic[P, W]):
         """Increments that are looked at while bases that are not kept pass by, after so many others."""
         return self.limits.ahead
 
-    def _beyond(self, candidate: Candidate, first: W, start: float) -> bool:
-        """Whether a window cannot be first: clusters are off by a share of the way from the increment's start."""
-        return candidate.onset - start > (1 + 2 * self.limits.reach) * (first.fx_onset - start)
-
-    def _elsewhere(self, candidate: Candidate, window: W, increment: float) -> bool:
-        """Whether a window begins so far from where a cluster announced it that clusters are not to be trusted."""
-        return abs(window.fx_onset - candidate.onset) > 2 * self.limits.reach * increment
+    @property
+    def off(self) -> float:
+        """How far from where a cluster announces it a window may begin, in shares of the way or of the increment."""
+        return 2 * self.limits.reach
 
     def record(self, sure: W) -> None:
         """Take down a window; the one with the smaller onset is the first."""
@@ -130,7 +127,7 @@ class Sliced(ABC, Generic[P, W]):
 
     def _found_by_all(self, places: Sequence[P]) -> list[Found]:
         """What the slices of all ranks have, by the order of the spectrum; those of other searches are waited for."""
-        first, stop = self.bases.range(places[0].matrix)
+        first, stop = self.bases.range(places[0].matrices[0])
         while True:
             known = self._known(places)
             fresh = self.ranks.together(partial(self._found, places, known))
@@ -142,7 +139,7 @@ class Sliced(ABC, Generic[P, W]):
 
     def _known(self, places: Sequence[P]) -> Pass:
         """What other searches have left; nothing if bases are kept, as the increments beyond need these."""
-        matrix = places[0].matrix
+        matrix = places[0].matrices[0]
         if self.folder is None or self.bases.keeps(matrix):
             return NEW_PASS
         folder = pass_folder(self.folder, places, self.bases.range(matrix), self.limits)
@@ -151,13 +148,13 @@ class Sliced(ABC, Generic[P, W]):
     def _found(self, places: Sequence[P], known: Pass) -> list[Found]:
         """What this rank's slices have, without those that are known."""
         found: list[Found] = []
-        first, stop = self.bases.range(places[0].matrix)
+        first, stop = self.bases.range(places[0].matrices[0])
         before = sum(each.size for each in known.borders)
         done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
         failure: FaultgougeError | None = None
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
         self.watch(f"{where}: {f'{before} of {stop - first} modes are known' if known.shifts else 'modes are counted'}")
-        for basis, levels in self.bases.at(places[0].matrix, known):
+        for basis, levels in self.bases.at(places[0].matrices[0], known):
             done += basis.own.stop - basis.own.start
             self.watch(f"{where}: {min(done, wanted)} of {wanted} modes")
             try:
@@ -201,7 +198,7 @@ class Sliced(ABC, Generic[P, W]):
         lost: Exception | None = None
         doubt = False
         for candidate in candidates:
-            if first is not None and self._beyond(candidate, first, here.fx):
+            if first is not None and candidate.onset - here.fx > (1 + self.off) * (first.fx_onset - here.fx):
                 break
             try:
                 window = self._confirmed(candidate, there, first)
@@ -209,7 +206,7 @@ class Sliced(ABC, Generic[P, W]):
                 window, doubt = None, True
                 lost = lost if isinstance(error, DoubtError) else error
             if window is not None:
-                elsewhere = self._elsewhere(candidate, window, there.fx - here.fx)
+                elsewhere = abs(window.fx_onset - candidate.onset) > self.off * (there.fx - here.fx)
                 doubt = doubt or (elsewhere and window.fx_onset > here.fx)
                 if first is None or window.fx_onset < first.fx_onset:
                     first = window
@@ -341,7 +338,7 @@ def first_along(oracle: Sliced[P, W], loads: Floats) -> tuple[W | None, Incremen
     here = oracle.at(float(loads[0]))
     done = 1
     while done < len(loads) and not oracle.finished:
-        ahead = 1 if oracle.bases.keeps(here.matrix) else oracle.ahead(done)
+        ahead = 1 if oracle.bases.keeps(here.matrices[0]) else oracle.ahead(done)
         places = [here, *_reached(oracle.at, loads[done : done + ahead])]
         walk(oracle, places)
         here = places[-1]

@@ -18,7 +18,6 @@ those that no other search has found or taken (:mod:`~faultgouge.analysis.onset.
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import partial
 from itertools import chain, pairwise
 
@@ -31,41 +30,13 @@ from threadpoolctl import threadpool_limits
 from ..errors import FaultgougeError
 from ..factors.sparse_lu import minimum_degree, symmetric_lu
 from ..packing.packing import Floats, Indices
-from .found import NEW_PASS, Border, Pass, Shift, Take
+from .found import NEW_PASS, Border, Pass, Shift, Slice, Take
 from .limits import LIMITS, Limits
 from .ranks import ALONE, Ranks
 
 
 class SliceError(FaultgougeError):
     """A part of a spectrum was not found: one sentence."""
-
-
-@dataclass(frozen=True, eq=False)
-class Slice:
-    """A run of neighbouring eigenvalues.
-
-    Attributes
-    ----------
-    first : int
-        Number in the whole spectrum of the first of `values`.
-    values : ndarray, shape (M,)
-        Eigenvalues, increasing: first those of a margin, then the slice's own ones, then another margin. Those farther
-        out in the margins are not converged.
-    vectors : ndarray, shape (E, M)
-        Orthonormal eigenvectors in columns.
-    own : slice
-        Which of the M belong to this slice and to no other.
-    """
-
-    first: int
-    values: Floats
-    vectors: Floats
-    own: slice
-
-    @property
-    def border(self) -> Border:
-        """What its neighbours must agree on."""
-        return Border.of(self.first, self.values, self.own)
 
 
 Solve = Callable[[Floats], Floats]

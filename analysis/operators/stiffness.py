@@ -90,7 +90,8 @@ def stiffness_matrix(
     ValueError
         If the form is neither of the two.
     """
-    _check(form)
+    if form not in ("consistent", "paper"):
+        raise ValueError(f'form = "{form}" must be "consistent" or "paper".')
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry
@@ -182,8 +183,3 @@ def contact_terms(law: Derivatives, normal: Floats, distance: Floats, pairs: int
     np.subtract(terms[:2, 2], b * normal, out=terms[2, :2])
     np.negative(a, out=terms[2, 2])
     return terms
-
-
-def _check(form: str) -> None:
-    if form not in ("consistent", "paper"):
-        raise ValueError(f'form = "{form}" must be "consistent" or "paper".')

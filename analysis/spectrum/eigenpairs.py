@@ -10,7 +10,7 @@ from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from ..operators.stiffness import stiffness_matrix
-from ..packing.packing import Floats, Indices, Packing
+from ..packing.packing import Floats, Packing
 from .spectrum import Complexes, all_modes, dynamical_matrix, mass_weighted, participation_ratio, rotation_share
 
 
@@ -129,6 +129,8 @@ def eigenpairs(packing: Packing, near: complex, count: int, tolerance: float = 0
     scipy.sparse.linalg.ArpackError
         If Arnoldi's iteration does not converge.
     """
+    from scipy.optimize import linear_sum_assignment
+
     matrix, active = dynamical_matrix(packing)
     size = matrix.shape[0]
     if not 1 <= count <= size - 2:
@@ -151,24 +153,10 @@ def eigenpairs(packing: Packing, near: complex, count: int, tolerance: float = 0
     values, right = eigs(matrix, count, sigma=shift, OPinv=inverse, v0=start, tol=tolerance)
     adjoint = LinearOperator(shifted.shape, lambda v: solve(v, "H"), dtype=number)
     mirrored, left = eigs(matrix.T, count, sigma=np.conj(shift), OPinv=adjoint, v0=start, tol=tolerance)
-    return _sorted_and_paired(values, right, mirrored.conj(), left, active, 3 * len(packing), solves)
-
-
-def _sorted_and_paired(
-    values: Complexes,
-    right: Complexes,
-    mirrored: Complexes,
-    left: Complexes,
-    active: Indices,
-    size: int,
-    solves: int,
-) -> Eigenpairs:
-    """Bring left vectors beside the right vectors of the same eigenvalue, spread over all coordinates."""
-    from scipy.optimize import linear_sum_assignment
-
     order = np.lexsort((values.imag, values.real))
     values, right = values[order], right[:, order]
-    _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored[None, :]))
-    spread = np.zeros((2, size, len(values)), dtype=np.complex128)
+    # left vectors beside the right vectors of the same eigenvalue
+    _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored.conj()[None, :]))
+    spread = np.zeros((2, 3 * len(packing), len(values)), dtype=np.complex128)
     spread[0, active], spread[1, active] = right, left[:, partner]
-    return Eigenpairs(values, spread[0], spread[1], solves)
+    return Eigenpairs(values, *spread, solves)

@@ -59,8 +59,8 @@ def motion_of(matrix, force, start, time, tau=None, dt=None):
     system = StateSpace.of_matrices(csr_array(matrix), csr_array(np.eye(size) / tau), np.ones(size))
     rows, rest = block_diag(system.unweight, np.eye(size)), np.zeros(size)
     pairs = ((partial(driven, OMEGA), system.state(rest, force)), (released, system.state(start, rest)))
-    modes = Modes.of(system.matrix)
-    found = sum(modes.apply(function, time, vector, rows, first_order).value for function, vector in pairs)
+    modes = Modes.of(system.matrix, first_order)
+    found = sum(modes.apply(function, time, vector, rows)[0] for function, vector in pairs)
     return found[:, :size], found[:, size:]
 
 
