@@ -90,7 +90,7 @@ class Growing:
     def followed(self, clusters: list[Cluster], here: Pencil, there: Pencil) -> Course | float:
         """The modes that grow at either load, solved for; else a load in between, at which more is to be seen."""
         before, middle = self.open or [], 0.5 * (here.fx + there.fx)
-        announced = [announcement(cluster, here.fx, there.fx) for cluster in clusters]
+        announced = [announcement(cluster) for cluster in clusters]
         hidden = next((modes for modes in announced if isinstance(modes, float)), None)
         if hidden is not None:
             return hidden
@@ -236,20 +236,21 @@ class Growing:
         self.closed += closed
 
 
-def announcement(cluster: Cluster, below: float, above: float) -> list[DampedMode] | float:
+def announcement(cluster: Cluster) -> list[DampedMode] | float:
     """Modes that grow in a cluster at the upper load, or nearly do so; a load in between, if others grow there.
 
     The modes are on all coordinates. Their pencil is the cluster's: they are where to begin with the operator.
     """
-    oracle, there = searched(cluster, below, above)
+    oracle, there = searched(cluster)
     for each in oracle.closed:
         if each.kind != "start" and each.fx_end is not None and cluster.owns(each.frequency):
             return 0.5 * (each.fx_onset + each.fx_end)
     return [cluster.lifted(mode) for mode in nearly_growing(cluster, there.modes)]
 
 
-def searched(cluster: Cluster, below: float, above: float) -> tuple[Growing, Pencil]:
-    """The oracle of a cluster after its walk from one load to another, and the place there."""
+def searched(cluster: Cluster) -> tuple[Growing, Pencil]:
+    """The oracle of a cluster after its walk from its lower load to its upper one, and the pencil there."""
+    below, above = cluster.loads
     oracle = Growing(cluster.pencil, CLUSTER * (above - below), None)
     here, there = oracle.at(below), oracle.at(above)
     walk(oracle, [here, there])

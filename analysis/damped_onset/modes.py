@@ -151,7 +151,7 @@ class DampedMode:
         return complex(-np.vdot(self.left, force) / self._slant)
 
     def at(self, pencil: Pencil, guess: complex | None = None) -> "DampedMode | None":
-        """The same mode in a neighbouring pencil, shape and all; None if it is not found there.
+        """The same mode in a neighbouring pencil, with the same shape rather than not; None if it is not found there.
 
         Parameters
         ----------
@@ -161,15 +161,14 @@ class DampedMode:
             Where to begin; the first-order change by default.
         """
         found = solved_mode(pencil, self.right, self.left, self.rate + self.change(pencil) if guess is None else guess)
-        return found if found is not None and self.resembles(found) else None
+        if found is None:
+            return None
+        alike = abs(np.vdot(self.right, found.right)), abs(np.vdot(self.left, found.left))
+        return found if min(alike) > 0.5 else None
 
     def same(self, other: "DampedMode") -> bool:
         """Whether two modes of one pencil are one and the same: their eigenvalues agree to half of the digits."""
         return abs(self.rate - other.rate) * min(self.overlap, other.overlap) < 1e-8 * abs(self.rate)
-
-    def resembles(self, other: "DampedMode") -> bool:
-        """Whether both have the same shape rather than not."""
-        return bool(min(abs(np.vdot(self.right, other.right)), abs(np.vdot(self.left, other.left))) > 0.5)
 
 
 @dataclass(frozen=True, eq=False)

@@ -194,10 +194,8 @@ class Screen:
     def _look(self, basis: Basis, here: Pencil, there: Pencil) -> list[Cluster] | None:
         if not (basis.covers(here.stiffness) and basis.covers(there.stiffness)):
             return None
-        if self._seen is None:
-            before = reduced(basis, basis.levels(here.stiffness), here)
-        else:
-            before = changed(basis, *self._seen, here)
+        seen = self._seen or (here, reduced(basis, basis.levels(here.stiffness), here))
+        before = changed(basis, *seen, here)
         after = changed(basis, here, before, there)
         self._seen = there, after
         suspects = may_grow(before, after)

@@ -40,9 +40,6 @@ bases that are kept are made anew."""
 MOST_AHEAD = 8
 """Increments at the most that are looked at while bases that are not kept pass by."""
 
-SHORTEST = 2.0**-6
-"""Shortest steps, in shares of the straight line from one pencil to another, in which a mode is followed."""
-
 LOOKS = 6
 """Looks at an announced mode, for a load at which it grows."""
 
@@ -256,7 +253,7 @@ def grown(cluster: Cluster) -> Iterator[Candidate]:
     """The modes of a cluster that begin to grow, and those that nearly do so at its upper load."""
     below, above = cluster.loads
     try:
-        oracle, there = searched(cluster, below, above)
+        oracle, there = searched(cluster)
     except LostTrackError:  # its windows are not told apart: what grows at its ends has to do
         oracle, there = None, cluster.pencil(above)
     windows = () if oracle is None else oracle.windows()
@@ -303,7 +300,7 @@ def followed(mode: DampedMode, pencil: Pencil) -> DampedMode:
         image = mode.at(pencil if share == 1 else start.towards(pencil, share))
         if image is not None:
             mode, done = image, share
-        elif step > SHORTEST:
+        elif step > LIMITS.shortest:
             step *= 0.5
         else:
             raise LostPairError(

@@ -52,24 +52,15 @@ class WeakLimit:
         The limit of the damped onset, force per top disk.
     frequency : float
         sqrt(lambda) of the mode that begins to grow, radian / time.
-    undamped : float
-        The onset without dissipation.
     """
 
     fx: float
     frequency: float
-    undamped: float
 
 
 def damping_block(packing: Packing, pair: Pair) -> Floats:
     """G_B of a packing's damping on the bases of a pair, shape (2, 2), 1 / time."""
     return pair.block(mass_weighted(damping_matrix(force_bearing(packing)), packing))
-
-
-def imbalance(packing: Packing, pair: Pair) -> float:
-    """h of a pair, positive as long as weak damping damps both of its modes."""
-    g, n = damping_block(packing, pair), pair.traceless
-    return float(np.trace(g) ** 2 * pair.discriminant - 4 * np.trace(n @ g) ** 2)
 
 
 def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, window: Window) -> WeakLimit | None:
@@ -96,7 +87,10 @@ def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, windo
     above = window.fx_onset
 
     def h(fx: float) -> float:
-        return imbalance(equilibrium(fx), pair_at(fx))
+        """Positive as long as weak damping damps both modes of the pair."""
+        pair = pair_at(fx)
+        g, n = damping_block(equilibrium(fx), pair), pair.traceless
+        return float(np.trace(g) ** 2 * pair.discriminant - 4 * np.trace(n @ g) ** 2)
 
     try:
         for below in loads[loads < window.fx_onset][::-1]:
@@ -113,7 +107,7 @@ def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, windo
     g = damping_block(packing, pair)
     sign = -np.sign(np.trace(pair.traceless @ g))  # the mode in which the two terms cancel
     value = pair.mean + sign * 0.5 * np.sqrt(max(0.0, pair.discriminant))
-    return WeakLimit(fx, float(np.sqrt(value)), window.fx_onset)
+    return WeakLimit(fx, float(np.sqrt(value)))
 
 
 def drag_onset(

@@ -85,14 +85,14 @@ class LinearMotion:
     def of(cls, packing: Packing) -> "LinearMotion":
         """Decompose a packing; errors as of `linear_response`."""
         system = StateSpace.of(packing)
-        if _dissipative(packing):
+        if packing.law.damped or packing.drag_time is not None:
             return cls(packing, system, Modes.of(system.matrix, first_order))
         return cls(packing, system, Modes.of(system.stiffness))
 
     @property
     def dissipative(self) -> bool:
         """Whether the packing has dashpots or drag."""
-        return _dissipative(self.packing)
+        return self.modes.reach is first_order
 
     def response(
         self,
@@ -203,10 +203,6 @@ def coordinates(packing: Packing, name: str, values: ArrayLike) -> Floats:
     if vector.shape != (3 * len(packing),):
         raise ValueError(f"{name} has shape {vector.shape}; {(3 * len(packing),)} is needed.")
     return vector
-
-
-def _dissipative(packing: Packing) -> bool:
-    return packing.law.damped or packing.drag_time is not None
 
 
 def _times(times: ArrayLike, dt: float | None) -> Floats:

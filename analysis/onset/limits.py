@@ -52,7 +52,8 @@ class Limits:
     jump: float = 1e-9
     """Width to which a jump is bracketed, in increments; its place depends on the path's increment by far more."""
     shortest: float = 2.0**-6
-    """Shortest steps, in shares of the straight line from one operator to another, in which a pair is followed."""
+    """Shortest steps, in shares of the straight line from one operator to another, in which pairs and modes are
+    followed."""
 
     # Inverse iteration of a pair
 

@@ -129,11 +129,9 @@ class Screen:
     def _look(self, basis: Basis, here: csr_array, there: csr_array) -> list[Floats] | None:
         if not (basis.covers(here) and basis.covers(there)):
             return None
-        if self._seen is None:
-            before = basis.levels(here)
-        else:
-            matrix, before = self._seen
-            before = before if matrix is here else basis.change(before, here - matrix)
+        matrix, before = self._seen or (here, basis.levels(here))
+        if matrix is not here:
+            before = basis.change(before, here - matrix)
         after = basis.change(before, there - here)
         self._seen = there, after
         pairs = may_meet(before, after, self.limits.slack)

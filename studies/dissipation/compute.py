@@ -55,7 +55,7 @@ def weak_cases(ramp: Ramped, ratios: Iterable[tuple[float, float]] = RATIOS) -> 
             continue
         weak = dissipating(ramp.path, WEAK * cn, WEAK * ct)
         found = damped_windows(weak, _around(ramp.forces, predicted.fx, window))
-        onsets = {"undamped": predicted.undamped, "predicted": predicted.fx}
+        onsets = {"undamped": window.fx_onset, "predicted": predicted.fx}
         yield {"cn": cn, "ct": ct, **onsets, "measured": found[0].fx_onset if found else None}
 
 
