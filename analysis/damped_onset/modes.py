@@ -20,7 +20,7 @@ iteration: Neumaier, SIAM J. Numer. Anal. 22, 914 (1985)). Each step divides the
 :math:`\mathrm{gap}/|s - \sigma|`, and that of s by its square.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -85,14 +85,13 @@ class Pencil:
     @cached_property
     def modes(self) -> "DampedModes":
         """All modes, by LAPACK."""
-        return DampedModes.of(self)
+        # of a copy: a pencil and modes that know each other would be freed late
+        return DampedModes.of(replace(self))
 
     def towards(self, other: "Pencil", share: float) -> "Pencil":
         """The pencil at a share of the straight line to another one."""
-        a, g = (
-            csr_array((1 - share) * one + share * another)
-            for one, another in zip(self.matrices, other.matrices, strict=True)
-        )
+        pairs = zip(self.matrices, other.matrices, strict=True)
+        a, g = (csr_array((1 - share) * one + share * another) for one, another in pairs)
         return Pencil((1 - share) * self.fx + share * other.fx, a, g, max(self.balance, other.balance))
 
     @cached_property

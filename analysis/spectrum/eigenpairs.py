@@ -159,4 +159,4 @@ def eigenpairs(packing: Packing, near: complex, count: int, tolerance: float = 0
     _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored.conj()[None, :]))
     spread = np.zeros((2, 3 * len(packing), len(values)), dtype=np.complex128)
     spread[0, active], spread[1, active] = right, left[:, partner]
-    return Eigenpairs(values, *spread, solves)
+    return Eigenpairs(values, spread[0], spread[1], solves)
