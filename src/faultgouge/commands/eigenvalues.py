@@ -139,15 +139,11 @@ def _gain_of(packing: Packing) -> dict[str, Any] | None:
         reason = (str(error).splitlines() or ["no reason given"])[0]
         say(f"the transient gain was not found ({type(error).__name__}: {reason}); the eigenvalues are complete")
         return None
-    return {
-        "displacement": displacement.gain,
-        "energy": energy.gain,
-        "time": displacement.time,
-        "window": displacement.window,
-        "bound": displacement.bound,
-        "disk": displacement.disk,
-        "direction": displacement.direction.tolist(),
-    }
+    names = ("time", "window", "bound", "disk")
+    gains = {"displacement": displacement.gain, "energy": energy.gain}
+    return (
+        gains | {name: getattr(displacement, name) for name in names} | {"direction": displacement.direction.tolist()}
+    )
 
 
 @app.command(epilog="Example: faultgouge onset paper.toml --json")
