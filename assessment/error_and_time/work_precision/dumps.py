@@ -92,8 +92,8 @@ def dumps(settings: Settings) -> Study:
     overlap, furthest = packing.geometry.overlap, np.abs(packing.position).max()
     stiffest = float(packing.law.normal_stiffness(overlap).max())
     weakest = float(packing.law.normal_curvature(overlap.min())) / stiffest
-    unit = [0.5 * 10.0 ** (np.ceil(np.log10(furthest)) - n) for n in digits]  # of the last digit of the largest
-    expected = [each * weakest for each in unit]
+    # half a unit of the last digit of the largest coordinate
+    expected = [0.5 * 10.0 ** (np.ceil(np.log10(furthest)) - n) * weakest for n in digits]
     sizes = [float(point.evaluations or 0) for point in points if point.method == TEXT]
     return study_of(
         "files",

@@ -146,16 +146,13 @@ def jacobian(settings: Settings) -> Study:
 def _runs(engine: Engine, packing: Packing, steps: Floats) -> list[Run[Floats]]:
     """What computes K, by steps of differences."""
     size = 3 * len(packing)
-    runs: list[Run[Floats]] = [
+    return [
         (ANALYTIC, None, partial(_counted, 1, lambda: stiffness_matrix(packing).toarray())),
         (PAPER, None, partial(_counted, 1, lambda: stiffness_matrix(packing, "paper").toarray())),
         (COMPLEX, None, partial(_counted, size, complex_step, packing)),
+        *((DIFFERENCES, step, partial(_counted, 2 * size, central_differences, packing, step)) for step in steps),
+        *((LAMMPS, step, partial(_counted, 2 * size, in_lammps, engine, packing, step)) for step in steps[::2]),
     ]
-    for step in steps:
-        runs.append((DIFFERENCES, step, partial(_counted, 2 * size, central_differences, packing, step)))
-    for step in steps[::2]:
-        runs.append((LAMMPS, step, partial(_counted, 2 * size, in_lammps, engine, packing, step)))
-    return runs
 
 
 def _counted(evaluations: int, compute: Callable[..., Floats], *arguments: Any) -> tuple[Floats, int]:

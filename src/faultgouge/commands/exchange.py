@@ -196,15 +196,15 @@ def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[st
     options = {key: value for key, value in options.items() if value is not None}
     if scene is not None and options.keys() - {"fx"}:
         raise typer.BadParameter(f"--{min(options)} cannot stand beside --scene, which decides it: leave one out")
-    values = {**disks.given, **options}
+    values = options if scene else {**disks.given, **options}
     _refuse_gaps(disks, top, scene, values)
     layer = upper_layer(disks, top)
-    wanted = _scene(scene, disks, values)
+    wanted = _scene(scene, values)
     return packing_of(
         disks,
         law_of(wanted, wanted.law.mus[0]),
         layer,
-        fx=(options if scene else values).get("fx", 0.0),
+        fx=values.get("fx", 0.0),
         fy=wanted.load.fy,
         inertia_factor=wanted.inertia_factor if scene else values.get("inertia_factor", 1.0),
         drag_time=drag_time(wanted),
@@ -231,7 +231,7 @@ def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict
     raise BadInputError(f"{disks.source} does not say {missing}: add {options}, as in `{example}`{ways}")
 
 
-def _scene(scene: Path | None, disks: Disks, values: dict[str, Any]) -> Scene:
+def _scene(scene: Path | None, values: dict[str, Any]) -> Scene:
     """The scene, or one that says what options and file say."""
     from faultgouge.pywrap.scenes.scene import Scene
 
