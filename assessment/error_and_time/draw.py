@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -47,14 +46,14 @@ def figure_of(study: Study) -> Figure:
         points, number = study.of(method), families.index(_family(method))
         size = LARGEST - (LARGEST - SMALLEST) * number / max(1, len(families) - 1)
         style: dict[str, Any] = {"color": f"C{number}", "marker": MARKERS[number], "markersize": size}
+        style |= {"clip_on": False, "zorder": 3 + 0.1 * number}
         if method != _family(method):
             style |= {"markerfacecolor": "white", "linestyle": "--"}
-        error = [point.error or zero for point in points]
-        clip = {"clip_on": False, "zorder": 3 + 0.1 * number}
         if not _steady(points):
             style["linestyle"] = "none"
-        left.plot([point.seconds for point in points], error, label=method, **style, **clip)
-        _second(right, points, error, study.abscissa, style | clip)
+        error = [point.error or zero for point in points]
+        left.plot([point.seconds for point in points], error, label=method, **style)
+        _second(right, points, error, study.abscissa, style)
     _draw_theory(left, right, study)
     _draw_floor(left, right, study, bottom, zero)
     left.set(xscale="log", yscale="log", ylim=(bottom, top), xlabel="wall time, s", ylabel=_label(study.error))
@@ -94,9 +93,8 @@ def _draw_floor(left: Axes, right: Axes, study: Study, bottom: float, zero: floa
 
 def _steady(points: list[Point]) -> bool:
     """Whether the error falls with every step from coarse to fine, or from fine to coarse."""
-    errors = [point.error for point in points]
-    falls, rises = (all(sign * (a - b) >= 0 for a, b in pairwise(errors)) for sign in (1, -1))
-    return falls or rises
+    steps = np.diff([point.error for point in points])
+    return bool(np.all(steps <= 0) or np.all(steps >= 0))
 
 
 def _family(method: str) -> str:
