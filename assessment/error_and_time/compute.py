@@ -25,8 +25,7 @@ from ...analysis.files.wholefile import make_folder, write_text
 from ...figures.pages import render
 from ...figures.style import save, spared
 from ...pywrap import Scene, ramp
-from .coverage.draw import changing_figure, coverage_figure
-from .draw import figure_of
+from .draw import changing_figure, coverage_figure, figure_of
 from .work_precision.dumps import dumps
 from .work_precision.eigenvalues import far, near
 from .work_precision.frequency import frequency, growth

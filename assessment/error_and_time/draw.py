@@ -1,18 +1,18 @@
-"""The figure of a study: error over wall time, and over what does not depend on the machine."""
+"""The figures of a study: error over wall time and over what no machine changes, and stated over true errors."""
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Sequence
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from ...figures.style import INK, STYLE
-from .work_precision.study import Point, Study
+from ...figures.style import INK, styled
+from .coverage.changing import Case
+from .work_precision.study import Covered, Point, Study
 
 MARKERS = "osD^vP"
 DASHES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
@@ -24,8 +24,11 @@ ZERO_ABOVE = 0.25
 
 SHADE = "#e9e9e9"
 
+AROUND = ((-29, -3), (-14, 6), (2, -11), (6, -3))
+"""Where the increments of the first arithmetic stand, points, by increasing true error: they lie close together."""
 
-@matplotlib.rc_context(fname=STYLE)
+
+@styled
 def figure_of(study: Study) -> Figure:
     """Two panels that share the errors, doubly logarithmic.
 
@@ -43,14 +46,14 @@ def figure_of(study: Study) -> Figure:
         points, number = study.of(method), families.index(_family(method))
         size = LARGEST - (LARGEST - SMALLEST) * number / max(1, len(families) - 1)
         style: dict[str, Any] = {"color": f"C{number}", "marker": MARKERS[number], "markersize": size}
+        style |= {"clip_on": False, "zorder": 3 + 0.1 * number}
         if method != _family(method):
             style |= {"markerfacecolor": "white", "linestyle": "--"}
-        error = [point.error or zero for point in points]
-        clip = {"clip_on": False, "zorder": 3 + 0.1 * number}
         if not _steady(points):
             style["linestyle"] = "none"
-        left.plot([point.seconds for point in points], error, label=method, **style, **clip)
-        _second(right, points, error, study.abscissa, style | clip)
+        error = [point.error or zero for point in points]
+        left.plot([point.seconds for point in points], error, label=method, **style)
+        _second(right, points, error, study.abscissa, style)
     _draw_theory(left, right, study)
     _draw_floor(left, right, study, bottom, zero)
     left.set(xscale="log", yscale="log", ylim=(bottom, top), xlabel="wall time, s", ylabel=_label(study.error))
@@ -90,9 +93,8 @@ def _draw_floor(left: Axes, right: Axes, study: Study, bottom: float, zero: floa
 
 def _steady(points: list[Point]) -> bool:
     """Whether the error falls with every step from coarse to fine, or from fine to coarse."""
-    errors = [point.error for point in points]
-    falls, rises = (all(sign * (a - b) >= 0 for a, b in pairwise(errors)) for sign in (1, -1))
-    return falls or rises
+    steps = np.diff([point.error for point in points])
+    return bool(np.all(steps <= 0) or np.all(steps >= 0))
 
 
 def _family(method: str) -> str:
@@ -135,3 +137,57 @@ def _label(text: str, width: int = 44) -> str:
     for name, symbol in (("F_x^c", "$F_x^c$"), ("R theta", r"$R\,\theta$")):
         text = text.replace(name, symbol)
     return text
+
+
+@styled
+def coverage_figure(cases: Sequence[Covered]) -> Figure:
+    """Stated over true errors, doubly logarithmic, a colour an arithmetic; the line is where they are equal.
+
+    A true error of zero stands at the left edge.
+    """
+    figure = Figure(figsize=(4.6, 3.6), layout="constrained")
+    axes = figure.subplots()
+    smallest = _framed(axes, [(case.true, case.stated) for case in cases])
+    for number, arithmetic in enumerate(dict.fromkeys(case.arithmetic for case in cases)):
+        of_it = sorted((case for case in cases if case.arithmetic == arithmetic), key=lambda case: case.true)
+        for place, case in enumerate(of_it):
+            at = (max(case.true, smallest), case.stated)
+            label = None if place else arithmetic  # once in the key
+            axes.plot(*at, MARKERS[number], color=f"C{number}", label=label, clip_on=False)
+            aside = AROUND[place % len(AROUND)] if number == 0 else (5, -10)
+            axes.annotate(f"{case.increment:g}", at, xytext=aside, textcoords="offset points", fontsize="small")
+    axes.legend(loc="lower right")
+    return figure
+
+
+@styled
+def changing_figure(cases: Sequence[Case]) -> Figure:
+    """The same of scenes in which contacts change before the onset, a colour a kind of onset.
+
+    Scenes that were drawn after the rule of the stated errors was made are open markers.
+    """
+    figure = Figure(figsize=(4.6, 3.6), layout="constrained")
+    axes = figure.subplots()
+    smallest = _framed(axes, [(case.true, case.stated or 0.0) for case in cases])
+    for number, kind in enumerate(dict.fromkeys(case.kind for case in cases)):
+        for fresh in (False, True):
+            of_it = [case for case in cases if case.kind == kind and case.fresh == fresh]
+            true = [max(case.true, smallest) for case in of_it]
+            stated = [case.stated or smallest for case in of_it]
+            style: dict[str, Any] = {"color": f"C{number}", "fillstyle": "none" if fresh else "full", "markersize": 4}
+            label = f"{kind}, {'drawn later' if fresh else 'first draws'}"
+            axes.plot(true, stated, MARKERS[number], label=label, clip_on=False, **style)
+    axes.legend(loc="lower right")
+    return figure
+
+
+def _framed(axes: Axes, errors: Sequence[tuple[float, float]]) -> float:
+    """The line of equal errors, what is covered in shade, and axes that hold all; the smallest value on them."""
+    smallest = 0.3 * min(each for pair in errors for each in pair if each > 0)
+    largest = 3 * max(each for pair in errors for each in pair)
+    axes.plot([smallest, largest], [smallest, largest], color=INK, linewidth=0.8)
+    axes.fill_between([smallest, largest], [smallest, largest], largest, color=INK, alpha=0.06, linewidth=0)
+    axes.text(0.06, 0.94, "covered", transform=axes.transAxes, va="top")
+    axes.set(xscale="log", yscale="log", xlim=(smallest, largest), ylim=(smallest, largest))
+    axes.set(xlabel="true error of $F_x^c$", ylabel="stated error of $F_x^c$", aspect="equal")
+    return smallest

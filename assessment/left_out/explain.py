@@ -164,17 +164,14 @@ def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
     log = folder / "dumps.log"
     with Engine(start.packing, MPI.COMM_SELF, log) as engine:
 
-        def without() -> None:
+        def reach(dumped: bool) -> None:
             reached.append(next_equilibrium(engine, start, fx, bounded).packing)
-
-        def with_it() -> None:
-            found = next_equilibrium(engine, start, fx, bounded)
-            engine.restore(found.packing)
-            engine.dump(files / "run.1")
-            reached.append(found.packing)
+            if dumped:
+                engine.restore(reached[-1])
+                engine.dump(files / "run.1")
 
         # an equilibrium by damped dynamics takes half a second
-        cost = Cost.of("equilibrium", without, with_it, turns=FEW)
+        cost = Cost.of("equilibrium", lambda: reach(False), lambda: reach(True), turns=FEW)
         parts = Loaded.of(engine, log).parts
     adds = [f"part {part}" for part in parts if part == "write.in"]
     adds += [f"file {path.name}" for path in sorted(files.iterdir())]

@@ -9,16 +9,7 @@ from .parts import Cost
 
 
 def explanation_table(explanation: Explanation) -> Group:
-    """A line for each feature, and below it what the scene's run has loaded.
-
-    Parameters
-    ----------
-    explanation : Explanation
-
-    Returns
-    -------
-    rich.console.Group
-    """
+    """A line for each feature, and below it what the scene's run has loaded."""
     title = f"{explanation.remark}; load average {explanation.load_average:.1f}"
     table = Table(title=title, title_justify="left", caption_justify="left")
     for heading in ("feature", "in", "because", "brings"):

@@ -160,17 +160,7 @@ class Feature:
 
 
 def features(run: Run) -> Iterator[Feature]:
-    """The features of an undamped run, each with two runs that differ in it and have no push, signal or weakening else.
-
-    Parameters
-    ----------
-    run : Run
-        The scene's.
-
-    Yields
-    ------
-    Feature
-    """
+    """The features of a run, each with two runs that differ in it and have no push, signal or weakening else."""
     bare = replace(run, motion={})
     law = run.packing.law
     rough = bare.of(law=law if law.frictional else replace(law, kt=2 / 7 * law.kn, mu=1.0))

@@ -11,11 +11,9 @@ from faultgouge.analysis import discrete_frequency, spectrum, stiffness_matrix
 from faultgouge.assessment import error_and_time as page
 from faultgouge.assessment.error_and_time.work_precision import dumps, relaxation, trajectory
 from faultgouge.assessment.error_and_time.work_precision.extended import refined
-from faultgouge.assessment.error_and_time.work_precision.forces import central_differences, complex_step
-from faultgouge.assessment.error_and_time.work_precision.frequency import corrected
-from faultgouge.assessment.error_and_time.work_precision.mode import Mode
+from faultgouge.assessment.error_and_time.work_precision.frequency import Mode, corrected
+from faultgouge.assessment.error_and_time.work_precision.jacobian import central_differences, complex_step
 from faultgouge.assessment.error_and_time.work_precision.study import Point, Settings, compensated, fit_order
-from faultgouge.assessment.error_and_time.work_precision.verlet import verlet
 from faultgouge.assessment.timing import in_turns
 from faultgouge.pywrap import Engine, Scene, ramp
 
@@ -57,7 +55,7 @@ def test_order_of_the_tangent(exact_end, tangent, order):
     packing = trajectory.three_disks()
     points = []
     for steps in (200, 400, 800, 1600):
-        end = verlet(packing, tangent, trajectory.TIME / steps, steps)
+        end = trajectory.verlet(packing, tangent, trajectory.TIME / steps, steps)
         points.append(Point(tangent, trajectory.TIME / steps, np.abs(end - exact_end).max(), 1.0, steps))
     fitted = fit_order(points, tangent, order)
     assert fitted.order == pytest.approx(order, abs=0.05)

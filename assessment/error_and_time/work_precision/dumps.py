@@ -84,21 +84,16 @@ def without_slips(packing: Packing) -> tuple[Packing, int]:
 def dumps(settings: Settings) -> Study:
     """The study, on a packing under shear."""
     packing = settings.at(0.02).packing
-    with tempfile.TemporaryDirectory(prefix="faultgouge-") as name, Engine(packing) as engine:
-        engine.dump(Path(name) / "packing")
-        return _study(settings, packing, Path(name))
-
-
-def _study(settings: Settings, packing: Packing, folder: Path) -> Study:
     exact = eigenvalues(packing)
     digits = (G, 9, 12, 15, 16, 17) if settings.quick else (G, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17)
-    runs = _runs(packing, folder, digits)
-    points = timed_points(runs, settings, lambda found: loss(found, exact))
+    with tempfile.TemporaryDirectory(prefix="faultgouge-") as name:
+        runs = _runs(packing, Path(name), digits)
+        points = timed_points(runs, settings, lambda found: loss(found, exact))
     overlap, furthest = packing.geometry.overlap, np.abs(packing.position).max()
     stiffest = float(packing.law.normal_stiffness(overlap).max())
     weakest = float(packing.law.normal_curvature(overlap.min())) / stiffest
-    unit = [0.5 * 10.0 ** (np.ceil(np.log10(furthest)) - n) for n in digits]  # of the last digit of the largest
-    expected = [each * weakest for each in unit]
+    # half a unit of the last digit of the largest coordinate
+    expected = [0.5 * 10.0 ** (np.ceil(np.log10(furthest)) - n) * weakest for n in digits]
     sizes = [float(point.evaluations or 0) for point in points if point.method == TEXT]
     return study_of(
         "files",
@@ -117,6 +112,8 @@ def _study(settings: Settings, packing: Packing, folder: Path) -> Study:
 
 def _runs(packing: Packing, folder: Path, digits: Sequence[int]) -> list[Run[Packing]]:
     """The ways through a file: method, digits, and what takes the packing through it."""
+    with Engine(packing) as engine:
+        engine.dump(folder / "packing")
     return [
         *((TEXT, n, partial(through_text, folder / "packing", n, folder)) for n in digits),
         (HDF5, None, partial(through_hdf5, packing, folder)),

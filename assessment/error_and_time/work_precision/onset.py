@@ -12,6 +12,7 @@ product linearly, and the pair is believed from :math:`50\, u |A|_F` on.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -22,8 +23,7 @@ from ....pywrap import Engine, Equilibrium, Scene
 from ....pywrap.onset.path_error import with_path_error
 from ....pywrap.runs.path import EquilibriumPath
 from ..coverage.changing import read, restated
-from ..coverage.covered import INCREMENTS, coverage
-from .study import Run, Settings, Study, Theory, compensated, study_of, timed_points
+from .study import Covered, Run, Settings, Study, Theory, compensated, study_of, timed_points
 
 OVERDAMPED, SCAN = "scan, overdamped", "scan, Newton"
 BISECTION, ROOT = "bisection", "root of the discriminant"
@@ -31,6 +31,8 @@ BISECTION, ROOT = "bisection", "root of the discriminant"
 BEYOND = 1e-5
 """Distance beyond the onset, force, at which the pair's imaginary part and overlap are measured for the floor."""
 
+INCREMENTS = (2e-3, 1e-3, 5e-4, 2.5e-4)
+"""Of the ramps whose stated errors are compared with the true ones."""
 
 SMALL = 20
 """Disks of the scenes with contacts that change which are computed anew: each takes a second or two."""
@@ -127,7 +129,6 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     found, *_ = reference.solved(finest, guess)
     exact = found.fx_c
     reference_error = found.error + abs(reference.root(check, guess)[0] - exact)
-    whole = {"doubles": partial(ways.whole, beyond=guess), "compensated": partial(reference.whole, beyond=guess)}
     runs = _runs(ways, quick, exact)
     resolution = float(np.spacing(exact))
     points = timed_points(runs, settings, lambda found: max(abs(found - exact), resolution))
@@ -151,7 +152,9 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
         numbers=numbers,
         reference_error=reference_error,
         theory=(_half_an_increment(exact), Theory("pair lost in rounding", (lost,))),
-        covered=coverage(whole, INCREMENTS[:2] if quick else INCREMENTS),
+        covered=_covered(
+            {"doubles": ways, "compensated": reference}, INCREMENTS[:2] if quick else INCREMENTS, beyond=guess
+        ),
         changing=tuple(changing),
         again=tuple(restated(case) for case in few),
     )
@@ -168,6 +171,21 @@ def _runs(ways: Ways, quick: bool, exact: float) -> list[Run[float]]:
         *((BISECTION, 1e-3 * 2.0**-n, partial(ways.bisect, 1e-3, n)) for n in halvings),
         *((ROOT, increment, partial(ways.root, increment, exact)) for increment in coarse),
     ]
+
+
+def _covered(ways: Mapping[str, Ways], increments: Sequence[float], beyond: float) -> tuple[Covered, ...]:
+    """Stated and true errors of the onset over arithmetics and increments.
+
+    The last arithmetic, with half of the last increment, is the truth; its own error counts as covered.
+    """
+    *_, finest = ways.values()
+    truth = finest.whole(0.5 * increments[-1], beyond)
+    cases = []
+    for arithmetic, those in ways.items():
+        for increment in increments:
+            found = those.whole(increment, beyond)
+            cases.append(Covered(arithmetic, increment, abs(found.fx_c - truth.fx_c), found.error + truth.error))
+    return tuple(cases)
 
 
 def _half_an_increment(exact: float) -> Theory:

@@ -175,22 +175,23 @@ def _runs(
 ) -> list[Run[Packing]]:
     """What finds the equilibrium; `dynamics` are the steps of dynamics and of Verlet, and its drag."""
     relax_step, verlet_step, drag = dynamics
-    runs: list[Run[Packing]] = []
-    for force in np.logspace(-3, -9, 4 if quick else 7).tolist():
-        runs.append((DECKS, force, partial(plain.overdamped, None, force)))
-        runs.append((OVERDAMPED, force, partial(plain.overdamped, relax_step, force)))
-        if force > 1e-6:  # its evaluations are slow, and its convergence steady
-            runs.append((FIRE, force, partial(plain.fire, verlet_step, force)))
-    for force in (1e-5, 1e-9, 1e-13):
-        runs.append((OVERDAMPED + COMPENSATED, force, partial(careful.overdamped, relax_step, force)))
-    for steps in (50, 100, 200, 400, 800):
-        runs.append((VERLET, steps, partial(plain.verlet, verlet_step, drag, steps)))
-        runs.append((VERLET + COMPENSATED, steps, partial(careful.verlet, verlet_step, drag, steps)))
-    for force in (1e-1, 1e-4, 1e-7, 0.0):
-        runs.append((NEWTON, force, partial(plain.newton, force or None)))
-    for force in (1e-1, 1e-4, 1e-7, 1e-12, 0.0):
-        runs.append((NEWTON + COMPENSATED, force, partial(careful.newton, force or None)))
-    return sorted(runs, key=lambda run: run[0])
+    forces = np.logspace(-3, -9, 4 if quick else 7).tolist()
+    most = (1e-1, 1e-4, 1e-7, 0.0)
+    counts = (50, 100, 200, 400, 800)
+    return [
+        # FIRE's evaluations are slow, and its convergence steady
+        *((FIRE, force, partial(plain.fire, verlet_step, force)) for force in forces if force > 1e-6),
+        *((NEWTON, force, partial(plain.newton, force or None)) for force in most),
+        *((NEWTON + COMPENSATED, force, partial(careful.newton, force or None)) for force in (*most[:3], 1e-12, 0.0)),
+        *((VERLET, steps, partial(plain.verlet, verlet_step, drag, steps)) for steps in counts),
+        *((VERLET + COMPENSATED, steps, partial(careful.verlet, verlet_step, drag, steps)) for steps in counts),
+        *((OVERDAMPED, force, partial(plain.overdamped, relax_step, force)) for force in forces),
+        *(
+            (OVERDAMPED + COMPENSATED, force, partial(careful.overdamped, relax_step, force))
+            for force in (1e-5, 1e-9, 1e-13)
+        ),
+        *((DECKS, force, partial(plain.overdamped, None, force)) for force in forces),
+    ]
 
 
 def _decay(label: str, first: float, rate: float, steps: Floats) -> Theory:

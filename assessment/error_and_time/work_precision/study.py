@@ -18,7 +18,6 @@ from ....analysis.motion.power_law import fit_power_law
 from ....pywrap import Engine, Equilibrium, Scene, equilibrate
 from ...timing import Progress, in_turns
 from ..coverage.changing import Case
-from ..coverage.covered import Covered
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -130,6 +129,31 @@ class Theory:
     label: str
     error: tuple[float, ...]
     parameter: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Covered:
+    """The error that an onset states, and the one that it has.
+
+    Attributes
+    ----------
+    arithmetic : str
+        Which.
+    increment : float
+        Of the ramp, force.
+    true, stated : float
+        Force.
+    """
+
+    arithmetic: str
+    increment: float
+    true: float
+    stated: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the stated error covers the true one."""
+        return self.true <= self.stated
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,21 @@ their own size. The packing is soft, so that all this shows in the slips.
 Velocity Verlet is of second order as long as the slip increment is. The force is continuously differentiable at
 Coulomb's bound and the clamp is applied at the end of the step, so that passing the bound costs no order. A contact
 that *forms* during the run would: its slip begins with zero at the end of a step.
+
+The same in NumPy, written to be read, is the reference for what the pair style integrates. A step moves the disks by
+:math:`\mathbf v\,\Delta t` with the velocities of the half step, advances each slip by
+
+.. math:: \Delta s = \boldsymbol\tau \cdot \Delta(\mathbf r_i - \mathbf r_j) - (\Delta u_i + \Delta u_j)
+
+and clamps it. While a contact turns by :math:`\Delta\varphi` and is compressed by :math:`\Delta\delta`, the tangent at
+the end of the step errs by :math:`\tfrac12 \Delta\varphi\, \Delta\delta` in each step, and so by the first order of
+:math:`\Delta t` in a given time; the tangent at the middle by the second order.
 """
 
 from __future__ import annotations
 
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -19,7 +29,6 @@ from ....analysis import MindlinLaw, Packing, touching
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine
 from .study import Point, Settings, Study, Theory, fit_order, study_of, timed
-from .verlet import Tangent, verlet
 
 TIME = 2.0
 """Length of the run: two swings of the overlaps."""
@@ -28,6 +37,7 @@ COARSEST = 200
 """Steps of the coarsest run: 60 to a period of the fastest mode."""
 
 LAMMPS, MIDPOINT, END = "LAMMPS, tangent at the middle", "NumPy, tangent at the middle", "NumPy, tangent at the end"
+Tangent = Literal["midpoint", "end"]
 TANGENTS: dict[str, Tangent] = {MIDPOINT: "midpoint", END: "end"}
 
 
@@ -52,6 +62,26 @@ def in_lammps(engine: Engine, packing: Packing, steps: int) -> Floats:
         dynamics.advance(steps)
         end = engine.packing
     return np.array([*end.position.T, end.scaled_angle])
+
+
+def verlet(packing: Packing, tangent: Tangent, dt: float, steps: int) -> Floats:
+    """(x, y, u) of the disks after so many steps from rest, shape (3, N), length; no contact may form or open."""
+    i, j, pair = packing.contacts.i, packing.contacts.j, ~packing.contacts.floor
+    mass = packing.mass * np.array([[1.0], [1.0], [packing.inertia_factor]])
+    velocity = np.zeros_like(mass)
+    for _ in range(steps):
+        velocity += 0.5 * dt / mass * packing.net_force.reshape(mass.shape)
+        step = dt * velocity
+        moved, turned = step[:2, i] - step[:2, j] * pair, step[2, i] + step[2, j] * pair
+        position, angle = packing.position + step[:2].T, packing.angle + step[2] / packing.radius
+        there = packing.moved(position, angle, packing.contacts)
+        middle = packing.moved(position - 0.5 * step[:2].T, angle, packing.contacts)
+        along = (middle if tangent == "midpoint" else there).geometry.tangent
+        slip = packing.contacts.slip + np.sum(along.T * moved, axis=0) - turned
+        clamped = packing.law.clamped(there.geometry.overlap, slip)
+        packing = packing.moved(position, angle, packing.contacts.slipped(clamped))
+        velocity += 0.5 * dt / mass * packing.net_force.reshape(mass.shape)
+    return np.array([*packing.position.T, packing.scaled_angle])
 
 
 def _reference(engine: Engine, packing: Packing, finest: int) -> tuple[Floats, float]:

@@ -46,15 +46,11 @@ fix             move all nve/disc 1.0
 def refused_by_lammps(disks: list[tuple[float, float]], commands: str, words: str) -> Outcome:
     """Disks of diameter one at given places, and commands that must end with an error which says the words."""
     placed = "".join(f"create_atoms 1 single {x!r} {y!r} 0.0\n" for x, y in disks)
-    return _refused("lmp -in FILE -log none", HEAD + placed + LAW + commands, words)
+    return refused_by("lmp -in FILE -log none", HEAD + placed + LAW + commands, words)
 
 
-def refused_by_command(command: str, scene: str, words: str) -> Outcome:
-    """A command of faultgouge, such as settle, that must refuse a scene."""
-    return _refused(f"faultgouge {command} FILE -o run.h5", scene, words)
-
-
-def _refused(command: str, text: str, words: str) -> Outcome:
+def refused_by(command: str, text: str, words: str) -> Outcome:
+    """A program that must refuse a FILE with this text, with an error which says the words."""
     world = MPI.COMM_WORLD
     said = _said(command.split(), text) if world.rank == 0 else None
     return refusal(world.bcast(said), words)

@@ -115,28 +115,22 @@ def _energy(packing: Packing, position: np.ndarray, velocity: np.ndarray, dt: fl
     return float(0.5 * v @ v + elastic + lifted + dt**2 * correction)
 
 
-def _long_run(steps: int, samples: int = 400) -> tuple[np.ndarray, np.ndarray]:
+def _drift(steps: int, samples: int = 400) -> Outcome:
     """Energies, and momenta along x in units of the disks' own, of an undamped run without friction."""
     packing = _smooth()
     _, limit = _fastest()
     push = np.random.default_rng(1).uniform(-1, 1, 2 * len(packing)) * SHAKEN * packing.geometry.overlap.min()
-    energy, momentum = [], []
+    energy, momentum = np.empty(samples), np.empty(samples)
     dt = 0.1 * limit
     # every rank has a run of its own, the same one: six disks on two ranks would do nothing but wait for each other
     with Engine(_displaced(packing, push), MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
-        for _ in range(samples):
+        for k in range(samples):
             motion = dynamics.advance(steps // samples)
-            energy.append(_energy(packing, motion.position, motion.velocity, dt))
-            momentum.append(motion.velocity[:, 0].sum() / np.abs(motion.velocity[:, 0]).sum())
-    return np.array(energy), np.array(momentum)
-
-
-def _drift(steps: int) -> Outcome:
-    energy, momentum = _long_run(steps)
-    tenth = len(energy) // 10
-    drift = abs(energy[-tenth:].mean() / energy[:tenth].mean() - 1)
+            energy[k] = _energy(packing, motion.position, motion.velocity, dt)
+            momentum[k] = motion.velocity[:, 0].sum() / np.abs(motion.velocity[:, 0]).sum()
+    tenth = samples // 10
     return measured(
-        drift,
+        abs(energy[-tenth:].mean() / energy[:tenth].mean() - 1),
         DRIFT,
         f"relative change of the energy of 6 disks without friction in {steps:.0e} undamped steps of 0.1 of the limit; "
         f"the momentum along x stays below {np.abs(momentum).max():.0e} of the disks' own",

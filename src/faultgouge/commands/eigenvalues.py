@@ -59,30 +59,29 @@ def spectrum(
     if values:
         _values(packing, as_json)
         return
-    result = eigenvalues_of(packing)
-    gain = _gain_of(packing)
-    names = ("condition", "overlap", "growth_rate", "frequency", "quality", "participation", "rotation")
-    pairs: list[dict[str, Any]] = [
-        {"eigenvalue": [pair.eigenvalue.real, pair.eigenvalue.imag]} | {name: getattr(pair, name) for name in names}
-        for pair in result.pairs
-    ]
-    if as_json:
-        print_json(
-            {
-                "eigenvalues": [[value.real, value.imag] for value in result.eigenvalues.tolist()],
-                "pairs": pairs,
-                "pair_count": len(pairs),
-                "least_q": result.least_q if pairs else None,
-                "largest_growth_rate": result.growth_rate(),
-                "rattlers": result.rattlers.tolist(),
-                "fx": packing.fx,
-                "residual": packing.residual,
-                "noise_pairs": result.noise_pairs,
-                "transient_gain": gain,
-            }
-        )
+    result, gain = eigenvalues_of(packing), _gain_of(packing)
+    if not as_json:
+        _print_spectrum(packing, result, gain)
         return
-    _print_spectrum(packing, result, pairs, gain)
+    names = ("condition", "overlap", "growth_rate", "frequency", "quality", "participation", "rotation")
+    print_json(
+        {
+            "eigenvalues": [[value.real, value.imag] for value in result.eigenvalues.tolist()],
+            "pairs": [
+                {"eigenvalue": [pair.eigenvalue.real, pair.eigenvalue.imag]}
+                | {name: getattr(pair, name) for name in names}
+                for pair in result.pairs
+            ],
+            "pair_count": len(result.pairs),
+            "least_q": result.least_q if result.pairs else None,
+            "largest_growth_rate": result.growth_rate(),
+            "rattlers": result.rattlers.tolist(),
+            "fx": packing.fx,
+            "residual": packing.residual,
+            "noise_pairs": result.noise_pairs,
+            "transient_gain": gain,
+        }
+    )
 
 
 def _values(packing: Packing, as_json: bool) -> None:
@@ -97,21 +96,21 @@ def _values(packing: Packing, as_json: bool) -> None:
         print(f"{real:.17g} {imaginary:.17g}")
 
 
-def _print_spectrum(
-    packing: Packing, result: Spectrum, pairs: list[dict[str, Any]], gain: dict[str, Any] | None
-) -> None:
+def _print_spectrum(packing: Packing, result: Spectrum, gain: dict[str, Any] | None) -> None:
     real = result.eigenvalues.real
     print(
         f"F_x = {packing.fx:g}: {len(real)} eigenvalues from {real.min():.6g} to {real.max():.6g}, "
         f"{len(result.rattlers)} rattlers left out"
     )
-    for pair in pairs:
+    for pair in result.pairs:
         print(
-            f"complex pair {pair['eigenvalue'][0]:.10g} +- {pair['eigenvalue'][1]:.10g} i: "
-            f"D grows as exp({pair['growth_rate']:.6g} t), |y^H x| = {pair['overlap']:.2g}"
+            f"complex pair {pair.eigenvalue.real:.10g} +- {pair.eigenvalue.imag:.10g} i: "
+            f"D grows as exp({pair.growth_rate:.6g} t), |y^H x| = {pair.overlap:.2g}"
         )
-    if pairs:
-        print(f"{len(pairs)} complex pairs; least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}")
+    if result.pairs:
+        print(
+            f"{len(result.pairs)} complex pairs; least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}"
+        )
     else:
         print("no complex pair: linearly stable")
     if gain is not None:
@@ -139,15 +138,11 @@ def _gain_of(packing: Packing) -> dict[str, Any] | None:
         reason = (str(error).splitlines() or ["no reason given"])[0]
         say(f"the transient gain was not found ({type(error).__name__}: {reason}); the eigenvalues are complete")
         return None
-    return {
-        "displacement": displacement.gain,
-        "energy": energy.gain,
-        "time": displacement.time,
-        "window": displacement.window,
-        "bound": displacement.bound,
-        "disk": displacement.disk,
-        "direction": displacement.direction.tolist(),
-    }
+    names = ("time", "window", "bound", "disk")
+    gains = {"displacement": displacement.gain, "energy": energy.gain}
+    return (
+        gains | {name: getattr(displacement, name) for name in names} | {"direction": displacement.direction.tolist()}
+    )
 
 
 @app.command(epilog="Example: faultgouge onset paper.toml --json")

@@ -9,12 +9,13 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
+from .pictures import modes_of
 from .terminal import Frame, PackingFile, progress, say, status, stored_packing
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
     from faultgouge.pywrap import Scene
-    from faultgouge.pywrap.exchange import Disks, ModeVectors
+    from faultgouge.pywrap.exchange import Disks
 
 app = typer.Typer()
 
@@ -80,7 +81,7 @@ def import_(
     check_folder(output)
     disks = _placed(file, frame, floor, width, contacts)
     laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
-    packing = _packing(disks, top, scene, laws, {"fy": fy, "fx": fx, "inertia_factor": inertia})
+    packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
     if disks.remark:
         say(f"{file}: {disks.remark}")
     keeps(f"nothing has been written to {output} yet")
@@ -122,6 +123,7 @@ def export(
     'faultgouge[export]'. With --frames a film of displacements: a .pvd for ParaView
     comes with a folder of .vtp.
     """
+    from faultgouge.pywrap.exchange import ModeVectors
     from faultgouge.pywrap.exchange.formats import check_writer, write_packing
 
     if frames is not None:
@@ -133,7 +135,8 @@ def export(
     packing = stored_packing(file, frame)
     if not is_root():
         return
-    vectors = [] if mode is None else _vectors(packing, mode)
+    modes = [] if mode is None else modes_of(packing, mode)[0]
+    vectors = [ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes]
     words = write_packing(output, packing, vectors)
     say(f"F_x = {packing.fx:g}: {words}; written to {output}")
 
@@ -154,16 +157,6 @@ def _export_frames(file: Path, says: str, output: Path) -> None:
         write_frames(output, progress(frames_of(run, numbers), "frames", len(numbers)))
         what = "an undamped run" if "trajectory" in run.names_of_series else "equilibria"
     say(f"{len(numbers)} frames of {what}; written to {output}")
-
-
-def _vectors(packing: Packing, mode: str) -> list[ModeVectors]:
-    from faultgouge.pywrap.exchange import ModeVectors
-
-    from .pictures import modes_of
-
-    return [
-        ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes_of(packing, mode)[0]
-    ]
 
 
 def _placed(file: Path, frame: int | None, floor: float, width: str | None, contacts: Path | None) -> Disks:
@@ -195,25 +188,23 @@ def _number_or_text(text: str | None) -> float | str | None:
         return text
 
 
-def _packing(
-    disks: Disks, top: str | None, scene: Path | None, laws: dict[str, Any], loads: dict[str, float | None]
-) -> Packing:
+def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[str, Any]) -> Packing:
     """The packing under the law and the load of the scene, of the options, or of the file."""
     from faultgouge.pywrap.exchange import packing_of, upper_layer
     from faultgouge.pywrap.settling.bed import drag_time, law_of
 
-    options = {key: value for key, value in {**laws, **loads}.items() if value is not None}
+    options = {key: value for key, value in options.items() if value is not None}
     if scene is not None and options.keys() - {"fx"}:
         raise typer.BadParameter(f"--{min(options)} cannot stand beside --scene, which decides it: leave one out")
-    values = {**disks.given, **options}
+    values = options if scene else {**disks.given, **options}
     _refuse_gaps(disks, top, scene, values)
     layer = upper_layer(disks, top)
-    wanted = _scene(scene, disks, values)
+    wanted = _scene(scene, values)
     return packing_of(
         disks,
         law_of(wanted, wanted.law.mus[0]),
         layer,
-        fx=(options if scene else values).get("fx", 0.0),
+        fx=values.get("fx", 0.0),
         fy=wanted.load.fy,
         inertia_factor=wanted.inertia_factor if scene else values.get("inertia_factor", 1.0),
         drag_time=drag_time(wanted),
@@ -240,7 +231,7 @@ def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict
     raise BadInputError(f"{disks.source} does not say {missing}: add {options}, as in `{example}`{ways}")
 
 
-def _scene(scene: Path | None, disks: Disks, values: dict[str, Any]) -> Scene:
+def _scene(scene: Path | None, values: dict[str, Any]) -> Scene:
     """The scene, or one that says what options and file say."""
     from faultgouge.pywrap.scenes.scene import Scene
 

@@ -108,11 +108,15 @@ def movie(
     count = max(2, round(seconds * rate))
     if not is_root():
         return
-    film = (
-        _film_of_mode(file, frame, mode, count, seconds, dots)
-        if mode
-        else _film_of_file(file, count, color.value, span, dots)
-    )
+    from faultgouge.figures.film import ModeFilm
+
+    film: Film
+    if mode:
+        packing = stored_packing(file, frame)
+        modes, what = modes_of(packing, mode)
+        film = ModeFilm(packing, modes, what, count, periods=max(1, round(seconds / 2)), dots=dots)
+    else:
+        film = _film_of_file(file, count, color.value, span, dots)
     write_film(film, output, rate, lambda frames, total: progress(frames, "frames", total))
     width, height = film.size
     say(f"{count} frames of {width} x {height} dots; written to {output}")
@@ -160,14 +164,6 @@ def view(
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
     write_view(packings, output, title, series, lambda them: progress(them, "loads"))
     say(f"{len(packings)} loads, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
-
-
-def _film_of_mode(file: Path, frame: int, mode: str, count: int, seconds: float, dots: int) -> Film:
-    from faultgouge.figures.film import ModeFilm
-
-    packing = stored_packing(file, frame)
-    modes, what = modes_of(packing, mode)
-    return ModeFilm(packing, modes, what, count, periods=max(1, round(seconds / 2)), dots=dots)
 
 
 def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int) -> Film:

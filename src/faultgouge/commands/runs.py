@@ -14,8 +14,6 @@ from ..ranks import is_root
 from .terminal import AsJson, Out, ScenePath, print_json, progress, read_scene, say, say_way, status
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
     from faultgouge.pywrap import Equilibrium, Record, Scene
     from faultgouge.pywrap.lammps.dynamics import Weakening
 
@@ -65,7 +63,8 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
         start = _settled(wanted, record)
         total, done = len(loads(settings)), round(start.fx / settings.step) + 1
         dumps = output.with_suffix("") if wanted.output is not None and wanted.output.dumps else None
-        for equilibrium in _told(progress(ramp_up(wanted, start, dumps=dumps), "equilibria", total, done)):
+        for equilibrium in progress(ramp_up(wanted, start, dumps=dumps), "equilibria", total, done):
+            say_way(equilibrium)
             record.append(equilibrium)
         record.finish()
     assert record.last is not None
@@ -77,6 +76,7 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
 @app.command(epilog="Example: faultgouge perturb paper.toml -o run.h5")
 def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
     """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t)."""
+    from faultgouge.analysis import RunFile
     from faultgouge.pywrap import Record, reach
     from faultgouge.pywrap.scenes.refusals import needed
 
@@ -86,7 +86,8 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         if record.last is None:
             step = wanted.ramp.step if wanted.ramp else 1e-3  # as in `reach`
             total = ceil(settings.fx / step * (1 - 1e-9)) + 1
-            *_, start = _told(progress(reach(wanted, settings.fx), "equilibria", total))
+            for start in progress(reach(wanted, settings.fx), "equilibria", total):
+                say_way(start)
             _lines(wanted, start)  # refuses what the packing does not allow, before anything is written
             record.append(start)
         assert record.last is not None
@@ -98,21 +99,8 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         record.finish()
     say(f"D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}; written to {output}")
     if as_json:
-        print_json(_series(output))
-
-
-def _told(equilibria: Iterable[Equilibrium]) -> Iterator[Equilibrium]:
-    """The equilibria, of which those are told that were reached by another way."""
-    for equilibrium in equilibria:
-        say_way(equilibrium)
-        yield equilibrium
-
-
-def _series(path: Path) -> dict[str, Any]:
-    from faultgouge.analysis import RunFile
-
-    with RunFile(path) as file:
-        return {name: column.tolist() for name, column in file.series("undamped").items()}
+        with RunFile(output) as file:
+            print_json({name: column.tolist() for name, column in file.series("undamped").items()})
 
 
 def _lines(scene: Scene, start: Equilibrium) -> int:
@@ -130,14 +118,11 @@ def _weakening(scene: Scene, record: Record) -> Weakening | None:
     if scene.friction is None:
         return None
     assert record.last is not None
-    threshold, why = 0.0, ""
-    if not isinstance(scene.friction.v0, str):
-        threshold = scene.friction.v0
-    else:
+    threshold, why = scene.friction.v0, ""
+    if isinstance(threshold, str):
         run = record.undamped(unforced(scene), record.last, "calibration")
-        threshold = max(
-            abs(sample.layer_velocity) for sample in progress(run, "calibrating v0", _lines(scene, record.last))
-        )
+        samples = progress(run, "calibrating v0", _lines(scene, record.last))
+        threshold = float(max(abs(sample.layer_velocity) for sample in samples))
         why = " (the largest velocity of the upper layer in an unforced run of this length: rounding noise)"
     weakening = weakening_of(scene.friction, threshold)
     say(f"v0 = {threshold:.3g}{why}, v_ss = {weakening.v_ss:.3g}")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from pathlib import Path
@@ -88,50 +89,35 @@ def say_way(equilibrium: Equilibrium) -> None:
         )
 
 
-class Minutes:
-    """A line on standard error every minute, off a terminal; a context manager.
-
-    A thread says the line, until there is another: work may be within one call for longer than a minute.
-    """
-
-    def __init__(self, message: str) -> None:
-        self._message, self._ended = message, Event()
-        self._thread = Thread(target=self._speak, daemon=True)
-
-    def now(self, message: str) -> None:
-        """Another line from now on."""
-        self._message = message
-
-    def _speak(self) -> None:
-        while not self._ended.wait(EVERY):
-            say(self._message)
-
-    def __enter__(self) -> Minutes:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._ended.set()
-        self._thread.join()
-
-
 @contextmanager
 def status(what: str) -> Iterator[Callable[[str], None]]:
     """A line on a terminal while something is under way; what is yielded replaces its text.
 
-    Off a terminal it is a line of the log, every minute.
+    Off a terminal it is a line of the log, every minute. A thread says it: work may be within one call for longer.
     """
     from rich.console import Console
 
     console = Console(stderr=True)
     if not is_root():
         yield lambda what: None
-    elif console.is_terminal:
+        return
+    if console.is_terminal:
         with console.status(what) as line:
             yield line.update
-    else:
-        with Minutes(what) as minutes:
-            yield minutes.now
+        return
+    latest, ended = deque([what], maxlen=1), Event()
+
+    def speak() -> None:
+        while not ended.wait(EVERY):
+            say(latest[0])
+
+    thread = Thread(target=speak, daemon=True)
+    thread.start()
+    try:
+        yield latest.append
+    finally:
+        ended.set()
+        thread.join()
 
 
 def progress(items: Iterable[T], what: str, total: int | None = None, done: int = 0) -> Iterator[T]:
@@ -141,14 +127,11 @@ def progress(items: Iterable[T], what: str, total: int | None = None, done: int 
     console = Console(stderr=True)
     if total is None and isinstance(items, Sized):
         total = len(items)
-    if not is_root():
-        yield from items
-        return
-    if not console.is_terminal:
+    if not console.is_terminal or not is_root():
         among = "" if total is None else f" of {total}"
-        with Minutes(f"{what}: {done}{among}") as minutes:
+        with status(f"{what}: {done}{among}") as show:
             for number, item in enumerate(items, done + 1):
-                minutes.now(f"{what}: {number}{among}")
+                show(f"{what}: {number}{among}")
                 yield item
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
