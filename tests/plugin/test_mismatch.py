@@ -49,8 +49,9 @@ def test_it_says_what_does_not_fit(compiler, lmp, tmp_path, flags, says):
     link = [*compiler, "-shared", built, "-Wl,--wrap=_ZSt28__throw_bad_array_new_lengthv", "-o", plugin]
     for command in (registers, weaken, link):
         subprocess.run(command, cwd=tmp_path, check=True)
-    done = lmp(f"plugin unload pair mindlin/smooth\nplugin load {plugin}\npair_style mindlin/smooth 1 1 1\n")
-    assert done.returncode != 0
+    done = lmp(
+        f"plugin unload pair mindlin/smooth\nplugin load {plugin}\npair_style mindlin/smooth 1 1 1\n", fails=True
+    )
     (line,) = (line for line in (done.stdout + done.stderr).splitlines() if "the faultgouge plugin" in line)
     assert says in line
     assert "build it for this LAMMPS: pip install --no-build-isolation" in line

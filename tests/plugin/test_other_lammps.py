@@ -26,8 +26,7 @@ def of_the_environment(tmp_path_factory):
 
 
 def test_same_eigenvalues_and_forces(of_the_environment, lmp, tmp_path):
-    done = lmp(DECKS / "ramp.in", *RAMP)
-    assert done.returncode == 0, done.stdout[-2000:]
+    lmp(DECKS / "ramp.in", *RAMP)
     names = sorted(path.name for path in tmp_path.glob("*.disks"))
     assert len(names) > 1
     for name in names:
