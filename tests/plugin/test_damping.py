@@ -1,4 +1,4 @@
-"""Dashpots and drag in LAMMPS: forces over velocities, Coulomb's bound, orders in the time step, what is refused."""
+"""Dashpots and drag in LAMMPS: forces over velocities, Coulomb's bound, orders in the time step."""
 
 import itertools
 from ctypes import c_double
@@ -146,7 +146,6 @@ def test_second_order_in_the_time_step(exponent, parts):
 
 
 SYSTEM = f"variable decks index {DECKS}\ninclude {DECKS}/system.in\n"
-MOVE = "fix move all nve/disc 1.0\n"
 
 
 @arithmetics
@@ -198,47 +197,6 @@ run 50
     np.testing.assert_allclose(disks.rows[:, :3], expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-PAIR = "pair_style mindlin/smooth 2e5 1e5 1.0 "
-SMOOTH = "pair_style mindlin/smooth 2e5 0 0 damping 1 0\nfix_modify floor mu 0\n"
-FLOOR = "unfix floor\nfix floor all wall/mindlin/smooth 2e5 1e5 1.0 ylo 0.0 "
-FIX = "fix move all "
-ADAPT = MOVE + "variable c equal 1.0\nfix less all adapt 1 pair mindlin/smooth "
-KNOWN = "knows the keywords exponent, history, damping, energy and compensated, but not "
-
-
-@pytest.mark.parametrize(
-    ("extra", "says"),
-    [
-        (PAIR + "exponent 2", "exponent must be 1.5 or 1, not 2"),
-        (PAIR + "exponent", "exponent must be 1.5 or 1, not left out"),
-        (PAIR + "history half", "history must be total or rescaled, not half"),
-        (PAIR + "history", "history must be total or rescaled, not left out"),
-        (PAIR + "history rescaled exponent 1", "history rescaled needs exponent 1.5"),
-        (FLOOR + "history half", "history must be total or rescaled, not half"),
-        (FLOOR + "exponent 1 history rescaled", "history rescaled needs exponent 1.5"),
-        (PAIR + "damping 1.0", "damping takes two numbers, CN CT"),
-        (PAIR + "damping -1.0 0.0", "damping CN CT must be finite and not negative (got -1.0 0.0)"),
-        (PAIR + "damping 1.0 inf", "inf"),
-        (PAIR + "dampin 1.0 1.0", KNOWN + "dampin"),
-        (FLOOR + "exponent 1.6", "exponent must be 1.5 or 1, not 1.6"),
-        (FLOOR + "damping 1.0", "damping takes two numbers, CN CT"),
-        (FLOOR + "damping 0.0 -2", "damping CN CT must be finite and not negative (got 0.0 -2)"),
-        (FLOOR + "rubber", KNOWN + "rubber"),
-        (f"{FLOOR} damping 1 1\n{MOVE}", "needs pair_style mindlin/smooth KN KT MU damping CN CT"),
-        ("fix_modify floor damping 1", "damping takes two numbers, CN CT, or no"),
-        (FIX + "nve/disc 1.0 drag", "drag takes a time, TAU"),
-        (FIX + "nve/disc 1.0 drag 0", "TAU must be a positive number, not 0"),
-        (FIX + "overdamped/disc 1.0 1.0 drag 5.0", "rotation yes|no and compensated, but got drag"),
-        (f"{PAIR} damping 1 1\n{FIX} overdamped/disc 1.0 1.0", "leave the keyword damping out"),
-        (SMOOTH + "minimize 0 1e-6 10 10", "a minimizer has no velocities"),
-        (ADAPT + "cn * * v_c", "cn"),
-        (ADAPT + "nonsense * * v_c", "nonsense"),
-    ],
-)
-def test_what_is_refused(said_against, extra, says):
-    assert says in said_against(f"{SYSTEM}{extra}\nrun 1\n")
-
-
 @pytest.mark.parametrize(
     ("name", "value", "other", "keywords", "floor"),
     [("cn", 4.0, 1.0, "damping ${cn} 2.0", ""), ("mu", 0.5, 1.0, "", "fix_modify floor mu v_wanted\n")],
@@ -246,9 +204,9 @@ def test_what_is_refused(said_against, extra, says):
 @pytest.mark.slow
 def test_what_is_adapted_is_so_from_the_start(lmp, tmp_path, name, value, other, keywords, floor):
     """fix adapt changes a parameter through extract(): the run is that of a pair style with the other value."""
-    model = f"{SYSTEM}pair_style mindlin/smooth ${{kn}} ${{kt}} ${{mu}} {keywords}\n{MOVE}timestep 1e-3\n"
+    model = f"{SYSTEM}pair_style mindlin/smooth ${{kn}} ${{kt}} ${{mu}} {keywords}\nfix move all nve/disc 1.0\n"
     adapt = f"variable wanted equal {value}\nfix adapt all adapt 1 pair mindlin/smooth {name} * * v_wanted\n{floor}"
-    run = "run 500\nwrite_dump all custom end id x y omegaz modify sort id format float %.17g\n"
+    run = "timestep 1e-3\nrun 500\nwrite_dump all custom end id x y omegaz modify sort id format float %.17g\n"
     ends = []
     for given, extra in ((value, ""), (other, adapt)):
         lmp(model + extra + run, fx=3.0, **{name: given})

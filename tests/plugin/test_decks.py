@@ -71,6 +71,7 @@ PAIR = "pair_style mindlin/smooth 2e5 "
 NVE, OVERDAMPED, FLOOR = "fix 1 all nve/disc 1.0 ", "fix 1 all overdamped/disc ", "fix 1 all wall/mindlin/smooth 2e5 "
 KNOWN = "knows the keywords exponent, history, damping, energy and compensated, but not "
 THIRD = "\ncreate_atoms 1 single {} 0.499 0\nset group all diameter 1.0"
+ADAPT = NVE + "\nvariable c equal 1.0\nfix less all adapt 1 pair mindlin/smooth "
 MINIMIZE, DELETE = "minimize 0 1e-6 10 10", "run 0\ngroup one id 1\ndelete_atoms group one {}\nrun 10"
 
 
@@ -103,6 +104,34 @@ MINIMIZE, DELETE = "minimize 0 1e-6 10 10", "run 0\ngroup one id 1\ndelete_atoms
         ({"fix": NVE + THIRD.format(1.2)}, "only 0.19999999999999996 apart, the centre of one inside of the other"),
         ({"fix": FLOOR + "5e4 1.0 ylo 0.6"}, "has its centre at 0.499, below the floor"),
         ({"run": "velocity all set 1e3 0 0\nrun 1000"}, "in one step, farther than its radius 0.501"),
+        # exponent, history, energy
+        ({"pair": PAIR + "5e4 1 exponent 2"}, "exponent must be 1.5 or 1, not 2"),
+        ({"pair": PAIR + "5e4 1 exponent"}, "exponent must be 1.5 or 1, not left out"),
+        ({"pair": PAIR + "5e4 1 history half"}, "history must be total or rescaled, not half"),
+        ({"pair": PAIR + "5e4 1 history"}, "history must be total or rescaled, not left out"),
+        ({"pair": PAIR + "5e4 1 history rescaled exponent 1"}, "history rescaled needs exponent 1.5"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 exponent 1.6"}, "exponent must be 1.5 or 1, not 1.6"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 history half"}, "history must be total or rescaled, not half"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 exponent 1 history rescaled"}, "history rescaled needs exponent 1.5"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 rubber"}, KNOWN + "rubber"),
+        ({"pair": PAIR + "5e4 1 energy"}, "energy must be yes or no"),
+        ({"pair": PAIR + "5e4 0 energy yes"}, "without friction there is no history to keep the energy of contacts in"),
+        # dashpots and drag
+        ({"pair": PAIR + "5e4 1 damping 1.0"}, "damping takes two numbers, CN CT"),
+        ({"pair": PAIR + "5e4 1 damping -1.0 0.0"}, "damping CN CT must be finite and not negative (got -1.0 0.0)"),
+        ({"pair": PAIR + "5e4 1 damping 1.0 inf"}, "inf"),
+        ({"pair": PAIR + "5e4 1 dampin 1.0 1.0"}, KNOWN + "dampin"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 damping 1.0"}, "damping takes two numbers, CN CT"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 damping 0.0 -2"}, "damping CN CT must be finite and not negative (got 0.0 -2)"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 damping 1 1"}, "needs pair_style mindlin/smooth KN KT MU damping CN CT"),
+        ({"fix": FLOOR + "5e4 1 ylo 0\nfix_modify 1 damping 1"}, "damping takes two numbers, CN CT, or no"),
+        ({"fix": NVE + "drag"}, "drag takes a time, TAU"),
+        ({"fix": NVE + "drag 0"}, "TAU must be a positive number, not 0"),
+        ({"fix": OVERDAMPED + "1.0 1.0 drag 5.0"}, "rotation yes|no and compensated, but got drag"),
+        ({"pair": PAIR + "5e4 1 damping 1 1", "fix": OVERDAMPED + "1.0 1.0"}, "leave the keyword damping out"),
+        ({"pair": PAIR + "0 0 damping 1 0", "run": MINIMIZE}, "a minimizer has no velocities"),
+        ({"fix": ADAPT + "cn * * v_c"}, "param cn not supported"),
+        ({"fix": ADAPT + "nonsense * * v_c"}, "param nonsense not supported"),
     ],
     ids=lambda value: str(next(iter(value.values())))[:40] if isinstance(value, dict) else "",
 )

@@ -160,14 +160,3 @@ def test_slips_stay_where_a_restart_begins_or_ends_to_count(seen, first, second)
     assert not pairs[:, 4].any()
     if second == "yes":
         assert not disks[:, 9].any()
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        (("'energy yes'", "energy"), "energy must be yes or no"),
-        ((f"{MU} damping", "0.0 damping"), "without friction there is no history to keep the energy of contacts in"),
-    ],
-)
-def test_refusals(said_against, change, says):
-    assert says in said_against(MODEL.replace(*change) + "run 0\n")
