@@ -28,16 +28,12 @@ def scene(**packing):
 
 
 @pytest.fixture(scope="module")
-def settled():
-    return settle(scene(seed=9))
-
-
-@pytest.fixture(scope="module")
 def large():
     return settle(scene(**LARGE))
 
 
-def test_settled_packing_is_in_balance_and_ready_for_friction(settled):
+def test_settled_packing_is_in_balance_and_ready_for_friction():
+    settled = settle(scene(seed=9))
     packing = settled.packing
     assert settled.residual < 1.5 * settled.floor < 2e-10
     assert np.all(packing.contacts.slip == 0)
