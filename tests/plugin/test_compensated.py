@@ -97,7 +97,7 @@ def test_state_goes_through_lammps_to_the_bit(equilibrium):
     with Engine(packing) as engine:
         for _ in range(2):
             assert engine.displace(packing, np.zeros(3 * len(packing))) == packing
-            engine.displace(packing, 1e-4 * np.ones(3 * len(packing)))
+            assert engine.displace(packing, 1e-4 * np.ones(3 * len(packing))) != packing
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from reference_layer import SMALL, toml
     ids=["no plugin", "a plugin that LAMMPS cannot load"],
 )
 @pytest.mark.slow
-def test_refusal(faultgouge, tmp_path, monkeypatch, library, says):
+def test_a_plugin_that_does_not_fit_is_refused(faultgouge, tmp_path, monkeypatch, library, says):
     if library:
         (tmp_path / "mindlinsmoothplugin.so").write_bytes(library)
     (tmp_path / "scene.toml").write_text(toml(SMALL))
