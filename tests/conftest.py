@@ -137,20 +137,25 @@ def faultgouge_here(
 
 @pytest.fixture
 def lmp(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess]:
-    """Runs an input script (text or file) with the command line program, in tmp_path.
+    """Runs an input script (text or file) with its variables in tmp_path; it is to end well, or to fail.
 
-    That of the environment; or the one that LAMMPS_PROGRAM names, with LAMMPS_MPIEXEC, see with_lammps.sh.
+    With the program of the environment; or the one that LAMMPS_PROGRAM names, with LAMMPS_MPIEXEC, see with_lammps.sh.
     """
     program = os.environ.get("LAMMPS_PROGRAM", BIN / "lmp")
     launcher = shlex.split(os.environ.get("LAMMPS_MPIEXEC", str(BIN / "mpiexec")))
 
-    def run(script: str | Path, *arguments: str, ranks: int = 1) -> subprocess.CompletedProcess:
+    def run(
+        script: str | Path, *arguments: str, ranks: int = 1, fails: bool = False, **variables: object
+    ) -> subprocess.CompletedProcess:
         if isinstance(script, str):
             file = tmp_path / "script.in"
             file.write_text(script)
         else:
             file = script
-        command = [*launcher, "-n", str(ranks), program, "-in", file, "-log", "none", *arguments]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+        given = [word for name, value in variables.items() for word in ("-var", name, str(value))]
+        command = [*launcher, "-n", str(ranks), program, "-in", file, "-log", "none", *arguments, *given]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+        assert (done.returncode != 0) == fails, done.stdout[-2000:]
+        return done
 
     return run

@@ -1,4 +1,4 @@
-"""Dashpots and drag in LAMMPS: forces over velocities, Coulomb's bound, orders in the time step, what is refused."""
+"""Dashpots and drag in LAMMPS: forces over velocities, Coulomb's bound, orders in the time step."""
 
 import itertools
 from ctypes import c_double
@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, damping_matrix, read_dump, touching
+from faultgouge.analysis import MindlinLaw, Packing, damping_matrix, touching
+from faultgouge.analysis.files.dumps import dump_frames
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.lammps.engine import Engine
 
@@ -47,9 +48,9 @@ class Moving:
 @arithmetics
 def test_matrix_is_the_derivative_of_the_forces_over_velocities(reference_packing, exponent, compensated):
     packing = damped(reference_packing(1.0), exponent, cn=1.3, ct=0.7, compensated=compensated)
-    contacts = packing.contacts
-    slip = np.resize([0.1, -0.3, 0.6, 0.0], len(contacts)) * packing.law.slip_limit(packing.geometry.overlap)
-    packing = replace(packing, contacts=Contacts(contacts.i, contacts.j, slip))
+    limit = packing.law.slip_limit(packing.geometry.overlap)
+    slip = np.resize([0.1, -0.3, 0.6, 0.0], len(limit)) * limit
+    packing = replace(packing, contacts=packing.contacts.slipped(slip))
     matrix, step = damping_matrix(packing).toarray(), 2.0**-10
     measured = np.empty_like(matrix)
     with Engine(packing) as engine:
@@ -75,16 +76,15 @@ def test_two_disks_and_the_floor_in_motion(exponent, compensated, cn, ct, mu, ov
     radius = np.array([0.5, 0.7])
     position = np.array([[1.0, 0.5 - overlap], [1.0 + 0.9, 0.0]])
     position[1, 1] = position[0, 1] + np.sqrt((1.2 - overlap) ** 2 - 0.81)
-    law = MindlinLaw(KN, KT, mu, exponent, cn, ct)
     found = touching(position, radius)
-    bare = Packing(position=position, radius=radius, law=law, contacts=found)
-    limit = law.slip_limit(bare.geometry.overlap)
-    rng = np.random.default_rng(5)
+    bare = Packing(position=position, radius=radius, law=MindlinLaw(KN, KT, mu), contacts=found)
     bare = damped(bare, exponent, cn, ct, compensated)
+    limit = bare.law.slip_limit(bare.geometry.overlap)
+    rng = np.random.default_rng(5)
     with Engine(bare) as engine:
         run = Moving(engine)
         for share, scale in itertools.product([-1.0, -0.5, 0.0, 0.9, 1.0, 3.0], [0.0, 1e-3, 1.0]):
-            packing = replace(bare, contacts=Contacts(found.i, found.j, share * limit))
+            packing = replace(bare, contacts=found.slipped(share * limit))
             velocity = scale * rng.standard_normal(6)
             engine.restore(packing)
             force = run.force(velocity).reshape(3, 2)
@@ -115,13 +115,6 @@ def forces_of_moving_contacts(packing, pairs, x, y, u):
     return expected
 
 
-def after(packing, dt, time):
-    """Positions and angular velocities of a run of the damped packing."""
-    with Engine(packing) as engine, engine.undamped(dt) as dynamics:
-        motion = dynamics.advance(round(time / dt))
-    return np.column_stack([motion.position, motion.velocity, packing.radius * motion.spin])
-
-
 @exponents
 @pytest.mark.parametrize(
     "parts",
@@ -143,35 +136,35 @@ def test_second_order_in_the_time_step(exponent, parts):
         fx=1.0,
         fy=float(law.normal_force(overlap)),
     )
-    packing = damped(column, exponent, **{"cn": 40.0, "ct": 40.0, **parts})
-    found = [after(packing, dt, 0.064) for dt in (1e-3, 5e-4, 2.5e-4)]
-    coarse, fine = (np.linalg.norm(found[k] - found[k + 1]) for k in (0, 1))
+    packing, ends = damped(column, exponent, **{"cn": 40.0, "ct": 40.0, **parts}), []
+    for dt in (1e-3, 5e-4, 2.5e-4):
+        with Engine(packing) as engine, engine.undamped(dt) as dynamics:
+            end = dynamics.advance(round(0.064 / dt))
+        ends.append(np.column_stack([end.position, end.velocity, packing.radius * end.spin]))
+    coarse, fine = (np.linalg.norm(ends[k] - ends[k + 1]) for k in (0, 1))
     assert 3.7 < coarse / fine < 4.3
 
 
-MODEL = """
-variable        decks index {decks}
-variable        fx index {fx}
-variable        precision index {precision}
-include         {decks}/system.in
-{extra}
-timestep        1e-3
-"""
+SYSTEM = f"variable decks index {DECKS}\ninclude {DECKS}/system.in\n"
 
 
 @arithmetics
 def test_drag_lets_free_disks_decay(lmp, tmp_path, compensated):
-    precision = "compensated" if compensated else "double"
-    extra = (
-        "displace_atoms all move 0 5 0\nunfix load\nvelocity all set 0.3 -0.2 0.0\nset group all omega 0 0 0.5\n"
-        "pair_style mindlin/smooth 1 0 0 ${compensated}\nfix move all nve/disc 1.0 drag 0.25 ${compensated}\n"
-        "fix_modify floor mu 0\n"
-    )
-    script = MODEL.format(decks=DECKS, fx=0.0, precision=precision, extra=extra)
-    dump = "write_dump all custom end id vx vy omegaz modify sort id format float %.17g\n"
-    done = lmp(script + "neigh_modify exclude group all all\nrun 100\n" + dump)
-    assert done.returncode == 0, done.stdout[-1000:]
-    rows = np.array([line.split() for line in (tmp_path / "end").read_text().splitlines()[9:]], float)[:, 1:]
+    script = f"""{SYSTEM}
+displace_atoms all move 0 5 0
+unfix load
+velocity all set 0.3 -0.2 0.0
+set group all omega 0 0 0.5
+pair_style mindlin/smooth 1 0 0 ${{compensated}}
+fix move all nve/disc 1.0 drag 0.25 ${{compensated}}
+fix_modify floor mu 0
+neigh_modify exclude group all all
+timestep 1e-3
+run 100
+write_dump all custom end vx vy omegaz modify format float %.17g
+"""
+    lmp(script, precision="compensated" if compensated else "double")
+    rows = next(dump_frames(tmp_path / "end")).rows
     # two hundred rounded factors
     np.testing.assert_allclose(rows, np.exp(-0.4) * np.tile([0.3, -0.2, 0.5], (len(rows), 1)), rtol=2e-14)
 
@@ -179,105 +172,43 @@ def test_drag_lets_free_disks_decay(lmp, tmp_path, compensated):
 @arithmetics
 def test_forces_after_a_run_are_those_of_the_contacts(lmp, tmp_path, compensated):
     """single() and the floor's columns hand out the forces, dashpots included, that the disks have felt."""
-    precision = "compensated" if compensated else "double"
-    extra = "unfix load\nvariable cn index 9.0\nvariable ct index 7.0\ninclude ${decks}/dashpots.in\n"
-    extra += "velocity all create 1e-2 5 loop geom\nfix move all nve/disc 1.0 ${compensated}\n"
-    extra += "compute seen all pair/local p1 p2 p5 p6 cutoff radius\n"
-    extra += "compute ids all property/local patom1 patom2 cutoff radius\n"
-    script = MODEL.format(decks=DECKS, fx=0.0, precision=precision, extra=extra)
-    script += (
-        "dump disks all custom 50 disks id fx fy tqz radius f_floor[1] f_floor[2]\n"
-        "dump_modify disks sort id format float %.17g\n"
-        "dump pairs all local 50 pairs c_ids[1] c_ids[2] c_seen[1] c_seen[2] c_seen[3] c_seen[4]\n"
-        "dump_modify pairs format float %.17g\nrun 50\n"
-    )
-    done = lmp(script)
-    assert done.returncode == 0, done.stdout[-1000:]
-    disks, pairs = (last_snapshot(tmp_path / name) for name in ("disks", "pairs"))
-    expected = np.zeros((len(disks), 3))
-    radius, floor_n, floor_t = disks[:, 4], disks[:, 5], disks[:, 6]
-    expected += np.column_stack([-floor_t, floor_n, -radius * floor_t])
-    for i, j, fn, ft, nx, ny in pairs:
+    script = f"""{SYSTEM}
+unfix load
+include {DECKS}/dashpots.in
+velocity all create 1e-2 5 loop geom
+fix move all nve/disc 1.0 ${{compensated}}
+compute seen all pair/local p1 p2 p5 p6 cutoff radius
+compute ids all property/local patom1 patom2 cutoff radius
+dump disks all custom 50 disks fx fy tqz radius f_floor[1] f_floor[2]
+dump_modify disks sort id format float %.17g
+dump pairs all local 50 pairs c_ids[1] c_ids[2] c_seen[1] c_seen[2] c_seen[3] c_seen[4]
+dump_modify pairs format float %.17g
+timestep 1e-3
+run 50
+"""
+    lmp(script, precision="compensated" if compensated else "double", cn=9.0, ct=7.0)
+    (*_, disks), (*_, pairs) = (dump_frames(tmp_path / name) for name in ("disks", "pairs"))
+    radius, floor_n, floor_t = disks.rows[:, 3:].T
+    expected = np.column_stack([-floor_t, floor_n, -radius * floor_t])
+    for i, j, fn, ft, nx, ny in pairs.rows:
         force = np.array([fn * nx - ft * ny, fn * ny + ft * nx])
         for disk, sign in ((int(i) - 1, 1), (int(j) - 1, -1)):
             expected[disk] += *(sign * force), -radius[disk] * ft
-    np.testing.assert_allclose(disks[:, 1:4], expected, rtol=0, atol=1e-12 * np.abs(expected).max())
-
-
-def last_snapshot(path):
-    lines = path.read_text().splitlines()
-    first = max(k for k, line in enumerate(lines) if line.startswith(("ITEM: ATOMS", "ITEM: ENTRIES")))
-    return np.array([line.split() for line in lines[first + 1 :]], float)
-
-
-PAIR = "pair_style mindlin/smooth 2e5 1e5 1.0 "
-FLOOR = "unfix floor\nfix floor all wall/mindlin/smooth 2e5 1e5 1.0 ylo 0.0 "
-MOVE = "\nfix move all nve/disc 1.0\n"
+    np.testing.assert_allclose(disks.rows[:, :3], expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(
-    ("extra", "says"),
-    [
-        (PAIR + "exponent 2", "exponent must be 1.5 or 1, not 2"),
-        (PAIR + "exponent", "exponent must be 1.5 or 1, not left out"),
-        (PAIR + "history half", "history must be total or rescaled, not half"),
-        (PAIR + "history", "history must be total or rescaled, not left out"),
-        (PAIR + "history rescaled exponent 1", "history rescaled needs exponent 1.5"),
-        (FLOOR + "history half", "history must be total or rescaled, not half"),
-        (FLOOR + "exponent 1 history rescaled", "history rescaled needs exponent 1.5"),
-        (PAIR + "damping 1.0", "damping takes two numbers, CN CT"),
-        (PAIR + "damping -1.0 0.0", "damping CN CT must be finite and not negative (got -1.0 0.0)"),
-        (PAIR + "damping 1.0 inf", "inf"),
-        (
-            PAIR + "dampin 1.0 1.0",
-            "knows the keywords exponent, history, damping, energy and compensated, but not dampin",
-        ),
-        (FLOOR + "exponent 1.6", "exponent must be 1.5 or 1, not 1.6"),
-        (FLOOR + "damping 1.0", "damping takes two numbers, CN CT"),
-        (FLOOR + "damping 0.0 -2", "damping CN CT must be finite and not negative (got 0.0 -2)"),
-        (FLOOR + "rubber", "knows the keywords exponent, history, damping, energy and compensated, but not rubber"),
-        (FLOOR + "damping 1 1" + MOVE, "needs pair_style mindlin/smooth KN KT MU damping CN CT"),
-        ("fix_modify floor damping 1", "damping takes two numbers, CN CT, or no"),
-        ("fix move all nve/disc 1.0 drag", "drag takes a time, TAU"),
-        ("fix move all nve/disc 1.0 drag 0", "TAU must be a positive number, not 0"),
-        ("fix move all overdamped/disc 1.0 1.0 drag 5.0", "rotation yes|no and compensated, but got drag"),
-        (PAIR + "damping 1 1\nfix move all overdamped/disc 1.0 1.0", "leave the keyword damping out"),
-        (
-            "pair_style mindlin/smooth 2e5 0 0 damping 1 0\nfix_modify floor mu 0\nminimize 0 1e-6 10 10",
-            "a minimizer has no velocities",
-        ),
-        (
-            MOVE + "variable c equal 1.0\nfix less all adapt 1 pair mindlin/smooth cn * * v_c",
-            "cn",
-        ),
-    ],
+    ("name", "value", "other", "keywords", "floor"),
+    [("cn", 4.0, 1.0, "damping ${cn} 2.0", ""), ("mu", 0.5, 1.0, "", "fix_modify floor mu v_wanted\n")],
 )
-def test_what_is_refused(said_against, extra, says):
-    assert says in said_against(MODEL.format(decks=DECKS, fx=0.0, precision="double", extra=extra) + "run 1\n")
-
-
 @pytest.mark.slow
-def test_adapted_dashpots_are_dashpots_from_the_start(lmp, tmp_path):
-    dumps = []
-    for cn, adapt in ((4.0, ""), (1.0, "variable c equal 4.0\nfix more all adapt 1 pair mindlin/smooth cn * * v_c\n")):
-        extra = f"pair_style mindlin/smooth ${{kn}} ${{kt}} ${{mu}} damping {cn} 2.0{MOVE}{adapt}"
-        script = MODEL.format(decks=DECKS, fx=3.0, precision="double", extra=extra)
-        done = lmp(script + "run 300\nwrite_dump all custom end id x y omegaz modify sort id format float %.17g\n")
-        assert done.returncode == 0, done.stdout[-1000:]
-        dumps.append((tmp_path / "end").read_text())
-    assert dumps[0] == dumps[1]
-
-
-@pytest.mark.ranks
-@pytest.mark.slow
-def test_deck_with_damping_and_weakening_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path):
-    written = []
-    settings = ["-var", "fx", "0.01", "-var", "time", "2.0", "-var", "amplitude", "1e-6", "-var", "v_ss", "2e-9"]
-    settings += ["-var", "cn", "2.0", "-var", "ct", "1.0", "-var", "tau", "20.0"]
-    for ranks in (1, 2):
-        done = lmp(DECKS / "perturb.in", "-var", "decks", str(DECKS), *settings, ranks=ranks)
-        assert done.returncode == 0, done.stdout[-1000:]
-        written.append((tmp_path / "perturb.end.disks").read_text())
-    assert written[0] == written[1]
-    packing = read_dump(tmp_path / "perturb.end.disks")
-    assert (packing.law.cn, packing.law.ct, packing.drag_time) == (2.0, 1.0, 20.0)
+def test_what_is_adapted_is_so_from_the_start(lmp, tmp_path, name, value, other, keywords, floor):
+    """fix adapt changes a parameter through extract(): the run is that of a pair style with the other value."""
+    model = f"{SYSTEM}pair_style mindlin/smooth ${{kn}} ${{kt}} ${{mu}} {keywords}\nfix move all nve/disc 1.0\n"
+    adapt = f"variable wanted equal {value}\nfix adapt all adapt 1 pair mindlin/smooth {name} * * v_wanted\n{floor}"
+    run = "timestep 1e-3\nrun 500\nwrite_dump all custom end id x y omegaz modify sort id format float %.17g\n"
+    ends = []
+    for given, extra in ((value, ""), (other, adapt)):
+        lmp(model + extra + run, fx=3.0, **{name: given})
+        ends.append((tmp_path / "end").read_text())
+    assert ends[0] == ends[1]

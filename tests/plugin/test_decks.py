@@ -1,33 +1,46 @@
 """Input decks: as they stand, on two ranks; and the sentences with which LAMMPS refuses what cannot work."""
 
+import re
+from contextlib import closing
+
 import pytest
+from mpi4py import MPI
 
+from faultgouge.analysis import read_dump
 from faultgouge.pywrap.lammps.decks import DECKS
+from faultgouge.pywrap.lammps.instance import lammps_instance
 
-SHORT = {"settle.in": (), "ramp.in": ("-var", "until", "2e-3"), "perturb.in": ("-var", "time", "0.5")}
+SHORT = {
+    "settle": {},
+    "ramp": {"until": 2e-3},
+    "perturb": {"time": 0.5},
+    "perturb, damped": {"fx": 0.01, "time": 2.0, "amplitude": 1e-6, "v_ss": 2e-9, "cn": 2.0, "ct": 1.0, "tau": 20.0},
+    "perturb, signal": {"time": 0.2, "signal": "record.txt", "scale": 1e-6, "on": "floor"},
+}
 
 
 @pytest.mark.ranks
 @pytest.mark.parametrize("precision", ["double", pytest.param("compensated", marks=pytest.mark.long)])
-@pytest.mark.parametrize("deck", SHORT)
+@pytest.mark.parametrize("run", SHORT)
 @pytest.mark.slow
-def test_deck_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path, deck, precision):
-    written = []
+def test_deck_runs_alone_and_the_same_on_two_ranks(lmp, tmp_path, run, precision):
+    (tmp_path / "record.txt").write_text("# time value\n0 0\n0.1 1\n0.2 -1\n")
+    written, given = [], SHORT[run]
     for ranks in (1, 2):
-        variables = ["-var", "decks", str(DECKS), "-var", "precision", precision]
-        done = lmp(DECKS / deck, *variables, *SHORT[deck], ranks=ranks)
-        assert done.returncode == 0, done.stdout[-2000:]
+        done = lmp(DECKS / f"{run.split(',')[0]}.in", ranks=ranks, decks=DECKS, precision=precision, **given)
         assert "WARNING" not in done.stdout
-        written.append({path.name: path.read_text() for path in sorted(tmp_path.glob("*.disks"))})
+        written.append({path: path.read_text() for path in tmp_path.glob("*.disks")})
     assert written[0]
     assert written[0] == written[1]
+    damping = {(each.law.cn, each.law.ct, each.drag_time) for each in map(read_dump, written[0])}
+    assert (given.get("cn", 0.0), given.get("ct", 0.0), given.get("tau")) in damping
 
 
 @pytest.mark.ranks
 @pytest.mark.slow
 def test_ranks_share_the_disks_evenly(lmp):
     """The box is three times as high as the disks, and LAMMPS cuts its height first."""
-    done = lmp(f"include {DECKS}/system.in\nrun 0", "-var", "decks", str(DECKS), ranks=2)
+    done = lmp(f"include {DECKS}/system.in\nrun 0", ranks=2, decks=DECKS)
     assert "1 by 2 by 1 MPI processor grid" in done.stdout
     (share,) = (line.split() for line in done.stdout.splitlines() if line.startswith("Nlocal:"))
     assert float(share[3]) <= 1.1 * float(share[1])  # the most beside the mean
@@ -59,68 +72,82 @@ GOOD = {
     "fix": "fix 1 all nve/disc 1.0",
     "run": "run 10",
 }
-
-
-def test_model_of_the_refusals_runs(lmp):
-    assert lmp(MODEL.format(**GOOD)).returncode == 0
+PAIR = "pair_style mindlin/smooth 2e5 "
+NVE, OVERDAMPED, FLOOR = "fix 1 all nve/disc 1.0 ", "fix 1 all overdamped/disc ", "fix 1 all wall/mindlin/smooth 2e5 "
+KNOWN = "knows the keywords exponent, history, damping, energy and compensated, but not "
+THIRD = "\ncreate_atoms 1 single {} 0.499 0\nset group all diameter 1.0"
+ADAPT = NVE + "\nvariable c equal 1.0\nfix less all adapt 1 pair mindlin/smooth "
+MINIMIZE, DELETE = "minimize 0 1e-6 10 10", "run 0\ngroup one id 1\ndelete_atoms group one {}\nrun 10"
 
 
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"pair": "pair_style mindlin/smooth 2e5 5e4"}, "takes three numbers, KN KT MU"),
-        ({"pair": "pair_style mindlin/smooth 2e5 5e4 -1"}, "KN must be positive, KT and MU not negative"),
+        ({"pair": PAIR + "5e4"}, "takes three numbers, KN KT MU"),
+        ({"pair": PAIR + "5e4 -1"}, "KN must be positive, KT and MU not negative"),
         ({"pair": "pair_style mindlin/smooth nan 5e4 1"}, "instead of 'nan'"),
-        (
-            {"pair": "pair_style mindlin/smooth 2e5 5e4 1 exact"},
-            "knows the keywords exponent, history, damping, energy and compensated, but not exact",
-        ),
-        ({"pair": "pair_style mindlin/smooth 2e5 5e4 1 compensated"}, "moves disks without the low parts"),
-        ({"fix": "fix 1 all nve/disc 1.0 compensated"}, "needs pair_style mindlin/smooth KN KT MU compensated"),
-        (
-            {"pair": "pair_style mindlin/smooth 2e5 0 0 compensated", "run": "minimize 0 1e-6 10 10"},
-            "does not carry the low parts",
-        ),
-        ({"fix": "fix 1 all wall/mindlin/smooth 2e5 5e4 1.0 ylo 0.0 compensated"}, "must both have the keyword"),
+        ({"pair": PAIR + "5e4 1 exact"}, KNOWN + "exact"),
+        ({"pair": PAIR + "5e4 1 compensated"}, "moves disks without the low parts"),
+        ({"fix": NVE + "compensated"}, "needs pair_style mindlin/smooth KN KT MU compensated"),
+        ({"pair": PAIR + "0 0 compensated", "run": MINIMIZE}, "does not carry the low parts"),
+        ({"fix": FLOOR + "5e4 1.0 ylo 0.0 compensated"}, "must both have the keyword"),
         ({"coeff": "pair_coeff 1 1"}, "must start with * *"),
         ({"vel": ""}, "use comm_modify vel yes"),
         ({"dimension": 3}, "use dimension 2"),
-        ({"width": 1.99}, "less than two diameters of the largest disk"),
-        ({"run": "minimize 0 1e-6 10 10"}, "cannot be minimized"),
+        ({"width": 1.99, "fix": NVE + "\nneighbor 0.05 bin"}, "less than two diameters of the largest disk"),
+        ({"run": MINIMIZE}, "cannot be minimized"),
         ({"fix": "fix 1 all nve/disc"}, "takes one number, I0"),
         ({"fix": "fix 1 all nve/disc 0.0"}, "I0 must be a positive number"),
-        ({"fix": "fix 1 all overdamped/disc 1.0"}, "takes two numbers, GAMMA and I0"),
-        (
-            {"fix": "fix 1 all nve/disc 1.0 turning no"},
-            "rotation yes|no and compensated, but got turning",
-        ),
-        ({"fix": "fix 1 all nve/disc 1.0 rotation"}, "rotation takes yes or no"),
-        ({"fix": "fix 1 all wall/mindlin/smooth 2e5 5e4 1.0 0.0"}, "takes KN KT MU ylo COORD"),
-        ({"fix": "fix 1 all wall/mindlin/smooth 2e5 5e4 1.0 yhi 0.0"}, "knows a floor only"),
-        ({"fix": "fix 1 all wall/mindlin/smooth 2e5 -5e4 1.0 ylo 0.0"}, "KT and MU not negative"),
-        (
-            {"run": "run 0\ngroup one id 1\ndelete_atoms group one\nrun 10"},
-            "use delete_atoms with compress no",
-        ),
-        ({"fix": "fix 1 all nve/disc 1.0\ncreate_atoms 1 single 1 0.499 0\nset group all diameter 1.0"}, "same centre"),
-        (
-            {"fix": "fix 1 all nve/disc 1.0\ncreate_atoms 1 single 1.2 0.499 0\nset group all diameter 1.0"},
-            "only 0.19999999999999996 apart, the centre of one inside of the other",
-        ),
-        (
-            {"fix": "fix 1 all nve/disc 1.0\nfix 2 all wall/mindlin/smooth 2e5 5e4 1.0 ylo 0.6"},
-            "has its centre at 0.499, below the floor",
-        ),
+        ({"fix": OVERDAMPED + "1.0"}, "takes two numbers, GAMMA and I0"),
+        ({"fix": NVE + "turning no"}, "rotation yes|no and compensated, but got turning"),
+        ({"fix": NVE + "rotation"}, "rotation takes yes or no"),
+        ({"fix": FLOOR + "5e4 1.0 0.0"}, "takes KN KT MU ylo COORD"),
+        ({"fix": FLOOR + "5e4 1.0 yhi 0.0"}, "knows a floor only"),
+        ({"fix": FLOOR + "-5e4 1.0 ylo 0.0"}, "KT and MU not negative"),
+        ({"run": DELETE.format("")}, "use delete_atoms with compress no"),
+        ({"fix": NVE + THIRD.format(1)}, "same centre"),
+        ({"fix": NVE + THIRD.format(1.2)}, "only 0.19999999999999996 apart, the centre of one inside of the other"),
+        ({"fix": FLOOR + "5e4 1.0 ylo 0.6"}, "has its centre at 0.499, below the floor"),
         ({"run": "velocity all set 1e3 0 0\nrun 1000"}, "in one step, farther than its radius 0.501"),
+        # exponent, history, energy
+        ({"pair": PAIR + "5e4 1 exponent 2"}, "exponent must be 1.5 or 1, not 2"),
+        ({"pair": PAIR + "5e4 1 exponent"}, "exponent must be 1.5 or 1, not left out"),
+        ({"pair": PAIR + "5e4 1 history half"}, "history must be total or rescaled, not half"),
+        ({"pair": PAIR + "5e4 1 history"}, "history must be total or rescaled, not left out"),
+        ({"pair": PAIR + "5e4 1 history rescaled exponent 1"}, "history rescaled needs exponent 1.5"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 exponent 1.6"}, "exponent must be 1.5 or 1, not 1.6"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 history half"}, "history must be total or rescaled, not half"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 exponent 1 history rescaled"}, "history rescaled needs exponent 1.5"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 rubber"}, KNOWN + "rubber"),
+        ({"pair": PAIR + "5e4 1 energy"}, "energy must be yes or no"),
+        ({"pair": PAIR + "5e4 0 energy yes"}, "without friction there is no history to keep the energy of contacts in"),
+        # dashpots and drag
+        ({"pair": PAIR + "5e4 1 damping 1.0"}, "damping takes two numbers, CN CT"),
+        ({"pair": PAIR + "5e4 1 damping -1.0 0.0"}, "damping CN CT must be finite and not negative (got -1.0 0.0)"),
+        ({"pair": PAIR + "5e4 1 damping 1.0 inf"}, "inf"),
+        ({"pair": PAIR + "5e4 1 dampin 1.0 1.0"}, KNOWN + "dampin"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 damping 1.0"}, "damping takes two numbers, CN CT"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 damping 0.0 -2"}, "damping CN CT must be finite and not negative (got 0.0 -2)"),
+        ({"fix": FLOOR + "5e4 1 ylo 0 damping 1 1"}, "needs pair_style mindlin/smooth KN KT MU damping CN CT"),
+        ({"fix": FLOOR + "5e4 1 ylo 0\nfix_modify 1 damping 1"}, "damping takes two numbers, CN CT, or no"),
+        ({"fix": NVE + "drag"}, "drag takes a time, TAU"),
+        ({"fix": NVE + "drag 0"}, "TAU must be a positive number, not 0"),
+        ({"fix": OVERDAMPED + "1.0 1.0 drag 5.0"}, "rotation yes|no and compensated, but got drag"),
+        ({"pair": PAIR + "5e4 1 damping 1 1", "fix": OVERDAMPED + "1.0 1.0"}, "leave the keyword damping out"),
+        ({"pair": PAIR + "0 0 damping 1 0", "run": MINIMIZE}, "a minimizer has no velocities"),
+        ({"fix": ADAPT + "cn * * v_c"}, "param cn not supported"),
+        ({"fix": ADAPT + "nonsense * * v_c"}, "param nonsense not supported"),
     ],
     ids=lambda value: str(next(iter(value.values())))[:40] if isinstance(value, dict) else "",
 )
-def test_refused(said_against, change, says):
-    if "width" in change:
-        change = {**change, "fix": "fix 1 all nve/disc 1.0\nneighbor 0.05 bin"}
-    assert says in said_against(MODEL.format(**{**GOOD, **change}))
+def test_refused(change, says):
+    """In this process, which saves the second that another one takes to start."""
+    refused = pytest.raises(Exception, match=f"ERROR.*{re.escape(says)}")
+    with closing(lammps_instance(MPI.COMM_SELF, None)) as instance, refused:
+        instance.commands_string(MODEL.format(**{**GOOD, **change}))
 
 
-def test_deleted_disks_leave_the_slips_of_the_others(lmp):
-    done = lmp(MODEL.format(**{**GOOD, "run": "run 0\ngroup one id 1\ndelete_atoms group one compress no\nrun 10"}))
-    assert done.returncode == 0, done.stdout[-1000:]
+@pytest.mark.parametrize("run", ["run 10", DELETE.format("compress no")])
+def test_model_of_the_refusals_runs(lmp, run):
+    """Also where disks are deleted that leave the slips of the others."""
+    lmp(MODEL.format(**{**GOOD, "run": run}))

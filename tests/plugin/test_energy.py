@@ -5,9 +5,15 @@ import itertools
 import numpy as np
 import pytest
 
+from faultgouge.analysis.files.dumps import dump_frames
+
 KN, KT, MU, FX, FY, WIDTH = 2e5, 2e5 * 2 / 7, 0.5, 2.5, 3.0, 2.8
 
 HEAD = """
+variable        energy index 'energy yes'
+variable        dashpots index '20.0 10.0'
+variable        compensated index ''
+variable        dt index 1e-4
 units           lj
 dimension       2
 boundary        p f p
@@ -26,38 +32,43 @@ set             group all mass 1.0
 group           top type 2
 """
 LAW = f"""
-pair_style      mindlin/smooth {KN} {KT} {MU} damping 20.0 10.0 {{keywords}}
+pair_style      mindlin/smooth {KN} {KT} {MU} damping ${{dashpots}} ${{energy}} ${{compensated}}
 pair_coeff      * *
-fix             floor all wall/mindlin/smooth {KN} {KT} {MU} ylo 0.0 damping 20.0 10.0 {{keywords}}
+fix             floor all wall/mindlin/smooth {KN} {KT} {MU} ylo 0.0 damping ${{dashpots}} ${{energy}} ${{compensated}}
 fix             push top addforce {FX} -{FY} 0.0
-fix             move all nve/disc 1.0 {{compensated}}
-timestep        {{dt}}
+fix             move all nve/disc 1.0 ${{compensated}}
+timestep        ${{dt}}
 """
+MODEL = HEAD + PILE + LAW
+"""Two disks on a floor that touch through the sides of a periodic box, and a third one that slides over them."""
 LOOK = """
 compute         ids all property/local patom1 patom2 cutoff radius
 compute         contact all pair/local p3 p7 p8 cutoff radius
-dump            pairs all local {every} pairs c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]
-dump            disks all custom {every} disks id id xu yu vx vy omegaz f_floor[3] f_floor[7] f_floor[{column}]
+dump            pairs all local ${every} pairs c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]
+dump            disks all custom ${every} disks id id xu yu vx vy omegaz f_floor[3] f_floor[7] f_floor[${column}]
 dump_modify     pairs format float %.17g
 dump_modify     disks format float %.17g sort id
 """
-"""Two disks on a floor that touch through the sides of a periodic box, and a third one that slides over them."""
+AGAIN = f"""
+write_restart   middle.restart
+clear
+{HEAD}
+read_restart    middle.restart
+group           top type 2
+"""
 
 arithmetics = pytest.mark.parametrize("compensated", ["", "compensated"], ids=["double", "compensated"])
 
 
-def law(dt=1e-4, energy="energy yes", compensated=""):
-    return LAW.format(dt=dt, keywords=f"{energy} {compensated}", compensated=compensated)
+@pytest.fixture
+def seen(lmp, tmp_path):
+    """Runs a script, and gives what was seen of pairs and of disks, the tables of a dump, one a step."""
 
+    def run(script, **settings):
+        lmp(script, **settings)
+        return [[frame.rows for frame in dump_frames(tmp_path / name)] for name in ("pairs", "disks")]
 
-def look(every, compensated=""):
-    return LOOK.format(every=every, column=9 if compensated else 8)
-
-
-def frames(path):
-    """The tables of a dump, one a step."""
-    parts = path.read_text().split("ITEM: TIMESTEP\n")[1:]
-    return [np.array([line.split() for line in part.splitlines()[8:]], dtype=float) for part in parts]
+    return run
 
 
 def contacts(pairs, disks):
@@ -72,10 +83,9 @@ def tangential_energy(slip, overlap):
     return KT * np.sqrt(overlap) * slip**2 * (1 / 2 + x / 3 - x**2 / 4)
 
 
-def balance(folder):
+def balance(pairs, disks):
     """(work of the load, energy gained, energy dissipated, what overlaps gave to stuck contacts) of a run."""
-    disks = frames(folder / "disks")
-    seen = [contacts(*both) for both in zip(frames(folder / "pairs"), disks, strict=True)]
+    seen = [contacts(*both) for both in zip(pairs, disks, strict=True)]
 
     def energy(k):
         # I = I_0 m R^2 with I_0 = m = 1 and R = 1/2
@@ -99,14 +109,12 @@ def balance(folder):
     [("20.0 10.0", ""), ("0 0", ""), ("20.0 10.0", "compensated")],
     ids=["sliding and dashpots", "sliding", "compensated"],
 )
-def test_work_of_the_load_is_stored_moves_or_is_dissipated(lmp, tmp_path, dashpots, compensated):
+def test_work_of_the_load_is_stored_moves_or_is_dissipated(seen, dashpots, compensated):
     """What is missing is of first order in the time step: the power at the end of a step stands for the whole step."""
-    missing = []
+    missing, settings = [], {"dashpots": dashpots, "compensated": compensated, "column": 8 + bool(compensated)}
     for steps in (2000, 4000):
-        text = law(0.2 / steps, compensated=compensated).replace("20.0 10.0", dashpots)
-        done = lmp(HEAD + PILE + text + look(1, compensated) + f"run {steps}\n")
-        assert done.returncode == 0, done.stdout[-2000:]
-        work, gained, dissipated, given = balance(tmp_path)
+        found = seen(MODEL + LOOK + f"run {steps}\n", dt=0.2 / steps, every=1, **settings)
+        work, gained, dissipated, given = balance(*found)
         missing.append(work + given - gained - dissipated)
     assert dissipated > 0.05 * work
     assert abs(given) < 0.1 * dissipated
@@ -115,72 +123,40 @@ def test_work_of_the_load_is_stored_moves_or_is_dissipated(lmp, tmp_path, dashpo
 
 
 @arithmetics
-def test_counting_changes_nothing_else(lmp, tmp_path, compensated):
-    def end(energy, column):
-        text = law(energy=energy, compensated=compensated) + look(100, compensated)
-        done = lmp(HEAD + PILE + text.replace(f"f_floor[{column + 1}]", f"f_floor[{column}]") + "run 1000\n")
-        assert done.returncode == 0, done.stdout[-2000:]
-        return frames(tmp_path / "pairs"), frames(tmp_path / "disks")
-
-    column = 8 if compensated else 7
-    without, counted = end("", column), end("energy yes", column)
-    for bare, full in zip(*(each[0] for each in (without, counted)), strict=True):
+def test_counting_changes_nothing_else(seen, compensated):
+    settings = {"every": 100, "compensated": compensated, "column": 7 + bool(compensated)}
+    without, counted = (seen(MODEL + LOOK + "run 1000\n", energy=energy, **settings) for energy in ("", "energy yes"))
+    for bare, full in zip(without[0], counted[0], strict=True):
         assert np.array_equal(bare[:, :4], full[:, :4])
         assert not bare[:, 4].any()
     assert all(np.array_equal(*both) for both in zip(without[1], counted[1], strict=True))
     assert counted[0][-1][:, 4].max() > 0
 
 
-AGAIN = f"""
-write_restart   middle.restart
-clear
-{HEAD}
-read_restart    middle.restart
-group           top type 2
-"""
-
-
 @arithmetics
 @pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_energies_go_through_a_restart(lmp, tmp_path, compensated, ranks):
+def test_energies_go_through_a_restart(seen, compensated, ranks):
     def end(middle, ranks=1):
-        halves = law(compensated=compensated), f"run 500\n{middle}", look(500, compensated), "run 500\n"
-        done = lmp(HEAD + PILE + "".join(halves), ranks=ranks)
-        assert done.returncode == 0, done.stdout[-2000:]
-        return contacts(frames(tmp_path / "pairs")[-1], frames(tmp_path / "disks")[-1])
+        settings = {"every": 500, "compensated": compensated, "column": 8 + bool(compensated)}
+        pairs, disks = seen(f"{MODEL}run 500\n{middle}{LOOK}run 500\n", ranks=ranks, **settings)
+        return contacts(pairs[-1], disks[-1])
 
-    straight, again = end(""), end(AGAIN + law(compensated=compensated), ranks)
+    straight, again = end(""), end(AGAIN + LAW, ranks)
     assert straight.keys() == again.keys()
     assert all(np.array_equal(straight[each], again[each]) for each in straight)
     assert max(row[2] for row in straight.values()) > 0
 
 
-@pytest.mark.parametrize("first", ["yes", "no"])
-def test_slips_stay_where_a_restart_begins_or_ends_to_count(lmp, tmp_path, first):
+@pytest.mark.parametrize(("first", "second"), [("yes", "no"), ("no", "yes")])
+def test_slips_stay_where_a_restart_begins_or_ends_to_count(seen, first, second):
     """Energies begin at zero then, or are left out; a wall without them has no column for them."""
-    second = {"yes": "no", "no": "yes"}[first]
-    column = 8 if second == "yes" else 7
-    seen = LOOK.format(every=500, column=column)
-    script = PILE + law(energy=f"energy {first}") + "run 500\n" + AGAIN + law(energy=f"energy {second}") + seen
-    done = lmp(HEAD + script + "run 0\n")
-    assert done.returncode == 0, done.stdout[-2000:]
-    pairs, disks = frames(tmp_path / "pairs")[-1], frames(tmp_path / "disks")[-1]
-    bare = HEAD + PILE + law(energy="") + "run 500\n" + LOOK.format(every=500, column=7) + "run 0\n"
-    assert lmp(bare).returncode == 0
-    assert np.array_equal(pairs, frames(tmp_path / "pairs")[-1])
-    assert np.array_equal(disks[:, :9], frames(tmp_path / "disks")[-1][:, :9])
+    begin, end = f"{MODEL}run 500\n", f"{LOOK}run 0\n"
+    again = AGAIN + LAW.replace("${energy}", f"energy {second}")
+    (pairs,), (disks,) = seen(begin + again + end, energy=f"energy {first}", every=500, column=7 + (second == "yes"))
+    (bare_pairs,), (bare_disks,) = seen(begin + end, energy="", every=500, column=7)
+    assert np.array_equal(pairs, bare_pairs)
+    assert np.array_equal(disks[:, :9], bare_disks[:, :9])
     assert not pairs[:, 4].any()
     if second == "yes":
         assert not disks[:, 9].any()
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        (("energy yes", "energy"), "energy must be yes or no"),
-        ((f"{MU} damping", "0.0 damping"), "without friction there is no history to keep the energy of contacts in"),
-    ],
-)
-def test_refusals(said_against, change, says):
-    assert says in said_against(HEAD + PILE + law().replace(*change) + "run 0\n")

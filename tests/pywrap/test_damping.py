@@ -1,10 +1,12 @@
 """A scene with [damping]: which stages it changes, and which it leaves as they are to the bit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from faultgouge.analysis import damping_matrix, largest_damping_rate, largest_frequency, stable_timestep
-from faultgouge.pywrap import Engine, Scene, SceneError, perturb, ramp, settle
+from faultgouge.pywrap import Engine, Scene, SceneError, perturb, ramp
 from faultgouge.pywrap.runs.undamped import time_step
 
 SCENE = {
@@ -30,9 +32,7 @@ def runs():
 def test_equilibria_are_the_same_to_the_bit(runs):
     (_, plain, _), (_, damped, _) = runs
     for a, b in zip(plain, damped, strict=True):
-        for name in ("position", "angle"):
-            assert np.array_equal(getattr(a.packing, name), getattr(b.packing, name))
-        assert np.array_equal(a.packing.contacts.slip, b.packing.contacts.slip)
+        assert a.packing == replace(b.packing, law=a.packing.law, drag_time=None)
 
 
 def test_runs_are_damped(runs):
@@ -47,31 +47,12 @@ def test_an_engine_goes_on_undamped(runs):
     packing = equilibria[1].packing
     displacement = 1e-6 * np.random.default_rng(1).standard_normal(3 * len(packing))
     with Engine(packing) as engine:
-        before = engine.displace(packing, displacement).position, engine.net_force
+        before = engine.displace(packing, displacement), engine.net_force
         with engine.undamped(1e-3) as dynamics:
             dynamics.advance(20)
-        after = engine.displace(packing, displacement).position, engine.net_force
-    assert np.array_equal(before[0], after[0])
+        after = engine.displace(packing, displacement), engine.net_force
+    assert before[0] == after[0]
     assert np.array_equal(before[1], after[1])
-
-
-def test_a_run_is_continued_in_another_engine_to_the_bit(runs):
-    packing = runs[1][1][1].packing
-    ends = []
-    with Engine(packing) as engine, engine.undamped(1e-3, amplitude=1e-3, omega=5.0) as dynamics:
-        dynamics.advance(50)
-        state = dynamics.state()
-        dynamics.resume(50, state)
-        ends.append(dynamics.advance(50))
-    with Engine(packing) as engine, engine.undamped(1e-3, amplitude=1e-3, omega=5.0) as dynamics:
-        dynamics.resume(50, state)
-        ends.append(dynamics.advance(50))
-    with Engine(packing) as engine, engine.undamped(1e-3, amplitude=1e-3, omega=5.0) as dynamics:
-        straight = dynamics.advance(100)
-    for name in ("position", "velocity", "spin"):
-        assert np.array_equal(getattr(ends[0], name), getattr(ends[1], name))
-    # wrapped into the box once more: a rounding of the coordinates
-    assert np.abs(ends[0].position - straight.position).max() < 1e-13
 
 
 def test_time_step_stays_below_what_dashpots_allow(runs):
@@ -105,7 +86,4 @@ def test_rescaled_slips_climb_with_newtons_method(precision):
 
 def test_harmonic_disks_settle_and_climb():
     scene = Scene.from_mapping(SCENE | {"law": {"kn": 3e3, "exponent": 1}})
-    first = settle(scene)
-    assert first.packing.law.exponent == 1
-    for equilibrium in ramp(scene, first):
-        assert equilibrium.residual < 1e-10
+    assert all(each.packing.law.exponent == 1 and each.residual < 1e-10 for each in ramp(scene))

@@ -25,11 +25,8 @@ def test_a_displacement_does_not_depend_on_those_before(reference_packing, compe
             later = engine.displace(base, displacement.ravel())
             force = engine.net_force
             with Engine(base) as other:
-                first = other.displace(base, displacement.ravel())
+                assert base != later == other.displace(base, displacement.ravel())
                 np.testing.assert_array_equal(force, other.net_force)
-            for name in ("position", "position_low", "angle"):
-                np.testing.assert_array_equal(getattr(later, name), getattr(first, name))
-            np.testing.assert_array_equal(later.contacts.slip, first.contacts.slip)
             moved = later.position[:, 0] - base.position[:, 0]
             crossed += np.count_nonzero(np.abs(moved) > 0.5 * base.box_length)
             base = later

@@ -1,15 +1,14 @@
 """Where a ramp to a given load ends."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_layer import REFERENCE
 
-from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate, ramp, reach
-from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+from faultgouge.assessment.stability.cases.packings import at_rest
+from faultgouge.pywrap import Engine, NoEquilibriumError, Scene, equilibrate, ramp, reach
 
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 SCENE = {
     "packing": {"file": str(REFERENCE)},
     "law": {"kn": 2e5},
@@ -26,11 +25,12 @@ def test_the_last_equilibrium_is_at_the_load_also_within_the_first_increment(fx,
     assert found[-1].packing.residual < 1e-9
 
 
-def test_a_ramp_ends_at_until_with_a_shorter_increment():
-    scene = Scene.from_mapping(SCENE | {"ramp": {"step": 7e-4, "until": 3e-3}})
-    assert [each.fx for each in ramp(scene)] == [0.0, 7e-4, 1.4e-3, 3 * 7e-4, 2.8e-3, 3e-3]
-    whole = Scene.from_mapping(SCENE | {"ramp": {"step": 1e-3, "until": 3e-3}})
-    assert [each.fx for each in ramp(whole)] == [0.0, 1e-3, 2e-3, 3e-3]
+@pytest.mark.parametrize(
+    ("step", "loads"), [(7e-4, [0.0, 7e-4, 1.4e-3, 3 * 7e-4, 2.8e-3, 3e-3]), (1e-3, [0.0, 1e-3, 2e-3, 3e-3])]
+)
+def test_a_ramp_ends_at_until_with_a_shorter_increment(step, loads):
+    scene = Scene.from_mapping(SCENE | {"ramp": {"step": step, "until": 3e-3}})
+    assert [each.fx for each in ramp(scene)] == loads
 
 
 @pytest.mark.slow
@@ -65,8 +65,7 @@ class Overhanging(Engine):
 def test_a_load_that_is_not_reached_from_below_is_reached_from_above(reference_packing):
     packing = reference_packing(1.0)
     with Overhanging(packing) as engine:
-        start = equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), 0.0)
-        last = equilibrate(engine, start, 1e-3)
+        last = equilibrate(engine, at_rest(packing), 1e-3)
         with pytest.raises(NoEquilibriumError, match=r"beyond F_x = 0\.001999"):
             equilibrate(engine, last, 2e-3)
         found = equilibrate(engine, last, 2e-3, onward=True)

@@ -1,6 +1,4 @@
-"""What a scene asks for, and what is refused before any of it is done."""
-
-from copy import deepcopy
+"""What a scene asks for, and runs without end; test_scene.py has what else is refused before any of it is done."""
 
 import pytest
 
@@ -17,34 +15,7 @@ SCENE = {
 
 
 def with_key(section, key, value):
-    scene = deepcopy(SCENE)
-    scene.setdefault(section, {})[key] = value
-    return scene
-
-
-@pytest.mark.parametrize(
-    ("section", "key", "value", "says"),
-    [
-        ("law", "kn", 5e-324, "law.kn = 5e-324 is refused: give a number between 1e-100 and 1e+100"),
-        ("law", "kt", 1e-320, "law.kt"),
-        ("law", "mu", 5e-324, "law.mu"),
-        ("load", "fy", 1e-300, "load.fy = 1e-300 is refused"),
-        ("load", "fy", 1e9, "presses two disks 2.9e+02 into each other, deeper than the smallest radius 0.5"),
-        ("law", "kn", 1e14, "settling takes about"),
-        ("law", "kn", 1e20, "no packing comes to rest"),
-        ("packing", "radii", [5e-324], "packing.radii"),
-        ("packing", "radii", [0.5, 1e-9], "deeper than the smallest radius"),
-        ("packing", "width", 1e10, "packing.width = 1e+10 is"),
-        ("packing", "seed", 2**64, "packing.seed"),
-        ("packing", "periodic", False, "packing.periodic = false leaves the sides open"),
-        ("ramp", "step", 1e-12, "ramp.step = 1e-12 makes 1e+10 equilibria"),
-        ("ramp", "until", 1e6, "ramp.step = 0.001 makes 1e+09 equilibria"),
-        ("perturb", "time_step", 1e-200, "perturb.time_step"),
-        ("friction", "v_ss", "1e400 v0", "friction.v_ss"),
-    ],
-)
-def test_what_no_packing_bears_is_refused(refused_scene, section, key, value, says):
-    assert says in refused_scene(with_key(section, key, value))
+    return SCENE | {section: SCENE[section] | {key: value}}
 
 
 @pytest.mark.parametrize(
@@ -57,9 +28,9 @@ def test_runs_without_end_are_refused(key, value):
     assert foreseen(scene, "settle") == ""
 
 
-@pytest.mark.parametrize("changes", [("perturb", "time", 1e5), ("perturb", "time_step", 1e-8)])
-def test_long_work_is_said(changes):
-    scene = Scene.from_mapping(with_key(*changes))
+@pytest.mark.parametrize(("key", "value"), [("time", 1e5), ("time_step", 1e-8)])
+def test_long_work_is_said(key, value):
+    scene = Scene.from_mapping(with_key("perturb", key, value))
     assert foreseen(scene, "perturb").startswith("perturb: about ")
     assert "time steps" in foreseen(scene, "perturb")
 
@@ -84,15 +55,6 @@ def test_a_reproduction_counts_what_it_runs():
         foreseen(scene, "reproduce", 10**9)
 
 
-def test_a_loop_of_links_and_deep_brackets_are_refused(tmp_path, refused_scene):
-    (tmp_path / "a.json").symlink_to(tmp_path / "b.json")
-    (tmp_path / "b.json").symlink_to(tmp_path / "a.json")
-    (tmp_path / "deep.json").write_text("[" * 100_000)
-    (tmp_path / "long.json").write_text('{"x": [' + "9" * 400 + '], "y": [1.0], "radius": [0.5]}')
-    for name in ("a.json", "deep.json", "long.json"):
-        assert name in refused_scene({**SCENE, "packing": {"file": name}}, tmp_path)
-
-
 @pytest.mark.parametrize(
     ("disks", "fy", "step", "until", "cn", "measured"),
     [
@@ -114,14 +76,13 @@ def test_time_of_a_search(disks, fy, step, until, cn, measured):
     packing = {"disks": disks, "width": 1.192 * disks**0.5, "seed": 1}
     scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": fy}, "ramp": {"step": step, "until": until}}
     scene |= {} if cn is None else {"damping": {"cn": cn}}
-    read = Scene.from_mapping(scene)
-    seconds = estimated(read, "onset").seconds - estimated(read, "settle").seconds
-    assert measured / 3 < seconds < 3 * measured
+    search, settling = (estimated(Scene.from_mapping(scene), command).seconds for command in ("onset", "settle"))
+    assert measured / 3 < search - settling < 3 * measured
 
 
 @pytest.mark.parametrize(("disks", "measured"), [(3000, 1.7e9), (10_000, 0.9e9), (30_000, 1.7e9), (100_000, 5.2e9)])
 def test_memory_of_a_search_in_slices(disks, measured):
     """Against peaks of the whole process in two threads (docs/benchmarks.md), within a factor of two."""
-    scene = deepcopy(SCENE) | {"packing": {"disks": disks, "width": 1.2 * disks**0.5, "seed": 3}}
+    scene = SCENE | {"packing": {"disks": disks, "width": 1.2 * disks**0.5, "seed": 3}}
     memory = estimated(Scene.from_mapping(scene), "onset").memory
     assert measured / 2 < memory < 2 * measured

@@ -15,17 +15,16 @@ from faultgouge.pywrap.runs.path import EquilibriumPath, loads
 @pytest.mark.long
 def test_no_pair_is_complex_below_the_first_window():
     """360 disks, whose first pair is complex by 3e-5 of itself: by less than clusters of modes may be in error."""
-    disks, seed = 360, 5
-    packing = {"disks": disks, "width": 22.6, "seed": seed}
-    ramp = {"step": 2 / disks, "until": 6 / disks}
+    packing, step = {"disks": 360, "width": 22.6, "seed": 5}, 2 / 360
+    ramp = {"step": step, "until": 3 * step}
     scene = Scene.from_mapping({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": ramp})
     start = settle(scene)
     with Engine(start.packing) as engine:
         path = EquilibriumPath(engine, start, scene)
-        onset = find_onset(path, ramp["step"] * np.arange(4))
+        onset = find_onset(path, step * np.arange(4))
         assert not onset.complete
         assert onset.doubtful == ()
-        distance = 1e-3 * ramp["step"]
+        distance = 1e-3 * step
         below = np.linspace(0, onset.fx_c - distance, 5)
         imaginary = []
         for fx in [*below, onset.fx_c + distance]:
@@ -36,37 +35,34 @@ def test_no_pair_is_complex_below_the_first_window():
     assert max(imaginary[:-1]) < noise < imaginary[-1]
 
 
-def test_a_window_beside_a_contact_that_begins_to_slide_is_found_between_loads_far_apart():
-    """The contact slides from 0.0246 on and bends the levels: seen from both ends they seem to stay apart."""
-    scene = Scene.from_mapping(
-        {
-            "precision": "compensated",
-            "packing": {"disks": 30, "seed": 98},
-            "law": {"kn": 2e3, "kt": "kn", "mu": 0.07},
-            "load": {"fy": 3.0},
-            "ramp": {"step": 4e-4, "until": 0.028},
-        }
-    )
+BESIDE_A_SLIDING_CONTACT = {
+    "precision": "compensated",
+    "packing": {"disks": 30, "seed": 98},
+    "law": {"kn": 2e3, "kt": "kn", "mu": 0.07},
+    "ramp": {"step": 4e-4, "until": 0.028},
+}
+"""The contact slides from 0.0246 on and bends the levels: seen from both ends they seem to stay apart."""
+ACROSS_OTHER_LEVELS = {
+    "packing": {"disks": 100, "width": 11.9, "top": 10, "seed": 9},
+    "law": {"kn": 2e5, "mu": 0.2},
+    "ramp": {"step": 2e-3, "until": 0.012},
+}
+"""A rattling mode falls from 690 to 289 through four others; its slopes at both ends are those of flat levels."""
+
+
+@pytest.mark.parametrize(
+    ("keys", "apart", "window", "known"),
+    [
+        (BESIDE_A_SLIDING_CONTACT, [0.024, 0.028], (0.0241548556, 0.0244768428), 1e-9),
+        (ACROSS_OTHER_LEVELS, None, (0.011169096612, 0.011204647041), 1e-10),
+    ],
+    ids=["beside a contact that begins to slide", "of a level that bends across another"],
+)
+def test_a_window_is_found_between_loads_far_apart(keys, apart, window, known):
+    scene = Scene.from_mapping({**keys, "load": {"fy": 3.0}})
     with Engine((start := settle(scene)).packing) as engine:
         path = EquilibriumPath(engine, start, scene)
         for fx in loads(scene.ramp)[1:]:
             path(float(fx))
-        (window,) = find_onset(path, [0.024, 0.028]).windows
-    assert (window.fx_onset, window.fx_end) == pytest.approx((0.0241548556, 0.0244768428), abs=1e-9)
-
-
-def test_a_window_of_a_level_that_bends_across_another_is_found_between_loads_far_apart():
-    """A rattling mode falls from 690 to 289 through four others; its slopes at both ends are those of flat levels."""
-    scene = Scene.from_mapping(
-        {
-            "packing": {"disks": 100, "width": 11.9, "top": 10, "seed": 9},
-            "law": {"kn": 2e5, "mu": 0.2},
-            "load": {"fy": 3.0},
-            "ramp": {"step": 2e-3, "until": 0.012},
-        }
-    )
-    with Engine((start := settle(scene)).packing) as engine:
-        path = EquilibriumPath(engine, start, scene)
-        onset = find_onset(path, loads(scene.ramp))
-    (window,) = onset.windows
-    assert (window.fx_onset, window.fx_end) == pytest.approx((0.011169096612, 0.011204647041), abs=1e-10)
+        (found,) = find_onset(path, loads(scene.ramp) if apart is None else apart).windows
+    assert (found.fx_onset, found.fx_end) == pytest.approx(window, abs=known)

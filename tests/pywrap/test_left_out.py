@@ -4,26 +4,19 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from reference_layer import LAYER, toml
 
-from faultgouge.analysis import MindlinLaw, PackingFileError, read_dump, touching
+from faultgouge.analysis import MindlinLaw, PackingFileError, RunFile, read_dump, touching
 from faultgouge.analysis.files.dumps import dump_frames
+from faultgouge.assessment.left_out.parts import same_motion
 from faultgouge.assessment.left_out.switches import Loaded
 from faultgouge.pywrap import Engine, EngineError
 from faultgouge.pywrap.lammps.decks import DECKS, Decks
 from faultgouge.pywrap.lammps.dynamics import Weakening
-
-BIN = Path(sys.executable).parent
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
-
-MODEL = {"decks", "data", "sides", "kn", "kt", "mu", "fx", "fy", "inertia", "precision", "compensated", "rotation"}
-MODEL |= {"dt", "mobile", "exponent", "history", "stiffness"}
-PUSH = {"amplitude", "omega", "target", "push"}
-WEAKEN = {"B", "w", "mu_ss", "v0", "v_ss", "friction"}
 
 UNREACHED = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=1e3, v_ss=1.0)
 
@@ -39,71 +32,50 @@ def with_law(packing, mu, kt=2e5 * 2 / 7):
     return replace(packing, law=MindlinLaw(2e5, kt, mu))
 
 
-def held(packing, tmp_path, **run):
-    log = tmp_path / "log"
-    with Engine(packing, log=log) as engine, engine.undamped(1e-4, **run):
-        return Loaded.of(engine, log)
-
-
-SMOOTH = {
-    "parts": ("system.in", "undamped.in"),
-    "fixes": ["floor", "load", "move"],
-    "computes": (),
-    "dumps": (),
-    "arrays": ["f_floor"],
-    "settings": ("periodic x",),
-    "variables": MODEL,
-}
-ROUGH = SMOOTH | {
-    "parts": ("system.in", "friction.in", "undamped.in"),
-    "fixes": ["angle", "floor", "load", "move", "slips"],
-    "arrays": ["f_floor", "f_slips", "d_theta"],
-    "settings": ("periodic x", "velocities of ghosts"),
-}
-PUSHED = {
-    "parts": (*ROUGH["parts"], "push.in"),
-    "fixes": ["angle", "floor", "load", "move", "push", "slips"],
-    "variables": MODEL | PUSH,
-}
-WEAKENED = {
-    "parts": (*ROUGH["parts"], "weaken.in"),
-    "fixes": ["angle", "floor", "load", "move", "slips", "weaken"],
-    "computes": ("velocity",),
-    "variables": MODEL | WEAKEN,
-}
+VARIABLES = {"decks", "data", "sides", "kn", "kt", "mu", "fx", "fy", "inertia", "precision", "compensated", "rotation"}
+VARIABLES |= {"dt", "mobile", "exponent", "history", "stiffness"}
+OPEN = {"part system.in", "part undamped.in", "fix floor", "fix load", "fix move", "array f_floor (7 columns)"}
+SMOOTH = OPEN | {"periodic x"}
+ROUGH = SMOOTH | {"part friction.in", "fix angle", "fix slips", "array f_slips (17 columns)", "array d_theta"}
+ROUGH |= {"velocities of ghosts"}
+PUSHED = ROUGH | {"part push.in", "fix push"}
+WEAKENED = ROUGH | {"part weaken.in", "fix weaken", "compute velocity"}
 
 
 @pytest.mark.parametrize(
-    ("change", "run", "expected"),
+    ("change", "run", "holds", "variables"),
     [
-        (lambda p: p, {}, ROUGH),
-        (lambda p: with_law(p, mu=0.0), {}, SMOOTH),
-        (lambda p: with_law(p, mu=1.0, kt=0.0), {}, SMOOTH),
-        (lambda p: with_law(opened(p), mu=0.0), {}, SMOOTH | {"settings": ()}),
-        (lambda p: p, {"amplitude": 1e-9, "omega": 0.01}, ROUGH | PUSHED),
-        (lambda p: p, {"weakening": UNREACHED}, ROUGH | WEAKENED),
+        (lambda p: p, {}, ROUGH, set()),
+        (lambda p: with_law(p, mu=0.0), {}, SMOOTH, set()),
+        (lambda p: with_law(p, mu=1.0, kt=0.0), {}, SMOOTH, set()),
+        (lambda p: with_law(opened(p), mu=0.0), {}, OPEN, set()),
+        (lambda p: p, {"amplitude": 1e-9, "omega": 0.01}, PUSHED, {"amplitude", "omega", "target", "push"}),
+        (lambda p: p, {"weakening": UNREACHED}, WEAKENED, {"B", "w", "mu_ss", "v0", "v_ss", "friction"}),
     ],
     ids=["friction", "mu = 0", "kt = 0", "open", "push", "weakening"],
 )
-def test_a_run_holds_what_it_needs_and_nothing_else(reference_packing, tmp_path, change, run, expected):
-    here = held(change(reference_packing(1.0)), tmp_path, **run)
-    found = {name: getattr(here, name) for name in expected}
-    found["arrays"] = [array.split()[0] for array in here.arrays]
-    assert found | {"fixes": sorted(here.fixes), "variables": set(here.variables)} == expected
+def test_a_run_holds_what_it_needs_and_nothing_else(reference_packing, tmp_path, change, run, holds, variables):
+    packing, log = change(reference_packing(1.0)), tmp_path / "log"
+    with Engine(packing, log=log) as engine, engine.undamped(1e-4, **run):
+        here = Loaded.of(engine, log)
+    assert set(here.everything) == holds
+    assert set(here.variables) == VARIABLES | variables
 
 
-def test_settling_and_relaxing_take_their_parts_away_again(reference_packing, tmp_path):
+@pytest.mark.parametrize(
+    ("mu", "work", "parts", "fixes"),
+    [
+        (0.0, lambda engine: engine.settle(1e-8), {"bed.in", "damp.in"}, {"floor", "load"}),
+        (1.0, lambda engine: engine.relax(1e-3), {"friction.in", "relax.in"}, {"angle", "floor", "load", "slips"}),
+    ],
+    ids=["settling", "relaxing"],
+)
+def test_what_dynamics_need_is_taken_away_again(reference_packing, tmp_path, mu, work, parts, fixes):
     log = tmp_path / "log"
-    with Engine(with_law(reference_packing(1.0), mu=0.0), log=log) as engine:
-        engine.settle(1e-8)
+    with Engine(reference_packing(mu), log=log) as engine:
+        work(engine)
         here = Loaded.of(engine, log)
-    assert set(here.parts) == {"system.in", "bed.in", "damp.in", "balance.in"}
-    assert (set(here.fixes), here.computes) == ({"floor", "load"}, ())
-    with Engine(reference_packing(1.0), log=log) as engine:
-        engine.relax(1e-3)
-        here = Loaded.of(engine, log)
-    assert set(here.parts) == {"system.in", "friction.in", "relax.in", "balance.in"}
-    assert (set(here.fixes), here.computes) == ({"angle", "floor", "load", "slips"}, ())
+    assert (set(here.parts), set(here.fixes), here.computes) == ({"system.in", "balance.in"} | parts, fixes, ())
 
 
 def motion_of(packing, steps=400, commands=(), **run):
@@ -115,11 +87,6 @@ def motion_of(packing, steps=400, commands=(), **run):
         if commands:
             engine.lammps.command("run 0 post no")
         return dynamics.advance(steps)
-
-
-def assert_same_motion(one, other):
-    for name in ("position", "velocity", "spin"):
-        assert np.array_equal(getattr(one, name), getattr(other, name)), name
 
 
 TURNING = ("unfix move", "comm_modify vel yes", "fix move mobile nve/disc 1.0 rotation yes")
@@ -142,7 +109,7 @@ def test_the_same_motion_with_and_without(reference_packing, law, other_law, opt
     packing = reference_packing(1.0)
     one, other = motion_of(with_law(packing, **law)), motion_of(with_law(packing, **other_law), **options)
     assert np.abs(one.position - packing.position).max() > 0.1
-    assert_same_motion(one, other)
+    assert same_motion(one, other._replace(friction=one.friction))
 
 
 def test_dumps_without_friction_have_no_slips_and_no_angles(reference_packing, tmp_path):
@@ -155,60 +122,42 @@ def test_dumps_without_friction_have_no_slips_and_no_angles(reference_packing, t
     assert contacts == ("id1", "id2", "f_n")
     again = read_dump(tmp_path / "smooth.disks")
     assert np.array_equal(again.position, packing.position)
-    assert np.array_equal(again.contacts.i, packing.contacts.i)
-    assert np.array_equal(again.contacts.j, packing.contacts.j)
-    assert again.law == packing.law
+    assert (again.contacts, again.law) == (packing.contacts, packing.law)
     with pytest.raises(PackingFileError, match="no column theta or d_theta"):
         read_dump(tmp_path / "smooth.disks", law=MindlinLaw(2e5, 1e5, 1.0))
 
 
-SCENE = """
-[packing]
-file = "{file}"
-[law]
-kn = 2e5
-[load]
-fy = 3.0
-[ramp]
-step = 1e-3
-until = 2e-3
-[perturb]
-fx = 1e-3
-time = 0.2
-"""
+SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 2e-3}, "perturb": {"fx": 1e-3, "time": 0.2}})
+RUN = ["numpy", "scipy", "h5py", "mpi4py", "lammps"]
 
 
-def run_command(folder, *arguments):
-    """A command in a process that then says which heavy packages it has imported."""
-    if not (folder / "scene.toml").exists():
-        (folder / "scene.toml").write_text(SCENE.format(file=REFERENCE))
+@pytest.mark.parametrize(
+    ("words", "imported"),
+    [
+        (["--help"], []),
+        pytest.param(["settle", "scene.toml"], RUN, marks=pytest.mark.slow),
+        pytest.param(["ramp", "scene.toml"], RUN, marks=pytest.mark.slow),
+        pytest.param(["perturb", "scene.toml"], RUN, marks=pytest.mark.slow),
+        pytest.param(["spectrum", "stored.h5"], ["numpy", "scipy", "h5py"], marks=pytest.mark.slow),
+    ],
+    ids=lambda value: value[0] if value else "",
+)
+def test_a_command_imports_what_it_needs(tmp_path, reference_packing, words, imported):
+    """In a process of its own; no figures and no trajectory library, and LAMMPS where something moves."""
+    (tmp_path / "scene.toml").write_text(SCENE)
+    with RunFile.create(tmp_path / "stored.h5", reference_packing(1.0)) as run:
+        run.append(reference_packing(1.0), floor=1e-11, evaluations=1)
     code = (
         "import json, sys\n"
         "from faultgouge.cli import main\n"
-        f"sys.argv = ['faultgouge', *{arguments!r}]\n"
+        f"sys.argv = ['faultgouge', *{words!r}]\n"
         "try:\n    main()\nexcept SystemExit as stop:\n    assert not stop.code, stop.code\n"
         "names = ('numpy', 'scipy', 'h5py', 'mpi4py', 'lammps', 'matplotlib', 'MDAnalysis', 'threadpoolctl')\n"
         "print(json.dumps([name for name in names if name in sys.modules]))\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, timeout=300)
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
-
-
-@pytest.mark.parametrize("command", ["settle", "ramp", "perturb"])
-@pytest.mark.slow
-def test_a_run_imports_no_figures_and_no_trajectory_library(tmp_path, command):
-    assert run_command(tmp_path, command, "scene.toml") == ["numpy", "scipy", "h5py", "mpi4py", "lammps"]
-
-
-def test_help_imports_nothing_heavy(tmp_path):
-    assert run_command(tmp_path, "--help") == []
-
-
-@pytest.mark.slow
-def test_a_spectrum_needs_no_lammps(tmp_path):
-    run_command(tmp_path, "settle", "scene.toml", "-o", "run.h5")
-    assert run_command(tmp_path, "spectrum", "run.h5") == ["numpy", "scipy", "h5py"]
+    assert json.loads(done.stdout.splitlines()[-1]) == imported
 
 
 def datasets(path):
@@ -220,13 +169,13 @@ def datasets(path):
 
 @pytest.mark.parametrize(("command", "output"), [("ramp", "dumps"), ("perturb", "trajectory")])
 @pytest.mark.slow
-def test_output_changes_no_dataset(tmp_path, command, output):
-    run_command(tmp_path, command, "scene.toml", "-o", "plain.h5")
-    scene = tmp_path / "scene.toml"
-    scene.write_text(scene.read_text() + f"[output]\n{output} = true\n")
-    run_command(tmp_path, command, "scene.toml", "-o", "rich.h5")
+def test_output_changes_no_dataset(faultgouge_here, tmp_path, command, output):
+    (tmp_path / "plain.toml").write_text(SCENE)
+    (tmp_path / "rich.toml").write_text(SCENE + toml({"output": {output: True}}))
+    for name in ("plain", "rich"):
+        faultgouge_here(command, f"{name}.toml", "-o", f"{name}.h5")
     plain, rich = datasets(tmp_path / "plain.h5"), datasets(tmp_path / "rich.h5")
-    more = {name for name in rich if name not in plain}
+    more = rich.keys() - plain.keys()
     assert bool(more) == (output == "trajectory")
     assert all("trajectory" in name for name in more)
     for name, values in plain.items():

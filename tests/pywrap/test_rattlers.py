@@ -1,12 +1,17 @@
-"""Rattlers in the middle of their cages: known middles, narrow cages, and gaps that never get narrower."""
+"""Rattlers: in the middle of their cages, out of the way of their neighbours, and held still where disks move."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, nearest_image
-from faultgouge.pywrap.equilibria.rattlers import middle_of_cage
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, nearest_image, touching
+from faultgouge.assessment.stability.cases.packings import at_rest
+from faultgouge.pywrap import Engine, equilibrate
+from faultgouge.pywrap.equilibria.rattlers import clear_rattlers, middle_of_cage
+from faultgouge.pywrap.runs.undamped import time_step
 
 
 def packing(position, radius, box_length=None):
@@ -60,3 +65,45 @@ def test_the_narrowest_gap_of_a_lone_mover_is_never_narrower(seed, box_length):
     # no gap needs to be wider than the radius; linear programs are solved to 1e-7
     least = min(narrowest_gap(cage, 4, cage.position[4]), cage.radius[4])
     assert narrowest_gap(cage, 4, place) >= least - 1e-6
+
+
+def beside(packing, rank, gap):
+    """A rattler, and the packing in which it lies so far from one of its neighbours."""
+    rattler = packing.rattlers[0]
+    others = np.delete(np.arange(len(packing)), rattler)
+    branch = packing.position[others] - packing.position[rattler]
+    distance = np.hypot(*branch.T)
+    gaps = distance - packing.radius[others] - packing.radius[rattler]
+    near = np.argsort(gaps)[rank]
+    position = packing.position.copy()
+    position[rattler] += (gaps[near] - gap) * branch[near] / distance[near]
+    contacts = touching(position, packing.radius, packing.box_length)
+    return rattler, replace(packing, position=position, contacts=contacts)
+
+
+def test_rattlers_are_moved_clear_and_nothing_else_is(reference_packing):
+    packing = reference_packing(1.0)
+    rattler, pushed = beside(packing, 0, -1e-9)
+    assert rattler not in pushed.rattlers
+    cleared = clear_rattlers(pushed, least=1e-6)
+    assert rattler in cleared.rattlers
+    loaded = np.setdiff1d(np.arange(len(packing)), packing.rattlers)
+    assert np.array_equal(cleared.position[loaded], packing.position[loaded])
+    assert len(cleared.contacts) == len(packing.contacts)
+
+
+def test_a_rattler_that_a_neighbour_runs_into_is_moved_out_of_the_way(reference_packing):
+    rattler, packing = beside(reference_packing(1.0), 2, 1e-9)
+    with Engine(packing) as engine:
+        found = equilibrate(engine, at_rest(packing), 1e-2)
+    assert rattler in found.packing.rattlers
+
+
+def test_rattlers_are_held_still(loaded):
+    packing = loaded(1e-3)
+    falling = replace(packing, top=packing.top | np.isin(np.arange(len(packing)), packing.rattlers[:1]))
+    dt = time_step(packing)
+    with Engine(falling) as engine, engine.undamped(dt) as dynamics:
+        motion = dynamics.advance(1000)
+    assert np.array_equal(motion.position[packing.rattlers], packing.position[packing.rattlers])
+    assert not np.array_equal(motion.position, packing.position)

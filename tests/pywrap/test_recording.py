@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from reference_layer import REFERENCE
 
 from faultgouge.analysis import RunFile
 from faultgouge.analysis.files import sealedfile
 from faultgouge.pywrap import Equilibrium, Record, Scene
 from faultgouge.pywrap.runs.recording import ways_of
 
-REFERENCE = Path(__file__).parents[1] / "reference" / "packing7.json"
 SCENE = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
 WRITERS = {"recording.py", "runfile.py", "sealedfile.py", "wholefile.py"}
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Contacts, find_onset, spectrum, stiffness_matrix
-from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate
+from faultgouge.assessment.stability.cases.packings import at_rest
+from faultgouge.pywrap import Engine, NoEquilibriumError, Scene, equilibrate
 from faultgouge.pywrap.equilibria.newton_matrix import factored
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 from faultgouge.pywrap.lammps.trial import Trial
@@ -16,18 +17,16 @@ from faultgouge.pywrap.runs.path import EquilibriumPath, next_equilibrium
 FX = 0.01
 
 
-def scene(method, step, until=FX):
-    ramp = {"step": step, "until": until, "method": method}
+def scene(method, step):
+    ramp = {"step": step, "until": FX, "method": method}
     if method == "overdamped":
         ramp["force_tolerance"] = 1e-10
     return Scene.from_mapping({"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": ramp})
 
 
 def ramped(packing, method, increment):
-    start = Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
-    reached = []
+    start, reached = at_rest(packing), []
     with Engine(packing) as engine:
-        start = equilibrate(engine, start, 0.0)
         for k in range(1, round(FX / increment) + 1):
             start = next_equilibrium(engine, start, k * increment, scene(method, increment))
             reached.append(start)
@@ -99,7 +98,7 @@ def test_newton_is_quadratic(reference_packing):
 
 def test_packing_that_flows_says_where(reference_packing):
     packing = reference_packing(0.1)
-    state = Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
+    state = at_rest(packing)
     says = r"no equilibrium was found beyond F_x = 0\.\d+"
     with Engine(packing) as engine, pytest.raises(NoEquilibriumError, match=says):  # noqa: PT012, the climb ends in it
         for k in range(1, 40):
@@ -112,9 +111,8 @@ def test_packing_that_flows_says_where(reference_packing):
 def test_onset(reference, reference_packing, number):
     case, increment = reference["cases"][number], 1e-3
     packing = reference_packing(case["mu"])
-    start = Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
     with Engine(packing) as engine:
-        path = EquilibriumPath(engine, equilibrate(engine, start, 0.0), scene("newton", increment))
+        path = EquilibriumPath(engine, at_rest(packing), scene("newton", increment))
         onset = find_onset(path, increment * np.arange(round(case["onset_fx"] / increment) + 3))
     assert onset.fx_c == pytest.approx(case["onset_fx"], rel=1e-9)
     assert abs(onset.fx_c - case["onset_fx"]) < 3 * onset.error

@@ -1,12 +1,15 @@
-"""Settling by Newton's method with implicit steps: what floats does not stop it, and it goes down to a minimum."""
+"""Settling: what comes out is in balance, depends on the scene alone, and a layer that sinks is refused.
+
+Newton's method with implicit steps goes down to a minimum, and what floats does not stop it.
+"""
 
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_layer import BIN
 from scipy.linalg import eigvalsh
 
 from faultgouge.analysis import MindlinLaw, Packing, spectrum, stiffness_matrix, touching
@@ -16,20 +19,64 @@ from faultgouge.pywrap.runs.undamped import ACCURATE_SHARE, time_step
 from faultgouge.pywrap.settling import settling
 from faultgouge.pywrap.settling.settling import minimized
 
-BIN = Path(sys.executable).parent
-SCENE = {"packing": {"disks": 400, "width": 24.0, "seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+LARGE = {"disks": 400, "width": 24.0, "seed": 1}
+"""Too large for dynamics alone."""
 
 
-@pytest.fixture
-def frictionless(reference_packing):
-    """The reference packing without friction: all of it may slide along the floor."""
-    packing = reference_packing(1.0)
-    return replace(packing, law=MindlinLaw(packing.law.kn, packing.law.kt, 0.0))
+def scene(**packing):
+    return Scene.from_mapping({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}})
 
 
-def displaced(packing: Packing, by: float) -> Packing:
-    position = packing.position + by * np.random.default_rng(0).standard_normal(packing.position.shape)
-    return replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
+@pytest.fixture(scope="module")
+def large():
+    return settle(scene(**LARGE))
+
+
+def test_settled_packing_is_in_balance_and_ready_for_friction():
+    settled = settle(scene(seed=9))
+    packing = settled.packing
+    assert settled.residual < 1.5 * settled.floor < 2e-10
+    assert np.all(packing.contacts.slip == 0)
+    matrix = stiffness_matrix(packing).toarray()
+    # zero slips: no term that is not symmetric, but for the rounding of products
+    assert np.abs(matrix - matrix.T).max() < 1e-15 * np.abs(matrix).max()
+    # the load rests on the floor, to the residual of each disk
+    floor = packing.contacts.floor
+    assert packing.normal_force[floor].sum() == pytest.approx(3.0 * packing.top.sum(), abs=1e-8)
+    assert not packing.top[packing.rattlers].any()
+
+
+def test_layer_that_always_sinks_is_refused():
+    with pytest.raises(NoEquilibriumError, match="sank through the bed from each of 5 loose starts"):
+        settle(scene(disks=60, top=3, width=12.0))
+
+
+@pytest.mark.slow
+def test_a_seed_whose_layer_sinks_is_the_packing_of_its_next_loose_start():
+    # which seed that is depends on the build, since settling is chaotic; of so thin a layer one start in eight sinks
+    for seed in range(100):
+        told = []
+        found = settle(scene(disks=60, top=7, width=12.0, seed=seed), watch=told.append)
+        if told:
+            break
+    assert told[0] == "the upper layer sank through the bed: loose start 2 of 5"
+    assert found.residual < 1.5 * found.floor
+    again = settle(scene(disks=60, top=7, width=12.0, seed=seed)).packing
+    assert np.array_equal(again.position, found.packing.position)
+
+
+@pytest.mark.slow
+def test_settling_with_friction_leaves_slips():
+    packing = settle(scene(disks=20, top=4, width=4.9, settle_friction=True)).packing
+    assert np.abs(packing.contacts.slip).max() > 0
+    assert packing.residual < 1e-9
+
+
+def test_spheres_rest_where_disks_of_equal_masses_do():
+    equal, spheres = (settle(scene(disks=20, top=4, width=4.9, masses=each)).packing for each in ("equal", "spheres"))
+    np.testing.assert_array_equal(spheres.position, equal.position)
+    np.testing.assert_array_equal(equal.mass, 1.0)
+    np.testing.assert_allclose(spheres.mass, (spheres.radius / 0.5) ** 3, rtol=1e-15)
 
 
 def lowest(packing: Packing) -> np.ndarray:
@@ -40,10 +87,12 @@ def lowest(packing: Packing) -> np.ndarray:
     return eigvalsh(matrix[np.ix_(held, held)])
 
 
-def test_floating_packing_goes_down_to_the_floor(frictionless):
+def test_floating_packing_goes_down_to_the_floor(reference_packing):
+    packing = reference_packing(0.0)
     # it may slide: a mode without stiffness, on which K is singular
-    assert abs(lowest(frictionless)[0]) < 1e-6
-    start = displaced(frictionless, 1e-4)
+    assert abs(lowest(packing)[0]) < 1e-6
+    position = packing.position + 1e-4 * np.random.default_rng(0).standard_normal(packing.position.shape)
+    start = replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
     assert start.residual > 1
     packing, found = minimized(start)
     assert found
@@ -67,23 +116,17 @@ def test_disk_on_top_of_another_rolls_down():
     assert lowest(packing)[0] > -1e-6
 
 
-@pytest.fixture(scope="module")
-def settled():
-    """A packing that is too large for dynamics alone."""
-    return settle(Scene.from_mapping(SCENE))
-
-
 @pytest.mark.slow
-def test_larger_packing_settles_to_the_floor(settled):
-    assert settled.residual < 1.5 * settled.floor < 3e-10
-    assert np.abs(settled.packing.contacts.slip).max() < 1e-9
-    assert not settled.packing.top[settled.packing.rattlers].any()
+def test_larger_packing_settles_to_the_floor(large):
+    assert large.residual < 1.5 * large.floor < 3e-10
+    assert np.abs(large.packing.contacts.slip).max() < 1e-9
+    assert not large.packing.top[large.packing.rattlers].any()
 
 
 @pytest.mark.parametrize("seed", [2, 3])
 @pytest.mark.slow
 def test_layer_of_a_tenth_comes_to_rest(seed):
-    packing = settle(Scene.from_mapping(SCENE | {"packing": SCENE["packing"] | {"seed": seed}})).packing
+    packing = settle(scene(**LARGE | {"seed": seed})).packing
     assert packing.top.sum() == 40
     # it lies on the bed: of 17 disks in height it fills the upper two
     assert packing.position[packing.top, 1].min() > 0.7 * packing.position[:, 1].max()
@@ -92,29 +135,27 @@ def test_layer_of_a_tenth_comes_to_rest(seed):
 @pytest.mark.slow
 def test_layer_that_still_sinks_when_steps_run_out_is_refused(monkeypatch):
     monkeypatch.setattr(settling, "STEPS", 5000)
-    scene = Scene.from_mapping(SCENE | {"packing": SCENE["packing"] | {"top": 8}})
     with pytest.raises(NoEquilibriumError, match=r"leave packing\.top out"):
-        settle(scene)
+        settle(scene(**LARGE, top=8))
 
 
 @pytest.mark.slow
-def test_time_step_of_a_large_packing_is_that_of_all_eigenvalues(settled):
+def test_time_step_of_a_large_packing_is_that_of_all_eigenvalues(large):
+    limit = 2 / spectrum(large.packing).omega_max
     # the root of an eigenvalue that is known to 1e-4
-    assert time_step(settled.packing) == pytest.approx(
-        ACCURATE_SHARE * 2 / spectrum(settled.packing).omega_max, rel=5e-5
-    )
+    assert time_step(large.packing) == pytest.approx(ACCURATE_SHARE * limit, rel=5e-5)
 
 
 @pytest.mark.ranks
 @pytest.mark.slow
-def test_same_packing_on_two_ranks(settled, tmp_path):
+def test_same_packing_on_two_ranks(large, tmp_path):
     script = (
         "import sys, numpy as np\n"
         "from mpi4py import MPI\n"
         "from faultgouge.pywrap import Scene, settle\n"
-        f"packing = settle(Scene.from_mapping({SCENE!r})).packing\n"
+        f"packing = settle(Scene.from_mapping({scene(**LARGE).resolved()!r})).packing\n"
         "if MPI.COMM_WORLD.rank == 0: np.save(sys.argv[1], packing.position)\n"
     )
     command = [BIN / "mpiexec", "-n", "2", sys.executable, "-c", script, tmp_path / "two.npy"]
     subprocess.run(command, check=True, timeout=300)
-    assert np.array_equal(np.load(tmp_path / "two.npy"), settled.packing.position)
+    assert np.array_equal(np.load(tmp_path / "two.npy"), large.packing.position)

@@ -1,4 +1,4 @@
-"""Signals in LAMMPS: against the linear response, the same on two ranks, and refused where they make no sense."""
+"""Signals in LAMMPS: against the linear response, and refused where they make no sense."""
 
 import numpy as np
 import pytest
@@ -42,23 +42,6 @@ def test_record_moves_the_packing_as_linear_response_says(packing, on, scale):
     assert np.abs(np.array(rows) - predicted).max() < 1e-2 * np.abs(rows).max()
 
 
-@pytest.mark.ranks
-@pytest.mark.slow
-@pytest.mark.long
-def test_deck_takes_a_table_and_is_the_same_on_two_ranks(lmp, tmp_path):
-    time = np.linspace(0.0, 0.3, 31)
-    table = tmp_path / "record.txt"
-    np.savetxt(table, np.column_stack([time, np.sin(20 * time)]), header="time value")
-    written = []
-    for ranks, on in ((1, "floor"), (2, "floor"), (1, "layer")):
-        given = {"decks": DECKS, "signal": table, "scale": 1e-6, "on": on, "time": 0.2}
-        variables = [word for name, value in given.items() for word in ("-var", name, str(value))]
-        done = lmp(DECKS / "perturb.in", *variables, ranks=ranks)
-        assert done.returncode == 0, done.stdout[-2000:]
-        written.append((tmp_path / "perturb.end.disks").read_text())
-    assert written[0] == written[1] != written[2]
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -70,8 +53,7 @@ def test_deck_takes_a_table_and_is_the_same_on_two_ranks(lmp, tmp_path):
 @pytest.mark.slow
 def test_lammps_refuses_a_bad_table(lmp, tmp_path, text, says):
     (tmp_path / "bad.txt").write_text(text)
-    done = lmp(DECKS / "perturb.in", "-var", "decks", str(DECKS), "-var", "signal", "bad.txt")
-    assert done.returncode != 0
+    done = lmp(DECKS / "perturb.in", fails=True, decks=DECKS, signal="bad.txt")
     assert says in done.stdout + done.stderr
 
 
