@@ -8,9 +8,10 @@ import time
 from pathlib import Path
 
 import pytest
-from reference_layer import BIN, LAYER, toml
+from reference_layer import LAYER, toml
 
 from faultgouge.analysis import RunFile
+from fuzz.kills import Work, started
 
 ASKED = {"perturb": {"fx": 2e-5, "time": 1e4}, "eruptions": {"load": [0.02], "time": 1e3}}
 SCENE = LAYER + toml({"ramp": {"step": 1e-5, "until": 0.02}} | ASKED)
@@ -25,11 +26,8 @@ SOON = 8.0
 """Seconds within which a command ends after a signal: its guard takes 0.8 to 1.5, and a busy machine takes the rest."""
 
 
-def interrupted(folder, command, number, when, group=False):
+def interrupted(running, number, when, group=False):
     """Errors of a command that gets a signal as soon as `when()` is true; it is to end soon, and with its exit code."""
-    running = subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
     deadline = time.monotonic() + 120
     while not when():
         assert running.poll() is None, running.communicate()[1]
@@ -73,12 +71,9 @@ def equilibria(path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.slow
 def test_a_run_says_what_is_kept(tmp_path, command, ranks, at, group, number):
-    (tmp_path / "scene.toml").write_text(SCENE)
     path = tmp_path / "run.h5"
-    arguments = [BIN / "faultgouge", command, "scene.toml", "-o", "run.h5"]
-    if ranks > 1:
-        arguments = [BIN / "mpiexec", "-n", str(ranks), *arguments]
-    errors = interrupted(tmp_path, arguments, number, lambda: equilibria(path) >= at, group)
+    running = started(Work(f"{command} scene.toml -o run.h5", SCENE, ranks), tmp_path)
+    errors = interrupted(running, number, lambda: equilibria(path) >= at, group)
     (says,) = (line for line in errors.splitlines() if line.startswith("Error:"))
     with RunFile(path) as run:
         held = "1 equilibrium" if len(run) == 1 else f"{len(run)} equilibria"
@@ -91,9 +86,8 @@ def test_a_run_says_what_is_kept(tmp_path, command, ranks, at, group, number):
 @pytest.mark.slow
 def test_the_work_ends_with_its_guard(tmp_path):
     """The same command then goes on to the bit: fuzz/kills.py."""
-    (tmp_path / "scene.toml").write_text(SCENE)
-    command = [BIN / "faultgouge", "ramp", "scene.toml"]
-    interrupted(tmp_path, command, signal.SIGKILL, lambda: equilibria(tmp_path / "run.h5") > 3)
+    running = started(Work("ramp scene.toml", SCENE), tmp_path)
+    interrupted(running, signal.SIGKILL, lambda: equilibria(tmp_path / "run.h5") > 3)
 
 
 def simulates(folder):
@@ -122,10 +116,8 @@ def simulates(folder):
 @pytest.mark.slow
 @pytest.mark.long
 def test_what_is_kept_is_said(tmp_path, command, says):
-    (tmp_path / "scene.toml").write_text(SCENE)
     (tmp_path / "sweep.toml").write_text(SWEEP)
-    arguments = [BIN / "faultgouge", *command.split()]
-    errors = interrupted(tmp_path, arguments, signal.SIGINT, lambda: simulates(tmp_path))
+    errors = interrupted(started(Work(command, SCENE), tmp_path), signal.SIGINT, lambda: simulates(tmp_path))
     *ahead, last = errors.strip().splitlines()
     assert last.startswith(f"Error: interrupted: {says}")
     assert not any(line.startswith("Error") for line in ahead)
@@ -138,24 +130,22 @@ LARGE = SWEPT | {"packing": {"disks": 5000, "seed": 1, "width": 84.3}, "ramp": {
 @pytest.mark.long
 def test_a_long_search_goes_on_to_the_bit(faultgouge, tmp_path):
     """Killed, interrupted and continued on one process; and in one piece."""
-    (tmp_path / "scene.toml").write_text(toml(LARGE))
-    faultgouge("settle", "scene.toml")
-    (tmp_path / "settled.toml").write_text(toml(LARGE | {"packing": {"file": "run.h5"}}))
-    command = ["onset", "settled.toml", "-o"]
-    begun = [BIN / "faultgouge", *command, "onset.json"]
+    (tmp_path / "settle.toml").write_text(toml(LARGE))
+    faultgouge("settle", "settle.toml")
+    onset = Work("onset scene.toml -o onset.json", toml(LARGE | {"packing": {"file": "run.h5"}}))
     slices = tmp_path / "onset.json.slices"
 
     def known():
         return len(list(slices.glob("*/*-*.npz")))
 
-    interrupted(tmp_path, begun, signal.SIGKILL, lambda: known() >= 10, group=True)
+    interrupted(started(onset, tmp_path), signal.SIGKILL, lambda: known() >= 10, group=True)
     first = known()
-    errors = interrupted(tmp_path, begun, signal.SIGINT, lambda: known() >= first + 10)
+    errors = interrupted(started(onset, tmp_path), signal.SIGINT, lambda: known() >= first + 10)
     says = "Error: interrupted: onset.json.slices has what was found so far; the same command goes on from there."
     assert errors.splitlines()[-1] == says
-    faultgouge(*command, "onset.json")
+    faultgouge(*onset.command.split())
     assert not slices.exists()
-    faultgouge(*command, "whole.json")
+    faultgouge("onset", "scene.toml", "-o", "whole.json")
     assert (tmp_path / "onset.json").read_bytes() == (tmp_path / "whole.json").read_bytes()
 
 
@@ -176,7 +166,8 @@ guarded(work)
 @pytest.mark.slow
 def test_a_long_call_of_a_library_does_not_hold_the_signal(tmp_path):
     command = [sys.executable, "-c", IN_A_LIBRARY]
-    errors = interrupted(tmp_path, command, signal.SIGTERM, (tmp_path / "begun").exists)
+    running = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    errors = interrupted(running, signal.SIGTERM, (tmp_path / "begun").exists)
     assert errors == "Error: terminated: nothing is kept.\n"
 
 

@@ -96,6 +96,7 @@ def test_an_undamped_run_has_positions_and_no_slips(motion, suffix):
         assert disks.slips is None
     some = read_disks(film(path, suffix, "1:4:2"), 1)
     np.testing.assert_array_equal(some.position, places[3])
+    assert 'timestep="1.5"' in film(path, ".pvd").read_text()
 
 
 @pytest.mark.slow
