@@ -136,6 +136,20 @@ def faultgouge_here(
 
 
 @pytest.fixture
+def refusal(faultgouge_here) -> Callable[..., str]:
+    """Runs a command that is refused in one sentence, and gives the sentence."""
+
+    def run(*words: object, code: int = 2) -> str:
+        done = faultgouge_here(*words, code=code)
+        assert done.stdout == ""
+        assert done.stderr.startswith("Error: ")
+        assert len(done.stderr.strip().splitlines()) == 1
+        return done.stderr
+
+    return run
+
+
+@pytest.fixture
 def lmp(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess]:
     """Runs an input script (text or file) with its variables in tmp_path; it is to end well, or to fail.
 

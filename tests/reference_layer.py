@@ -38,9 +38,6 @@ impact_velocity = "1 m/s"
 """
 """Of quartz spheres."""
 
-BEYOND_ITS_ONSET = LAYER + toml({"ramp": {"step": 6e-3, "until": 0.024}, "perturb": {"fx": 0.024, "time": 1.0}})
-"""A ramp in four steps through the onset, 0.0218, and an undamped run from its end."""
-
 SMALL = {
     "packing": {"disks": 30, "top": 5, "width": 6.0},
     "law": {"kn": 2e5},

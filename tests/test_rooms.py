@@ -1,6 +1,7 @@
 """Imports run one way: no circle of files, and no arrow up between rooms. Imports inside functions count, too."""
 
 import ast
+from glob import glob
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -48,13 +49,11 @@ FLOORS = {
 
 
 def modules() -> dict[str, Path]:
-    """Every module with its file; the folders of the package are links."""
+    """Every module with its file; the folders of the package are links, which `glob` follows."""
     found = {}
-    for entry in ROOT.iterdir():
-        for path in [entry] if entry.suffix == ".py" else entry.resolve().rglob("*.py"):
-            inside = [entry.name, *path.relative_to(entry.resolve()).parts] if entry.is_dir() else [entry.name]
-            names = ["faultgouge", *inside[:-1], Path(inside[-1]).stem]
-            found[".".join(names[:-1] if names[-1] == "__init__" else names)] = path
+    for path in glob("**/*.py", root_dir=ROOT, recursive=True):
+        names = ["faultgouge", *Path(path).with_suffix("").parts]
+        found[".".join(names[:-1] if names[-1] == "__init__" else names)] = ROOT / path
     return found
 
 
@@ -78,30 +77,26 @@ def arrows() -> dict[str, set[str]]:
     return {name: imports(name, path, known) for name, path in known.items()}
 
 
-def floor_of(package: str, module: str) -> int | None:
-    """On which floor of a package a module lies; None for the package itself and what lies outside."""
-    if not module.startswith(package + "."):
-        return None
-    room = module[len(package) + 1 :].split(".")[0]
-    floors = [number for number, floor in enumerate(FLOORS[package]) if room in floor]
-    assert floors, f"{module}: {room} is in none of the rooms of {package}"
-    return floors[0]
-
-
 def test_no_circle_of_files(arrows):
     assert len(arrows) > 240
     assert "faultgouge.analysis" in arrows["faultgouge.figures.film"]
     list(TopologicalSorter(arrows).static_order())  # raises CycleError, which names the circle
 
 
+def room_of(module: str, package: str) -> str | None:
+    """In which room of a package a module lies; None for the package itself and what lies outside."""
+    return module.removeprefix(package + ".").split(".")[0] if module.startswith(package + ".") else None
+
+
 @pytest.mark.parametrize("package", FLOORS)
 def test_no_arrow_up_or_sideways(arrows, package):
+    height = {room: number for number, floor in enumerate(FLOORS[package]) for room in floor}
+    assert {room_of(module, package) for module in arrows} - {None} == height.keys()
     wrong = []
     for module, imported in arrows.items():
-        here = floor_of(package, module)
+        here = room_of(module, package)
         for each in imported:
-            there = floor_of(package, each)
-            same = module.split(".")[: package.count(".") + 2] == each.split(".")[: package.count(".") + 2]
-            if here is not None and there is not None and there >= here and not same:
+            there = room_of(each, package)
+            if here is not None and there not in (None, here) and height[there] >= height[here]:
                 wrong.append(f"{module} -> {each}")
     assert wrong == []

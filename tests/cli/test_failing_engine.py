@@ -13,44 +13,33 @@ FAILING = """
 import sys
 from mpi4py import MPI
 from faultgouge.cli import main
+from faultgouge.commands import program
 from faultgouge.pywrap import Engine, EngineError
 
-wanted, rank = int(sys.argv[1]), int(sys.argv[2])
-displaced, calls = Engine.displaced, 0
+displaced, calls, wanted, failing_rank = Engine.displaced, 0, 0, -1
 
 def failing(self, *arguments):
     global calls
     calls += 1
-    if calls == wanted and rank in (-1, MPI.COMM_WORLD.rank):
+    if calls == wanted and failing_rank in (-1, MPI.COMM_WORLD.rank):
         raise EngineError(f"LAMMPS stopped: it was told to at call {wanted}.")
     return displaced(self, *arguments)
 
 Engine.displaced = failing
+"""
+
+ONCE = """
+wanted, failing_rank = int(sys.argv[1]), int(sys.argv[2])
 sys.argv = ["faultgouge", "onset", "scene.toml"]
 main()
 """
 
 EVERY_CALL = """
-import sys
-from mpi4py import MPI
-from faultgouge.commands import program
-from faultgouge.pywrap import Engine, EngineError
-
-displaced, calls, wanted = Engine.displaced, 0, 0
-
-def failing(self, *arguments):
-    global calls
-    calls += 1
-    if calls == wanted:
-        raise EngineError("as it was told to")
-    return displaced(self, *arguments)
-
 def search():
     global calls
     calls = 0
     program()(["onset", "scene.toml", *sys.argv[2:]], standalone_mode=False)
 
-Engine.displaced = failing
 search()
 total = calls
 for wanted in range(1, total + 1, int(sys.argv[1])):
@@ -64,12 +53,6 @@ if MPI.COMM_WORLD.rank == 0:
 """
 
 
-@pytest.fixture
-def scene(tmp_path):
-    (tmp_path / "scene.toml").write_text(toml(SCENE))
-    return tmp_path
-
-
 @pytest.fixture(scope="module")
 def settled(faultgouge_in, tmp_path_factory):
     """A folder with the scene of the packing that is settled already."""
@@ -80,17 +63,20 @@ def settled(faultgouge_in, tmp_path_factory):
     return folder
 
 
+def with_failing_engine(folder, ranks, script, *arguments):
+    launcher = [BIN / "mpiexec", "-n", str(ranks)] if ranks > 1 else []
+    command = [*launcher, sys.executable, "-c", FAILING + script, *map(str, arguments)]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+
+
 @pytest.mark.ranks
 @pytest.mark.parametrize(
     ("ranks", "rank"), [(1, -1), (2, 1), *(pytest.param(2, k, marks=pytest.mark.long) for k in (-1, 0))]
 )
 @pytest.mark.parametrize("call", [1, pytest.param(30, marks=pytest.mark.long)])
 @pytest.mark.slow
-def test_its_sentence_reaches_the_command(scene, ranks, rank, call):
-    command = [sys.executable, "-c", FAILING, str(call), str(rank)]
-    if ranks > 1:
-        command = [BIN / "mpiexec", "-n", str(ranks), *command]
-    done = subprocess.run(command, cwd=scene, capture_output=True, text=True, timeout=300)
+def test_its_sentence_reaches_the_command(settled, ranks, rank, call):
+    done = with_failing_engine(settled, ranks, ONCE, call, rank)
     assert done.returncode == 1
     says = [line for line in done.stderr.splitlines() if line.startswith("Error:")]
     assert says == [f"Error: LAMMPS stopped: it was told to at call {call}."]
@@ -104,7 +90,6 @@ def test_its_sentence_reaches_the_command(scene, ranks, rank, call):
 @pytest.mark.slow
 def test_no_call_is_taken_for_a_missing_onset(settled, ranks, stride, search):
     """At every call on one rank; two ranks call the same, and every sixth call shows that both hear of it."""
-    command = [BIN / "mpiexec", "-n", str(ranks), sys.executable, "-c", EVERY_CALL, str(stride), *search]
-    done = subprocess.run(command, cwd=settled, capture_output=True, text=True, timeout=300)
+    done = with_failing_engine(settled, ranks, EVERY_CALL, stride, *search)
     assert done.returncode == 0, done.stderr[-500:]
     assert int(done.stdout.splitlines()[-1]) > 20

@@ -2,10 +2,10 @@
 
 import json
 
-import h5py
 import pytest
 from reference_layer import LAYER, UNITS, toml
 
+from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.units import real_units
 
@@ -19,11 +19,9 @@ SCENE = LAYER.replace("kn = 2e5", "kn = 2e5\nmu = [1.0, 0.8]") + toml(SECTIONS) 
 FIGURES = ("figure1", "figure2", "figure3", "figure4", "figure5a", "figure5b", "figure6", "amplitude", "damping")
 
 
-def complete(results):
-    """Whether each run.h5 of a folder says that its run has come to its end."""
-    for path in results.rglob("*.h5"):
-        with h5py.File(path) as file:
-            yield file.attrs["complete"]
+def is_complete(path):
+    with RunFile(path) as file:
+        return file.complete
 
 
 @pytest.mark.slow
@@ -35,7 +33,7 @@ def test_reproduce(faultgouge, tmp_path):
     for name in (*FIGURES, "response"):
         for suffix in (".png", ".svg"):
             assert (results / (name + suffix)).stat().st_size > 5_000
-    assert set(complete(results)) == {True}
+    assert {is_complete(path) for path in results.rglob("*.h5")} == {True}
     report = (results / "report.md").read_text()
     for assumption in ("side boundaries", "upper layer", "inertia", "time step", "f_min", "settling"):
         assert assumption in report

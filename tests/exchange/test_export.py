@@ -1,34 +1,37 @@
-"""What is exported is read by the programs that it is for, and comes back to the bit."""
+"""What is exported is read by the programs that it is for, and comes back to the bit: packings, and films of frames."""
 
-import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from suffixes import GSD
 
-from faultgouge.analysis import Contacts, RunFile, normal_modes
-from faultgouge.pywrap.exchange import ModeVectors, packing_of, read_disks, upper_layer, write_packing
+from faultgouge.analysis import Contacts, MindlinLaw, RunFile, nearest_image, normal_modes
+from faultgouge.pywrap.exchange import (
+    ModeVectors,
+    chosen_frames,
+    frames_of,
+    packing_of,
+    read_disks,
+    upper_layer,
+    write_frames,
+    write_packing,
+)
 
-FORMATS = (".xyz", ".data", GSD)
+FILMS = pytest.mark.parametrize("suffix", [".xyz", ".gsd"], indirect=True)
+EXTRA = "needs the extra export: pip install 'faultgouge[export]'"
+READERS = "needs a large library that is no dependency: make readers"
 
 
-def back(path, packing):
-    """The packing as the file has it, the law excepted, which the command makes of the file's numbers."""
-    disks = read_disks(path)
-    return disks, packing_of(
-        disks,
-        packing.law,
-        upper_layer(disks, None),
-        fx=disks.given["fx"],
-        fy=disks.given["fy"],
-        inertia_factor=disks.given["inertia_factor"],
-        drag_time=disks.given.get("tau"),
-    )
+def back(disks):
+    """The packing as the file has it, with the law and the load of its numbers."""
+    law = dict(disks.given)
+    given = {name: law.pop(name) for name in ("fx", "fy", "inertia_factor")}
+    drag_time = law.pop("tau", None)
+    return packing_of(disks, MindlinLaw(**law), upper_layer(disks, None), **given, drag_time=drag_time)
 
 
 @pytest.mark.parametrize("kind", ["as it is", "open sides", "compensated", "rescaled", "no contacts", "far image"])
-@pytest.mark.parametrize("suffix", FORMATS)
 def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
     packing, c = sheared, sheared.contacts
     if kind == "open sides":
@@ -46,43 +49,68 @@ def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
         packing = replace(packing, position=packing.position + np.array([3 * packing.box_length, 0.0]))
     path = tmp_path / f"packing{suffix}"
     write_packing(path, packing)
-    disks, found = back(path, packing)
-    assert found == packing
-    assert {name: disks.given[name] for name in ("kn", "kt", "mu")} == {
-        name: getattr(packing.law, name) for name in ("kn", "kt", "mu")
-    }
-    assert disks.given.get("rescaled", 0.0) == packing.law.rescaled
+    assert back(read_disks(path)) == packing
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
 @pytest.mark.slow
-def test_the_commands_there_and_back(faultgouge_here, tmp_path, stored, sheared, suffix):
-    faultgouge_here("export", stored, "-o", f"packing{suffix}")
+def test_the_commands_there_and_back(faultgouge_here, tmp_path, ramp, sheared, suffix):
+    faultgouge_here("export", ramp, "-o", f"packing{suffix}")
     faultgouge_here("import", f"packing{suffix}", "-o", "back.h5")
     with RunFile(tmp_path / "back.h5") as file:
         assert file.complete
         assert file.packing() == sheared
 
 
-def test_lammps_reads_its_data(lmp, tmp_path, sheared):
-    write_packing(tmp_path / "packing.data", sheared)
-    done = lmp(
-        "units lj\ndimension 2\nboundary p f p\natom_style sphere\nread_data packing.data\n"
-        "pair_style zero 1.5\npair_coeff * *\nrun 0\n"
-        "write_dump all custom back.dump id type x y radius mass modify sort id format float %.17g\n"
-    )
-    assert done.returncode == 0, done.stdout
-    rows = np.loadtxt((tmp_path / "back.dump").read_text().splitlines()[9:])
-    np.testing.assert_array_equal(rows[:, 1], 1 + sheared.top)
-    x = rows[:, 2] - sheared.position[:, 0]
-    np.testing.assert_allclose(x - sheared.box_length * np.round(x / sheared.box_length), 0, atol=1e-14)  # wrapped
-    np.testing.assert_array_equal(rows[:, 3], sheared.position[:, 1])
-    np.testing.assert_array_equal(rows[:, 4], sheared.radius)
-    np.testing.assert_allclose(rows[:, 5], sheared.mass, rtol=2.3e-16)  # a last bit: density times volume is rounded
+def film(path, suffix, says="all"):
+    """Frames of a run.h5 as a file beside it."""
+    target = path.with_name(f"frames{suffix}")
+    with RunFile(path) as run:
+        write_frames(target, frames_of(run, chosen_frames(run, says)))
+    return target
+
+
+@FILMS
+def test_each_equilibrium_of_a_ramp_comes_back_to_the_bit(ramp, suffix):
+    target = film(ramp, suffix)
+    with RunFile(ramp) as run:
+        for number in range(2):
+            assert back(read_disks(target, number)) == run.packing(number)
+
+
+@pytest.fixture
+def motion(ramp, sheared):
+    """The ramp with three samples of an undamped run behind it; and the places of the disks in its four frames."""
+    rng = np.random.default_rng(2)
+    moved = sheared.position + 1e-4 * rng.normal(size=(3, *sheared.position.shape))
+    with RunFile(ramp, "a") as file:
+        file.append_trajectory([0.5, 1.0, 1.5], moved)
+    return ramp, np.insert(moved, 0, sheared.position, axis=0)
+
+
+@FILMS
+def test_an_undamped_run_has_positions_and_no_slips(motion, suffix):
+    path, places = motion
+    target = film(path, suffix)
+    for number, place in enumerate(places):
+        disks = read_disks(target, number)
+        np.testing.assert_array_equal(disks.position, place)
+        assert disks.slips is None
+    some = read_disks(film(path, suffix, "1:4:2"), 1)
+    np.testing.assert_array_equal(some.position, places[3])
+    times = re.findall('timestep="(.*?)"', film(path, ".pvd").read_text())
+    assert [float(time) for time in times] == [0.0, 0.5, 1.0, 1.5]
+
+
+@pytest.mark.slow
+def test_the_command_writes_a_list_of_frames(faultgouge_here, tmp_path, ramp, sheared):
+    done = faultgouge_here("export", ramp, "--frames", "all", "-o", "film.pvd")
+    assert "2 frames of equilibria; written to film.pvd" in done.stderr
+    assert sorted(path.name for path in (tmp_path / "film").iterdir()) == ["00000.vtp", "00001.vtp"]
+    assert f'timestep="{sheared.fx!r}"' in (tmp_path / "film.pvd").read_text()
 
 
 def test_pyvista_reads_disks_contacts_and_modes(tmp_path, sheared):
-    pyvista = pytest.importorskip("pyvista", reason="reading .vtp needs pyvista, which is no dependency")
+    pyvista = pytest.importorskip("pyvista", reason=READERS)
     modes = normal_modes(sheared)
     vectors = modes.right[:, 3].reshape(3, -1) * (1 + 0.5j)
     write_packing(tmp_path / "packing.vtp", sheared, [ModeVectors("mode_3", complex(modes.values[3]), vectors)])
@@ -107,56 +135,59 @@ def test_pyvista_reads_disks_contacts_and_modes(tmp_path, sheared):
     assert np.isnan(mesh["contact_slip"][:n]).all()
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_ovito_reads_it(tmp_path, sheared, suffix):
-    ovito = pytest.importorskip("ovito.io", reason="needs ovito, a large library that is no dependency")
+def test_pyvista_steps_through_a_pvd(motion, sheared):
+    pyvista = pytest.importorskip("pyvista", reason=READERS)
+    path, places = motion
+    reader = pyvista.get_reader(film(path, ".pvd"))
+    assert list(reader.time_values) == [0.0, 0.5, 1.0, 1.5]
+    for number, place in enumerate(places):
+        reader.set_active_time_point(number)
+        (mesh,) = reader.read()
+        n = len(sheared)
+        np.testing.assert_array_equal(mesh.points[:n, :2], place)
+        apart = nearest_image(place - places[0], sheared.box_length)
+        np.testing.assert_array_equal(mesh["displacement"][:n, :2], apart)
+        assert "contact_normal_force" in mesh.array_names
+        assert "contact_slip" not in mesh.array_names
+
+
+def assert_same_places(found, place, box_length, atol):
+    """The same in the plane, whatever the image in the periodic box."""
+    np.testing.assert_allclose(nearest_image(np.array(found)[:, :2] - place, box_length), 0, atol=atol)
+
+
+@FILMS
+def test_ovito_steps_through_it(ramp, suffix):
+    ovito = pytest.importorskip("ovito.io", reason=READERS)
+    pipeline = ovito.import_file(str(film(ramp, suffix)))
+    assert pipeline.source.num_frames == 2
+    with RunFile(ramp) as run:
+        packings = [run.packing(number) for number in range(2)]
+    for number, packing in enumerate(packings):
+        data = pipeline.compute(number)
+        atol = 1e-6 if suffix == ".gsd" else 1e-14  # float32
+        assert_same_places(data.particles["Position"], packing.position, packing.box_length, atol)
+        np.testing.assert_allclose(data.particles["Radius"], packing.radius, rtol=1e-7)
+        if suffix == ".xyz":
+            # its reader of text is a last bit off
+            force = packing.net_force.reshape(3, -1)[:2].T
+            np.testing.assert_allclose(np.array(data.particles["Force"])[:, :2], force, rtol=1e-14)
+            assert tuple(data.cell.pbc) == (True, False, False)
+
+
+@FILMS
+def test_mdanalysis_reads_it(tmp_path, sheared, suffix):
+    library = pytest.importorskip("MDAnalysis", reason=EXTRA)
     write_packing(tmp_path / f"packing{suffix}", sheared)
-    data = ovito.import_file(str(tmp_path / f"packing{suffix}")).compute()
-    place = np.array(data.particles["Position"])[:, :2] - sheared.position
-    place[:, 0] -= sheared.box_length * np.round(place[:, 0] / sheared.box_length)
-    np.testing.assert_allclose(place, 0, atol=1e-6 if suffix == ".gsd" else 1e-14)
-    np.testing.assert_allclose(data.particles["Radius"], sheared.radius, rtol=1e-7)
-    if suffix == ".xyz":
-        # its reader of text is a last bit off
-        force = sheared.net_force.reshape(3, -1)[:2].T
-        np.testing.assert_allclose(np.array(data.particles["Force"])[:, :2], force, rtol=1e-14)
-        assert tuple(data.cell.pbc) == (True, False, False)
+    atoms = library.Universe(str(tmp_path / f"packing{suffix}")).atoms
+    assert_same_places(atoms.positions, sheared.position, sheared.box_length, 2e-6)  # float32
 
 
-def test_mdanalysis_and_gsd_read_it(tmp_path, sheared):
-    pytest.importorskip("gsd.hoomd", reason="needs the extra export: pip install 'faultgouge[export]'")
-    library = pytest.importorskip("MDAnalysis", reason="needs the extra export: pip install 'faultgouge[export]'")
-    import gsd.hoomd
-
+def test_gsd_reads_it(tmp_path, sheared):
+    hoomd = pytest.importorskip("gsd.hoomd", reason=EXTRA)
     write_packing(tmp_path / "packing.gsd", sheared)
-    write_packing(tmp_path / "packing.xyz", sheared)
-    with gsd.hoomd.open(str(tmp_path / "packing.gsd")) as file:
+    with hoomd.open(str(tmp_path / "packing.gsd")) as file:
         frame = file[0]
     assert frame.configuration.dimensions == 2
     np.testing.assert_array_equal(frame.particles.diameter, np.float32(2 * sheared.radius))
     np.testing.assert_array_equal(frame.log["particles/net_force"][:, :2], sheared.net_force.reshape(3, -1)[:2].T)
-    for suffix in (".gsd", ".xyz"):
-        atoms = library.Universe(str(tmp_path / f"packing{suffix}")).atoms
-        apart = atoms.positions[:, 0] - sheared.position[:, 0]
-        apart -= sheared.box_length * np.round(apart / sheared.box_length)
-        np.testing.assert_allclose(apart, 0, atol=2e-6)  # float32
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("-o", "packing.pdb"), "exports are .vtp, .xyz, .data, .gsd"),
-        (("-o", "packing.data", "--mode", "pair"), "has no room for modes"),
-        (("--frame", "3"), "there is no frame 3"),
-        (("-o", "nowhere/packing.vtp"), "cannot be written"),
-    ],
-)
-def test_what_an_export_is_refused_for(refusal, stored, words, says):
-    assert says in refusal("export", stored, *words, code=1 if "written" in says else 2)
-
-
-def test_a_packing_json_goes_the_same_way(tmp_path, reference, sheared):
-    (tmp_path / "packing.json").write_text(json.dumps(reference))
-    disks = read_disks(tmp_path / "packing.json")
-    np.testing.assert_array_equal(upper_layer(disks, None), sheared.top)

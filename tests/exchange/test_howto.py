@@ -2,14 +2,13 @@
 
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from reference_layer import BIN
 
 from faultgouge.analysis import RunFile
 
-BIN = Path(sys.executable).parent
 HOWTO = Path(__file__).parents[2] / "docs" / "howto_own_packing.md"
 
 

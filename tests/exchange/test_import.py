@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from faultgouge.analysis import BadInputError, RunFile
+from faultgouge.analysis import BadInputError, RunFile, nearest_image
 from faultgouge.analysis.files.wholefile import MAGIC
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.exchange import read_disks, upper_layer, write_packing
@@ -14,73 +14,64 @@ from faultgouge.pywrap.exchange import read_disks, upper_layer, write_packing
 LAW = ("--kn", "2e5", "--fy", "3")
 
 
-def csv(packing, names="id,x,y,radius,mass,angle,top"):
-    columns = {
-        "id": range(1, len(packing) + 1),
-        "x": packing.position[:, 0],
-        "y": packing.position[:, 1],
-        "radius": packing.radius,
-        "mass": packing.mass,
-        "angle": packing.angle,
-        "top": packing.top.astype(int),
-    }
-    rows = zip(*(np.asarray(columns[name]).tolist() for name in names.split(",")), strict=True)
-    return "\n".join([names, *(",".join(map(repr, row)) for row in rows)]) + "\n"
+def table(packing, names, mark=" ", digits="%.17g", **more):
+    """A line a disk: what the packing, or another column, has by these names."""
+    x, y = packing.position.T
+    known = {"id": np.arange(1, len(x) + 1), "x": x, "y": y, "z": 0 * x, "radius": packing.radius}
+    known |= {"top": packing.top, "type": 1 + packing.top} | more
+    rows = zip(*(known[name].tolist() for name in names), strict=True)
+    return "".join(mark.join(digits % number for number in row) + "\n" for row in rows)
 
 
-def slips(contacts):
-    rows = zip((contacts.i + 1).tolist(), (contacts.j + 1).tolist(), contacts.slip.tolist(), strict=True)
-    return "\n".join(["id1,id2,slip", *(",".join(map(repr, row)) for row in rows)]) + "\n"
+def csv(packing, names):
+    return f"{names}\n{table(packing, names.split(','), ',')}"
 
 
-def dump(packing, step=0, columns="id type x y z radius", count=None, z=0.0):
+def dump(packing, step=0, count=None):
     n = len(packing) if count is None else count
-    place, kind = packing.position.tolist(), (1 + packing.top).tolist()
-    rows = [f"{k + 1} {kind[k]} {place[k][0]} {place[k][1]} {z * k} {packing.radius[k]}" for k in range(n)]
-    head = [f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{n}\nITEM: BOX BOUNDS pp ff pp"]
-    head += [f"0 {packing.box_length}\n-1 60\n-0.5 0.5\nITEM: ATOMS {columns}"]
-    return "\n".join([*head, *rows]) + "\n"
+    rows = table(packing, ("id", "type", "x", "y", "z", "radius")).splitlines(keepends=True)
+    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{n}\nITEM: BOX BOUNDS pp ff pp\n"
+    head += f"0 {packing.box_length}\n-1 60\n-0.5 0.5\nITEM: ATOMS id type x y z radius\n"
+    return head + "".join(rows[:n])
+
+
+def read_to_the_bit(path, text, packing):
+    """What is read of a text, which has places and radii of a packing."""
+    path.write_text(text)
+    disks = read_disks(path)
+    np.testing.assert_array_equal(disks.position, packing.position)
+    np.testing.assert_array_equal(disks.radius, packing.radius)
+    return disks
 
 
 @pytest.mark.parametrize("names", ["x,y,radius", "radius,y,x,top"])
 @pytest.mark.parametrize("mark", [";", "\t", " "])
 def test_csv_as_others_write_it(tmp_path, sheared, names, mark):
-    (tmp_path / "packing.csv").write_text("# " * (mark == " ") + csv(sheared, names).replace(",", mark))
-    disks = read_disks(tmp_path / "packing.csv")
-    np.testing.assert_array_equal(disks.position, sheared.position)
-    np.testing.assert_array_equal(disks.radius, sheared.radius)
+    text = "# " * (mark == " ") + csv(sheared, names).replace(",", mark)
+    read_to_the_bit(tmp_path / "packing.csv", text, sheared)
 
 
 def yade(packing, columns="x_y_z_r", digits="%.17g"):
     """As yade.export.textExt writes it, which has %g."""
-    values = {"x": packing.position[:, 0], "y": packing.position[:, 1], "z": 0 * packing.radius, "r": packing.radius}
-    values |= {"matId": 1 + packing.top, "id": np.arange(len(packing)), "attrs": packing.mass}
-    rows = np.column_stack([values[name] for name in columns.split("_")])
-    lines = ["\t".join(digits % value for value in row) for row in rows.tolist()]
-    return "\n".join([f"#format {columns}", "# mass", *lines]) + "\n"
+    own = {"r": packing.radius, "matId": 1 + packing.top, "id": np.arange(len(packing)), "attrs": packing.mass}
+    return f"#format {columns}\n# mass\n{table(packing, columns.split('_'), digits=digits, **own)}"
 
 
 def mercury(packing, dimensions=2, times=(0.0, 0.5)):
     """As MercuryDPM's DPMBase::outputXBallsData writes it; at earlier times the particles are higher."""
-    lines, n, width = [], len(packing), packing.box_length
+    text, width = "", packing.box_length
     for time in times:
-        place = packing.position + np.array([0, times[-1] - time])
-        bounds = [0, 0, width, 9] if dimensions == 2 else [0, 0, -1, width, 9, 1]
-        lines.append(" ".join(map(repr, [n, time, *bounds])))
-        gap = np.zeros((n, 2 if dimensions == 2 else 3))
-        columns = [place, gap, packing.radius[:, None], gap, packing.top[:, None]]
-        if dimensions == 3:
-            columns = [place, gap[:, :1], gap, packing.radius[:, None], gap, gap, packing.top[:, None]]
-        lines += [" ".join(map(repr, row)) for row in np.hstack(columns).tolist()]
-    return "\n".join(lines) + "\n"
+        bounds = f"0 0 {width} 9" if dimensions == 2 else f"0 0 -1 {width} 9 1"
+        text += f"{len(packing)} {time} {bounds}\n"
+        higher = packing.position[:, 1] + (times[-1] - time)
+        names = "x y z z radius z z top" if dimensions == 2 else "x y z z z z radius z z z z z z top"
+        text += table(packing, names.split(), y=higher)
+    return text
 
 
 @pytest.mark.parametrize("columns", ["x_y_z_r", "x_y_z_r_matId", "id_x_y_z_r_matId", "x_y_z_r_attrs"])
 def test_yade_text(tmp_path, sheared, columns):
-    (tmp_path / "packing.txt").write_text(yade(sheared, columns))
-    disks = read_disks(tmp_path / "packing.txt")
-    np.testing.assert_array_equal(disks.position, sheared.position)
-    np.testing.assert_array_equal(disks.radius, sheared.radius)
+    disks = read_to_the_bit(tmp_path / "packing.txt", yade(sheared, columns), sheared)
     assert disks.box_length is None
     assert disks.remark == ""
     if "matId" in columns:
@@ -94,10 +85,7 @@ def test_yade_text(tmp_path, sheared, columns):
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.parametrize("name", ["run.data", "run.data.0012"])
 def test_mercury_data(tmp_path, sheared, dimensions, name):
-    (tmp_path / name).write_text(mercury(sheared, dimensions))
-    disks = read_disks(tmp_path / name)
-    np.testing.assert_array_equal(disks.position, sheared.position)
-    np.testing.assert_array_equal(disks.radius, sheared.radius)
+    disks = read_to_the_bit(tmp_path / name, mercury(sheared, dimensions), sheared)
     assert disks.box_length == sheared.box_length
     np.testing.assert_array_equal(upper_layer(disks, "type:1"), sheared.top)
     np.testing.assert_array_equal(read_disks(tmp_path / name, 0).position, sheared.position + np.array([0, 0.5]))
@@ -126,7 +114,7 @@ def test_the_layer_may_be_said_in_six_ways(tmp_path, sheared):
             upper_layer(disks, says)
 
 
-def test_a_restart_has_groups_and_masses(lmp, tmp_path, sheared):
+def test_lammps_reads_its_data_and_a_restart_has_all_of_it_and_groups(lmp, tmp_path, sheared):
     write_packing(tmp_path / "packing.data", sheared)
     done = lmp(
         "units lj\ndimension 2\nboundary p f p\natom_style sphere\nread_data packing.data\ngroup odd id 1:99:2\n"
@@ -137,8 +125,12 @@ def test_a_restart_has_groups_and_masses(lmp, tmp_path, sheared):
     disks = read_disks(tmp_path / "packing.restart")
     np.testing.assert_array_equal(upper_layer(disks, "group:upper"), sheared.top)
     np.testing.assert_array_equal(upper_layer(disks, "group:odd"), np.arange(len(sheared)) % 2 == 0)
+    np.testing.assert_array_equal(upper_layer(disks, "type:2"), sheared.top)
+    moved = nearest_image(disks.position - sheared.position, sheared.box_length)  # LAMMPS takes images into the box
+    np.testing.assert_allclose(moved[:, 0], 0, atol=1e-14)
     np.testing.assert_array_equal(disks.position[:, 1], sheared.position[:, 1])
-    np.testing.assert_allclose(disks.mass, sheared.mass, rtol=2.3e-16)
+    np.testing.assert_array_equal(disks.radius, sheared.radius)
+    np.testing.assert_allclose(disks.mass, sheared.mass, rtol=2.3e-16)  # a last bit: density times volume is rounded
     assert disks.box_length == sheared.box_length
 
 
@@ -158,13 +150,8 @@ def test_what_mdanalysis_reads_with_radii(tmp_path, sheared):
 def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge_here, reference_packing):
     """Numbers with five digits: a hundredth of an overlap, and forces of the order of the load."""
     packing = reference_packing(1.0)
-    (tmp_path / "rough.csv").write_text(
-        "x,y,radius,top\n"
-        + "\n".join(
-            f"{x:.3f},{y:.3f},{r},{int(t)}"
-            for (x, y), r, t in zip(packing.position, packing.radius, packing.top, strict=True)
-        )
-    )
+    rounded = replace(packing, position=np.round(packing.position, 3))
+    (tmp_path / "rough.csv").write_text(csv(rounded, "x,y,radius,top"))
     words = ("import", "rough.csv", "--width", packing.box_length, *LAW, "-o", "rest.h5")
     done = faultgouge_here(*words, code=2)
     assert "not in balance under fy = 3" in done.stderr
@@ -177,8 +164,7 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge_here, reference_
     assert rest.residual < 1e-9
     assert not rest.contacts.slip.any()
     # the packing is the one that was rounded: the reference is an equilibrium of the same law
-    moved = rest.position - packing.position
-    moved[:, 0] -= packing.box_length * np.round(moved[:, 0] / packing.box_length)
+    moved = nearest_image(rest.position - packing.position, packing.box_length)
     held = np.setdiff1d(np.arange(len(packing)), np.union1d(rest.rattlers, packing.rattlers))
     assert np.abs(moved[held]).max() < 0.01
 
@@ -189,7 +175,9 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge_here, reference_
 def test_disks_with_slips_come_to_rest_with_friction_on_any_number_of_ranks(tmp_path, faultgouge, sheared):
     rounded = replace(sheared, position=np.round(sheared.position, 6))  # forces of 1e-2 out of balance
     (tmp_path / "packing.csv").write_text(csv(rounded, "x,y,radius,top"))
-    (tmp_path / "slips.csv").write_text(slips(sheared.contacts))
+    c = sheared.contacts
+    slips = np.column_stack([c.i + 1, c.j + 1, c.slip])
+    np.savetxt(tmp_path / "slips.csv", slips, "%.17g", ",", header="id1,id2,slip", comments="")
     width, shear = ("--width", sheared.box_length), ("--fx", sheared.fx)
     words = ("import", "packing.csv", *width, "--contacts", "slips.csv", *LAW, *shear)
     found = []
@@ -203,14 +191,14 @@ def test_disks_with_slips_come_to_rest_with_friction_on_any_number_of_ranks(tmp_
     assert one.fx == sheared.fx
     assert one.residual < 1e-9
     # friction keeps the slips to within what the disks have moved
-    np.testing.assert_allclose(one.contacts.slip, sheared.contacts.slip, atol=1e-6)
+    np.testing.assert_allclose(one.contacts.slip, c.slip, atol=1e-6)
 
 
 def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
     packing = reference_packing(1.0)
-    (tmp_path / "packing.csv").write_text(csv(packing, "x,y,radius"))
     (tmp_path / "packing.dump").write_text(dump(packing))
     (tmp_path / "packing.json").write_text(json.dumps(reference))
+    (tmp_path / "packing.doc").write_text("?")
     rest = {"law": {"kn": 2e5}, "load": {"fy": 3.0}}
 
     def settled(**section):
@@ -222,19 +210,17 @@ def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
         ({"file": "packing.dump"}, "does not say which disks are the upper layer"),
         ({"file": "packing.dump", "top": "type:9"}, "holds no disk"),
         ({"file": "packing.dump", "top": 10, "frame": 3}, "no --frame 3"),
-        ({"file": "packing.doc"}, "cannot be read"),
+        ({"file": "none.doc"}, "cannot be read"),
+        ({"file": "packing.doc"}, r"is of no format that is read: give .*LAMMPS data .*GSD .*run\.h5"),
     ):
         with pytest.raises(SceneError, match=says):
             settled(**section)
-    (tmp_path / "packing.doc").write_text("?")
-    with pytest.raises(SceneError, match=r"is of no format that is read: give .*LAMMPS data .*GSD .*run\.h5"):
-        settled(file="packing.doc")
 
 
 BAD = {
-    "missing column": ("a.dump", lambda p: dump(p, columns="id type x y z size"), "no column radius or diameter"),
+    "missing column": ("a.dump", lambda p: dump(p).replace("radius", "size"), "no column radius or diameter"),
     "other disks": ("a.dump", lambda p: dump(p) + dump(p, 7, count=50), "other disks at step 7 (50) than at step 0"),
-    "three dimensions": ("a.dump", lambda p: dump(p, z=0.1), "is of three dimensions: z goes from 0 to 9.9"),
+    "three dimensions": ("a.dump", lambda p: dump(p).replace(" 0 ", " 9 ", 1), "three dimensions: z goes from 0 to 9"),
     "cut off": ("a.dump", lambda p: dump(p)[:-200], "not a complete LAMMPS text dump"),
     "same centre": ("a.csv", lambda p: "x,y,radius\n1,1,0.5\n3,1,0.5\n1.1,1,0.5\n", "disks 1 and 3 are 0.1 apart"),
     "below the floor": ("a.csv", lambda p: "x,y,radius\n1,-1,0.5\n3,1,0.5\n", "say with --floor"),
@@ -252,7 +238,7 @@ BAD = {
     "yade without radii": ("a.txt", lambda p: "#format x_y_z\n1 1 0\n", "names no columns x, y, z and r"),
     "yade cut off": ("a.txt", lambda p: "#format x_y_z_r\n1 1 0\n", "line 2: it has 3 columns, and line 1 announces 4"),
     "mercury cut off": ("a.data", lambda p: "2 0.5 0 0 9 9\n1 1 0 0 0.5 0 0 0\n", "breaks off"),
-    "mercury in 3 D": ("a.data", lambda p: mercury(p, 3, (0.0,)).replace(" 0.0 0.0", " 1.0 0.0", 1), "three dim"),
+    "mercury in 3 D": ("a.data", lambda p: mercury(p, 3, (0.0,)).replace(" 0 0 0 ", " 1 0 0 ", 1), "three dim"),
     "no restart": ("a.restart", lambda p: "?", "no LAMMPS restart file"),
     "no gsd": ("a.gsd", lambda p: "?", "GSD"),
     "plain xyz": ("a.xyz", lambda p: "1\nhello\nH 1 1 0\n", "no Properties"),
