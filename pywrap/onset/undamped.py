@@ -131,7 +131,7 @@ def onset_run(
         extra = [] if near_onset is None else [fx for fx in onset.fx_c + near_onset if 0 <= fx <= last]
         between = {float(fx): path(float(fx)) for fx in extra}
         watch("the path once more, with other increments")
-        onset = with_path_error(onset, engine, path, scene)
+        onset = with_path_error(onset, path)
     return OnsetRun(mu, tuple(path.kept), onset, last if flows else None, between)
 
 

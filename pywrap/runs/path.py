@@ -148,7 +148,7 @@ class EquilibriumPath:
         further: Sequence[Equilibrium] = (),
         onward: bool = False,
     ) -> None:
-        self._engine, self._scene, self._onward = engine, scene, onward
+        self.engine, self.scene, self._onward = engine, scene, onward
         self.kept = [start, *further]
         # an equilibrium, and another one near it
         self._beside = (self.kept[-1], self.kept[-2]) if further else None
@@ -160,7 +160,7 @@ class EquilibriumPath:
             return below.packing
         beside = self._beside[1] if self._beside and self._beside[0] is below else None
         onward = self._onward and fx > self.kept[-1].fx
-        found = next_equilibrium(self._engine, below, fx, self._scene, beside, onward)
+        found = next_equilibrium(self.engine, below, fx, self.scene, beside, onward)
         if fx > self.kept[-1].fx:
             self.kept.append(found)
             self._beside = found, below
