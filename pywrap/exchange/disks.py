@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ...analysis import FLOOR, Contacts, MindlinLaw, Packing, PackingFileError, nearest_image, touching
+from ...analysis.packing.geometry import neighbour_tree
 
 Floats = NDArray[np.float64]
 
@@ -60,12 +60,12 @@ class Slips:
 
 @dataclass(frozen=True, eq=False)
 class Disks:
-    """What a file says about disks, sorted by ID.
+    """What a file says about disks, or a loose start, sorted by ID.
 
     Attributes
     ----------
     source : str
-        The file, and where in it.
+        The file, and where in it; or what else they come from.
     position : ndarray, shape (N, 2)
         Centres, length.
     radius : ndarray, shape (N,)
@@ -269,7 +269,8 @@ def _check_places(disks: Disks) -> None:
             f"{disks.source}: the centre of disk {disks.id[below][0]} is at y = {disks.position[below][0, 1]:g}, and "
             "the floor is y = 0: say with --floor at which y it is."
         )
-    pairs = _near(disks)
+    tree = neighbour_tree(disks.position, disks.box_length)
+    pairs = tree.query_pairs(float(disks.radius.max()), output_type="ndarray")
     apart = nearest_image(disks.position[pairs[:, 0]] - disks.position[pairs[:, 1]], disks.box_length)
     distance = np.hypot(*apart.T)
     inside = distance < np.maximum(*disks.radius[pairs].T)
@@ -279,17 +280,6 @@ def _check_places(disks: Disks) -> None:
             f"{disks.source}: disks {a} and {b} are {distance[inside][0]:g} apart, so that the centre of one lies in "
             "the other: the law is that of small overlaps; separate them."
         )
-
-
-def _near(disks: Disks) -> NDArray[np.int64]:
-    """Pairs of centres that are closer than the largest radius, shape (P, 2)."""
-    place = disks.position.copy()
-    box = None
-    if disks.box_length is not None:
-        place[:, 0] %= disks.box_length
-        place[place[:, 0] >= disks.box_length, 0] = 0.0
-        box = [disks.box_length, 0.0]
-    return np.asarray(cKDTree(place, boxsize=box).query_pairs(float(disks.radius.max()), output_type="ndarray"))
 
 
 def _whole(source: str, name: str, column: Floats) -> NDArray[np.int64]:

@@ -128,12 +128,6 @@ def contact_force(packing: Packing) -> Floats:
     return packing.normal_force[:, None] * g.normal + packing.tangential_force[:, None] * g.tangent
 
 
-def contact_mobilised(packing: Packing) -> Floats:
-    """|f_t|/(mu f_n) of each contact, shape (C,); zero without friction."""
-    limit = packing.law.mu * packing.normal_force
-    return np.divide(np.abs(packing.tangential_force), limit, out=np.zeros_like(limit), where=limit > 0)
-
-
 def disk_force(packing: Packing) -> Floats:
     """Net force on each disk, load included, and torque over radius, shape (N, 3)."""
     return packing.net_force.reshape(3, -1).T
@@ -146,7 +140,7 @@ def disk_pressure(packing: Packing) -> Floats:
 
 def disk_mobilised(packing: Packing) -> Floats:
     """The largest |f_t|/(mu f_n) of the contacts of each disk, shape (N,)."""
-    return _gathered(np.maximum, packing, contact_mobilised(packing))
+    return _gathered(np.maximum, packing, packing.mobilised)
 
 
 def _gathered(operation: np.ufunc, packing: Packing, values: Floats) -> Floats:
