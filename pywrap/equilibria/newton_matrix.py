@@ -89,7 +89,8 @@ def factored(
     unknowns = np.count_nonzero(active)
     if unknowns == 0:
         return None
-    idle = _idle(graph, law.normal_force, loaded)
+    matters = loaded & (law.normal_force > IDLE * law.normal_force.max(initial=0.0))
+    idle = graph.count(matters) == 0  # disks with none but contacts that carry nothing that matters
     expelled = _expelled(graph, loaded, old) & ~trial.still.top
     if unknowns <= BANDED:
         return Factors(_banded(graph.band(active), terms, idle), expelled)
@@ -110,12 +111,6 @@ def _banded(band: Band, terms: Floats, idle: Booleans) -> BandSolver:
     matrix = band.matrix(terms)
     matrix[2 * band.width] = _held(matrix[2 * band.width], band.disks, idle)
     return BandSolver(band, matrix)
-
-
-def _idle(graph: ContactGraph, carried: Floats, loaded: Booleans) -> Booleans:
-    """Disks with none but contacts that carry nothing that matters, shape (N,)."""
-    matters = loaded & (carried > IDLE * carried.max(initial=0.0))
-    return graph.count(matters) == 0
 
 
 def _held(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:

@@ -200,7 +200,7 @@ def _packing(
 ) -> Packing:
     """The packing under the law and the load of the scene, of the options, or of the file."""
     from faultgouge.pywrap.exchange import packing_of, upper_layer
-    from faultgouge.pywrap.settling.bed import drag_time, law_of
+    from faultgouge.pywrap.settling.bed import law_of, load_of
 
     options = {key: value for key, value in {**laws, **loads}.items() if value is not None}
     if scene is not None and options.keys() - {"fx"}:
@@ -209,15 +209,10 @@ def _packing(
     _refuse_gaps(disks, top, scene, values)
     layer = upper_layer(disks, top)
     wanted = _scene(scene, disks, values)
-    return packing_of(
-        disks,
-        law_of(wanted, wanted.law.mus[0]),
-        layer,
-        fx=(options if scene else values).get("fx", 0.0),
-        fy=wanted.load.fy,
-        inertia_factor=wanted.inertia_factor if scene else values.get("inertia_factor", 1.0),
-        drag_time=drag_time(wanted),
-    )
+    load = load_of(wanted) | {"fx": (options if scene else values).get("fx", 0.0)}
+    if scene is None and "inertia_factor" in values:
+        load["inertia_factor"] = values["inertia_factor"]
+    return packing_of(disks, law_of(wanted, wanted.law.mus[0]), layer, **load)
 
 
 def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict[str, Any]) -> None:
@@ -269,9 +264,9 @@ def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
             "with --relax."
         )
     with status("coming to rest") as show:
-        rest = at_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
-    say(rest.words)
-    return rest.equilibrium.packing
+        found, words = at_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
+    say(words)
+    return found
 
 
 def _store(output: Path, packing: Packing) -> None:
