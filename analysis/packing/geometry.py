@@ -117,12 +117,11 @@ def touching(position: ArrayLike, radius: ArrayLike, box_length: float | None = 
 
 def neighbour_tree(position: Floats, box_length: float | None) -> cKDTree:
     """The tree that finds near centres, shape (N, 2), also across the periodic sides."""
-    if box_length is None:
-        return cKDTree(position)
     wrapped = position.copy()
-    wrapped[:, 0] %= box_length
-    wrapped[wrapped[:, 0] >= box_length, 0] = 0.0  # a tiny negative x modulo L rounds to L
-    return cKDTree(wrapped, boxsize=[box_length, 0.0])
+    if box_length is not None:
+        wrapped[:, 0] %= box_length
+        wrapped[wrapped[:, 0] >= box_length, 0] = 0.0  # a tiny negative x modulo L rounds to L
+    return cKDTree(wrapped, boxsize=None if box_length is None else [box_length, 0.0])
 
 
 def check_box(radius: Floats, box_length: float | None) -> None:

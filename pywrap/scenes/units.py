@@ -34,7 +34,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...analysis import MindlinLaw
+from ...analysis import MindlinLaw, PackingFileError
 from .keys import Keys
 from .packing_section import GeneratedPacking
 from .refusals import refusal
@@ -172,7 +172,10 @@ def _layer(scene: Keys) -> tuple[float, float, float | None, int]:
     section = scene.packing
     if isinstance(section, GeneratedPacking):
         return 2 * min(section.radii), 1.0, section.width if section.periodic else None, section.top
-    packing = section.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
+    try:
+        packing = section.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
+    except PackingFileError as error:
+        raise refusal("packing.file", f'= "{section.file.name}" is refused: {str(error).rstrip(".")}') from None
     k = packing.radius.argmin()
     return 2 * float(packing.radius[k]), float(packing.mass[k]), packing.box_length, int(packing.top.sum())
 
