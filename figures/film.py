@@ -22,13 +22,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from faultgouge.analysis import Packing, PackingFileError, RunFile, nearest_image
+from faultgouge.analysis.packing.arrays import Floats
 
 from .mode import Mode, ModeArtist, finish, side_by_side
 from .packing import COLOURS, PackingArtist, View
 from .series import few_decades
 from .style import BULK, EDGE, INK, styled
 
-Floats = NDArray[np.float64]
 Frame = NDArray[np.uint8]
 
 DOTS = 110

@@ -26,10 +26,9 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from faultgouge.analysis import Packing
+from faultgouge.analysis.packing.arrays import Floats, Indices
 
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER, figure_of, styled
-
-Floats = NDArray[np.float64]
 
 LEAST_SHARE = 1e-4
 """Lower end of the scale of mobilised friction and slip."""
@@ -81,9 +80,9 @@ class View:
     right: float
     bottom: float
     ceiling: float
-    disk: NDArray[np.int64]
+    disk: Indices
     place: Floats
-    contact: NDArray[np.int64]
+    contact: Indices
     start: Floats
     end: Floats
 

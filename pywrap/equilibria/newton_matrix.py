@@ -9,16 +9,12 @@ sparse (:mod:`~faultgouge.analysis.factors.linear`).
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...analysis.factors.linear import Band, BandSolver, Solver, SparseSolver
+from ...analysis.factors.linear import Band, BandSolver, Booleans, Solver, SparseSolver
 from ...analysis.operators.stiffness import assembled, contact_terms
+from ...analysis.packing.arrays import Floats, Indices
 from ..lammps.contact_graph import ContactGraph
 from ..lammps.trial import Trial
-
-Floats = NDArray[np.float64]
-Booleans = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 IDLE = 1e-7
 """Share of the largest contact force up to which a contact carries nothing that matters."""

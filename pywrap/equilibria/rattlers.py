@@ -18,13 +18,10 @@ reach the maximum, however narrow the cage.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import Packing, nearest_image, touching
+from ...analysis.packing.arrays import Floats, Indices
 from ...analysis.packing.geometry import neighbour_tree
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 TRAVEL = 0.3
 """How far a disk may move along x and along y, in radii: cages are a few tenths wide."""

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import FLOOR, Contacts, MindlinLaw, Packing, PackingFileError, nearest_image, touching
+from ...analysis.packing.arrays import Floats, Indices
 from ...analysis.packing.geometry import neighbour_tree
-
-Floats = NDArray[np.float64]
 
 FLAT = 1e-6
 """Spread of z up to which disks lie in a plane, in smallest radii: text with seven digits, or float32, leaves less."""
@@ -51,8 +50,8 @@ class Slips:
         Whether these are all contacts. Otherwise all that touches is in contact, and what is not listed has no slip.
     """
 
-    first: NDArray[np.int64]
-    second: NDArray[np.int64]
+    first: Indices
+    second: Indices
     slip: Floats
     low: Floats | None = None
     complete: bool = False
@@ -90,10 +89,10 @@ class Disks:
     source: str
     position: Floats
     radius: Floats
-    id: NDArray[np.int64]
+    id: Indices
     mass: Floats | None = None
     angle: Floats | None = None
-    kind: NDArray[np.int64] | None = None
+    kind: Indices | None = None
     top: NDArray[np.bool_] | None = None
     position_low: Floats | None = None
     box_length: float | None = None
@@ -232,7 +231,7 @@ def _contacts(disks: Disks, law: MindlinLaw) -> Contacts:
     return near.slipped(np.where(np.array(where) >= 0, np.append(listed.slip, 0.0)[where], 0.0))
 
 
-def _index(disks: Disks, ids: NDArray[np.int64]) -> NDArray[np.int64]:
+def _index(disks: Disks, ids: Indices) -> Indices:
     """Indices of IDs; 0 is the floor."""
     where = np.minimum(np.searchsorted(disks.id, ids), len(disks) - 1)
     strange = (disks.id[where] != ids) & (ids != 0)
@@ -241,7 +240,7 @@ def _index(disks: Disks, ids: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.where(ids == 0, FLOOR, where)
 
 
-def _check_numbers(source: str, columns: Mapping[str, Floats], ids: NDArray[np.int64]) -> None:
+def _check_numbers(source: str, columns: Mapping[str, Floats], ids: Indices) -> None:
     for name, column in columns.items():
         odd = ~np.isfinite(column)
         if odd.any():
@@ -282,7 +281,7 @@ def _check_places(disks: Disks) -> None:
         )
 
 
-def _whole(source: str, name: str, column: Floats) -> NDArray[np.int64]:
+def _whole(source: str, name: str, column: Floats) -> Indices:
     if not np.array_equal(column, np.rint(column)) or (name == "id" and np.any(column < 1)):
         raise PackingFileError(f"{source}: the column {name} must hold whole numbers{' from 1' * (name == 'id')}.")
     return column.astype(np.int64)

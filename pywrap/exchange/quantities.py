@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from ...analysis import Packing
 from ...analysis.files.runfile_header import unusual
+from ...analysis.packing.arrays import Floats
 from .disks import Slips
-
-Floats = NDArray[np.float64]
 
 KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
 """Names of law, load and inertia in files."""

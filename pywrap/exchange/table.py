@@ -7,14 +7,12 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import MindlinLaw, PackingFileError, read_packing
 from ...analysis.files.dumps import CONTACT, dump_frames
+from ...analysis.packing.arrays import Floats
 from .disks import Disks, Slips, of_columns
 from .text import columns_of, lines_of
-
-Floats = NDArray[np.float64]
 
 PARTNERS = {"first": ("id1", "i", "first"), "second": ("id2", "j", "second"), "slip": ("slip",), "low": ("slip_low",)}
 """Columns of a table of contacts and the names that they may have."""

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, find_onset
 from ...analysis.damped_onset.modes import Pencil
 from ...analysis.damped_onset.sliced import first_growing
 from ...analysis.damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows, dissipating, dissipative
 from ...analysis.onset import Increments, seeks_all
+from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
 from ..runs.path import EquilibriumPath, loads
@@ -99,7 +99,7 @@ class Ramped:
     """
 
     path: EquilibriumPath
-    forces: NDArray[np.float64]
+    forces: Floats
     whole: bool
     flows: bool
 

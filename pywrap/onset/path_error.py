@@ -46,12 +46,12 @@ from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, 
 from ...analysis.damped_onset.modes import DampedMode, Pencil, nearest_mode
 from ...analysis.damped_onset.windows import DampedWindow
 from ...analysis.onset import force_bearing
+from ...analysis.packing.arrays import Floats
 from ...analysis.packing.law import AT_THE_BOUND
 from ..equilibria.quasistatic import Equilibrium
 from ..runs.path import EquilibriumPath
 from .nearby_root import nearby_root
 
-Floats = NDArray[np.float64]
 Vanishes = Callable[[Packing], float]
 
 FEWEST = 4

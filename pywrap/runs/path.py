@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from ...analysis import NoEquilibriumError, Packing
+from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
 from ..lammps.engine import Engine
 from ..scenes.refusals import needed
@@ -82,7 +82,7 @@ def reach(scene: Scene, fx: float) -> Iterator[Equilibrium]:
         yield next_equilibrium(engine, last, fx, bounded)
 
 
-def loads(settings: Ramp) -> NDArray[np.float64]:
+def loads(settings: Ramp) -> Floats:
     """F_x of the equilibria of a ramp, force, from 0: multiples of the step, to the bit, and `until` in the end."""
     # half a step in a million is far above the rounding of until/step, and far below a step
     rounding = 5e-7
@@ -168,7 +168,7 @@ class EquilibriumPath:
             self._beside = below, found
         return found.packing
 
-    def climb(self, forces: NDArray[np.float64]) -> Iterator[Equilibrium]:
+    def climb(self, forces: Floats) -> Iterator[Equilibrium]:
         """The equilibria at increasing forces, up to the last one that the packing bears."""
         for fx in forces:
             try:

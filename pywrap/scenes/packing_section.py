@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
+from ...analysis.packing.arrays import Floats
 from ..exchange import Disks, format_of, is_hdf5, packing_of, read_disks, upper_layer
 from .loose import layer_size, loose_start
 from .refusals import Positive, Section, refusal
@@ -93,7 +93,7 @@ class GeneratedPacking(Section):
         """The loose start that this section describes, or a later one of its seed."""
         return loose_start(self.disks, self.radii, self.top, self.width, self.seed, periodic=self.periodic, draw=draw)
 
-    def mass_of(self, radius: NDArray[np.float64]) -> NDArray[np.float64]:
+    def mass_of(self, radius: Floats) -> Floats:
         """Masses of disks, shape (N,), in units of that of the smallest."""
         power = 3 if self.masses == "spheres" else 0
         return np.asarray((radius / min(self.radii)) ** power)

@@ -29,16 +29,15 @@ from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 
 from ...analysis import NoEquilibriumError, Packing, stiffness_matrix
 from ...analysis.factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
+from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
 from ..equilibria.rattlers import placed
 from ..lammps.engine import Engine
 
-Floats = NDArray[np.float64]
 Watch: TypeAlias = Callable[[str], None]
 
 SMALL = 300
