@@ -70,11 +70,9 @@ class Motion:
     @classmethod
     def read(cls, run: RunFile) -> "Motion | None":
         """The undamped run of an open file; None if the file has no trajectory."""
-        try:
-            series = run.series("trajectory")
-        except PackingFileError:
+        if "trajectory" not in run.names_of_series:
             return None
-        packing = run.packing(-1)
+        packing, series = run.packing(-1), run.series("trajectory")
         # the run begins at rest, before its first sample
         time, position = np.insert(series["time"], 0, 0.0), np.insert(series["position"], 0, packing.position, axis=0)
         low = series.get("position_low")
