@@ -22,13 +22,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from faultgouge.analysis import Packing, PackingFileError, RunFile, nearest_image
+from faultgouge.analysis.packing.arrays import Floats
 
 from .mode import Mode, ModeArtist, finish, side_by_side
 from .packing import COLOURS, PackingArtist, View
 from .series import few_decades
 from .style import BULK, EDGE, INK, styled
 
-Floats = NDArray[np.float64]
 Frame = NDArray[np.uint8]
 
 DOTS = 110
@@ -70,11 +70,9 @@ class Motion:
     @classmethod
     def read(cls, run: RunFile) -> "Motion | None":
         """The undamped run of an open file; None if the file has no trajectory."""
-        try:
-            series = run.series("trajectory")
-        except PackingFileError:
+        if "trajectory" not in run.names_of_series:
             return None
-        packing = run.packing(-1)
+        packing, series = run.packing(-1), run.series("trajectory")
         # the run begins at rest, before its first sample
         time, position = np.insert(series["time"], 0, 0.0), np.insert(series["position"], 0, packing.position, axis=0)
         low = series.get("position_low")

@@ -16,11 +16,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from faultgouge.analysis import BadInputError, Eigenpairs, Packing, closest_to_meeting
+from faultgouge.analysis.packing.arrays import Floats
 
 from .packing import WIDTH, PackingArtist, View
 from .style import EDGE, INK, styled
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 LONGEST = 1.6

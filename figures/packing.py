@@ -13,6 +13,7 @@ Most contacts of a stable packing are far below Coulomb's bound, so that both sh
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -25,10 +26,9 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from faultgouge.analysis import Packing
+from faultgouge.analysis.packing.arrays import Floats, Indices
 
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER, figure_of, styled
-
-Floats = NDArray[np.float64]
 
 LEAST_SHARE = 1e-4
 """Lower end of the scale of mobilised friction and slip."""
@@ -42,12 +42,6 @@ def _slip_share(packing: Packing) -> Floats:
     return np.divide(np.abs(packing.contacts.slip), limit, out=np.zeros(len(limit)), where=limit > 0)
 
 
-def mobilised(packing: Packing) -> Floats:
-    """|f_t|/(mu f_n) of each contact: the share of Coulomb's bound that it uses, shape (c,)."""
-    limit = packing.law.mu * packing.normal_force
-    return np.divide(np.abs(packing.tangential_force), limit, out=np.zeros(len(limit)), where=limit > 0)
-
-
 def _share_scale(_: Floats) -> Normalize:
     return LogNorm(LEAST_SHARE, 1, clip=True)  # a contact without slip has the lowest colour
 
@@ -57,9 +51,9 @@ def _force_scale(values: Floats) -> Normalize:
 
 
 COLOURS: dict[str, tuple[str, Callable[[Packing], Floats], Callable[[Floats], Normalize], str | Colormap]] = {
-    "mobilised": (r"mobilised friction $|f_t|/(\mu f_n)$", mobilised, _share_scale, MOBILIZATION),
+    "mobilised": (r"mobilised friction $|f_t|/(\mu f_n)$", attrgetter("mobilised"), _share_scale, MOBILIZATION),
     "slip": ("slip / slip limit", _slip_share, _share_scale, MOBILIZATION),
-    "force": ("normal force $f_n$", lambda packing: packing.normal_force, _force_scale, "viridis_r"),
+    "force": ("normal force $f_n$", attrgetter("normal_force"), _force_scale, "viridis_r"),
 }
 """What the bars of the contacts may show: label, values of the contacts, scale, colours."""
 
@@ -86,9 +80,9 @@ class View:
     right: float
     bottom: float
     ceiling: float
-    disk: NDArray[np.int64]
+    disk: Indices
     place: Floats
-    contact: NDArray[np.int64]
+    contact: Indices
     start: Floats
     end: Floats
 
@@ -189,9 +183,8 @@ class PackingArtist:
 
     def _disks(self, axes: Axes) -> EllipseCollection:
         packing, disk = self.packing, self.view.disk
-        hollow = np.isin(np.arange(len(packing)), packing.rattlers)
         faces = self.faces(packing)
-        edges = np.where(packing.top & hollow, UPPER, EDGE)
+        edges = np.where(packing.top & (faces == "white"), UPPER, EDGE)
         diameter = 2 * packing.radius[disk]
         disks = EllipseCollection(
             diameter,

@@ -9,6 +9,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from faultgouge.analysis.packing.arrays import Floats
+
 from .style import INK, styled
 
 INSET_POINTS = 8
@@ -33,17 +35,17 @@ class PairCurve:
     """
 
     mu: float
-    fx: NDArray[np.float64]
+    fx: Floats
     eigenvalues: NDArray[np.complex128]
     fx_c: float | None
 
     @property
-    def real(self) -> NDArray[np.float64]:
+    def real(self) -> Floats:
         """Real parts, the smaller one first, shape (n, 2)."""
         return np.sort(self.eigenvalues.real, axis=1)
 
     @property
-    def imaginary(self) -> NDArray[np.float64]:
+    def imaginary(self) -> Floats:
         """Imaginary parts, the negative one first, shape (n, 2)."""
         return np.sort(self.eigenvalues.imag, axis=1)
 

@@ -5,11 +5,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from faultgouge.analysis.packing.arrays import Floats
 
 from .style import figure_of, styled
-
-Floats = NDArray[np.float64]
 
 BELOW_NOISE = 1e-2
 """Lower end of a picture of growth, in units of the median of the first quarter: the very first steps, which are many

@@ -14,7 +14,7 @@ from matplotlib.colors import to_hex
 
 from faultgouge.analysis import BadInputError, Packing
 
-from .packing import LEAST_SHARE, PackingArtist, View, mobilised
+from .packing import LEAST_SHARE, PackingArtist, View
 from .style import EDGE, FLOOR, INK, MOBILIZATION
 from .view_pair import LARGE, NEAREST, Followed, Progress, followed
 
@@ -132,7 +132,7 @@ def _frame(packing: Packing, course: Followed, k: int) -> dict[str, Any]:
         "i": contacts.i[view.contact],
         "j": contacts.j[view.contact],
         "width": 0.5 * packing.radius.min() * (force / force.max(initial=np.finfo(float).tiny))[view.contact],
-        "share": np.maximum(mobilised(packing), LEAST_SHARE)[view.contact],
+        "share": np.maximum(packing.mobilised, LEAST_SHARE)[view.contact],
         "re": course.values[k].real,
         "im": course.values[k].imag,
         "pair": np.concatenate([course.pair[k].real, course.pair[k].imag]),

@@ -10,16 +10,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse.linalg import eigs
 
 from faultgouge.analysis import Eigenpairs, Packing, closest_to_meeting, eigenvalues, growth_rate
 from faultgouge.analysis.onset.modes import Modes, force_bearing, full_operator
 from faultgouge.analysis.onset.pair import Pair, continued
 
-from .mode import ModeError, displacement
+from .mode import Complexes, ModeError, displacement
 
-Complexes = NDArray[np.complex128]
 Progress = Callable[[Sequence[Packing]], Iterable[Packing]]
 
 LARGE = 300

@@ -52,9 +52,9 @@ def write_film(film: Film, path: Path, rate: float = 10.0, progress: Progress = 
     FilmError
         If the name ends otherwise, or imageio-ffmpeg is not installed.
     """
-    writers: dict[str, Callable[[Film, Path, float, Progress], None]] = {".gif": _gif, ".mp4": _mp4}
     check_name(path)
-    writers[path.suffix.lower()](film, path, rate, progress)
+    write = _gif if path.suffix.lower() == ".gif" else _mp4
+    write(film, path, rate, progress)
 
 
 def check_name(path: Path) -> None:

@@ -123,7 +123,7 @@ class Climb:
         """How far this ramp is from another one at the loads that both have reached."""
         common = sorted(self.shared.keys() & reference.shared.keys())
         pairs = [(self.shared[k].packing, reference.shared[k].packing) for k in common]
-        differ = [len(bearing_contacts(a, FY) ^ bearing_contacts(b, FY)) for a, b in pairs]
+        differ = [len(bearing_contacts(a) ^ bearing_contacts(b)) for a, b in pairs]
         first = next((k for k, count in zip(common, differ, strict=True) if count), None)
         return {
             "compared_to": common[-1] * INCREMENTS[0],

@@ -104,12 +104,7 @@ def touching(position: ArrayLike, radius: ArrayLike, box_length: float | None = 
     radius = floats("radius", radius, np.shape(radius))
     position = floats("position", position, (len(radius), 2))
     check_box(radius, box_length)
-    wrapped = position.copy()
-    if box_length is not None:
-        wrapped[:, 0] %= box_length
-        wrapped[wrapped[:, 0] >= box_length, 0] = 0.0  # a tiny negative x modulo L rounds to L
-    tree = cKDTree(wrapped, boxsize=None if box_length is None else [box_length, 0.0])
-    i, j = tree.query_pairs(2 * radius.max(), output_type="ndarray").T
+    i, j = neighbour_tree(position, box_length).query_pairs(2 * radius.max(), output_type="ndarray").T
     branch = separation(position[i], None, position[j], None, box_length)
     near = overlap_and_distance(branch, exact_sum(radius[i], radius[j]))[0][0] > 0
     floor = np.flatnonzero(radius - position[:, 1] > 0)
@@ -118,6 +113,15 @@ def touching(position: ArrayLike, radius: ArrayLike, box_length: float | None = 
         np.concatenate([j[near], np.full(len(floor), FLOOR)]),
         np.zeros(near.sum() + len(floor)),
     )
+
+
+def neighbour_tree(position: Floats, box_length: float | None) -> cKDTree:
+    """The tree that finds near centres, shape (N, 2), also across the periodic sides."""
+    wrapped = position.copy()
+    if box_length is not None:
+        wrapped[:, 0] %= box_length
+        wrapped[wrapped[:, 0] >= box_length, 0] = 0.0  # a tiny negative x modulo L rounds to L
+    return cKDTree(wrapped, boxsize=None if box_length is None else [box_length, 0.0])
 
 
 def check_box(radius: Floats, box_length: float | None) -> None:

@@ -178,6 +178,12 @@ class Packing:
         """f_t of each contact along tau, force, shape (C,)."""
         return self.law.tangential_force(self.geometry.overlap, self.contacts.slip)
 
+    @property
+    def mobilised(self) -> Floats:
+        """|f_t|/(mu f_n): the share of Coulomb's bound that each contact uses, shape (C,); zero without friction."""
+        limit = self.law.mu * self.normal_force
+        return np.divide(np.abs(self.tangential_force), limit, out=np.zeros_like(limit), where=limit > 0)
+
     @cached_property
     def rattlers(self) -> Indices:
         """Indices of the disks that touch nothing; their rows of the stability operator are zero."""

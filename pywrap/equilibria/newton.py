@@ -27,15 +27,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import Packing, nearest_image, touching
+from ...analysis.packing.arrays import Floats, Indices
 from ..lammps.trial import EPSILON, Trial
 from .newton_matrix import IDLE, Factors, factored
 from .rattlers import middle_of_cage
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 ITERATIONS = 40
 """Newton iterations before an increment is halved. Three or four do, but where a disk is pushed out between two others:
@@ -255,7 +252,7 @@ def too_long(step: Floats, packing: Packing) -> bool:
     return bool(np.abs(step).max() > 0.1 * packing.radius.min())
 
 
-def _out_of_the_way(trial: Packing, disks: NDArray[np.int64], displacement: Floats) -> Floats:
+def _out_of_the_way(trial: Packing, disks: Indices, displacement: Floats) -> Floats:
     """The displacement with which these disks end up in the middle of their cages."""
     changed = displacement.copy()
     changed.reshape(3, -1)[:2, disks] += (middle_of_cage(trial, disks) - trial.position[disks]).T

@@ -9,16 +9,12 @@ sparse (:mod:`~faultgouge.analysis.factors.linear`).
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...analysis.factors.linear import Band, BandSolver, Solver, SparseSolver
+from ...analysis.factors.linear import Band, BandSolver, Booleans, Solver, SparseSolver
 from ...analysis.operators.stiffness import assembled, contact_terms
+from ...analysis.packing.arrays import Floats, Indices
 from ..lammps.contact_graph import ContactGraph
 from ..lammps.trial import Trial
-
-Floats = NDArray[np.float64]
-Booleans = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 IDLE = 1e-7
 """Share of the largest contact force up to which a contact carries nothing that matters."""
@@ -89,7 +85,8 @@ def factored(
     unknowns = np.count_nonzero(active)
     if unknowns == 0:
         return None
-    idle = _idle(graph, law.normal_force, loaded)
+    matters = loaded & (law.normal_force > IDLE * law.normal_force.max(initial=0.0))
+    idle = graph.count(matters) == 0  # disks with none but contacts that carry nothing that matters
     expelled = _expelled(graph, loaded, old) & ~trial.still.top
     if unknowns <= BANDED:
         return Factors(_banded(graph.band(active), terms, idle), expelled)
@@ -110,12 +107,6 @@ def _banded(band: Band, terms: Floats, idle: Booleans) -> BandSolver:
     matrix = band.matrix(terms)
     matrix[2 * band.width] = _held(matrix[2 * band.width], band.disks, idle)
     return BandSolver(band, matrix)
-
-
-def _idle(graph: ContactGraph, carried: Floats, loaded: Booleans) -> Booleans:
-    """Disks with none but contacts that carry nothing that matters, shape (N,)."""
-    matters = loaded & (carried > IDLE * carried.max(initial=0.0))
-    return graph.count(matters) == 0
 
 
 def _held(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:

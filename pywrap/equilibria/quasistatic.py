@@ -71,6 +71,11 @@ class Equilibrium:
     evaluations: int
     way: str | None = None
 
+    @classmethod
+    def of(cls, packing: Packing) -> "Equilibrium":
+        """A packing as it stands, by its own forces: where to start from, balanced or not."""
+        return cls(packing, packing.residual, rounding_floor(packing), 0)
+
     @property
     def fx(self) -> float:
         """F_x on each disk of the upper layer."""

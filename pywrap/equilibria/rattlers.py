@@ -18,13 +18,10 @@ reach the maximum, however narrow the cage.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ...analysis import Packing, nearest_image, touching
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from ...analysis.packing.arrays import Floats, Indices
+from ...analysis.packing.geometry import neighbour_tree
 
 TRAVEL = 0.3
 """How far a disk may move along x and along y, in radii: cages are a few tenths wide."""
@@ -54,6 +51,11 @@ def clear_rattlers(packing: Packing, least: float) -> Packing:
     idle = packing.loaded(least).rattlers
     position = packing.position.copy()
     position[idle] = middle_of_cage(packing, idle)
+    return placed(packing, position)
+
+
+def placed(packing: Packing, position: Floats) -> Packing:
+    """The packing with its disks elsewhere, shape (N, 2); all that touches there is in contact, without slip."""
     return replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
 
 
@@ -74,13 +76,10 @@ def middle_of_cage(packing: Packing, disks: Indices) -> Floats:
     """
     radius, box = packing.radius, packing.box_length
     position = packing.position.copy()
-    wrapped = position.copy()
-    if box is not None:
-        wrapped[:, 0] %= box
-    tree = cKDTree(wrapped, boxsize=None if box is None else [box, 0.0])
+    tree = neighbour_tree(position, box)
     # both may move, by sqrt(2) TRAVEL
     reach = radius[disks] + (1 + 4 * TRAVEL) * radius.max()
-    for disk, near in zip(disks, tree.query_ball_point(wrapped[disks], reach), strict=True):
+    for disk, near in zip(disks, tree.query_ball_point(tree.data[disks], reach), strict=True):
         cage = np.setdiff1d(near, [disk])
         branch = nearest_image(position[disk] - position[cage], box)
         position[disk] += _to_the_middle(branch, radius[cage] + radius[disk], position[disk, 1], radius[disk])

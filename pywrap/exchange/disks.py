@@ -13,11 +13,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ...analysis import FLOOR, Contacts, MindlinLaw, Packing, PackingFileError, nearest_image, touching
-
-Floats = NDArray[np.float64]
+from ...analysis.packing.arrays import Floats, Indices
+from ...analysis.packing.geometry import neighbour_tree
 
 FLAT = 1e-6
 """Spread of z up to which disks lie in a plane, in smallest radii: text with seven digits, or float32, leaves less."""
@@ -51,8 +50,8 @@ class Slips:
         Whether these are all contacts. Otherwise all that touches is in contact, and what is not listed has no slip.
     """
 
-    first: NDArray[np.int64]
-    second: NDArray[np.int64]
+    first: Indices
+    second: Indices
     slip: Floats
     low: Floats | None = None
     complete: bool = False
@@ -60,12 +59,12 @@ class Slips:
 
 @dataclass(frozen=True, eq=False)
 class Disks:
-    """What a file says about disks, sorted by ID.
+    """What a file says about disks, or a loose start, sorted by ID.
 
     Attributes
     ----------
     source : str
-        The file, and where in it.
+        The file, and where in it; or what else they come from.
     position : ndarray, shape (N, 2)
         Centres, length.
     radius : ndarray, shape (N,)
@@ -90,10 +89,10 @@ class Disks:
     source: str
     position: Floats
     radius: Floats
-    id: NDArray[np.int64]
+    id: Indices
     mass: Floats | None = None
     angle: Floats | None = None
-    kind: NDArray[np.int64] | None = None
+    kind: Indices | None = None
     top: NDArray[np.bool_] | None = None
     position_low: Floats | None = None
     box_length: float | None = None
@@ -232,7 +231,7 @@ def _contacts(disks: Disks, law: MindlinLaw) -> Contacts:
     return near.slipped(np.where(np.array(where) >= 0, np.append(listed.slip, 0.0)[where], 0.0))
 
 
-def _index(disks: Disks, ids: NDArray[np.int64]) -> NDArray[np.int64]:
+def _index(disks: Disks, ids: Indices) -> Indices:
     """Indices of IDs; 0 is the floor."""
     where = np.minimum(np.searchsorted(disks.id, ids), len(disks) - 1)
     strange = (disks.id[where] != ids) & (ids != 0)
@@ -241,7 +240,7 @@ def _index(disks: Disks, ids: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.where(ids == 0, FLOOR, where)
 
 
-def _check_numbers(source: str, columns: Mapping[str, Floats], ids: NDArray[np.int64]) -> None:
+def _check_numbers(source: str, columns: Mapping[str, Floats], ids: Indices) -> None:
     for name, column in columns.items():
         odd = ~np.isfinite(column)
         if odd.any():
@@ -269,7 +268,8 @@ def _check_places(disks: Disks) -> None:
             f"{disks.source}: the centre of disk {disks.id[below][0]} is at y = {disks.position[below][0, 1]:g}, and "
             "the floor is y = 0: say with --floor at which y it is."
         )
-    pairs = _near(disks)
+    tree = neighbour_tree(disks.position, disks.box_length)
+    pairs = tree.query_pairs(float(disks.radius.max()), output_type="ndarray")
     apart = nearest_image(disks.position[pairs[:, 0]] - disks.position[pairs[:, 1]], disks.box_length)
     distance = np.hypot(*apart.T)
     inside = distance < np.maximum(*disks.radius[pairs].T)
@@ -281,18 +281,7 @@ def _check_places(disks: Disks) -> None:
         )
 
 
-def _near(disks: Disks) -> NDArray[np.int64]:
-    """Pairs of centres that are closer than the largest radius, shape (P, 2)."""
-    place = disks.position.copy()
-    box = None
-    if disks.box_length is not None:
-        place[:, 0] %= disks.box_length
-        place[place[:, 0] >= disks.box_length, 0] = 0.0
-        box = [disks.box_length, 0.0]
-    return np.asarray(cKDTree(place, boxsize=box).query_pairs(float(disks.radius.max()), output_type="ndarray"))
-
-
-def _whole(source: str, name: str, column: Floats) -> NDArray[np.int64]:
+def _whole(source: str, name: str, column: Floats) -> Indices:
     if not np.array_equal(column, np.rint(column)) or (name == "id" and np.any(column < 1)):
         raise PackingFileError(f"{source}: the column {name} must hold whole numbers{' from 1' * (name == 'id')}.")
     return column.astype(np.int64)

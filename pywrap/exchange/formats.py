@@ -67,7 +67,7 @@ FORMATS = (
     DUMP,
     RESTART,
     Format("CSV", "table", (".csv",), "read_table"),
-    Format("packing.json", "json_file", (".json",), "read_json"),
+    Format("packing.json", "table", (".json",), "read_json"),
     Format("GSD", "gsd_file", (".gsd",), "read_gsd", "write_gsd", frames=True, film=True),
     Format("ParaView's list of frames", "vtp", (".pvd",), writer="write_pvd", alone=False, film=True),
     YADE,

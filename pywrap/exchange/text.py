@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import PackingFileError
+from ...analysis.packing.arrays import Floats
 
 WORDS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0}
 """Words that stand for numbers."""
@@ -49,7 +49,7 @@ def uncommented(lines: Iterable[str], first: int) -> Iterator[tuple[int, list[st
 
 def columns_of(
     path: Path, lines: Iterable[tuple[int, list[str]]], names: Sequence[str | None], wanted: str, *, more: bool = True
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Floats]:
     """The columns of some lines by name.
 
     Parameters

@@ -111,7 +111,7 @@ def _of_contacts(packing: Packing) -> dict[str, NDArray]:
         "contact_tangential_force": packing.tangential_force,
         "contact_slip": contacts.slip,
         "contact_overlap": packing.geometry.overlap,
-        "contact_mobilised": quantities.contact_mobilised(packing),
+        "contact_mobilised": packing.mobilised,
     }
 
 

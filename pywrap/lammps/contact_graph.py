@@ -10,11 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import FLOOR, Contacts
-from ...analysis.factors.linear import Band, band
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Booleans = NDArray[np.bool_]
+from ...analysis.factors.linear import Band, Booleans, band
+from ...analysis.packing.arrays import Floats, Indices
 
 
 class ContactGraph:

@@ -6,12 +6,10 @@ arithmetic each slip has its low part beside it. See fix_slip_history.h and fix_
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import FLOOR, Contacts, Packing
+from ...analysis.packing.arrays import Floats
 from .contact_graph import ContactGraph
-
-Floats = NDArray[np.float64]
 
 FLOOR_SLIP, FLOOR_OVERLAP, FLOOR_SLIP_LOW = 2, 6, 7
 

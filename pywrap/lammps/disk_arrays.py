@@ -6,7 +6,8 @@ memory; by way of LAMMPS's Python module there would be copies in between.
 
 from collections.abc import Callable
 from ctypes import POINTER, c_int
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +17,8 @@ Floats = NDArray[np.float64]
 DOUBLE = 1
 
 
-class _Channel(NamedTuple):
-    """How one array goes in and out, by way of memory whose address is looked up once."""
-
-    gather: Callable[..., None]
-    scatter: Callable[..., None]
-    name: bytes
-    columns: int
-    values: Floats
-    address: int
+Channel: TypeAlias = tuple[Floats, Callable[[], None], Callable[[], None]]
+"""Memory whose address is looked up once, and what takes one array of LAMMPS there and back."""
 
 
 class DiskArrays:
@@ -46,35 +40,36 @@ class DiskArrays:
         self._extract_fix = self._library["lammps_extract_fix"]  # a function of our own: that of the module is shared
         self._extract_fix.argtypes = self._library.lammps_extract_fix.argtypes
         self._extract_fix.restype = POINTER(c_int)
-        self._channels: dict[tuple[str, int], _Channel] = {}
+        self._channels: dict[tuple[str, int], Channel] = {}
 
     def gather(self, name: str, columns: int) -> Floats:
         """An array of LAMMPS (x, v, f ..., f_FIX, d_NAME), shape (N, columns)."""
-        channel = self._channel(name, columns)
-        self._call(channel.gather, channel)
-        return channel.values.copy()
+        values, gather, _ = self._channel(name, columns)
+        self._call(gather)
+        return values.copy()
 
     def scatter(self, name: str, values: Floats) -> None:
         """Write such an array, shape (N,) or (N, columns); in fixes it counts from the next run's begin."""
-        channel = self._channel(name, values.size // self._disks)
-        channel.values.reshape(values.shape)[...] = values
-        self._call(channel.scatter, channel)
+        memory, _, scatter = self._channel(name, values.size // self._disks)
+        memory.reshape(values.shape)[...] = values
+        self._call(scatter)
 
     def columns(self, fix: str) -> int:
         """Columns of the array of a fix."""
         return int(self._extract_fix(self._lammps.lmp, fix.encode(), *self._size_of_fix)[0])
 
-    def _channel(self, name: str, columns: int) -> "_Channel":
+    def _channel(self, name: str, columns: int) -> Channel:
         if (name, columns) not in self._channels:
             kind = "" if name[:2] in ("f_", "d_") else "_atoms"
-            gather, scatter = (getattr(self._library, f"lammps_{way}{kind}") for way in ("gather", "scatter"))
             values = np.zeros((self._disks, columns))
-            self._channels[name, columns] = _Channel(
-                gather, scatter, name.encode(), columns, values, values.ctypes.data
+            arguments = self._lammps.lmp, name.encode(), DOUBLE, columns, values.ctypes.data
+            gather, scatter = (
+                partial(getattr(self._library, f"lammps_{way}{kind}"), *arguments) for way in ("gather", "scatter")
             )
+            self._channels[name, columns] = values, gather, scatter
         return self._channels[name, columns]
 
-    def _call(self, function: Callable[..., None], channel: "_Channel") -> None:
-        function(self._lammps.lmp, channel.name, DOUBLE, channel.columns, channel.address)
+    def _call(self, function: Callable[[], None]) -> None:
+        function()
         if self._library.lammps_has_error(self._lammps.lmp):
             raise self._lammps._lammps_exception

@@ -13,16 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from ...analysis import Packing
 from ...analysis.files.signal_files import write_table
 from ...analysis.motion.signals import Signal
+from ...analysis.packing.arrays import Floats
 from .decks import Decks
 from .shared_folder import shared_folder
 from .wire import Wire
-
-Floats = NDArray[np.float64]
 
 
 class Motion(NamedTuple):

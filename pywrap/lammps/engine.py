@@ -15,12 +15,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
 
-import numpy as np
 from mpi4py import MPI
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ...analysis import Packing
 from ...analysis.motion.signals import Signal
+from ...analysis.packing.arrays import Floats
 from .data_file import data_file
 from .decks import DECKS, Decks
 from .displacing import Displacing
@@ -29,8 +29,6 @@ from .instance import lammps_instance
 from .shared_folder import shared_folder
 from .trial import Trial
 from .wire import Wire
-
-Floats = NDArray[np.float64]
 
 LOOK = 1000
 """Time steps between two looks at the forces."""

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing
+from ...analysis.packing.arrays import Floats
 from ...analysis.packing.law import Derivatives
 from .contact_graph import ContactGraph
-
-Floats = NDArray[np.float64]
 
 EPSILON = float(np.finfo(float).eps)
 

@@ -8,9 +8,9 @@ packing.
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import Packing, touching
+from ...analysis.packing.arrays import Floats
 from ...analysis.packing.compensated import exact_sum
 from .contact_graph import ContactGraph
 from .contact_rows import ContactRows
@@ -19,7 +19,6 @@ from .disk_arrays import DiskArrays
 from .displacing import Displacing
 from .trial import Trial
 
-Floats = NDArray[np.float64]
 Arrays = dict[str, Floats]
 
 LOW_COLUMNS = 5

@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, find_onset
 from ...analysis.damped_onset.modes import Pencil
 from ...analysis.damped_onset.sliced import first_growing
 from ...analysis.damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows, dissipating, dissipative
 from ...analysis.onset import Increments, seeks_all
+from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
 from ..runs.path import EquilibriumPath, loads
-from ..scenes.refusals import SceneError
+from ..scenes.refusals import needed
 from ..scenes.scene import Scene
 from ..settling.bed import settle
 from ..settling.settling import Watch
@@ -88,12 +88,8 @@ class Ramped:
 
     Attributes
     ----------
-    engine : Engine
-        LAMMPS with the packing.
-    scene : Scene
-        Of the ramp, without dissipation.
     path : EquilibriumPath
-        fx -> Packing.
+        fx -> Packing, without dissipation.
     forces : ndarray
         The loads of the ramp, of a packing whose windows are all sought those that have an equilibrium.
     whole : bool
@@ -102,10 +98,8 @@ class Ramped:
         Whether the packing flows before the ramp's end, as far as that is known.
     """
 
-    engine: Engine
-    scene: Scene
     path: EquilibriumPath
-    forces: NDArray[np.float64]
+    forces: Floats
     whole: bool
     flows: bool
 
@@ -139,9 +133,7 @@ def ramped(scene: Scene, mu: float | None = None, watch: Watch = lambda says: No
     NoEquilibriumError
         If the packing flows from the first increment on.
     """
-    if scene.ramp is None:
-        raise SceneError("the scene has no section [ramp]: add it, with step and until")
-    wanted = loads(scene.ramp)
+    wanted = loads(needed(scene.ramp, "ramp"))
     scene = scene.model_copy(update={"damping": None})
     start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"))
     with Engine(start.packing) as engine:
@@ -152,7 +144,7 @@ def ramped(scene: Scene, mu: float | None = None, watch: Watch = lambda says: No
             for _ in path.climb(wanted[1:]):
                 pass
             forces = np.array([each.fx for each in path.kept])
-        yield Ramped(engine, scene, path, forces, whole, len(forces) < len(wanted))
+        yield Ramped(path, forces, whole, len(forces) < len(wanted))
 
 
 Dissipation = Callable[[Packing], Packing]
@@ -195,9 +187,7 @@ def damped_onset_run(
     DampedOnsetError
         If no motion grows up to the ramp's end.
     """
-    if scene.damping is None:
-        raise SceneError("the scene has no section [damping]: add it, with cn, ct or tau")
-    damping = scene.damping
+    damping = needed(scene.damping, "damping")
     dissipation = partial(dissipative, cn=damping.cn, ct=damping.ct, drag_time=damping.tau)
     with ramped(scene, mu, watch) as ramp:
         if ramp.whole:
@@ -206,10 +196,8 @@ def damped_onset_run(
             found = _first_window(ramp, mu, dissipation, watch, known, folder)
         equilibria = tuple(ramp.path.kept)
         watch("the path once more, with other increments")
-        again, undamped = (ramp.engine, ramp.path, ramp.scene), found.undamped
-        if undamped is not None:
-            undamped = with_path_error(undamped, *again)
-        windows = with_damped_path_error(found.windows, dissipation, *again)
+        undamped = None if found.undamped is None else with_path_error(found.undamped, ramp.path)
+        windows = with_damped_path_error(found.windows, dissipation, ramp.path)
         return replace(found, windows=windows, undamped=undamped, equilibria=equilibria)
 
 

@@ -46,14 +46,12 @@ from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, 
 from ...analysis.damped_onset.modes import DampedMode, Pencil, nearest_mode
 from ...analysis.damped_onset.windows import DampedWindow
 from ...analysis.onset import force_bearing
+from ...analysis.packing.arrays import Floats
 from ...analysis.packing.law import AT_THE_BOUND
 from ..equilibria.quasistatic import Equilibrium
-from ..lammps.engine import Engine
 from ..runs.path import EquilibriumPath
-from ..scenes.scene import Scene
 from .nearby_root import nearby_root
 
-Floats = NDArray[np.float64]
 Vanishes = Callable[[Packing], float]
 
 FEWEST = 4
@@ -128,19 +126,15 @@ class PathError:
         return max(part * abs(self.shift), 2 * abs(self.finer), 2 * float(np.ptp([0.0, *self.moved]))) + hidden
 
 
-def with_path_error(onset: Onset, engine: Engine, path: EquilibriumPath, scene: Scene) -> Onset:
+def with_path_error(onset: Onset, path: EquilibriumPath) -> Onset:
     """An onset with the error of its path: extrapolated where that can be done, bounded where not.
 
     Parameters
     ----------
     onset : Onset
         As found on the path; the errors of its windows are those of rounding.
-    engine : Engine
-        LAMMPS with the packing of the path.
     path : EquilibriumPath
         The ramp, at least up to the last window.
-    scene : Scene
-        Of the ramp.
 
     Returns
     -------
@@ -148,16 +142,12 @@ def with_path_error(onset: Onset, engine: Engine, path: EquilibriumPath, scene: 
         Windows with the onset of the exact path and the whole error. A window keeps its own, and a `path_error` of
         None, where the ramp has no equilibrium at the onset that the search has found there.
     """
-    others = OtherPaths(engine, path, scene)
+    others = OtherPaths(path)
     return replace(onset, windows=tuple(_whole(window, meeting(window.eigenvalue), others) for window in onset.windows))
 
 
 def with_damped_path_error(
-    windows: Sequence[DampedWindow],
-    dissipation: Callable[[Packing], Packing],
-    engine: Engine,
-    path: EquilibriumPath,
-    scene: Scene,
+    windows: Sequence[DampedWindow], dissipation: Callable[[Packing], Packing], path: EquilibriumPath
 ) -> tuple[DampedWindow, ...]:
     """Windows of growing motion with the error of the path on which they were found.
 
@@ -167,10 +157,10 @@ def with_damped_path_error(
         As found on the path; their errors are those of rounding.
     dissipation : callable
         A packing of the path -> the same with its dashpots and drag.
-    engine, path, scene
+    path : EquilibriumPath
         As in `with_path_error`.
     """
-    others = OtherPaths(engine, path, scene)
+    others = OtherPaths(path)
     return tuple(_whole(window, crossing(window.frequency, dissipation), others) for window in windows)
 
 
@@ -198,18 +188,13 @@ class OtherPaths:
 
     Parameters
     ----------
-    engine : Engine
-        LAMMPS with the packing of the path.
     path : EquilibriumPath
         The ramp, at least up to the last onset.
-    scene : Scene
-        Of the ramp.
     """
 
-    def __init__(self, engine: Engine, path: EquilibriumPath, scene: Scene) -> None:
+    def __init__(self, path: EquilibriumPath) -> None:
         self.path = path
-        self._engine, self._scene = engine, scene
-        self._states = [bearing_contacts(each.packing, scene.load.fy) for each in path.kept]
+        self._states = [bearing_contacts(each.packing) for each in path.kept]
         self._coarser, self._finer, self._moved = [path.kept[0]], [path.kept[0]], [[path.kept[0]] for _ in MOVED]
 
     def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
@@ -263,7 +248,7 @@ class OtherPaths:
             If the ramp has no equilibrium at fx.
         """
         before = self._states[: sum(each.fx < fx for each in self.path.kept)]
-        states = [*before, bearing_contacts(self.path(fx), self._scene.load.fy)]
+        states = [*before, bearing_contacts(self.path(fx))]
         return np.array([a != b for a, b in pairwise(states)])
 
     def _along(self, through: Floats, known: list[Equilibrium]) -> EquilibriumPath:
@@ -272,7 +257,7 @@ class OtherPaths:
         common = 0
         while common < min(len(inner), len(known) - 1) and known[common + 1].fx == inner[common]:
             common += 1
-        path = EquilibriumPath(self._engine, known[0], self._scene, known[1 : common + 1])
+        path = EquilibriumPath(self.path.engine, known[0], self.path.scene, known[1 : common + 1])
         try:
             for load in inner[common:]:
                 path(float(load))
@@ -281,9 +266,9 @@ class OtherPaths:
         return path
 
 
-def bearing_contacts(packing: Packing, fy: float) -> frozenset[tuple[int, int, bool]]:
+def bearing_contacts(packing: Packing) -> frozenset[tuple[int, int, bool]]:
     """The contacts (i, j, whether it slides) that carry a force; j = -1 for the floor."""
-    carrying = packing.loaded(CARRIES * fy)
+    carrying = packing.loaded(CARRIES * packing.fy)
     contacts = carrying.contacts
     limit = carrying.law.slip_limit(carrying.geometry.overlap)
     slides = np.abs(contacts.slip) > AT_THE_BOUND * limit

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ...analysis.digits import with_uncertainty
 from ...analysis.onset import full_operator, seeks_all
 from ...analysis.onset.search import windows_rows
+from ...analysis.packing.arrays import Floats
 from ...analysis.spectrum.spectrum import active_coordinates
 from ...analysis.tabled import Tabled
 from ..equilibria.quasistatic import Equilibrium
@@ -65,7 +65,7 @@ def onset_run(
     scene: Scene,
     mu: float,
     reached: Callable[[Equilibrium], None] | None = None,
-    near_onset: NDArray[np.float64] | None = None,
+    near_onset: Floats | None = None,
     modes: tuple[int, int] | None = None,
     watch: Watch = lambda says: None,
     folder: Path | None = None,
@@ -131,7 +131,7 @@ def onset_run(
         extra = [] if near_onset is None else [fx for fx in onset.fx_c + near_onset if 0 <= fx <= last]
         between = {float(fx): path(float(fx)) for fx in extra}
         watch("the path once more, with other increments")
-        onset = with_path_error(onset, engine, path, scene)
+        onset = with_path_error(onset, path)
     return OnsetRun(mu, tuple(path.kept), onset, last if flows else None, between)
 
 

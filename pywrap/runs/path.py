@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from ...analysis import NoEquilibriumError, Packing
+from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
 from ..lammps.engine import Engine
 from ..scenes.refusals import needed
@@ -82,7 +82,7 @@ def reach(scene: Scene, fx: float) -> Iterator[Equilibrium]:
         yield next_equilibrium(engine, last, fx, bounded)
 
 
-def loads(settings: Ramp) -> NDArray[np.float64]:
+def loads(settings: Ramp) -> Floats:
     """F_x of the equilibria of a ramp, force, from 0: multiples of the step, to the bit, and `until` in the end."""
     # half a step in a million is far above the rounding of until/step, and far below a step
     rounding = 5e-7
@@ -148,7 +148,7 @@ class EquilibriumPath:
         further: Sequence[Equilibrium] = (),
         onward: bool = False,
     ) -> None:
-        self._engine, self._scene, self._onward = engine, scene, onward
+        self.engine, self.scene, self._onward = engine, scene, onward
         self.kept = [start, *further]
         # an equilibrium, and another one near it
         self._beside = (self.kept[-1], self.kept[-2]) if further else None
@@ -160,7 +160,7 @@ class EquilibriumPath:
             return below.packing
         beside = self._beside[1] if self._beside and self._beside[0] is below else None
         onward = self._onward and fx > self.kept[-1].fx
-        found = next_equilibrium(self._engine, below, fx, self._scene, beside, onward)
+        found = next_equilibrium(self.engine, below, fx, self.scene, beside, onward)
         if fx > self.kept[-1].fx:
             self.kept.append(found)
             self._beside = found, below
@@ -168,7 +168,7 @@ class EquilibriumPath:
             self._beside = below, found
         return found.packing
 
-    def climb(self, forces: NDArray[np.float64]) -> Iterator[Equilibrium]:
+    def climb(self, forces: Floats) -> Iterator[Equilibrium]:
         """The equilibria at increasing forces, up to the last one that the packing bears."""
         for fx in forces:
             try:

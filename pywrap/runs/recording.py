@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeVar
 
 from mpi4py import MPI
 
-from ...analysis import Packing, RunFile
+from ...analysis import RunFile
 from ...analysis.files.wholefile import check_folder
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Motion, Weakening
@@ -104,7 +104,9 @@ class Record:
     def append(self, equilibrium: Equilibrium) -> None:
         """Write one equilibrium."""
         if self.communicator.rank == 0:
-            file = self._opened(equilibrium.packing)
+            if self._file is None:
+                self._file = RunFile.create(self.path, equilibrium.packing, self._attributes())
+            file = self._file
             with file.change():
                 file.complete = False
                 file.append(equilibrium.packing, floor=equilibrium.floor, evaluations=equilibrium.evaluations)
@@ -204,11 +206,6 @@ class Record:
         goes_on = "is complete" if file.complete else "the same command goes on from there"
         count = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}{more}"
         self._said(f"{self.path} holds {count}; {goes_on}")
-
-    def _opened(self, packing: Packing) -> RunFile:
-        if self._file is None:
-            self._file = RunFile.create(self.path, packing, self._attributes())
-        return self._file
 
     def _attributes(self) -> dict[str, str | int]:
         return {

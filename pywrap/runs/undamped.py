@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from ...analysis import Packing, largest_damping_rate, largest_frequency, mean_square_displacement, stable_timestep
+from ...analysis.packing.arrays import Floats, Indices
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Dynamics, Motion, Weakening
 from ..lammps.engine import Engine
@@ -69,7 +69,7 @@ class Checkpoint:
     """
 
     step: int
-    state: dict[str, NDArray[np.float64]]
+    state: dict[str, Floats]
 
 
 def time_step(packing: Packing, wanted: float | None = None) -> float:
@@ -175,9 +175,7 @@ def perturb(
     return run()
 
 
-def sampling(
-    settings: Perturb, packing: Packing, samples: int = 2000, early: int = 200
-) -> tuple[float, NDArray[np.int64]]:
+def sampling(settings: Perturb, packing: Packing, samples: int = 2000, early: int = 200) -> tuple[float, Indices]:
     """Time step of an undamped run, and the steps at which it is sampled; parameters and errors as of `perturb`."""
     dt = time_step(packing, settings.time_step)
     settings.check_samples(dt)
@@ -215,7 +213,7 @@ def _sampled(time: float, motion: Motion, packing: Packing) -> Sample:
     )
 
 
-def _ends_of_parts(total: int) -> NDArray[np.int64]:
+def _ends_of_parts(total: int) -> Indices:
     """The steps at which the parts of a run end; they depend on its length alone, and not on when it is sampled."""
     part = max(SHORTEST_PART, -(-total // MOST_PARTS))
     return np.arange(part, total, part)

@@ -212,7 +212,7 @@ def impossible(scene: Keys) -> tuple[str, str] | None:
     packing, law, fy = scene.packing, scene.law, scene.load.fy
     if not isinstance(packing, GeneratedPacking):
         return None
-    overlap = _overlap(scene, fy)
+    overlap = _law(scene).overlap_of_force(fy)
     smallest = min(packing.radii)
     if not overlap < smallest:
         return "load.fy", (
@@ -270,12 +270,9 @@ def _searched_bytes(disks: int) -> float:
     return disks * BYTES_SEARCHED + (bases if bases < BYTES_OF_BASES[1] else 0.0)
 
 
-def _overlap(scene: Keys, force: float) -> float:
-    return _law(scene).overlap_of_force(force)
-
-
 def _stiffness(scene: Keys, force: float) -> float:
-    return float(_law(scene).normal_stiffness(_overlap(scene, force)))
+    law = _law(scene)
+    return float(law.normal_stiffness(law.overlap_of_force(force)))
 
 
 def _law(scene: Keys) -> MindlinLaw:

@@ -16,10 +16,9 @@ spot. A layer of several disks comes to rest. A tenth of all disks, the paper's 
 the geometry the same for packings of all sizes.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
+
+from ..exchange import Disks
 
 CELL = 1.25
 """Smallest side of a cell, in largest diameters: a quarter is the room for placing a largest disk."""
@@ -27,31 +26,6 @@ CELL = 1.25
 
 LAYER = 0.1
 """Share of the disks that are the upper layer, where a scene does not say."""
-
-
-@dataclass(frozen=True, eq=False)
-class Start:
-    """Disks in a box, at rest, without contacts or history.
-
-    Attributes
-    ----------
-    position : ndarray, shape (N, 2)
-        Centres, length; the floor is y = 0.
-    radius : ndarray, shape (N,)
-        Radii, length.
-    top : ndarray of bool, shape (N,)
-        The disks of the upper layer.
-    box_length : float or None
-        Period along x, length; None where the sides are open.
-    """
-
-    position: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    top: NDArray[np.bool_]
-    box_length: float | None
-
-    def __len__(self) -> int:
-        return len(self.radius)
 
 
 def layer_size(disks: int, radii: tuple[float, ...], width: float) -> int:
@@ -85,7 +59,7 @@ def loose_start(
     *,
     periodic: bool = True,
     draw: int = 0,
-) -> Start:
+) -> Disks:
     """Disks above the floor that overlap nowhere, the same on every platform for one seed.
 
     Parameters
@@ -107,7 +81,8 @@ def loose_start(
 
     Returns
     -------
-    Start
+    Disks
+        Positions, radii, the upper layer and the period; the floor is y = 0.
 
     Raises
     ------
@@ -117,30 +92,30 @@ def loose_start(
     if not 0 <= top <= disks or disks < 1:
         raise ValueError(f"an upper layer of {top} disks cannot be made from {disks}")
     sizes = np.resize(np.sort(radii), disks)
-    row, bulk = sizes[:top], sizes[top:]
     diameter = 2 * sizes.max()
     if diameter > width:
         raise ValueError(f"a disk of radius {sizes.max()} is wider than the box of width {width}")
 
     generator = _generator(seed, draw)
-    bulk = generator.permutation(bulk)
+    bulk = generator.permutation(sizes[top:])
     columns = max(1, int(width / (CELL * diameter)))
     side = np.array([width / columns, CELL * diameter])
     full, rest = divmod(len(bulk), columns)
     # In the last, incomplete row the free cells are as random as the disks.
     cells = np.concatenate([np.arange(full * columns), full * columns + generator.permutation(columns)[:rest]])
     corner = np.column_stack([cells % columns, cells // columns]) * side
-    room = side - 2 * bulk[:, None]
-    inside = corner + bulk[:, None] + room * generator.random((len(bulk), 2))
+    inside = corner + bulk[:, None] + (side - 2 * bulk[:, None]) * generator.random((len(bulk), 2))
 
     order = np.arange(top)
     # as many tiers as divide the layer, so that its ends do not meet across the periodic side
     tiers = next((t for t in range(1, top + 1) if top % t == 0 and diameter * top <= t * width), 1)
     height = side[1] * (full + (rest > 0)) + diameter * (order % tiers + 0.5)
     above = np.column_stack([width * (order + 0.5) / max(top, 1), height])
-    return Start(
+    return Disks(
+        f"the loose start of the seed {seed}",
         position=np.concatenate([inside, above]),
-        radius=np.concatenate([bulk, row]),
+        radius=np.concatenate([bulk, sizes[:top]]),
+        id=np.arange(1, disks + 1),
         top=np.arange(disks) >= len(bulk),
         box_length=width if periodic else None,
     )

@@ -2,16 +2,17 @@
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from ...analysis import BadInputError, PackingFileError, RunFile
-from ..exchange import Disks, format_of, is_hdf5, read_disks, upper_layer
-from .loose import Start, layer_size, loose_start
+from ...analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
+from ...analysis.packing.arrays import Floats
+from ..exchange import Disks, format_of, is_hdf5, packing_of, read_disks, upper_layer
+from .loose import layer_size, loose_start
 from .refusals import Positive, Section, refusal
 
 SPARSEST = 10.0
@@ -88,11 +89,11 @@ class GeneratedPacking(Section):
             raise refusal("", f"is refused because {error}: widen the box, or take fewer disks") from None
         return self
 
-    def start(self, draw: int = 0) -> Start:
+    def start(self, draw: int = 0) -> Disks:
         """The loose start that this section describes, or a later one of its seed."""
         return loose_start(self.disks, self.radii, self.top, self.width, self.seed, periodic=self.periodic, draw=draw)
 
-    def mass_of(self, radius: NDArray[np.float64]) -> NDArray[np.float64]:
+    def mass_of(self, radius: Floats) -> Floats:
         """Masses of disks, shape (N,), in units of that of the smallest."""
         power = 3 if self.masses == "spheres" else 0
         return np.asarray((radius / min(self.radii)) ** power)
@@ -142,24 +143,32 @@ class StoredPacking(Section):
                     )
             return self
         try:
-            self.read()
+            upper_layer(read_disks(self.file, self.frame), self.top)
         except BadInputError as error:
             raise refusal("file", f'= "{self.file.name}" is refused: {str(error).rstrip(".")}') from None
         return self
 
-    def read(self) -> tuple[Disks, NDArray[np.bool_]] | None:
-        """What the file has, and the upper layer; None for a run.h5."""
-        if is_hdf5(self.file):
-            return None
-        disks = read_disks(self.file, self.frame)
-        return disks, upper_layer(disks, self.top)
+    def packing(self, law: MindlinLaw, **more: Any) -> Packing:
+        """The packing of the file under a law; `more` are its fy, inertia_factor and drag_time.
+
+        Raises
+        ------
+        PackingFileError
+            If the file has no equilibrium, or no packing.
+        """
+        if not is_hdf5(self.file):
+            disks = read_disks(self.file, self.frame)
+            return packing_of(disks, law, upper_layer(disks, self.top), **more)
+        with RunFile(self.file) as run:
+            if len(run) == 0:
+                raise PackingFileError(f"{self.file} has no equilibrium in it")
+            return replace(run.packing(0), law=law, **more)
 
     @property
     def disks(self) -> int:
         """Number of disks."""
-        read = self.read()
-        if read is not None:
-            return len(read[0])
+        if not is_hdf5(self.file):
+            return len(read_disks(self.file, self.frame))
         with RunFile(self.file) as run:
             return len(run.packing(0)) if len(run) else 0
 

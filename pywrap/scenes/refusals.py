@@ -36,7 +36,7 @@ NotNegative: TypeAlias = Annotated[float, Field(ge=0, allow_inf_nan=False), Afte
 
 T = TypeVar("T")
 
-KEYS = {"ramp": "step and until", "perturb": "fx and time"}
+KEYS = {"ramp": "step and until", "perturb": "fx and time", "damping": "cn, ct or tau"}
 """What a section needs at least."""
 
 

@@ -133,11 +133,8 @@ class SignalKeys(Section):
         SignalError
             If rows of the file are closer than the time step, or the whole signal is.
         """
-        if self.signal is None or self.signal in KINDS:
-            return
-        signal = self.forcing()
-        assert signal is not None
-        if signal.shortest < dt:
+        signal = self.forcing() if self._from_file else None
+        if signal is not None and signal.shortest < dt:
             raise SignalError(
                 f"perturb.signal has rows that are {signal.shortest:.3g} apart, and the time step is {dt:.3g}: a run "
                 f"with too few samples would not follow it, so lower perturb.time_step or raise perturb.stretch to "

@@ -31,11 +31,10 @@ rock, with the modulus :math:`G = E/2(1 + \nu)`, has it at the strain :math:`\si
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from ...analysis import MindlinLaw, RunFile, read_packing
+from ...analysis import MindlinLaw, PackingFileError
 from .keys import Keys
 from .packing_section import GeneratedPacking
 from .refusals import refusal
@@ -143,17 +142,17 @@ def real_units(scene: Keys) -> RealUnits | None:
         raise refusal(
             "units", f"takes k_n from Hertz's contact, and law.exponent = {scene.law.exponent:g}: leave one out"
         )
-    layer = _layer(scene)
-    if layer.width is None:
+    smallest, its_mass, width, top = _layer(scene)
+    if width is None:
         raise refusal("units", "has no stress without the width of the layer: take a periodic packing")
     diameter, density, modulus = (units.si(key) for key in ("grain_diameter", "density", "youngs_modulus"))
-    length = diameter / layer.diameter
+    length = diameter / smallest
     volume = np.pi * diameter**3 / 6 if units.thickness is None else np.pi * diameter**2 / 4 * units.si("thickness")
-    mass = density * volume / layer.mass
+    mass = density * volume / its_mass
     stiffness = modulus * np.sqrt(diameter) / (3 * (1 - units.poisson_ratio**2))
     time = float(np.sqrt(scene.law.kn * mass / (stiffness * np.sqrt(length))))
     depth = diameter if units.thickness is None else units.si("thickness")
-    area = layer.width * length * depth / layer.top
+    area = width * length * depth / top
     shear_modulus = modulus / (2 * (1 + units.poisson_ratio))
     real = RealUnits(length, mass, time, area, shear_modulus, density, scene.load.fy)
     if units.overburden is not None:
@@ -168,28 +167,17 @@ def real_units(scene: Keys) -> RealUnits | None:
     return real
 
 
-class _Layer(NamedTuple):
+def _layer(scene: Keys) -> tuple[float, float, float | None, int]:
     """What a scene says of its layer, in its own units: smallest diameter and its mass, width, disks on top."""
-
-    diameter: float
-    mass: float
-    width: float | None
-    top: int
-
-
-def _layer(scene: Keys) -> _Layer:
     section = scene.packing
     if isinstance(section, GeneratedPacking):
-        return _Layer(2 * min(section.radii), 1.0, section.width if section.periodic else None, section.top)
-    if section.file.suffix == ".json":
-        packing = read_packing(section.file, MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
-    else:
-        with RunFile(section.file) as file:
-            packing = file.packing(0)
-    smallest = packing.radius.argmin()
-    return _Layer(
-        2 * float(packing.radius[smallest]), float(packing.mass[smallest]), packing.box_length, int(packing.top.sum())
-    )
+        return 2 * min(section.radii), 1.0, section.width if section.periodic else None, section.top
+    try:
+        packing = section.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
+    except PackingFileError as error:
+        raise refusal("packing.file", f'= "{section.file.name}" is refused: {str(error).rstrip(".")}') from None
+    k = packing.radius.argmin()
+    return 2 * float(packing.radius[k]), float(packing.mass[k]), packing.box_length, int(packing.top.sum())
 
 
 def restitution(kn: float, cn: float, mass: float, velocity: float) -> float:

@@ -6,16 +6,16 @@ All functions are collective over the ranks of the communicator.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
-from ...analysis import MindlinLaw, NoEquilibriumError, Packing, PackingFileError, RunFile, touching
+from ...analysis import MindlinLaw, NoEquilibriumError, Packing
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
 from ..equilibria.rattlers import clear_rattlers
 from ..exchange import packing_of
 from ..lammps.engine import Engine
-from ..scenes.loose import Start
 from ..scenes.packing_section import GeneratedPacking
 from ..scenes.refusals import SceneError
 from ..scenes.scene import Scene
@@ -79,7 +79,7 @@ def settle(
     packing = _in_arithmetic(packing, scene.precision)
     with Engine(packing, communicator) as engine:
         try:
-            return equilibrate(engine, _unpolished(packing), packing.fx)
+            return equilibrate(engine, Equilibrium.of(packing), packing.fx)
         except NoEquilibriumError as error:
             raise NoEquilibriumError(
                 f"the packing does not come to rest (a disk feels {packing.residual:.2g}): put more disks into the "
@@ -108,17 +108,24 @@ def law_of(scene: Scene, mu: float) -> MindlinLaw:
     return MindlinLaw(scene.law.kn, scene.law.kt, mu, scene.law.exponent, cn, ct, rescaled)
 
 
-def drag_time(scene: Scene) -> float | None:
-    return scene.damping.tau if scene.damping else None
+def load_of(scene: Scene) -> dict[str, Any]:
+    """What packings of the scene have beside disks and law."""
+    drag_time = scene.damping.tau if scene.damping else None
+    return {"fy": scene.load.fy, "inertia_factor": scene.inertia_factor, "drag_time": drag_time}
 
 
 def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None, watch: Watch) -> Packing:
     """The first of the seed's loose starts whose upper layer stays on top, settled."""
     assert isinstance(scene.packing, GeneratedPacking)
+    settling_law = law if scene.packing.settle_friction else replace(law, mu=0.0)
     for draw in range(STARTS):
         if draw:
             watch(f"the upper layer sank through the bed: loose start {draw + 1} of {STARTS}")
-        packing = _laid(scene, scene.packing.start(draw), law, communicator, watch)
+        start = scene.packing.start(draw)
+        assert start.top is not None
+        loose = packing_of(start, settling_law, start.top, **load_of(scene))
+        with Engine(loose, communicator) as engine:
+            packing = settled(engine, loose, watch)
         idle = len(packing.loaded(rounding_floor(packing)).rattlers)
         if idle <= 0.5 * len(packing):
             break
@@ -136,24 +143,6 @@ def _settled(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None, watch
     return replace(packing, law=law, angle=np.zeros(len(packing)))
 
 
-def _laid(scene: Scene, start: Start, law: MindlinLaw, communicator: MPI.Comm | None, watch: Watch) -> Packing:
-    """A loose start after its settling, with friction if the scene says so."""
-    assert isinstance(scene.packing, GeneratedPacking)
-    loose = Packing(
-        position=start.position,
-        radius=start.radius,
-        top=start.top,
-        box_length=start.box_length,
-        inertia_factor=scene.inertia_factor,
-        law=law if scene.packing.settle_friction else replace(law, mu=0.0),
-        contacts=touching(start.position, start.radius, start.box_length),
-        fy=scene.load.fy,
-        drag_time=drag_time(scene),
-    )
-    with Engine(loose, communicator) as engine:
-        return settled(engine, loose, watch)
-
-
 def _in_arithmetic(packing: Packing, precision: str) -> Packing:
     """The packing with low parts of its coordinates, or without."""
     if precision == "double":
@@ -161,25 +150,13 @@ def _in_arithmetic(packing: Packing, precision: str) -> Packing:
     return packing if packing.compensated else replace(packing, position_low=np.zeros_like(packing.position))
 
 
-def _unpolished(packing: Packing) -> Equilibrium:
-    return Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
-
-
 def _stored(scene: Scene, law: MindlinLaw) -> Packing:
     assert not isinstance(scene.packing, GeneratedPacking)
-    path, read = scene.packing.file, scene.packing.read()
-    if read is not None:
-        packing = packing_of(read[0], law, read[1], inertia_factor=scene.inertia_factor, fy=scene.load.fy)
-    else:
-        with RunFile(path) as file:
-            if len(file) == 0:
-                raise PackingFileError(f"{path} has no equilibrium in it")
-            packing = file.packing(0)
-        packing = replace(packing, law=law, inertia_factor=scene.inertia_factor, fy=scene.load.fy)
-    packing = _in_arithmetic(replace(packing, drag_time=drag_time(scene)), scene.precision)
+    packing = _in_arithmetic(scene.packing.packing(law, **load_of(scene)), scene.precision)
     if packing.residual > OUT_OF_BALANCE * scene.load.fy:
         raise SceneError(
-            f"{path}: the packing is not in balance, a disk feels {packing.residual:.3g} under fy = {scene.load.fy:g}: "
-            "check law and load against those it was settled with, or bring it to rest by `faultgouge import --relax`"
+            f"{scene.packing.file}: the packing is not in balance, a disk feels {packing.residual:.3g} under "
+            f"fy = {scene.load.fy:g}: check law and load against those it was settled with, or bring it to rest by "
+            "`faultgouge import --relax`"
         )
     return packing

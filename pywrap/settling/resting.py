@@ -7,7 +7,7 @@ the disks are. It makes what rearrangements there are; Newton's method does the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,48 +15,13 @@ from ...analysis import BadInputError, NoEquilibriumError, Packing, nearest_imag
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
 from ..equilibria.rattlers import clear_rattlers
 from ..lammps.engine import Engine
-from .settling import ABOVE_ROUNDING, TOLERANCES, Watch, contact_rounding, settled
+from .settling import ABOVE_ROUNDING, TOLERANCES, Watch, contact_rounding, largest_force, settled
 
 SEEN = 0.01
 """Displacement, in radii of the disk, from which a disk counts as moved."""
 
 
-@dataclass(frozen=True, eq=False)
-class Rest:
-    """A packing brought to rest, and what that did.
-
-    Attributes
-    ----------
-    equilibrium : Equilibrium
-        At rest.
-    before : Packing
-        As it was.
-    """
-
-    equilibrium: Equilibrium
-    before: Packing
-
-    @property
-    def words(self) -> str:
-        """What moved, and by how much."""
-        after, before = self.equilibrium.packing, self.before
-        moved = np.hypot(*nearest_image(after.position - before.position, after.box_length).T)
-        far = int(np.sum(moved > SEEN * after.radius))
-        old, new = (set(zip(p.contacts.i.tolist(), p.contacts.j.tolist(), strict=True)) for p in (before, after))
-        return (
-            f"brought to rest: the largest force on a disk was {largest_force(before):.3g} and is "
-            f"{self.equilibrium.residual:.2g}; {far} of {len(after)} disks moved by more than {SEEN:.0%} of their "
-            f"radius, the farthest by {moved.max():.3g}, all by {np.sqrt(np.mean(moved**2)):.3g} (rms); "
-            f"{len(new - old)} contacts closed and {len(old - new)} opened"
-        )
-
-
-def largest_force(packing: Packing) -> float:
-    """Largest force on a disk, with torque over radius; disks that touch nothing included, which may fall."""
-    return float(np.linalg.norm(packing.net_force.reshape(3, -1), axis=0).max())
-
-
-def at_rest(packing: Packing, watch: Watch = lambda says: None) -> Rest:
+def at_rest(packing: Packing, watch: Watch = lambda says: None) -> tuple[Packing, str]:
     """Bring a packing to rest under its law and load.
 
     Parameters
@@ -65,6 +30,13 @@ def at_rest(packing: Packing, watch: Watch = lambda says: None) -> Rest:
         Disks as another code left them.
     watch : callable, optional
         Told in words what begins.
+
+    Returns
+    -------
+    Packing
+        At rest.
+    str
+        What moved, and by how much.
 
     Raises
     ------
@@ -87,8 +59,21 @@ def at_rest(packing: Packing, watch: Watch = lambda says: None) -> Rest:
             "that closes the box (--top), or a lower load (--fy)"
         )
     with Engine(resting) as engine:
-        start = Equilibrium(resting, resting.residual, rounding_floor(resting), 0)
-        return Rest(equilibrate(engine, start, resting.fx), packing)
+        found = equilibrate(engine, Equilibrium.of(resting), resting.fx)
+    return found.packing, _what_moved(packing, found)
+
+
+def _what_moved(before: Packing, found: Equilibrium) -> str:
+    after = found.packing
+    moved = np.hypot(*nearest_image(after.position - before.position, after.box_length).T)
+    far = int(np.sum(moved > SEEN * after.radius))
+    old, new = (set(zip(p.contacts.i.tolist(), p.contacts.j.tolist(), strict=True)) for p in (before, after))
+    return (
+        f"brought to rest: the largest force on a disk was {largest_force(before):.3g} and is {found.residual:.2g}; "
+        f"{far} of {len(after)} disks moved by more than {SEEN:.0%} of their radius, the farthest by "
+        f"{moved.max():.3g}, all by {np.sqrt(np.mean(moved**2)):.3g} (rms); {len(new - old)} contacts closed and "
+        f"{len(old - new)} opened"
+    )
 
 
 def _without(packing: Packing, watch: Watch) -> Packing:

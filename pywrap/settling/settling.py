@@ -25,20 +25,19 @@ dynamics goes on from there, down to a tenth of the force before.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 
-from ...analysis import NoEquilibriumError, Packing, stiffness_matrix, touching
+from ...analysis import NoEquilibriumError, Packing, stiffness_matrix
 from ...analysis.factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
+from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
+from ..equilibria.rattlers import placed
 from ..lammps.engine import Engine
 
-Floats = NDArray[np.float64]
 Watch: TypeAlias = Callable[[str], None]
 
 SMALL = 300
@@ -107,7 +106,7 @@ def settled(engine: Engine, loose: Packing, watch: Watch = lambda says: None, be
             engine.damp(loose, finest, STEPS, LIGHT * float(np.sqrt(_stiffest(loose))))
         packing = engine.packing
         try:
-            return equilibrate(engine, Equilibrium(packing, packing.residual, rounding_floor(packing), 0), 0.0).packing
+            return equilibrate(engine, Equilibrium.of(packing), 0.0).packing
         except NoEquilibriumError:
             return packing if loose.law.frictional else minimized(packing)[0]
     watch(f"dynamics down to {TOLERANCES[0] * loose.fy:.0e} on a disk")
@@ -117,7 +116,7 @@ def settled(engine: Engine, loose: Packing, watch: Watch = lambda says: None, be
         engine.damp(loose, TOLERANCES[0] * loose.fy, STEPS, _viscosity(loose))
     for tolerance, finer in pairwise(TOLERANCES):
         packing = engine.packing
-        if _largest(packing) > (1 + 1e-6) * tolerance * loose.fy:  # but for the rounding of forces
+        if largest_force(packing) > (1 + 1e-6) * tolerance * loose.fy:  # but for the rounding of forces
             return packing  # out of steps: the layer sinks
         watch("Newton's method")
         packing, found = minimized(packing)
@@ -145,7 +144,7 @@ def minimized(packing: Packing, iterations: int = ITERATIONS) -> tuple[Packing, 
     bool
         Whether the force is down at the rounding floor.
     """
-    best, least = packing, _largest(packing)
+    best, least = packing, largest_force(packing)
     sigma = _stiffest(packing) * min(1.0, least / packing.fy) * 1e-2
     sigma = max(sigma, 1e-12 * _stiffest(packing))
     here = packing
@@ -157,7 +156,7 @@ def minimized(packing: Packing, iterations: int = ITERATIONS) -> tuple[Packing, 
         step = factors.solve(here.net_force[: 2 * len(here)])
         here, share = _downhill(here, step)
         sigma *= 0.2 if share > 0.5 else 4.0 if share < 0.1 else 1.0
-        residual = _largest(here)
+        residual = largest_force(here)
         if least < 10 * rounding_floor(best) and residual > 0.5 * least:
             return best, True
         if residual < least:
@@ -172,17 +171,12 @@ def _downhill(packing: Packing, step: Floats) -> tuple[Packing, float]:
     share = min(1.0, LONGEST * packing.radius.min() / np.hypot(*move.T).max())
     slope = packing.net_force[: len(step)] @ step
     while True:
-        there = _moved(packing, share * move)
+        there = placed(packing, packing.position + share * move)
         after = there.net_force[: len(step)] @ step
         if after >= -UPHILL * slope or share < 1e-6:
             return there, share
         # where the slope would vanish if it fell evenly; a contact that closed on the way makes it fall late
         share *= max(0.1, slope / (slope - after))
-
-
-def _moved(packing: Packing, move: Floats) -> Packing:
-    position = packing.position + move
-    return replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
 
 
 def _positive(packing: Packing, sigma: float) -> Factors | None:
@@ -198,8 +192,8 @@ def _positive(packing: Packing, sigma: float) -> Factors | None:
     return None if factors.negative else factors
 
 
-def _largest(packing: Packing) -> float:
-    """Largest force on a disk, rattlers of the upper layer included: they fall."""
+def largest_force(packing: Packing) -> float:
+    """Largest force on a disk, with torque over radius; disks that touch nothing included, which may fall."""
     return float(np.linalg.norm(packing.net_force.reshape(3, -1), axis=0).max())
 
 

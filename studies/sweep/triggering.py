@@ -123,7 +123,7 @@ def first_onset(scene: Scene, mu: float, start: Start) -> tuple[Row, tuple[Equil
         ends, reach, found = first_window(path, scene)
         error = None
         if found is not None:
-            whole = with_path_error(found, engine, path, scene)
+            whole = with_path_error(found, path)
             reach, error = whole.fx_c, whole.error
         return {"mu": mu, "ends": ends, "reach": reach, "error": error}, tuple(path.kept)
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...analysis import NoEquilibriumError, Packing, nearest_image
 from ...pywrap import Engine, Equilibrium
-from ...pywrap.equilibria.quasistatic import equilibrate, rounding_floor
+from ...pywrap.equilibria.quasistatic import equilibrate
 from ...pywrap.runs.undamped import time_step
 
 STEP = 0.01
@@ -126,7 +126,7 @@ def rest(engine: Engine) -> tuple[Equilibrium, float]:
             raise FailedError(f"at F_x = {fx:.6g} the layer has moved by {moved:.3g}")
         if np.abs(motion.velocity).max() < SLOW:
             try:
-                found = equilibrate(engine, Equilibrium(now, now.residual, rounding_floor(now), 0), fx)
+                found = equilibrate(engine, Equilibrium.of(now), fx)
             except NoEquilibriumError:
                 engine.restore(now)
                 engine.set_fx(fx)

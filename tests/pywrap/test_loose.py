@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from faultgouge.pywrap.scenes.loose import Start, layer_size, loose_start
+from faultgouge.pywrap.exchange import Disks
+from faultgouge.pywrap.scenes.loose import layer_size, loose_start
 
 
-def smallest_gap(start: Start) -> float:
+def smallest_gap(start: Disks) -> float:
     """Distance between the surfaces of the closest pair, or of the closest disk and the floor."""
     position = start.position
     if start.box_length is not None:

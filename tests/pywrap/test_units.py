@@ -1,9 +1,13 @@
 """Real units, against numbers worked out by hand, and quantities that do not convert."""
 
+import json
+
 import numpy as np
 import pytest
 
+from faultgouge.analysis import MindlinLaw, read_packing
 from faultgouge.pywrap import Scene
+from faultgouge.pywrap.exchange import write_packing
 from faultgouge.pywrap.scenes.units import dashpot, quality_factor, real_units, restitution
 
 QUARTZ = {
@@ -35,6 +39,17 @@ def test_units_are_those_of_hertz_and_of_the_grains():
         real.stress(0.01) / np.sqrt(shear * 2650), rel=1e-12
     )
     assert real.ground_velocity(0.01, 5.0, "floor") == pytest.approx(0.01 / 5.0 * real.velocity(1.0), rel=1e-12)
+
+
+def test_units_of_a_file_are_those_of_its_smallest_disk_whatever_the_format(tmp_path):
+    disks = {"x": [1.0, 3.0], "y": [0.49, 0.69], "radius": [0.5, 0.7], "top": [1], "box_length": 4.0}
+    (tmp_path / "disks.json").write_text(json.dumps(disks))
+    write_packing(tmp_path / "disks.xyz", read_packing(tmp_path / "disks.json", MindlinLaw(2e5, 0.0, 0.0)))
+    scenes = [LEAST | {"packing": {"file": name}, "units": QUARTZ} for name in ("disks.json", "disks.xyz")]
+    own, other = (real_units(Scene.from_mapping(each, tmp_path)) for each in scenes)
+    assert own.length == pytest.approx(1e-4, rel=1e-12)
+    assert own.overburden == pytest.approx(3.0 * own.force / (4.0 * 1e-4 * 1e-4), rel=1e-12)
+    assert other == own
 
 
 def test_thickness_changes_mass_and_area():

@@ -10,7 +10,6 @@ from reference_layer import toml
 
 from faultgouge.analysis import spectrum, stiffness_matrix
 from faultgouge.analysis.onset import LIMITS
-from faultgouge.figures.packing import mobilised
 from faultgouge.pywrap import Engine, Scene, equilibrate, settle
 from faultgouge.studies.modes.compute import antisymmetric_norm, counted, modes, switched
 from faultgouge.studies.modes.sets import sets
@@ -57,7 +56,7 @@ def test_without_b_no_pair_is_complex(loaded):
     same = stiffness_matrix(packing, coupled=every) - stiffness_matrix(packing)
     assert abs(same).max() == 0
     # the law is flat at its bound: what is within 1e-9 of the slip limit has the bound's force but for a rounding
-    np.testing.assert_array_equal(sliding(packing), mobilised(packing) > 1 - 1e-13)
+    np.testing.assert_array_equal(sliding(packing), packing.mobilised > 1 - 1e-13)
     found = switched(packing)
     assert found["none"]["pairs"] == 0
     assert found["sticking"]["pairs"] > 0

@@ -51,7 +51,7 @@ def whole(mu, precision, increment):
         for k in range(1, last + 1):
             path(k * increment)
         found = find_onset(path, increment * np.arange(first, last + 1))
-        return with_path_error(found, engine, path, scene)
+        return with_path_error(found, path)
 
 
 @pytest.mark.slow
@@ -80,7 +80,7 @@ def test_a_contact_that_slides_before_the_onset_is_covered():
         with Engine(start.packing) as engine:
             path = EquilibriumPath(engine, start, scene)
             window, *_ = find_onset(path, increment * np.arange(round(3e-3 / increment) + 1)).windows
-            part = OtherPaths(engine, path, scene).error(window.fx_onset, meeting(window.eigenvalue), window.error)
+            part = OtherPaths(path).error(window.fx_onset, meeting(window.eigenvalue), window.error)
         assert part.changes
         assert part.correction == 0
         found[precision, increment] = window.fx_onset, window.error + part.error
@@ -127,7 +127,7 @@ def test_an_onset_that_is_not_found_again_is_uncertain_by_the_increment():
     with Engine(start.packing) as engine:
         path = EquilibriumPath(engine, start, scene)
         path(1e-3)
-        part = OtherPaths(engine, path, scene).error(0.0005, meeting(30.0), 1e-11)  # no pair coalesces there
+        part = OtherPaths(path).error(0.0005, meeting(30.0), 1e-11)  # no pair coalesces there
     assert np.isnan(part.shift)
     assert part.correction == 0
     assert part.error == pytest.approx(5e-4)
@@ -157,10 +157,10 @@ def test_an_onset_is_kept_where_the_other_path_fails(failure):
     with Engine(start.packing) as engine:
         path = EquilibriumPath(engine, start, scene)
         found = find_onset(path, np.array([0.0, 5e-3, 1e-2, 1.5e-2, 2e-2]))
-        whole = with_path_error(found, engine, path, scene)
+        whole = with_path_error(found, path)
         once = OnceOnly(engine, start, scene, path.kept[1:])
         once.failure = failure
-        alone = with_path_error(found, engine, once, scene)
+        alone = with_path_error(found, once)
     assert alone.windows == found.windows
     assert alone.as_dict()["error_of_path"] is None
     assert 0 < whole.as_dict()["error_of_path"] <= whole.error

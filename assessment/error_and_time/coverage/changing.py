@@ -199,15 +199,14 @@ class FirstOnset:
 
     def changes(self, path: EquilibriumPath, fx: float) -> int:
         """Number of the increments before a load in which contacts change."""
-        return int(OtherPaths(self._engine, path, self._scene).changes(fx).sum())
+        return int(OtherPaths(path).changes(fx).sum())
 
     def whole(self, path: EquilibriumPath, window: Window | DampedWindow) -> tuple[float, float]:
         """The onset of a window, and the error that is stated: rounding and path together."""
-        again = self._engine, path, self._scene
         if isinstance(window, Window):
-            first, *_ = with_path_error(Onset((window,), complete=False), *again).windows
+            first, *_ = with_path_error(Onset((window,), complete=False), path).windows
             return first.fx_onset, first.error
-        damped, *_ = with_damped_path_error([window], self._damped, *again)
+        damped, *_ = with_damped_path_error([window], self._damped, path)
         return damped.fx_onset, damped.error
 
 

@@ -91,7 +91,7 @@ class Ways:
     def whole(self, increment: float, beyond: float) -> Onset:
         """The same with the error of the path in it."""
         found, path, _ = self.solved(increment, beyond)
-        return with_path_error(found, self._engine, path, self._scene)
+        return with_path_error(found, path)
 
     def beyond(self, onset: float) -> tuple[float, float]:
         """The error that a bisection ends at, and |y^H x| at `BEYOND` beyond the onset."""

@@ -13,7 +13,6 @@ which is sampled instead, so that the oscillation of E does not hide a drift.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -22,6 +21,7 @@ from scipy.linalg import eigh
 
 from ....analysis import Packing, spectrum, stable_timestep, stiffness_matrix, touching
 from ....pywrap import Engine, SceneError
+from ....pywrap.equilibria.rattlers import placed
 from ....pywrap.runs.undamped import time_step
 from .alone import refused_by_lammps
 from .case import Case, Outcome, measured, refused
@@ -55,8 +55,7 @@ def _fastest() -> tuple[np.ndarray, float]:
 
 
 def _displaced(packing: Packing, step: np.ndarray) -> Packing:
-    position = packing.position + step.reshape(2, -1).T
-    return replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
+    return placed(packing, packing.position + step.reshape(2, -1).T)
 
 
 def _excited(share: float, amplitude: float, steps: np.ndarray) -> np.ndarray:

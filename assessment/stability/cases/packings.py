@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from ....analysis import MindlinLaw, Packing, touching
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium, Scene, equilibrate, settle
-from ....pywrap.equilibria.quasistatic import rounding_floor
 
 KN = 2e5
 LOAD = 1.5e-5
@@ -131,4 +130,4 @@ def sheared(packing: Packing) -> Equilibrium:
 
 
 def _start(packing: Packing) -> Equilibrium:
-    return Equilibrium(packing, packing.residual, rounding_floor(packing), 0)
+    return Equilibrium.of(packing)

@@ -191,7 +191,7 @@ def _number_or_text(text: str | None) -> float | str | None:
 def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[str, Any]) -> Packing:
     """The packing under the law and the load of the scene, of the options, or of the file."""
     from faultgouge.pywrap.exchange import packing_of, upper_layer
-    from faultgouge.pywrap.settling.bed import drag_time, law_of
+    from faultgouge.pywrap.settling.bed import law_of, load_of
 
     options = {key: value for key, value in options.items() if value is not None}
     if scene is not None and options.keys() - {"fx"}:
@@ -200,15 +200,8 @@ def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[st
     _refuse_gaps(disks, top, scene, values)
     layer = upper_layer(disks, top)
     wanted = _scene(scene, values)
-    return packing_of(
-        disks,
-        law_of(wanted, wanted.law.mus[0]),
-        layer,
-        fx=values.get("fx", 0.0),
-        fy=wanted.load.fy,
-        inertia_factor=wanted.inertia_factor if scene else values.get("inertia_factor", 1.0),
-        drag_time=drag_time(wanted),
-    )
+    load = load_of(wanted) | {"fx": 0.0} | {key: values[key] for key in ("fx", "inertia_factor") if key in values}
+    return packing_of(disks, law_of(wanted, wanted.law.mus[0]), layer, **load)
 
 
 def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict[str, Any]) -> None:
@@ -260,9 +253,9 @@ def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
             "with --relax."
         )
     with status("coming to rest") as show:
-        rest = at_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
-    say(rest.words)
-    return rest.equilibrium.packing
+        found, words = at_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
+    say(words)
+    return found
 
 
 def _store(output: Path, packing: Packing) -> None:
