@@ -1,6 +1,7 @@
 """All eigenvectors of a sparse symmetric matrix, slice by slice, against LAPACK."""
 
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from threading import Barrier
 
 import numpy as np
@@ -98,27 +99,25 @@ def test_degenerate_eigenvalues_are_all_found():
     np.testing.assert_allclose(values, expected, rtol=0, atol=1e-6)
 
 
-@pytest.mark.slow
-def test_missing_eigenvalue_is_noticed():
+def overlooking(matrix, shift):
     """An inertia that is one too high from some shift on, as if an eigenvalue had been overlooked."""
+    solve, below = factored(matrix, shift)
+    return solve, below + (shift > 4.0)
 
-    def wrong(matrix, shift):
-        solve, below = factored(matrix, shift)
-        return solve, below + (shift > 4.0)
 
-    with pytest.raises(SliceError, match="one is missing in between"):
-        list(slices(network(34, 2), 20, factorise=wrong))
+def inaccurate(matrix, shift):
+    """Factors of a matrix that is off by 2e-4: half of a mean distance of eigenvalues at their upper end."""
+    return factored(csc_array(matrix * (1 + 2e-4)), shift)
 
 
 @pytest.mark.slow
-def test_inaccurate_factors_are_noticed():
-    """Factors of a matrix that is off by 2e-4: half of a mean distance of eigenvalues at their upper end."""
-
-    def inaccurate(matrix, shift):
-        return factored(csc_array(matrix * (1 + 2e-4)), shift)
-
-    with pytest.raises(SliceError, match="the factors are inaccurate"):
-        list(slices(network(34, 3), 20, factorise=inaccurate))
+@pytest.mark.parametrize(
+    ("factorise", "says"),
+    [(overlooking, "one is missing in between"), (inaccurate, "the factors are inaccurate")],
+)
+def test_wrong_factors_are_noticed(factorise, says):
+    with pytest.raises(SliceError, match=says):
+        list(slices(network(34, 2), 20, factorise=factorise))
 
 
 def next_to_an_eigenvalue(distance):
@@ -186,40 +185,35 @@ def test_ranks_have_together_the_slices_of_one_to_the_bit(size):
         assert np.array_equal(one.vectors, other.vectors)
 
 
-def test_an_error_of_one_rank_is_that_of_all():
+def failing(rank, matrix, shift):
+    """An error that the second of two ranks meets."""
+    if shift > 6 and rank == 1:
+        raise SliceError("of one rank")
+    return factored(matrix, shift)
+
+
+def overlooking_at_the_border(rank, matrix, shift):
+    """Inertias that are too high by one on the second of two ranks."""
+    solve, below = factored(matrix, shift)
+    return solve, below + rank
+
+
+@pytest.mark.parametrize(
+    ("factorise", "says"), [(failing, "of one rank"), (overlooking_at_the_border, "is missing in between")]
+)
+def test_an_error_of_one_rank_is_that_of_all(factorise, says):
     matrix = network(20, 5)
 
     def of(ranks):
-        def failing(matrix, shift):
-            if shift > 6 and ranks.rank == 1:
-                raise SliceError("of one rank")
-            return factored(matrix, shift)
-
-        return list(slices(matrix, 10, limits=FEW, factorise=failing, ranks=ranks))
+        return list(slices(matrix, 10, limits=FEW, factorise=partial(factorise, ranks.rank), ranks=ranks))
 
     for each in on_ranks(2, of):
-        with pytest.raises(SliceError, match="of one rank"):
-            each.result()
-
-
-def test_ranks_that_leave_out_an_eigenvalue_at_their_border_notice():
-    matrix = network(20, 5)
-
-    def of(ranks):
-        def wrong(matrix, shift):
-            solve, below = factored(matrix, shift)
-            return solve, below + ranks.rank
-
-        return list(slices(matrix, 10, limits=FEW, factorise=wrong, ranks=ranks))
-
-    for each in on_ranks(2, of):
-        with pytest.raises(SliceError, match="is missing in between"):
+        with pytest.raises(SliceError, match=says):
             each.result()
 
 
 @pytest.mark.slow
-def test_ranks_find_the_same_first_window_to_the_bit(ramp):
-    path = ramp(1.0, 1e-3, 22)
+def test_ranks_find_the_same_first_window_to_the_bit(path):
     family, loads = Family(lambda fx: full_operator(path(fx)), 0.0, FEW), np.array(path.grid[12:])
     alone = first_window(family, loads)
     assert alone[0] is not None
