@@ -21,7 +21,9 @@ class Ramp:
 
     def __init__(self, start: Packing, grid: np.ndarray) -> None:
         self.grid = [start.fx, *grid]
-        self.states = [start, *quasistatic.ramp(start, grid)]
+        self.states = [start]
+        for fx in grid:
+            self.states.append(quasistatic.equilibrium(self.states[-1], fx))
 
     def __call__(self, fx: float) -> Packing:
         below = self.states[bisect.bisect_right(self.grid, fx) - 1]

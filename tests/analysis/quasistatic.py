@@ -102,12 +102,3 @@ def equilibrium(old: Packing, fx: float, good_enough: float = 1e-8) -> Packing:
             best, best_residual = trial, residual
         q[active] += splu(stiffness[active][:, active]).solve(force[active])
     raise NoEquilibriumError(f"no equilibrium at fx = {fx}: residual {best_residual:.1e}")
-
-
-def ramp(packing: Packing, loads: np.ndarray) -> list[Packing]:
-    """Equilibria at the given loads, each from the one before."""
-    states = []
-    for fx in loads:
-        packing = equilibrium(packing, fx)
-        states.append(packing)
-    return states

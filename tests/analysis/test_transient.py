@@ -48,17 +48,11 @@ def near(path):
     return [path(0.0205), path(0.0218)]
 
 
-@pytest.fixture(scope="module")
-def gains(near):
-    """Their transient gains, in displacement."""
-    return [transient_gain(packing) for packing in near]
-
-
 @pytest.mark.slow
-def test_the_gain_is_the_largest_singular_value(near, gains):
+def test_the_gain_is_the_largest_singular_value(near):
     """Of the propagator of a real packing at its time, and at others around; the start is one that reaches it."""
-    for packing, found in zip(near, gains, strict=True):
-        step = 0.02
+    for packing in near:
+        found, step = transient_gain(packing), 0.02
         around = sampled(packing, "displacement", found.time + np.array([-step, 0, step]))
         assert around[1] == pytest.approx(found.gain, rel=1e-6)
         assert around.max() <= found.gain * (1 + 1e-9)

@@ -6,7 +6,7 @@ from threading import Barrier
 
 import numpy as np
 import pytest
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, diags_array
 
 from faultgouge.analysis.onset import LIMITS, Family, Limits, Ranks, full_operator
 from faultgouge.analysis.onset.sliced import first_window
@@ -18,18 +18,10 @@ FEW = Limits(own=24, coarse=60, first_look=20, one_basis=50)
 def network(size, seed):
     """Springs of random stiffness between neighbours on a square lattice of so many points a side."""
     rng = np.random.default_rng(seed)
-    number = np.arange(size * size).reshape(size, size)
-    pairs = np.concatenate(
-        [
-            np.column_stack([number[:, :-1].ravel(), number[:, 1:].ravel()]),
-            np.column_stack([number[:-1].ravel(), number[1:].ravel()]),
-        ]
-    )
-    stiffness = rng.uniform(0.5, 1.5, len(pairs))
-    matrix = np.zeros((size * size, size * size))
-    for (i, j), k in zip(pairs, stiffness, strict=True):
-        matrix[[i, i, j, j], [i, j, i, j]] += np.array([k, -k, -k, k])
-    return csc_array(matrix)
+    line, every = np.diff(np.eye(size), axis=0), np.eye(size)
+    stretches = csc_array(np.concatenate([np.kron(every, line), np.kron(line, every)]))
+    stiffness = rng.uniform(0.5, 1.5, stretches.shape[0])
+    return csc_array(stretches.T @ diags_array(stiffness) @ stretches)
 
 
 @pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.long), 2])

@@ -219,8 +219,7 @@ def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
     monkeypatch.setattr(Modes, "of", counted)
     quick = all_windows(family, path.grid)
     few, decomposed[:] = len(decomposed), []
-    # nothing is known of any increment
-    every = all_windows(family, path.grid, lambda here, there, known: None)
+    every = all_windows(family, path.grid, no_few)
     assert len(decomposed) >= 23
     assert few <= 4 * len(quick)
     assert len(quick) == len(every)
