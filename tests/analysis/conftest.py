@@ -11,27 +11,9 @@ import pytest
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, touching
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parent / "onset"))
 
 import quasistatic
-
-
-@pytest.fixture(scope="session")
-def bed(reference: dict) -> Callable[[float], Packing]:
-    """The reference packing as it was settled, with zero slips, for a friction coefficient."""
-
-    def make(mu: float) -> Packing:
-        position = np.column_stack([reference["x"], reference["y"]])
-        return Packing(
-            position=position,
-            radius=reference["radius"],
-            contacts=touching(position, reference["radius"], reference["box_length"]),
-            law=MindlinLaw(reference["kn"], reference["kt"], mu),
-            box_length=reference["box_length"],
-            top=np.isin(np.arange(len(position)), reference["top"]),
-            fy=reference["fy_per_top_disk"],
-        )
-
-    return make
 
 
 class Ramp:
@@ -39,7 +21,9 @@ class Ramp:
 
     def __init__(self, start: Packing, grid: np.ndarray) -> None:
         self.grid = [start.fx, *grid]
-        self.states = [start, *quasistatic.ramp(start, grid)]
+        self.states = [start]
+        for fx in grid:
+            self.states.append(quasistatic.equilibrium(self.states[-1], fx))
 
     def __call__(self, fx: float) -> Packing:
         below = self.states[bisect.bisect_right(self.grid, fx) - 1]
@@ -47,17 +31,23 @@ class Ramp:
 
 
 @pytest.fixture(scope="session")
-def ramp(bed: Callable[[float], Packing]) -> Callable[[float, float, int], Ramp]:
+def ramp(reference_packing: Callable[[float], Packing]) -> Callable[[float, float, int], Ramp]:
     """Ramps of the reference packing by friction, increment and number of increments, computed once."""
     known: dict[tuple[float, float, int], Ramp] = {}
 
     def make(mu: float, increment: float, count: int) -> Ramp:
         key = (mu, increment, count)
         if key not in known:
-            known[key] = Ramp(bed(mu), increment * np.arange(1, count + 1))
+            known[key] = Ramp(reference_packing(mu), increment * np.arange(1, count + 1))
         return known[key]
 
     return make
+
+
+@pytest.fixture(scope="session")
+def path(ramp: Callable[[float, float, int], Ramp]) -> Ramp:
+    """Equilibria of the reference packing with mu = 1, through its onset at F_x = 0.0218330564080."""
+    return ramp(1.0, 1e-3, 22)
 
 
 @pytest.fixture(params=[1.5, 1.0], ids=["Hertz", "harmonic"])

@@ -15,6 +15,19 @@ from scipy.sparse.linalg import splu
 from faultgouge.analysis import FLOOR, Contacts, NoEquilibriumError, Packing, stiffness_matrix, touching
 
 
+def plain_force(kn, kt, mu, overlap, slip, exponent=1.5):
+    """f_n and f_t, from the formulas, in whatever arithmetic the arguments bring."""
+    if overlap <= 0:
+        return 0, 0
+    normal = kn * overlap**exponent
+    if kt == 0 or mu == 0:
+        return normal, 0
+    limit = mu * (kn / kt) * overlap
+    slip = min(max(slip, -limit), limit)
+    x = abs(slip) / limit
+    return normal, -kt * overlap ** (exponent - 1) * (1 + x - x**2) * slip
+
+
 def moved(old: Packing, q: np.ndarray, fx: float) -> Packing:
     """The packing after the displacement q = (dx.., dy.., R dtheta..) from the equilibrium `old`."""
     dx, dy, du = q.reshape(3, -1)
@@ -63,14 +76,7 @@ def forces(packing: Packing) -> np.ndarray:
             between = branch(packing.position, packing.box_length, i, j)
             distance = np.hypot(*between)
             normal, overlap = between / distance, packing.radius[i] + packing.radius[j] - distance
-        if overlap <= 0:
-            continue
-        fn, ft = law.kn * overlap**law.exponent, 0.0
-        if law.frictional:
-            limit = law.mu * law.kn / law.kt * overlap
-            slip = min(max(slip, -limit), limit)
-            x = abs(slip) / limit
-            ft = -law.kt * overlap ** (law.exponent - 1) * (1 + x - x**2) * slip
+        fn, ft = plain_force(law.kn, law.kt, law.mu, overlap, slip, law.exponent)
         force = fn * normal + ft * np.array([-normal[1], normal[0]])
         total[:2, i] += force
         total[2, i] -= ft
@@ -96,12 +102,3 @@ def equilibrium(old: Packing, fx: float, good_enough: float = 1e-8) -> Packing:
             best, best_residual = trial, residual
         q[active] += splu(stiffness[active][:, active]).solve(force[active])
     raise NoEquilibriumError(f"no equilibrium at fx = {fx}: residual {best_residual:.1e}")
-
-
-def ramp(packing: Packing, loads: np.ndarray) -> list[Packing]:
-    """Equilibria at the given loads, each from the one before."""
-    states = []
-    for fx in loads:
-        packing = equilibrium(packing, fx)
-        states.append(packing)
-    return states

@@ -30,26 +30,15 @@ def written(packing, step=0):
     """Both snapshots of a packing: rows shuffled, partners swapped, and a pair that does not touch."""
     rng = np.random.default_rng(step)
     c, n = packing.contacts, len(packing)
-    slips = dict(zip(c.i[c.floor], c.slip[c.floor], strict=True))
-    disks = [
-        (
-            k + 1,
-            1 + packing.top[k],
-            *packing.position[k],
-            packing.radius[k],
-            packing.mass[k],
-            packing.angle[k],
-            *packing.net_force[k::n],
-            slips.get(k, 0.0),
-            0.0,
-        )
-        for k in range(n)
-    ]
+    floor_slip = np.zeros(n)
+    floor_slip[c.i[c.floor]] = c.slip[c.floor]
+    known = packing.position, packing.radius, packing.mass, packing.angle, packing.net_force.reshape(3, n).T
+    disks = np.column_stack([1 + np.arange(n), 1 + packing.top, *known, floor_slip, np.zeros(n)])
     pairs = [(i + 1, j + 1, 0, 0, s) for i, j, s in zip(c.i, c.j, c.slip, strict=True) if j >= 0]
     pairs = [(j, i, *rest) if rng.random() < 0.5 else (i, j, *rest) for i, j, *rest in pairs] + [(1, 3, 0, 0, 0)]
     x = "ff" if packing.box_length is None else "pp"
     return (
-        block(step, "ATOMS", DISK_COLUMNS, [disks[k] for k in rng.permutation(n)], x),
+        block(step, "ATOMS", DISK_COLUMNS, disks[rng.permutation(n)], x),
         block(step, "ENTRIES", CONTACT_COLUMNS, [pairs[k] for k in rng.permutation(len(pairs))], x),
     )
 
@@ -66,6 +55,10 @@ def dumped(tmp_path, cluster):
         "fx 0.5\nfy 3\ninertia_factor 0.5\n"
     )
     return tmp_path / "bed.disks"
+
+
+def edit(path, old, new):
+    path.write_text(path.read_text().replace(old, new))
 
 
 def test_roundtrip_to_the_bit(dumped, cluster):
@@ -98,16 +91,10 @@ def test_frames_are_matched_by_step(dumped, cluster):
 
 
 def test_names_as_lammps_has_them(dumped, cluster):
-    contacts = dumped.with_suffix(".contacts")
-    contacts.write_text(
-        contacts.read_text().replace(CONTACT_COLUMNS, "c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]")
-    )
-    dumped.write_text(dumped.read_text().replace("floor_slip", "f_floor[3]"))
+    names = "c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]"
+    edit(dumped.with_suffix(".contacts"), CONTACT_COLUMNS, names)
+    edit(dumped, "floor_slip", "f_floor[3]")
     assert read_dump(dumped) == cluster
-
-
-def spoil(path, old, new):
-    path.write_text(path.read_text().replace(old, new))
 
 
 @pytest.mark.parametrize(
@@ -125,7 +112,7 @@ def spoil(path, old, new):
     ],
 )
 def test_spoiled_dumps(dumped, suffix, old, new, says):
-    spoil(dumped.with_suffix(suffix), old, new)
+    edit(dumped.with_suffix(suffix), old, new)
     with pytest.raises(PackingFileError, match=says):
         read_dump(dumped)
 
@@ -143,11 +130,11 @@ def test_missing_and_cut_off_dumps(dumped, suffix):
         read_dump(dumped)
 
 
-def test_packing_from_json(tmp_path, reference, bed, cluster):
+def test_packing_from_json(tmp_path, reference, reference_packing, cluster):
     path = tmp_path / "packing.json"
     path.write_text(json.dumps(reference))
-    law = bed(0.8).law
-    assert read_packing(path, law, fy=3.0) == bed(0.8)
+    law = reference_packing(0.8).law
+    assert read_packing(path, law, fy=3.0) == reference_packing(0.8)
     plain = {"x": [0.0, 1.0], "y": [1.0, 1.5], "radius": [0.5, 0.7]}
     path.write_text(json.dumps(plain))
     packing = read_packing(path, law)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
-import quasistatic
 
 from faultgouge.analysis.motion.power_law import fit_power_law
 from faultgouge.analysis.motion.response import linear_response
@@ -124,10 +123,9 @@ def test_power_law_and_its_error():
 
 
 @pytest.fixture(scope="module")
-def packings(ramp):
+def packings(path):
     """Equilibria of the reference packing at F_x^c (1 - distance), nearest first."""
-    path = ramp(1.0, 1e-3, 22)
-    return [quasistatic.equilibrium(path(0.021), ONSET * (1 - distance)) for distance in DISTANCES]
+    return [path(ONSET * (1 - distance)) for distance in DISTANCES]
 
 
 @pytest.fixture(scope="module")

@@ -104,21 +104,6 @@ def test_impossible_packings(cluster, change, says):
         replace(cluster, **change)
 
 
-def test_geometry_of_a_pair_across_the_box_and_of_the_floor():
-    packing = Packing(
-        position=[[0.1, 0.45], [3.9, 0.45]],
-        radius=[0.5, 0.4],
-        contacts=Contacts([0, 0], [1, -1], [0, 0]),
-        law=LAW,
-        box_length=4.0,
-    )
-    # Exact numbers up to the rounding of the inputs.
-    np.testing.assert_allclose(packing.geometry.normal, [[1, 0], [0, 1]], atol=1e-15)
-    np.testing.assert_allclose(packing.geometry.tangent, [[0, 1], [-1, 0]], atol=1e-15)
-    np.testing.assert_allclose(packing.geometry.overlap, [0.7, 0.05], rtol=1e-14)
-    np.testing.assert_allclose(packing.geometry.distance, [0.2, 0.45], rtol=1e-14)
-
-
 def test_coincident_centres_are_refused():
     packing = Packing(position=[[0, 1], [0, 1]], radius=[1, 1], contacts=Contacts([0], [1], [0]), law=LAW)
     with pytest.raises(ValueError, match="same centre"):

@@ -6,10 +6,11 @@ from functools import partial
 import mpmath
 import numpy as np
 import pytest
+from linearised import dissipative, motion_matrix
 from scipy.linalg import block_diag, expm
 from scipy.sparse import csr_array
 
-from faultgouge.analysis import damping_matrix, mean_square_displacement, stiffness_matrix
+from faultgouge.analysis import mean_square_displacement
 from faultgouge.analysis.motion.forcing import floor_force
 from faultgouge.analysis.motion.matrix_functions import Modes, first_order
 from faultgouge.analysis.motion.oscillator import Oscillator
@@ -132,13 +133,8 @@ def test_resonance_is_no_special_case():
     np.testing.assert_allclose(at_rest.displacement, time**2 / 2)
 
 
-def dissipative(packing, cn=0.0, ct=0.0, tau=None):
-    """A packing with dashpots and drag."""
-    return replace(packing, law=replace(packing.law, cn=cn, ct=ct), drag_time=tau)
-
-
 @pytest.mark.parametrize(
-    "dissipation", [{}, {"cn": 30.0, "ct": 10.0}, {"cn": 3e3}, {"ct": 20.0, "tau": 0.03}, {"tau": 0.05}]
+    "dissipation", [{}, {"cn": 30.0, "ct": 10.0}, {"cn": 3e3}, {"ct": 20.0, "drag_time": 0.03}, {"drag_time": 0.05}]
 )
 def test_motion_of_a_packing_against_the_exponential(cluster, dissipation):
     """M q'' + C q' + K q = f cos(omega t), with unequal masses; dashpots of 3e3 are far beyond critical damping."""
@@ -146,9 +142,7 @@ def test_motion_of_a_packing_against_the_exponential(cluster, dissipation):
     mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
     force, start, omega = layer_force(packing, 2.0), 1e-3 * np.random.default_rng(7).normal(size=18), 40.0
     system = np.zeros((38, 38))  # q, q', cos and sin
-    system[:18, 18:36] = np.eye(18)
-    system[18:36, :18] = -stiffness_matrix(packing).toarray() / mass[:, None]
-    system[18:36, 18:36] = -damping_matrix(packing).toarray() / mass[:, None]
+    system[:36, :36] = motion_matrix(packing)
     system[18:36, 36] = force / mass
     system[36, 37], system[37, 36] = -omega, omega
     time, begin = np.linspace(0, 0.1, 6), np.concatenate([start, np.zeros(18), [1, 0]])
@@ -162,8 +156,8 @@ def test_motion_of_a_packing_against_the_exponential(cluster, dissipation):
     np.testing.assert_allclose(found.layer_velocity, known[:, 18:24][:, packing.top].mean(axis=1), atol=1e-7)
 
 
-def test_rattlers_are_held_still(bed):
-    packing = bed(1.0)
+def test_rattlers_are_held_still(reference_packing):
+    packing = reference_packing(1.0)
     everything = 1e-6 * floor_force(packing)
     response = linear_response(packing, [0.0, 0.5], force=everything, omega=0.01)
     still = np.isin(np.arange(100), packing.rattlers)

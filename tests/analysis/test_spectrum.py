@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tiling import tiled
 
 from faultgouge.analysis import (
     Contacts,
@@ -40,8 +41,8 @@ def test_one_disk_on_the_floor():
     assert result.growth_rate() == 0
 
 
-def test_rattlers_and_force_free_coordinates_are_left_out(bed):
-    packing = bed(1.0)
+def test_rattlers_and_force_free_coordinates_are_left_out(reference_packing):
+    packing = reference_packing(1.0)
     assert spectrum(packing).rattlers.tolist() == [58, 80, 85, 88, 89]
     assert len(spectrum(packing).eigenvalues) == 285
     smooth = replace(packing, law=MindlinLaw(2e5, 0, 1.0))
@@ -51,8 +52,8 @@ def test_rattlers_and_force_free_coordinates_are_left_out(bed):
     assert spectrum(nothing).omega_max == 0
 
 
-def test_eigenvalues_alone_are_those_of_the_spectrum(bed):
-    packing = bed(0.2)
+def test_eigenvalues_alone_are_those_of_the_spectrum(reference_packing):
+    packing = reference_packing(0.2)
     whole, alone = spectrum(packing), eigenvalues(packing)
     # the same operator in two orders of its coordinates: a simple eigenvalue moves by kappa u |A|
     kappa = 1 / eigenpairs(packing, 0.0, 1).overlap.min()
@@ -61,8 +62,8 @@ def test_eigenvalues_alone_are_those_of_the_spectrum(bed):
     assert whole.least_q == min((abs(w.real) / abs(2 * w.imag) for w in np.sqrt(pairs)), default=np.inf)
 
 
-def test_pairs_behind_the_onset(ramp):
-    result = spectrum(ramp(1.0, 1e-3, 22)(0.022))
+def test_pairs_behind_the_onset(path):
+    result = spectrum(path(0.022))
     (pair,) = result.pairs
     omega = np.sqrt(pair.eigenvalue)
     assert pair.eigenvalue.imag > 0
@@ -72,48 +73,32 @@ def test_pairs_behind_the_onset(ramp):
     assert pair.eigenvalue in result.unstable
 
 
-def test_imaginary_part_grows_as_the_root_of_the_distance(ramp):
-    path, onset = ramp(1.0, 1e-3, 22), 0.021833056408868
+def test_imaginary_part_grows_as_the_root_of_the_distance(path):
+    onset = 0.021833056408868
     near, nearer = (spectrum(path(onset + distance)).pairs[0].eigenvalue.imag for distance in (1e-5, 1e-7))
     # The next order is the distance over the width of the window, 1e-2.
     assert near / nearer == pytest.approx(10, rel=1e-2)
 
 
 def test_copies_of_a_packing_have_its_pairs_each_and_no_others(cluster):
-    """Three copies out of reach of each other: threefold eigenvalues, which rounding splits at will."""
+    """Three copies that do not touch each other: threefold eigenvalues, which rounding splits at will."""
     c = cluster.contacts
     kept = np.arange(len(c)) != 2  # the contact across the box
-    shift = np.arange(3)
-    copies = Packing(
-        position=np.concatenate([cluster.position + np.array([100 * k, 0]) for k in shift]),
-        radius=np.tile(cluster.radius, 3),
-        law=cluster.law,
-        contacts=Contacts(
-            np.concatenate([c.i[kept] + 6 * k for k in shift]),
-            np.concatenate([np.where(c.floor, -1, c.j + 6 * k)[kept] for k in shift]),
-            np.tile(c.slip[kept], 3),
-        ),
-    )
-    single = replace(
-        cluster,
-        box_length=None,
-        mass=None,
-        inertia_factor=1.0,
-        contacts=Contacts(c.i[kept], c.j[kept], c.slip[kept]),
-    )
-    one, three = spectrum(single), spectrum(copies)
+    contacts = Contacts(c.i[kept], c.j[kept], c.slip[kept])
+    single = replace(cluster, mass=None, inertia_factor=1.0, contacts=contacts)
+    one, three = spectrum(single), spectrum(tiled(single, 3))
     assert one.pairs
     assert len(three.pairs) == 3 * len(one.pairs)
-    # A shift of 200 costs coordinates two digits, and the overlaps of 1e-2 two more.
-    expected = [pair.eigenvalue for pair in one.pairs for _ in shift]
+    # The overlaps of 1e-2 cost two digits of coordinates up to 11.
+    expected = [pair.eigenvalue for pair in one.pairs for _ in range(3)]
     np.testing.assert_allclose(
         np.sort_complex([pair.eigenvalue for pair in three.pairs]), np.sort_complex(expected), rtol=1e-10
     )
 
 
 @pytest.mark.parametrize("near", [2058.4, 2058.4 + 3j, 40.0])
-def test_shift_invert_finds_what_lapack_finds(ramp, near):
-    packing = ramp(1.0, 1e-3, 22)(0.022)
+def test_shift_invert_finds_what_lapack_finds(path, near):
+    packing = path(0.022)
     dense = spectrum(packing)
     some = eigenpairs(packing, near, 6)
     nearest = dense.eigenvalues[np.argsort(np.abs(dense.eigenvalues - near))[:6]]
@@ -133,9 +118,9 @@ def test_shift_invert_finds_what_lapack_finds(ramp, near):
 
 
 @pytest.mark.parametrize("count", [0, 284])
-def test_impossible_number_of_eigenpairs(bed, count):
+def test_impossible_number_of_eigenpairs(reference_packing, count):
     with pytest.raises(ValueError, match="285"):
-        eigenpairs(bed(1.0), 100.0, count)
+        eigenpairs(reference_packing(1.0), 100.0, count)
 
 
 @pytest.mark.parametrize("value", [1.0, 2.5e3, 2e3 + 1.5j, -30.0, 1e-8])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import quasistatic
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix
+from faultgouge.analysis import stiffness_matrix
 
 
 def differences(packing, step, columns):
@@ -30,19 +30,6 @@ def test_derivative_of_forces(cluster):
     expected = differences(cluster, 1e-6, range(18))
     assert np.abs(matrix - expected).max() < 1e-8 * np.abs(matrix).max()
     assert np.abs(stiffness_matrix(cluster, "paper").toarray() - expected).max() > 1e-4 * np.abs(matrix).max()
-
-
-def test_cluster_has_every_state(cluster):
-    x = cluster.contacts.slip / cluster.law.slip_limit(cluster.geometry.overlap)
-    assert len(cluster.contacts) == 12
-    assert cluster.contacts.floor.sum() == 4
-    assert (x > 1).any()
-    assert (x < -1).any()
-    assert (np.abs(x) < 0.5).any()
-    assert ((np.abs(x) > 0.95) & (np.abs(x) < 1)).any()
-    pairs = ~cluster.contacts.floor
-    bare = cluster.position[cluster.contacts.i[pairs], 0] - cluster.position[cluster.contacts.j[pairs], 0]
-    assert (np.abs(bare) > 2).any()
 
 
 def test_paper_form_lacks_the_turning_of_the_tangent(cluster):
@@ -71,13 +58,6 @@ def test_no_friction_no_rotation(cluster, kt, mu):
     assert not matrix[:, 12:].any()
     assert np.abs(matrix - matrix.T).max() < 4e-16 * np.abs(matrix).max()
     assert not smooth.net_force[12:].any()
-
-
-def test_nothing_touches():
-    alone = Packing(position=[[0, 5]], radius=[1], contacts=Contacts([], [], []), law=MindlinLaw(1, 1, 1))
-    matrix = stiffness_matrix(alone)
-    assert matrix.shape == (3, 3)
-    assert matrix.nnz == 0
 
 
 def test_unknown_form(cluster):

@@ -1,12 +1,13 @@
 """The block of a contact against 60 decimal digits: derivatives of the forces.
 
 Coordinates, radii and slips count as the exact doubles that they are, with their low parts if they have any. Nothing
-is shared with the package but the law's definition, which is written down once more.
+is shared with the package but the law's definition, which the tests have written down once more.
 """
 
 import mpmath
 import numpy as np
 import pytest
+from quasistatic import plain_force
 
 from faultgouge.analysis import FLOOR, Contacts, MindlinLaw, Packing, stiffness_matrix
 
@@ -84,14 +85,6 @@ class Exact:
             self.reach = mpf(float(packing.radius[first])) + mpf(float(packing.radius[second]))
         self.slip = mpf(float(c.slip[0])) + (mpf(float(c.slip_low[0])) if c.slip_low is not None else 0)
 
-    def law(self, overlap, slip):
-        """f_n and f_t."""
-        root = overlap ** (self.p - 1)
-        normal = self.kn * overlap * root
-        x = abs(slip) / (self.mu * self.kn / self.kt * overlap)
-        assert x <= 1
-        return normal, -self.kt * root * (1 + x - x * x) * slip
-
     def forces(self, q):
         """(F_x, F_y, T/R) on i and on j after a displacement, the slip advanced along the tangent at its middle."""
         between = [self.branch[a] + (0 if self.floor and a == 0 else q[a] - q[3 + a]) for a in (0, 1)]
@@ -104,7 +97,7 @@ class Exact:
             length = mpmath.sqrt(middle[0] ** 2 + middle[1] ** 2)
             middle = [m / length for m in middle]
         slip = self.slip - middle[1] * (q[0] - q[3]) + middle[0] * (q[1] - q[4]) - q[2] - q[5]
-        fn, ft = self.law(overlap, slip)
+        fn, ft = plain_force(self.kn, self.kt, self.mu, overlap, slip, self.p)
         on_i = [fn * normal[0] - ft * normal[1], fn * normal[1] + ft * normal[0], -ft]
         return [*on_i, -on_i[0], -on_i[1], -ft]
 

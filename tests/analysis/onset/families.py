@@ -22,12 +22,12 @@ def normal_form(d):
     return lambda e: embedded([[1 - d, e], [-e, 1 + d]])
 
 
-def crossing(place, product, speed=1.0):
-    """Two levels that pass each other at `place`, coupled: D = (2 speed (F - place))^2 + 4 product."""
+def crossing(place, product):
+    """Two levels that pass each other at `place`, coupled: D = (2 (F - place))^2 + 4 product."""
 
     def operator(f):
         coupling = np.sqrt(abs(product))
-        gap = speed * (f - place)
+        gap = f - place
         return embedded([[10 + gap, coupling], [np.sign(product) * coupling, 10 - gap]])
 
     return operator

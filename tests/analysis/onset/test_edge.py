@@ -101,8 +101,8 @@ def test_a_jump_is_no_root():
     assert jump.loads[0] <= 0.3 < jump.loads[1]
 
 
-def test_forces_out_of_balance_at_random_are_an_error_of_the_load(ramp):
-    packing = ramp(1.0, 1e-3, 22)(0.02)
+def test_forces_out_of_balance_at_random_are_an_error_of_the_load(path):
+    packing = path(0.02)
     assert load_error(packing) < 1e-10
     forces = 1e-6 * np.random.default_rng(1).uniform(-1, 1, (10_000, packing.top.sum()))
     off = replace(packing, fx=packing.fx + np.abs(forces).max())

@@ -60,9 +60,9 @@ def test_an_error_at_any_call_reaches_the_caller(search, operator):
 @pytest.mark.parametrize("disks", [300, 50])
 @pytest.mark.parametrize("error", [LostEngineError, MemoryError])
 @pytest.mark.slow
-def test_an_engine_that_fails_is_no_packing_without_onset(ramp, disks, error):
+def test_an_engine_that_fails_is_no_packing_without_onset(path, disks, error):
     """Of equilibria along a ramp, with the search of a small packing and with that of a large one."""
-    path, limits = ramp(1.0, 1e-3, 22), Limits(all_windows=disks)
+    limits = Limits(all_windows=disks)
     loads = path.grid[21:]
     counting = Failing(path)
     assert find_onset(counting, loads, limits=limits).windows

@@ -23,9 +23,8 @@ def pair_of(packing):
 
 @pytest.mark.parametrize("factors", ["dense", "sparse", "of a neighbour"])
 @pytest.mark.parametrize("fx", [0.0218, 0.0218330564, 0.021833056408868, 0.0219, 0.022])
-def test_continued_pair_is_that_of_lapack(ramp, fx, factors):
+def test_continued_pair_is_that_of_lapack(path, fx, factors):
     """From real through double to complex, from a load at which the pair is complex."""
-    path = ramp(1.0, 1e-3, 22)
     matrix = full_operator(path(fx))
     start = pair_of(path(0.022))
     limits = Limits() if factors == "dense" else Limits(dense_factors=0)
@@ -46,9 +45,8 @@ def test_continued_pair_is_that_of_lapack(ramp, fx, factors):
     assert found.same_planes(expected)
 
 
-def test_continuation_is_refused_rather_than_wrong(ramp):
+def test_continuation_is_refused_rather_than_wrong(path):
     """Planes of two unrelated modes belong to no pair that inverse iteration can reach."""
-    path = ramp(1.0, 1e-3, 22)
     matrix = full_operator(path(0.022))
     modes = Modes.of(0.022, matrix)
     apart = modes.pair((30, 200))
@@ -56,18 +54,17 @@ def test_continuation_is_refused_rather_than_wrong(ramp):
     assert continued(wrong, 0.022, matrix) is None
 
 
-def test_overlap_of_a_block_is_that_of_the_eigenvectors(ramp):
-    packing = ramp(1.0, 1e-3, 22)(0.022)
+def test_overlap_of_a_block_is_that_of_the_eigenvectors(path):
+    packing = path(0.022)
     modes = Modes.of(0.022, full_operator(packing))
     (pair,) = modes.complex_pairs
     expected = abs(np.vdot(modes.left[:, pair[0]], modes.right[:, pair[0]]))
     assert modes.pair(pair).overlap == pytest.approx(expected, rel=1e-8)
 
 
-def test_factors_of_a_distant_neighbour_are_given_up(ramp):
+def test_factors_of_a_distant_neighbour_are_given_up(path):
     """Those of another spectrum, nowhere near the pair: its own are made."""
     limits = Limits(dense_factors=0)
-    path = ramp(1.0, 1e-3, 22)
     matrix = full_operator(path(0.022))
     start = pair_of(path(0.0219))
     far = inverse_of(matrix, 10 * start.mean, limits)
@@ -77,9 +74,9 @@ def test_factors_of_a_distant_neighbour_are_given_up(ramp):
 
 
 @pytest.mark.parametrize("fx", [0.0215, 0.0218330564, 0.022])
-def test_slope_of_the_discriminant(ramp, fx):
+def test_slope_of_the_discriminant(path, fx):
     """Against the difference of two blocks, from real through double to complex."""
-    path, step = ramp(1.0, 1e-3, 22), 1e-6
+    step = 1e-6
     below, middle, above = (full_operator(path(fx + offset * step)) for offset in (-1, 0, 1))
     pair = dense_pair(middle, pair_of(path(0.022)))
     slope = (continued(pair, fx, above).discriminant - continued(pair, fx, below).discriminant) / 2

@@ -12,9 +12,8 @@ from faultgouge.analysis.onset.screening import may_meet
 SLACK = LIMITS.slack
 
 
-def test_clusters_have_the_eigenvalues_of_the_operator(ramp):
+def test_clusters_have_the_eigenvalues_of_the_operator(path):
     """Projected on the modes of another load; what is left out is of third order in the coupling."""
-    path = ramp(1.0, 1e-3, 22)
     basis = Basis.of(full_operator(path(0.0)))
     owned = [cluster.modes.start + np.arange(cluster.core[0], cluster.core[1] + 1) for cluster in basis.clusters]
     np.testing.assert_array_equal(np.concatenate(owned), np.arange(285))
@@ -31,9 +30,8 @@ def test_clusters_have_the_eigenvalues_of_the_operator(ramp):
 
 
 @pytest.mark.parametrize("base", [0.0, 0.015, 0.021])
-def test_meetings_are_those_of_the_eigenvalues(ramp, base):
+def test_meetings_are_those_of_the_eigenvalues(path, base):
     """Every pair that LAPACK has complex, or coming within its couplings, is named; most others are not."""
-    path = ramp(1.0, 1e-3, 22)
     basis = Basis.of(full_operator(path(base)))
     for load, most in ((base, 8), (base + 1e-3, 8)):
         here, there = (full_operator(path(fx)) for fx in (load, load + 1e-3 if load < 0.0215 else load))

@@ -1,11 +1,12 @@
 """All eigenvectors of a sparse symmetric matrix, slice by slice, against LAPACK."""
 
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from threading import Barrier
 
 import numpy as np
 import pytest
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, diags_array
 
 from faultgouge.analysis.onset import LIMITS, Family, Limits, Ranks, full_operator
 from faultgouge.analysis.onset.sliced import first_window
@@ -17,18 +18,10 @@ FEW = Limits(own=24, coarse=60, first_look=20, one_basis=50)
 def network(size, seed):
     """Springs of random stiffness between neighbours on a square lattice of so many points a side."""
     rng = np.random.default_rng(seed)
-    number = np.arange(size * size).reshape(size, size)
-    pairs = np.concatenate(
-        [
-            np.column_stack([number[:, :-1].ravel(), number[:, 1:].ravel()]),
-            np.column_stack([number[:-1].ravel(), number[1:].ravel()]),
-        ]
-    )
-    stiffness = rng.uniform(0.5, 1.5, len(pairs))
-    matrix = np.zeros((size * size, size * size))
-    for (i, j), k in zip(pairs, stiffness, strict=True):
-        matrix[[i, i, j, j], [i, j, i, j]] += np.array([k, -k, -k, k])
-    return csc_array(matrix)
+    line, every = np.diff(np.eye(size), axis=0), np.eye(size)
+    stretches = csc_array(np.concatenate([np.kron(every, line), np.kron(line, every)]))
+    stiffness = rng.uniform(0.5, 1.5, stretches.shape[0])
+    return csc_array(stretches.T @ diags_array(stiffness) @ stretches)
 
 
 @pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.long), 2])
@@ -98,27 +91,25 @@ def test_degenerate_eigenvalues_are_all_found():
     np.testing.assert_allclose(values, expected, rtol=0, atol=1e-6)
 
 
-@pytest.mark.slow
-def test_missing_eigenvalue_is_noticed():
+def overlooking(matrix, shift):
     """An inertia that is one too high from some shift on, as if an eigenvalue had been overlooked."""
+    solve, below = factored(matrix, shift)
+    return solve, below + (shift > 4.0)
 
-    def wrong(matrix, shift):
-        solve, below = factored(matrix, shift)
-        return solve, below + (shift > 4.0)
 
-    with pytest.raises(SliceError, match="one is missing in between"):
-        list(slices(network(34, 2), 20, factorise=wrong))
+def inaccurate(matrix, shift):
+    """Factors of a matrix that is off by 2e-4: half of a mean distance of eigenvalues at their upper end."""
+    return factored(csc_array(matrix * (1 + 2e-4)), shift)
 
 
 @pytest.mark.slow
-def test_inaccurate_factors_are_noticed():
-    """Factors of a matrix that is off by 2e-4: half of a mean distance of eigenvalues at their upper end."""
-
-    def inaccurate(matrix, shift):
-        return factored(csc_array(matrix * (1 + 2e-4)), shift)
-
-    with pytest.raises(SliceError, match="the factors are inaccurate"):
-        list(slices(network(34, 3), 20, factorise=inaccurate))
+@pytest.mark.parametrize(
+    ("factorise", "says"),
+    [(overlooking, "one is missing in between"), (inaccurate, "the factors are inaccurate")],
+)
+def test_wrong_factors_are_noticed(factorise, says):
+    with pytest.raises(SliceError, match=says):
+        list(slices(network(34, 2), 20, factorise=factorise))
 
 
 def next_to_an_eigenvalue(distance):
@@ -186,40 +177,35 @@ def test_ranks_have_together_the_slices_of_one_to_the_bit(size):
         assert np.array_equal(one.vectors, other.vectors)
 
 
-def test_an_error_of_one_rank_is_that_of_all():
+def failing(rank, matrix, shift):
+    """An error that the second of two ranks meets."""
+    if shift > 6 and rank == 1:
+        raise SliceError("of one rank")
+    return factored(matrix, shift)
+
+
+def overlooking_at_the_border(rank, matrix, shift):
+    """Inertias that are too high by one on the second of two ranks."""
+    solve, below = factored(matrix, shift)
+    return solve, below + rank
+
+
+@pytest.mark.parametrize(
+    ("factorise", "says"), [(failing, "of one rank"), (overlooking_at_the_border, "is missing in between")]
+)
+def test_an_error_of_one_rank_is_that_of_all(factorise, says):
     matrix = network(20, 5)
 
     def of(ranks):
-        def failing(matrix, shift):
-            if shift > 6 and ranks.rank == 1:
-                raise SliceError("of one rank")
-            return factored(matrix, shift)
-
-        return list(slices(matrix, 10, limits=FEW, factorise=failing, ranks=ranks))
+        return list(slices(matrix, 10, limits=FEW, factorise=partial(factorise, ranks.rank), ranks=ranks))
 
     for each in on_ranks(2, of):
-        with pytest.raises(SliceError, match="of one rank"):
-            each.result()
-
-
-def test_ranks_that_leave_out_an_eigenvalue_at_their_border_notice():
-    matrix = network(20, 5)
-
-    def of(ranks):
-        def wrong(matrix, shift):
-            solve, below = factored(matrix, shift)
-            return solve, below + ranks.rank
-
-        return list(slices(matrix, 10, limits=FEW, factorise=wrong, ranks=ranks))
-
-    for each in on_ranks(2, of):
-        with pytest.raises(SliceError, match="is missing in between"):
+        with pytest.raises(SliceError, match=says):
             each.result()
 
 
 @pytest.mark.slow
-def test_ranks_find_the_same_first_window_to_the_bit(ramp):
-    path = ramp(1.0, 1e-3, 22)
+def test_ranks_find_the_same_first_window_to_the_bit(path):
     family, loads = Family(lambda fx: full_operator(path(fx)), 0.0, FEW), np.array(path.grid[12:])
     alone = first_window(family, loads)
     assert alone[0] is not None

@@ -17,7 +17,7 @@ from faultgouge.analysis import (
     spectrum,
 )
 from faultgouge.analysis.digits import with_uncertainty
-from faultgouge.analysis.onset import Family, Modes, force_bearing, full_operator
+from faultgouge.analysis.onset import Family, Limits, Modes, force_bearing, full_operator
 from faultgouge.analysis.onset.dense import all_windows
 from faultgouge.analysis.onset.modes import assign
 from faultgouge.analysis.onset.pair import deepest_dip
@@ -192,17 +192,17 @@ def test_deepest_dip_of_parabolas():
 
 
 @pytest.mark.slow
-def test_a_scan_of_the_spectra_agrees_within_its_increment(ramp):
-    path = ramp(1.0, 1e-3, 22)
+def test_a_scan_of_the_spectra_agrees_within_its_increment(path):
     solved = find_onset(path, path.grid)
     complex_from = next(packing.fx for packing in path.states if spectrum(packing).pairs)
     assert complex_from - 1e-3 < solved.fx_c <= complex_from
 
 
-def test_no_onset_is_said_so(ramp):
-    path = ramp(1.0, 1e-3, 22)
-    with pytest.raises(OnsetError, match=r"up to F_x = 0\.003:"):
-        find_onset(path, path.grid[:4])
+@pytest.mark.parametrize("disks", [300, 50])
+def test_no_onset_is_said_so(path, disks):
+    """By the search of a small packing, and by that of a large one."""
+    with pytest.raises(OnsetError, match=r"up to F_x = 0\.003: raise the largest load"):
+        find_onset(path, path.grid[:4], limits=Limits(all_windows=disks))
 
 
 @pytest.mark.parametrize("mu", [1.0, 0.8])
@@ -219,8 +219,7 @@ def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
     monkeypatch.setattr(Modes, "of", counted)
     quick = all_windows(family, path.grid)
     few, decomposed[:] = len(decomposed), []
-    # nothing is known of any increment
-    every = all_windows(family, path.grid, lambda here, there, known: None)
+    every = all_windows(family, path.grid, no_few)
     assert len(decomposed) >= 23
     assert few <= 4 * len(quick)
     assert len(quick) == len(every)
@@ -257,8 +256,7 @@ def test_what_the_screening_misses_is_walked_again():
 
 
 @pytest.mark.slow
-def test_json(ramp):
-    path = ramp(1.0, 1e-3, 22)
+def test_json(path):
     onset = find_onset(path, path.grid[20:])
     as_dict = onset.as_dict()
     assert as_dict["fx_c"] == onset.fx_c
@@ -321,9 +319,9 @@ def test_error_follows_the_noise_of_the_equilibria(noise):
     assert np.median(misses) < 1
 
 
-def test_contacts_without_force_are_left_out(bed):
+def test_contacts_without_force_are_left_out(reference_packing):
     """A rattler brought to touch by 1e-12 of a length: a stiffness of 0.3 that no force stands for."""
-    packing = bed(1.0)
+    packing = reference_packing(1.0)
     rattler = packing.rattlers[0]
     gap = np.hypot(*(packing.position - packing.position[rattler]).T) - packing.radius - packing.radius[rattler]
     gap[packing.rattlers] = np.inf
@@ -334,13 +332,8 @@ def test_contacts_without_force_are_left_out(bed):
     reach = packing.radius[rattler] + packing.radius[neighbour]
     position[rattler] = position[neighbour] + (reach - 1e-12) * direction
     contacts = packing.contacts
-    touching = replace(
-        packing,
-        position=position,
-        contacts=Contacts(
-            np.append(contacts.i, rattler), np.append(contacts.j, neighbour), np.append(contacts.slip, 0.0)
-        ),
-    )
+    more = Contacts(np.append(contacts.i, rattler), np.append(contacts.j, neighbour), np.append(contacts.slip, 0.0))
+    touching = replace(packing, position=position, contacts=more)
     assert len(touching.rattlers) == len(packing.rattlers) - 1
     assert touching.residual == packing.residual
     assert len(force_bearing(touching).contacts) == len(contacts)
