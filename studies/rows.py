@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -39,10 +39,22 @@ def stored(path: Path, key: str, what: str) -> list[dict[str, Any]]:
     return rows
 
 
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """The rows of a table that is whole."""
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
 def append(path: Path, row: Mapping[str, Any]) -> None:
     """Write a row; it is in the file when this returns."""
     with path.open("a") as file:
         file.write(json.dumps(row) + "\n")
+
+
+def kept(path: Path, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Rows as they come, each in the file before it is handed on."""
+    for row in rows:
+        append(path, row)
+        yield row
 
 
 class Rows:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.packing.packing import Floats, Indices
-from ..statistics import between, lowers, median_interval, quartiles, resampled, share
+from ...analysis.packing.packing import Floats
+from ..statistics import exponent, lowers, median_interval, quartiles, share
 from .fits import shape, size_law
 from .sets import FRICTION
 from .tables import Table
@@ -303,10 +303,4 @@ def _slope(disks: Floats, values: Floats) -> dict[str, float] | None:
     sizes = np.unique(disks)
     if len(sizes) < 2:
         return None
-
-    def fit(chosen: list[Indices]) -> float:
-        means = [float(np.mean(np.log(values[group]))) for group in chosen]
-        return float(np.polyfit(np.log(sizes), means, 1)[0])
-
-    groups = [np.flatnonzero(disks == size) for size in sizes]
-    return between(fit(groups), [fit(chosen) for chosen in resampled(groups, 1000)])
+    return exponent(sizes, [values[disks == size] for size in sizes], lambda each: np.mean(np.log(each)), 1000)

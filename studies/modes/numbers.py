@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 
 from ...analysis.packing.packing import Floats
-from ..statistics import share
+from ..statistics import exponent, median, share
 from .loss import GROWS, RESTITUTIONS
-from .tables import Table, median, power
+from .tables import Table
+
+DRAWS = 2000
+"""Resamples of the packings for the interval of an exponent."""
 
 QUANTITIES = ("share", "growth_rate", "least_q")
 
@@ -167,9 +170,16 @@ def powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
         known = {n: each for n, each in samples.items() if len(each) >= max(2, len(by_size[n].rows) // 2)}
         found[f"load of share {level:g}"] = {
             "by_size": {n: median(each) for n, each in known.items()},
-            "power": power(known, list(known.values())) if len(known) > 1 else None,
+            "power": _power(known),
         }
     return found | growth_powers(by_size)
+
+
+def _power(samples: Mapping[int, Floats]) -> list[float] | None:
+    """Exponent p of medians that go as N^p, with its interval; None of a single size."""
+    if len(samples) < 2:
+        return None
+    return [*exponent(list(samples), list(samples.values()), lambda each: np.log(np.median(each)), DRAWS).values()]
 
 
 def growth_powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
@@ -186,7 +196,7 @@ def growth_powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
             }
             found[f"{name} at {load:g}"] = {
                 "by_size": {n: median(samples[n]) for n in known},
-                "power": power(known, list(known.values())) if len(known) > 1 else None,
+                "power": _power(known),
             }
     return found
 

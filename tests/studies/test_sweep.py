@@ -13,9 +13,8 @@ from reference_layer import BIN, REFERENCE, SMALL, toml
 
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
-from faultgouge.studies.sweep.compute import run_sweep, stored
+from faultgouge.studies.sweep.compute import merge, run_sweep, stored
 from faultgouge.studies.sweep.draw import draw_sweep
-from faultgouge.studies.sweep.merge import merge
 from faultgouge.studies.sweep.points import Sweep, shard
 from faultgouge.studies.sweep.tasks import TASKS
 
