@@ -13,7 +13,8 @@ import numpy as np
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.onset.damped import ramped
-from faultgouge.studies.dissipation.compute import RATIOS, over_distance, over_strength, seeded, weak_cases
+from faultgouge.studies.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
+from faultgouge.studies.packings import seeded
 from faultgouge.studies.rows import kept, read_rows
 
 HERE = Path(__file__).parent

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -92,10 +93,17 @@ class Table:
         """F_x/F_y that some packing has borne."""
         return sorted({load["fx_over_fy"] for row in self.rows for load in row.get("loads", ())})
 
+    def borne(self, fx_over_fy: float) -> list[dict[str, Any]]:
+        """What there is of a load, of every packing that has borne it."""
+        return [load for row in self.rows for load in row.get("loads", ()) if load["fx_over_fy"] == fx_over_fy]
+
     def at(self, fx_over_fy: float, key: str) -> Floats:
         """A number of every packing that has borne a load, shape (n,): least Q is inf where there is no pair."""
-        found = [load[key] for row in self.rows for load in row.get("loads", ()) if load["fx_over_fy"] == fx_over_fy]
-        return np.array([np.inf if value is None else value for value in found], dtype=float)
+        return np.array([np.inf if load[key] is None else load[key] for load in self.borne(fx_over_fy)], dtype=float)
+
+    def of_seeds(self, seeds: Collection[int]) -> Table:
+        """The packings of these seeds."""
+        return Table(self.name, tuple(row for row in self.rows if row["seed"] in seeds))
 
 
 def read_tables(folder: Path) -> dict[str, Table]:

@@ -25,9 +25,8 @@ from ...analysis.files.wholefile import make_folder, write_json, write_text
 from ...pywrap import SceneError
 from .. import rows
 from ..hands import Progress, Say, hands
-from .examine import Row
 from .points import Sweep, shard
-from .table import write_tables
+from .table import Row, write_tables
 from .tasks import TASKS
 from .workers import computed
 

@@ -16,7 +16,7 @@ from scipy.stats import binomtest
 from ...analysis.packing.packing import Floats
 from ...figures.pages import render
 from ...figures.style import INK, save, styled
-from ..rows import read_rows
+from ..rows import columns, read_rows
 from ..statistics import interval, median, share
 from .compute import CONTROLLED, LOADINGS, LOSSES, SHARES
 
@@ -141,11 +141,10 @@ def figure(found: dict[str, Any]) -> Figure:
     left.legend(loc="lower right")
     for k, loss in enumerate(LOSSES):
         rows = [row for row in found["dynamic"] if row["restitution"] == loss and row["flow"]["of"]]
-        middle = np.array([row["flow"]["share"] for row in rows])
-        bars = [[m - row["flow"]["low"], row["flow"]["high"] - m] for m, row in zip(middle, rows, strict=True)]
-        place = np.array([row["share"] for row in rows]) + 0.01 * (k - 1)
+        middle, low, high = columns([row["flow"] for row in rows], "share", "low", "high")
+        bars = np.clip([middle - low, high - middle], 0, 1)
         label = "undamped" if loss == 1 else f"restitution {loss}"
-        axes.errorbar(place, middle, yerr=np.clip(np.array(bars).T, 0, 1), fmt="o-", capsize=3, label=label)
+        axes.errorbar(columns(rows, "share")[0] + 0.01 * (k - 1), middle, yerr=bars, fmt="o-", capsize=3, label=label)
     axes.axvline(1.0, color="black", linestyle="--", label="static yield")
     axes.set(xlabel="$F_x$ over static yield", ylabel="share of packings that flow", ylim=(-0.02, 1.02))
     axes.legend(loc="upper left")
