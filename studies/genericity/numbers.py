@@ -298,4 +298,4 @@ def _slope(disks: Floats, values: Floats) -> dict[str, float] | None:
     sizes = np.unique(disks)
     if len(sizes) < 2:
         return None
-    return exponent(sizes, [values[disks == size] for size in sizes], lambda each: np.mean(np.log(each)), 1000)
+    return exponent(sizes, [values[disks == size] for size in sizes], lambda each: float(np.mean(np.log(each))), 1000)

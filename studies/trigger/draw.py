@@ -28,8 +28,8 @@ def map_figure(result: dict[str, Any]) -> Figure:
     norm = LogNorm(np.nanmin(amplitude), np.nanmax(amplitude))
     colours = axes.pcolormesh(_edges(omega), _edges(distance), amplitude, norm=norm, cmap="viridis_r")
     runs = [row for row in result["map"] if row["measured"] is not None]
-    places, measured = columns(runs, "omega", "distance"), columns(runs, "measured")[0]
-    axes.scatter(*places, c=measured, norm=norm, cmap="viridis_r", s=22, edgecolors="white", linewidths=0.9)
+    across, up, measured = columns(runs, "omega", "distance", "measured")
+    axes.scatter(across, up, c=measured, norm=norm, cmap="viridis_r", s=22, edgecolors="white", linewidths=0.9)
     axes.minorticks_off()
     bar = figure.colorbar(colours, ax=axes)
     bar.set_label(rf"{WAVE[result['on']]}$_c$ that triggers")
