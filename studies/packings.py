@@ -20,6 +20,11 @@ AT_LIMIT = 1 - 1e-9
 """Share of the slip limit from which a contact slides: it is clamped to the limit, to rounding."""
 
 
+def seeded(scene: Scene, seed: int) -> Scene:
+    """The same scene with another packing."""
+    return scene.model_copy(update={"packing": scene.packing.model_copy(update={"seed": seed})})
+
+
 @contextmanager
 def path_from(rest: Equilibrium, scene: Scene) -> Iterator[EquilibriumPath]:
     """The equilibria of a scene over F_x from the settled packing on; LAMMPS closes in the end."""

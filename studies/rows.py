@@ -5,11 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ..analysis.packing.packing import Floats
 from ..pywrap import Scene, SceneError
 
 
@@ -39,10 +42,27 @@ def stored(path: Path, key: str, what: str) -> list[dict[str, Any]]:
     return rows
 
 
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """The rows of a table that is whole."""
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def columns(rows: Sequence[Mapping[str, Any]], *names: str) -> Floats:
+    """Numbers of rows, shape (names, rows); nan where there is none."""
+    return np.array([[row[name] for row in rows] for name in names], dtype=np.float64)
+
+
 def append(path: Path, row: Mapping[str, Any]) -> None:
     """Write a row; it is in the file when this returns."""
     with path.open("a") as file:
         file.write(json.dumps(row) + "\n")
+
+
+def kept(path: Path, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Rows as they come, each in the file before it is handed on."""
+    for row in rows:
+        append(path, row)
+        yield row
 
 
 class Rows:

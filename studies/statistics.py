@@ -7,8 +7,8 @@ like the others is an assumption; how many there are is given with each result.)
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..analysis.packing.packing import Floats, Indices
 
 Bools = NDArray[np.bool_]
+Values = TypeVar("Values", Indices, Floats)
 
 
 def share(count: int, of: int) -> dict[str, Any]:
@@ -36,7 +37,7 @@ def interval(value: Sequence[float | None] | None, digits: str = ".2g", beyond: 
     return f"{middle} ({low} to {high})"
 
 
-def resampled(groups: Sequence[Indices], draws: int) -> Iterator[list[Indices]]:
+def resampled(groups: Sequence[Values], draws: int) -> Iterator[list[Values]]:
     """Each group drawn again, with replacement, so many times."""
     generator = np.random.default_rng(0)
     return ([generator.choice(group, len(group)) for group in groups] for _ in range(draws))
@@ -46,6 +47,30 @@ def between(value: float, draws: Sequence[float] | Floats) -> dict[str, float]:
     """A number with the 95 % interval of what resampled packings give in its place: {"value", "low", "high"}."""
     low, high = np.quantile(draws, [0.025, 0.975])
     return {"value": float(value), "low": float(low), "high": float(high)}
+
+
+def exponent(
+    sizes: Sequence[float] | Floats, samples: Sequence[Floats], middle: Callable[[Floats], float], draws: int
+) -> dict[str, float]:
+    """The exponent of a power law over the size, as `between` has it; of each sample `middle` gives the logarithm."""
+    logs = np.log(sizes)
+
+    def fitted(groups: Sequence[Floats]) -> float:
+        return float(np.polyfit(logs, [middle(each) for each in groups], 1)[0])
+
+    return between(fitted(samples), [fitted(each) for each in resampled(samples, draws)])
+
+
+def median(values: Sequence[float] | Floats, draws: int = 2000) -> list[float]:
+    """Median with its 95 % interval from resampled packings: [median, low, high]; inf stands for what has no bound."""
+    values = np.sort(np.asarray(values, dtype=float))
+    if len(values) == 0:
+        return [np.nan] * 3
+    chosen = np.sort(np.random.default_rng(0).integers(len(values), size=(draws, len(values))), axis=1)
+    middles = np.sort(values[chosen[:, len(values) // 2]])
+    return [
+        float(each) for each in (values[len(values) // 2], middles[int(0.025 * draws)], middles[int(0.975 * draws)])
+    ]
 
 
 def lowers(strong: Mapping[str, Any], weak: Mapping[str, Any]) -> bool | None:

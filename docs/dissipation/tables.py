@@ -3,7 +3,6 @@
 python docs/dissipation/tables.py weak|cn|drag|gain [SEED ..]
 """
 
-import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +13,9 @@ import numpy as np
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.onset.damped import ramped
-from faultgouge.studies.dissipation.compute import RATIOS, over_distance, over_strength, seeded, weak_cases
+from faultgouge.studies.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
+from faultgouge.studies.packings import seeded
+from faultgouge.studies.rows import kept, read_rows
 
 HERE = Path(__file__).parent
 
@@ -79,11 +80,9 @@ def gain(done: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
 def main(what: str, seeds: list[int]) -> None:
     """Append to one table; of `weak` these seeds alone."""
     path = HERE / f"{what}.jsonl"
-    done = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    done = read_rows(path) if path.exists() else []
     records = weak(done, seeds) if what == "weak" else gain(done) if what == "gain" else strength(what, done)
-    for record in records:
-        with path.open("a") as file:
-            file.write(json.dumps(record) + "\n")
+    for record in kept(path, records):
         print(record, flush=True)
 
 

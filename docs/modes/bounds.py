@@ -3,7 +3,6 @@
 python docs/modes/bounds.py FOLDER     rows of bounds.jsonl: packings of seeds 1, 2, ..., all of them, at three loads
 """
 
-import json
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from faultgouge.analysis import NoEquilibriumError, Packing, eigenvalues
 from faultgouge.pywrap import Engine, Scene, equilibrate, settle
 from faultgouge.studies.modes.compute import antisymmetric_norm
+from faultgouge.studies.rows import append
 
 PACKINGS = {50: 12, 100: 12, 200: 8, 400: 6, 1000: 3}
 LOADS = (0.03, 0.1, 0.2)
@@ -43,9 +43,9 @@ def rows(disks: int, seed: int) -> Iterator[dict[str, Any]]:
 
 
 if __name__ == "__main__":
-    with (Path(sys.argv[1]) / "bounds.jsonl").open("w") as file:
-        for disks, count in PACKINGS.items():
-            for seed in range(1, count + 1):
-                for row in rows(disks, seed):
-                    file.write(json.dumps(row) + "\n")
-                    file.flush()
+    table = Path(sys.argv[1]) / "bounds.jsonl"
+    table.unlink(missing_ok=True)
+    for disks, count in PACKINGS.items():
+        for seed in range(1, count + 1):
+            for row in rows(disks, seed):
+                append(table, row)

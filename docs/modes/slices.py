@@ -5,7 +5,6 @@ python docs/modes/slices.py FOLDER [DISKS [SEED ...]]     rows of slices.jsonl: 
 Of more than 1,000 disks the slices stand alone.
 """
 
-import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,6 +15,7 @@ from bounds import at_loads
 from faultgouge.analysis import dynamical_matrix, eigenvalues
 from faultgouge.studies.modes.compute import ALL, Counted
 from faultgouge.studies.modes.sliced import sliced
+from faultgouge.studies.rows import append
 
 PACKINGS = {1000: 5, 3000: 5, 10_000: 1}
 LOADS = {1000: (0.03, 0.1), 3000: (0.01, 0.03, 0.1), 10_000: (0.01, 0.03)}
@@ -37,8 +37,6 @@ def rows(disks: int, seed: int) -> Iterator[dict[str, Any]]:
 if __name__ == "__main__":
     disks = int(sys.argv[2]) if len(sys.argv) > 2 else 1000
     seeds = [int(each) for each in sys.argv[3:]] or range(1, PACKINGS[disks] + 1)
-    with (Path(sys.argv[1]) / "slices.jsonl").open("a") as file:
-        for seed in seeds:
-            for row in rows(disks, seed):
-                file.write(json.dumps(row) + "\n")
-                file.flush()
+    for seed in seeds:
+        for row in rows(disks, seed):
+            append(Path(sys.argv[1]) / "slices.jsonl", row)

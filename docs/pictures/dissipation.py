@@ -3,13 +3,13 @@
 python docs/pictures/dissipation.py
 """
 
-import json
 from pathlib import Path
 from typing import Any
 
 from faultgouge.analysis.motion.power_law import fit_power_law
 from faultgouge.figures.style import save_as
 from faultgouge.studies.dissipation.draw import dissipation_figure
+from faultgouge.studies.rows import read_rows
 
 TABLES = Path(__file__).parents[1] / "dissipation"
 
@@ -23,8 +23,7 @@ KINDS = {
 
 def table(name: str, by: str) -> list[dict[str, Any]]:
     """The records of a table, in the order of one of their numbers."""
-    records = [json.loads(line) for line in (TABLES / f"{name}.jsonl").read_text().splitlines()]
-    return sorted(records, key=lambda record: record[by])
+    return sorted(read_rows(TABLES / f"{name}.jsonl"), key=lambda record: record[by])
 
 
 if __name__ == "__main__":

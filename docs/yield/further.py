@@ -4,7 +4,6 @@ python docs/yield/further.py rest FOLDER [SEED ...]      rows of lasting.jsonl
 python docs/yield/further.py large FOLDER [SEED ...]     rows of quartz_400.jsonl, as those of the task "yield"
 """
 
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,12 +14,12 @@ import numpy as np
 
 from faultgouge.pywrap import Engine, Equilibrium, Scene, settle
 from faultgouge.pywrap.runs.undamped import time_step
-from faultgouge.pywrap.scenes.units import dashpot
-from faultgouge.studies.modes.loss import impact_velocity, with_dashpots
+from faultgouge.studies.modes.loss import with_dashpots
 from faultgouge.studies.packings import distance, shake
+from faultgouge.studies.rows import append
 from faultgouge.studies.sweep.points import read_toml
-from faultgouge.studies.yielding.compute import LOSSES, NOISE, SHARES, dynamic
-from faultgouge.studies.yielding.static import FailedError, branch, layer_slip
+from faultgouge.studies.yielding.compute import NOISE, dashpots, dynamic, dynamic_runs
+from faultgouge.studies.yielding.static import branch, layer_slip
 
 SCENE = Path(__file__).parents[2] / "scenes" / "sweeps" / "yield.toml"
 HISTORIES = ("total", "rescaled")
@@ -46,18 +45,14 @@ def lasting(seed: int) -> Iterator[dict[str, Any]]:
     given = scene(seed)
     path = branch(settle(given))
     for share in (0.97, 0.9):
-        try:
-            here = path.at(share * path.kept[-1].fx)
-        except FailedError:
-            continue
-        for history in HISTORIES:
+        here = path.borne(share * path.kept[-1].fx)
+        for history in HISTORIES if here is not None else ():
             start = with_history(here, history)
             known = {"seed": seed, "share": share, "fx_over_fy": here.fx / given.load.fy, "history": history}
             if history == "rescaled":  # those of total slips are in quartz_100.jsonl
                 yield known | {"restitution": 1.0} | dynamic(start, 0.0, seed)
             for restitution in (0.9, 0.7) if share > 0.9 else ():
-                cn = dashpot(given.law.kn, restitution, 1.0, impact_velocity(given))
-                yield known | {"restitution": restitution} | left_alone(start, cn, seed)
+                yield known | {"restitution": restitution} | left_alone(start, dashpots(given, restitution), seed)
 
 
 def left_alone(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
@@ -87,24 +82,13 @@ def large(seed: int) -> Iterator[dict[str, Any]]:
     """Static yield and dynamic runs of 400 disks."""
     given = scene(seed, **LARGE)
     path = branch(settle(given))
-    fy, last = given.load.fy, path.kept[-1].fx
-    runs = []
-    for share in SHARES:
-        try:
-            here = path.at(share * last)
-        except FailedError:
-            continue
-        for restitution in LOSSES:
-            run = dynamic(here, dashpot(given.law.kn, restitution, 1.0, impact_velocity(given)), seed)
-            runs.append({"share": share, "restitution": restitution, "fx_over_fy": here.fx / fy} | run)
-    yield {"seed": seed, "newton": path.newton / fy, "static": last / fy, "dynamic": runs}
+    known = {"seed": seed, "newton": path.newton / given.load.fy, "static": path.kept[-1].fx / given.load.fy}
+    yield known | {"dynamic": dynamic_runs(given, path)}
 
 
 if __name__ == "__main__":
     kind, folder, *seeds = sys.argv[1:]
     compute, name = {"rest": (lasting, "lasting"), "large": (large, "quartz_400")}[kind]
-    with (Path(folder) / f"{name}.jsonl").open("a") as file:
-        for seed in map(int, seeds or range(1, 21)):
-            for row in compute(seed):
-                file.write(json.dumps(row) + "\n")
-                file.flush()
+    for seed in map(int, seeds or range(1, 21)):
+        for row in compute(seed):
+            append(Path(folder) / f"{name}.jsonl", row)

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from faultgouge.studies.yielding.lasting import write_lasting
-from faultgouge.studies.yielding.page import write_page
+from faultgouge.studies.yielding.page import write_lasting, write_page
 
 if __name__ == "__main__":
     folder = Path(__file__).parent

@@ -20,7 +20,6 @@ from ...analysis import OnsetError, Packing, Window
 from ...analysis.damped_onset.weak import drag_onset, weak_limit
 from ...analysis.damped_onset.windows import damped_windows, dissipating
 from ...analysis.motion.transient import NoGainError, transient_gain
-from ...pywrap import Scene
 from ...pywrap.onset.damped import Ramped
 
 Row = dict[str, Any]
@@ -136,8 +135,3 @@ def _first_window(ramp: Ramped) -> Window:
     if window is None:
         raise OnsetError(f"No pair of eigenvalues is complex up to F_x = {ramp.forces[-1]:.10g}: raise ramp.until.")
     return window
-
-
-def seeded(scene: Scene, seed: int) -> Scene:
-    """The same scene with another packing."""
-    return scene.model_copy(update={"packing": scene.packing.model_copy(update={"seed": seed})})

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ...figures.series import few_decades, positive
 from ...figures.style import INK, styled
+from ..rows import columns
 
 MARKERS = {"opens": "o", "slides": "s", "law": "D", "flows": "^", "cut off": "X", "stable": "."}
 WORDS = {
@@ -36,24 +36,18 @@ def size_figure(runs: list[dict[str, Any]]) -> Figure:
         for damped in (False, True):
             rows = [row for row in runs if row["ends"] == ends and row["damped"] == damped]
             if rows:
-                sizes.plot(
-                    [row["fx"] for row in rows],
-                    [row["msd"] for row in rows],
-                    marker,
-                    color="C0",
-                    markersize=4,
-                    markerfacecolor="white" if damped else "C0",
-                    label=WORDS[ends] + (" (damped)" if damped else ""),
-                )
+                face, label = ("white", f"{WORDS[ends]} (damped)") if damped else ("C0", WORDS[ends])
+                places = columns(rows, "fx", "msd")
+                sizes.plot(*places, marker, color="C0", markersize=4, markerfacecolor=face, label=label)
     free = [row for row in runs if not row["damped"]]
-    fx = np.array([row["fx"] for row in free])
-    sizes.plot(fx, [row["slip"] ** 2 for row in free], "_", color="C1", label="(slip of the layer)$^2$")
-    sizes.plot(fx, [row["noise"] for row in free], ":", color=INK, linewidth=0.7, label="noise of doubles")
+    fx, slip, noise = columns(free, "fx", "slip", "noise")
+    sizes.plot(fx, slip**2, "_", color="C1", label="(slip of the layer)$^2$")
+    sizes.plot(fx, noise, ":", color=INK, linewidth=0.7, label="noise of doubles")
     sizes.set(yscale="log", ylabel="largest $D$")
     few_decades(sizes, 8)
     sizes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     for key, colour, name in (("lost", "C0", "open"), ("sliding", "C2", "slide"), ("gained", "C3", "new")):
-        contacts.plot(fx, [row[key] for row in free], ".-", color=colour, linewidth=0.6, label=name)
+        contacts.plot(*columns(free, "fx", key), ".-", color=colour, linewidth=0.6, label=name)
     contacts.set(xlabel="$F_x$", ylabel="contacts", xscale="log", ylim=(-0.5, max(5, 1.1 * contacts.dataLim.y1)))
     contacts.yaxis.set_major_locator(MaxNLocator(5, integer=True))
     contacts.legend()

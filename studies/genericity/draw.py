@@ -11,6 +11,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from ...analysis.packing.packing import Floats
 from ...figures.style import INK, styled
+from ..rows import columns
 from ..statistics import course
 from ..sweep.draw import draw_pairs
 from .numbers import STEPS
@@ -37,9 +38,7 @@ def onsets_figure(onsets: Table, predicted: Floats) -> Figure:
     if left.lines:
         left.legend(fontsize=7)
     strong, weak = STEPS[0]
-    rows = {row["packing.seed"]: row for row in onsets.where(law_mu=strong).settled.rows}
-    others = [row for row in onsets.where(law_mu=weak).settled.rows if row["packing.seed"] in rows]
-    pairs = [(rows[row["packing.seed"]], row) for row in others]
+    pairs = onsets.where(law_mu=strong).settled.beside(onsets.where(law_mu=weak).settled, "packing.seed")
     draw_pairs(right, [(a, b, bool(b["ancestors"]) and a["ancestors"] == b["ancestors"]) for a, b in pairs], ms=3.5)
     for marker, face, label in (
         ("o", "C0", "the same two modes"),
@@ -82,27 +81,21 @@ def size_figure(numbers: dict[str, Any]) -> Figure:
         rows = [row for row in found["rows"] if row["median"][0] is not None]
         if not rows:
             continue
-        disks = np.array([row["disks"] for row in rows]) * (1.0 if marker == "o" else 1.04)
-        middle = np.array([row["median"][0] for row in rows])
-        low = np.array([row["median"][1] for row in rows], dtype=float)
-        high = np.array([np.nan if row["median"][2] is None else row["median"][2] for row in rows])
+        disks = columns(rows, "disks")[0] * (1.0 if marker == "o" else 1.04)
+        middle, low, high = np.array([row["median"] for row in rows], dtype=float).T
         left.errorbar(disks, middle, [middle - low, np.nan_to_num(high - middle)], fmt=marker, ms=3.5, label=name)
     levels = numbers["levels"]["rows"]
     if levels:
-        disks = np.array([row["disks"] for row in levels])
-        left.plot(disks, [row["median"]["value"] for row in levels], ":", color=INK, label="two levels")
+        medians = [row["median"]["value"] for row in levels]
+        left.plot(*columns(levels, "disks"), medians, ":", color=INK, label="two levels")
     left.set(xscale="log", yscale="log", xlabel="disks", ylabel="median of $F_x^c / F_y$")
     if levels or left.containers:
         left.legend()
     for number, each in enumerate(numbers["growth"]):
         points = [point for point in each["points"] if point["median"] > 0]
-        loads = [point["load"] for point in points]
-        right.plot(
-            loads, [point["median"] for point in points], "o-", ms=2.5, color=f"C{number}", label=f"{each['disks']}"
-        )
-        right.fill_between(
-            loads, [p["low"] for p in points], [p["high"] for p in points], color=f"C{number}", alpha=0.2, linewidth=0
-        )
+        loads, middle, low, high = columns(points, "load", "median", "low", "high")
+        right.plot(loads, middle, "o-", ms=2.5, color=f"C{number}", label=f"{each['disks']}")
+        right.fill_between(loads, low, high, color=f"C{number}", alpha=0.2, linewidth=0)
     right.set(xlabel="$F_x / F_y$", ylabel="largest growth rate of $D$")
     if right.lines:
         right.legend(title="disks")

@@ -9,7 +9,6 @@ each size.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -23,29 +22,24 @@ DRAWS = 300
 
 def size_law(disks: Floats, reach: Floats, found: Bools) -> dict[str, Any]:
     """The exponent p of F_0 = c N^-p and the shape k, each with its interval; N of each packing is in `disks`, (M,)."""
-    return _with_intervals(np.log(disks), reach, found, {"exponent": (1, -1.0), "shape": (2, None)}) | {
-        "packings": len(reach)
-    }
+    (_, slope, log_shape), draws = _fits(np.log(disks), reach, found)
+    exponent, k = between(-slope, -draws[:, 1]), between(np.exp(log_shape), np.exp(draws[:, 2]))
+    return {"exponent": exponent, "shape": k, "packings": len(reach)}
 
 
 def shape(reach: Floats, found: Bools) -> dict[str, Any]:
     """F_0 and k of one size, each with its interval."""
-    names = {"f0": (0, None), "shape": (2, None)}
-    return _with_intervals(np.zeros(len(reach)), reach, found, names) | {"packings": len(reach)}
+    best, draws = _fits(np.zeros(len(reach)), reach, found)
+    f0, k = (between(np.exp(best[column]), np.exp(draws[:, column])) for column in (0, 2))
+    return {"f0": f0, "shape": k, "packings": len(reach)}
 
 
-def _with_intervals(
-    logs: Floats, reach: Floats, found: Bools, names: Mapping[str, tuple[int, float | None]]
-) -> dict[str, Any]:
+def _fits(logs: Floats, reach: Floats, found: Bools) -> tuple[Floats, Floats]:
+    """The parameters of `_fit`, shape (3,), and those of resampled packings, shape (draws, 3)."""
     best = _fit(logs, reach, found)
     groups = [np.flatnonzero(logs == value) for value in np.unique(logs)]
     chosen = map(np.concatenate, resampled(groups, DRAWS))
-    draws = np.array([_fit(logs[c], reach[c], found[c], best) for c in chosen if found[c].sum() > len(groups)])
-    result = {}
-    for name, (k, sign) in names.items():
-        value, *drawn = np.exp([best[k], *draws[:, k]]) if sign is None else sign * np.array([best[k], *draws[:, k]])
-        result[name] = between(value, drawn)
-    return result
+    return best, np.array([_fit(logs[c], reach[c], found[c], best) for c in chosen if found[c].sum() > len(groups)])
 
 
 def _fit(logs: Floats, reach: Floats, found: Bools, start: Floats | None = None) -> Floats:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...analysis.packing.packing import Floats, Indices
-from ..statistics import between, lowers, median_interval, quartiles, resampled, share
+from ...analysis.packing.packing import Floats
+from ..statistics import exponent, lowers, median_interval, quartiles, share
 from .fits import shape, size_law
 from .sets import FRICTION
 from .tables import Table
@@ -73,8 +74,8 @@ def of_friction(table: Table) -> dict[str, Any]:
 
 def lowered(onsets: Table, strong: float, weak: float) -> dict[str, Any]:
     """Whether a smaller friction coefficient lowers the onset, and what is different where it does not."""
-    first, second = (_by_seed(onsets.where(law_mu=mu)) for mu in (strong, weak))
-    both = [(first[seed], second[seed]) for seed in sorted(first.keys() & second.keys())]
+    first, second = (onsets.where(law_mu=mu).settled for mu in (strong, weak))
+    both = first.beside(second, "packing.seed")
     decided = [(lower, a, b) for a, b in both if (lower := lowers(a, b)) is not None]
     pairs = [each for each in decided if each[1]["ends"] == each[2]["ends"]]
     same = [(lower, a, b) for lower, a, b in pairs if a["ancestors"] and a["ancestors"] == b["ancestors"]]
@@ -90,10 +91,6 @@ def lowered(onsets: Table, strong: float, weak: float) -> dict[str, Any]:
         "appears": ends.count(False),
         "vanishes": ends.count(True),
     }
-
-
-def _by_seed(table: Table) -> dict[int, dict[str, Any]]:
-    return {row["packing.seed"]: row for row in table.settled.rows}
 
 
 def kinds(onsets: Table) -> dict[str, Any]:
@@ -137,8 +134,7 @@ def settled_with_friction(table: Table) -> dict[str, Any]:
 
 def halved(onsets: Table, finer: Table) -> dict[str, Any]:
     """Onsets with increments half as large."""
-    known = {(row["packing.seed"], row["law.mu"]): row for row in onsets.settled.rows}
-    both = [(known[key], row) for row in finer.settled.rows if (key := (row["packing.seed"], row["law.mu"])) in known]
+    both = onsets.settled.beside(finer.settled, "packing.seed", "law.mu")
     off = np.array([abs(b["reach"] / a["reach"] - 1) for a, b in both if a["ends"] == b["ends"] == "onset"])
     return {
         "rows": len(both),
@@ -243,17 +239,17 @@ def surrogates(table: Table, reference: Table) -> dict[str, Any]:
                 for row in table.having(f"{name}.ends").rows
             )
         )
-        result[name] = _ends(part) | signs(_by_seed(own), _by_seed(part))
+        result[name] = _ends(part) | signs(own.beside(part, "packing.seed"))
     return result
 
 
-def signs(own: dict[int, dict[str, Any]], other: dict[int, dict[str, Any]]) -> dict[str, Any]:
-    """The sign test of pairs, packing by packing: in how many the other has the lower onset, of how many that differ.
+def signs(pairs: Iterable[tuple[dict[str, Any], dict[str, Any]]]) -> dict[str, Any]:
+    """The sign test of pairs: in how many the second has the lower onset, of how many that differ.
 
     Parameters
     ----------
-    own, other : dict
-        Rows with "ends" and "reach" by seed.
+    pairs : iterable of tuple
+        Rows with "ends" and "reach" of one packing.
 
     Returns
     -------
@@ -263,7 +259,6 @@ def signs(own: dict[int, dict[str, Any]], other: dict[int, dict[str, Any]]) -> d
     """
     from scipy.stats import binomtest  # half a second to import
 
-    pairs = [(own[seed], other[seed]) for seed in sorted(own.keys() & other.keys())]
     differ = [pair for pair in pairs if pair[0]["reach"] != pair[1]["reach"]]
     decided = [verdict for pair in differ if (verdict := lowers(*pair)) is not None]
     lower = sum(decided)
@@ -303,10 +298,4 @@ def _slope(disks: Floats, values: Floats) -> dict[str, float] | None:
     sizes = np.unique(disks)
     if len(sizes) < 2:
         return None
-
-    def fit(chosen: list[Indices]) -> float:
-        means = [float(np.mean(np.log(values[group]))) for group in chosen]
-        return float(np.polyfit(np.log(sizes), means, 1)[0])
-
-    groups = [np.flatnonzero(disks == size) for size in sizes]
-    return between(fit(groups), [fit(chosen) for chosen in resampled(groups, 1000)])
+    return exponent(sizes, [values[disks == size] for size in sizes], lambda each: float(np.mean(np.log(each))), 1000)

@@ -75,9 +75,8 @@ def _first(operator: Callable[[float], csr_array], steps: Floats, narrowest: flo
 def randomized(pencil: Pencil, generator: np.random.Generator) -> Pencil:
     """A packing's pencil with spacings and couplings permuted among neighbouring levels, and random signs."""
     gaps = np.diff(pencil.values)
-    blocks = [slice(k, k + BLOCK) for k in range(0, len(gaps), BLOCK)]
-    for block in blocks:
-        gaps[block] = generator.permutation(gaps[block])
+    for k in range(0, len(gaps), BLOCK):
+        gaps[k : k + BLOCK] = generator.permutation(gaps[k : k + BLOCK])
     values = pencil.values[0] + np.concatenate([[0.0], np.cumsum(gaps)])
     symmetric = _permuted(pencil.symmetric, generator)
     antisymmetric = _permuted(pencil.antisymmetric, generator)
@@ -89,21 +88,13 @@ def randomized(pencil: Pencil, generator: np.random.Generator) -> Pencil:
 
 def _permuted(matrix: Floats, generator: np.random.Generator) -> Floats:
     """The elements above the diagonal, permuted within blocks, with random signs."""
-    upper = np.triu(matrix, 1)
-    size = len(matrix)
-    for i in range(0, size, BLOCK):
-        for j in range(i, size, BLOCK):
-            rows, columns = _above(i, j, size)
-            values = generator.permutation(upper[rows, columns])
-            upper[rows, columns] = values * generator.choice([-1.0, 1.0], len(values))
+    upper, above = np.triu(matrix, 1), np.triu(np.ones(matrix.shape, dtype=bool), 1)
+    for i in range(0, len(matrix), BLOCK):
+        for j in range(i, len(matrix), BLOCK):
+            block, chosen = (each[i : i + BLOCK, j : j + BLOCK] for each in (upper, above))
+            values = generator.permutation(block[chosen])
+            block[chosen] = values * generator.choice([-1.0, 1.0], len(values))
     return upper
-
-
-def _above(i: int, j: int, size: int) -> tuple[Any, Any]:
-    """Rows and columns of the elements of a block that lie above the diagonal."""
-    rows, columns = np.meshgrid(np.arange(i, min(i + BLOCK, size)), np.arange(j, min(j + BLOCK, size)), indexing="ij")
-    above = columns > rows
-    return rows[above], columns[above]
 
 
 def shuffled(packing: Packing, instead: Mapping[tuple[int, int], tuple[int, int]]) -> csr_array:

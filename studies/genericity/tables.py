@@ -45,6 +45,12 @@ class Table:
         """The rows with something in a column."""
         return Table(tuple(row for row in self.rows if row.get(name) is not None))
 
+    def beside(self, other: Table, *names: str) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+        """Rows of this and of the other table that have the same cells in these columns, in the order of the other."""
+        own = {tuple(row[name] for name in names): row for row in self.rows}
+        keys = [tuple(row[name] for name in names) for row in other.rows]
+        return [(own[key], row) for key, row in zip(keys, other.rows, strict=True) if key in own]
+
     def column(self, name: str) -> list[Any]:
         """A column, None where there is nothing."""
         return [row.get(name) for row in self.rows]

@@ -33,7 +33,7 @@ pairs with either (:mod:`~faultgouge.analysis.packing.law`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -120,8 +120,7 @@ def counted(packing: Packing) -> Counted:
     """
     if len(packing) > ALL:
         found, error = sliced(packing)
-        omega = np.sqrt(found)
-        return Counted(omega[np.argsort(-omega.imag)], dynamical_matrix(packing)[0].shape[0], error)
+        return replace(Counted.of(found), modes=dynamical_matrix(packing)[0].shape[0], error=error)
     values = eigenvalues(packing)
     rounding = unit_rounding(dynamical_matrix(packing)[0].data)
     surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))

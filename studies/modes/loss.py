@@ -22,10 +22,10 @@ import numpy as np
 from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
-from ...analysis import Packing, eigenvalues, stiffness_matrix
+from ...analysis import Packing, dynamical_matrix, eigenvalues
 from ...analysis.onset import force_bearing
 from ...analysis.operators.damping import damping_matrix
-from ...analysis.spectrum.spectrum import active_coordinates, mass_weighted
+from ...analysis.spectrum.spectrum import mass_weighted
 from ...pywrap import Scene
 from ...pywrap.scenes.units import dashpot, real_units, restitution
 from ..packings import Start
@@ -58,21 +58,16 @@ def loss(scene: Scene, start: Start) -> dict[str, Any]:
 
     def look(packing: Packing) -> dict[str, Any]:
         found = counted(packing)
-        squares = found.omega**2
+        squares, told = found.omega**2, found.as_dict()
         drag = squares.imag / np.sqrt(np.maximum(squares.real, np.finfo(float).tiny))
-        told = found.as_dict()
         grown = damped_growth(packing, dashpots)
-        return {
-            "pairs": told["pairs"],
-            "growth_rate": told["growth_rate"],
-            "omega": told["omega"],
+        critical = restitution(kn, critical_dashpot(packing, dashpots, grown), 1.0, velocity)
+        return {name: told[name] for name in ("pairs", "growth_rate", "omega")} | {
             "slowest": float(np.sqrt(max(0.0, eigenvalues(packing).real.min()))),
             "least_q": told["least_q"],
             "drag_rate": float(drag.max(initial=0.0)),
             "damped": [[each, *rate] for each, rate in grown.items()],
-            "critical_restitution": min(
-                1.0, restitution(kn, critical_dashpot(packing, dashpots, grown), 1.0, velocity)
-            ),
+            "critical_restitution": min(1.0, critical),
         }
 
     return along_ramp(scene, start, look)
@@ -92,9 +87,8 @@ def with_dashpots(packing: Packing, cn: float, ratio: float = TANGENTIAL) -> Pac
 def fastest(packing: Packing) -> complex:
     """The eigenvalue of s^2 M + s C + K with the largest real part, Im s >= 0, 1 / time."""
     bearing = force_bearing(packing)
-    a, g = (mass_weighted(each(bearing), bearing) for each in (stiffness_matrix, damping_matrix))
-    active = active_coordinates(a)
-    stiffness, damping = (each[active][:, active].toarray() for each in (a, g))
+    a, active = dynamical_matrix(bearing)
+    stiffness, damping = a.toarray(), mass_weighted(damping_matrix(bearing), bearing)[active][:, active].toarray()
     size = len(stiffness)
     companion = np.block([[np.zeros((size, size)), np.eye(size)], [-stiffness, -damping]])
     rates = eigvals(companion, check_finite=False)

@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 
 from ...analysis.packing.packing import Floats
-from ..statistics import share
+from ..statistics import exponent, median, share
 from .loss import GROWS, RESTITUTIONS
-from .tables import Table, median, power
+from .tables import Table
+
+DRAWS = 2000
+"""Resamples of the packings for the interval of an exponent."""
 
 QUANTITIES = ("share", "growth_rate", "least_q")
 
@@ -104,8 +107,8 @@ def losses(table: Table) -> dict[str, Any]:
     grows = {}
     for each in RESTITUTIONS:
         grows[f"{each:g}"] = [
-            share(sum(rate > GROWS for e, rate, _ in flat if e == each), found["count"][k])
-            for k, flat in enumerate(_damped(table, load) for load in table.loads)
+            share(sum(rate > GROWS for row in rows for e, rate, _ in row["damped"] if e == each), len(rows))
+            for rows in map(table.borne, table.loads)
         ]
     returns = sum(
         any(later[1] > GROWS >= earlier[1] for earlier, later in pairwise(load["damped"]))
@@ -113,11 +116,6 @@ def losses(table: Table) -> dict[str, Any]:
         for load in row["loads"]
     )
     return found | {"grows": grows, "returns": returns}
-
-
-def _damped(table: Table, fx_over_fy: float) -> list[list[float]]:
-    loads = [load for row in table.rows for load in row["loads"] if load["fx_over_fy"] == fx_over_fy]
-    return [each for load in loads for each in load["damped"]]
 
 
 def structural(table: Table) -> dict[str, Any]:
@@ -165,11 +163,16 @@ def powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
         samples = {n: np.array([crossing(row, level) for row in table.rows]) for n, table in by_size.items()}
         samples = {n: each[np.isfinite(each)] for n, each in samples.items()}
         known = {n: each for n, each in samples.items() if len(each) >= max(2, len(by_size[n].rows) // 2)}
-        found[f"load of share {level:g}"] = {
-            "by_size": {n: median(each) for n, each in known.items()},
-            "power": power(known, list(known.values())) if len(known) > 1 else None,
-        }
+        medians = {n: median(each) for n, each in known.items()}
+        found[f"load of share {level:g}"] = {"by_size": medians, "power": _power(known)}
     return found | growth_powers(by_size)
+
+
+def _power(samples: Mapping[int, Floats]) -> list[float] | None:
+    """Exponent p of medians that go as N^p, with its interval; None of a single size."""
+    if len(samples) < 2:
+        return None
+    return [*exponent(list(samples), list(samples.values()), lambda each: np.log(np.median(each)), DRAWS).values()]
 
 
 def growth_powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
@@ -184,10 +187,8 @@ def growth_powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
                 for n, each in samples.items()
                 if 2 * len(each) > len(by_size[n].rows) and np.median(each) not in (0.0, np.inf)
             }
-            found[f"{name} at {load:g}"] = {
-                "by_size": {n: median(samples[n]) for n in known},
-                "power": power(known, list(known.values())) if len(known) > 1 else None,
-            }
+            medians = {n: median(samples[n]) for n in known}
+            found[f"{name} at {load:g}"] = {"by_size": medians, "power": _power(known)}
     return found
 
 
@@ -204,7 +205,7 @@ def switches(table: Table) -> dict[str, Any]:
     """Share of complex modes, least Q and share of packings with a pair, with b of some contacts alone."""
     found: dict[str, Any] = {}
     for load in table.loads:
-        rows = [each for row in table.rows for each in row["loads"] if each["fx_over_fy"] == load]
+        rows = table.borne(load)
         found[f"{load:g}"] = {
             name: {
                 "share": median([each["share"] for each in parts]),
@@ -228,9 +229,8 @@ def histories(tables: Mapping[str, Table]) -> dict[str, Any]:
     """Packings of the same seeds with total and with rescaled slips, at each load; nothing where a set is missing."""
     if not all(name in tables for name in HISTORIES.values()):
         return {}
-    rows = {law: {row["seed"]: row for row in tables[name].rows} for law, name in HISTORIES.items()}
-    seeds = sorted(set.intersection(*map(set, rows.values())))
-    matched = {law: Table(HISTORIES[law], tuple(rows[law][seed] for seed in seeds)) for law in HISTORIES}
+    seeds = set.intersection(*({row["seed"] for row in tables[name].rows} for name in HISTORIES.values()))
+    matched = {law: tables[name].of_seeds(seeds) for law, name in HISTORIES.items()}
     return {
         law: along(table, ("share", "least_q"))
         | {"with_pairs": [int(np.sum(table.at(load, "pairs") > 0)) for load in table.loads]}
@@ -240,8 +240,7 @@ def histories(tables: Mapping[str, Table]) -> dict[str, Any]:
 
 def against_random(table: Table, by_size: Mapping[int, Table]) -> dict[str, Any]:
     """Shares of complex modes: measured, of random matrices, and by the formula, of the same packings at each load."""
-    seeds = {row["seed"] for row in table.rows}
-    own = Table(table.name, tuple(row for row in by_size[table.disks].rows if row["seed"] in seeds))
+    own = by_size[table.disks].of_seeds({row["seed"] for row in table.rows})
     return {
         "packings": len(table.rows),
         "loads": table.loads,

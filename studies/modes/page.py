@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,15 +10,13 @@ import numpy as np
 
 from ...analysis.files.wholefile import write_text
 from ...figures.pages import render
-from ...figures.style import save_as
+from ..frame import leave, save_png
 from ..statistics import interval
 from .draw import collapse, over_load
 from .loss import EVERY, RESTITUTIONS
 from .numbers import COMPARED, QUALITIES, numbers
 from .sets import SIZES
 from .tables import read_tables
-
-PAGES = ("modes.md", "tables.md")
 
 LOSSES = ("least_q", "critical_restitution")
 """Quantities of the picture of loss."""
@@ -40,18 +37,18 @@ def write_page(tables: Path, folder: Path) -> Path:
     Path
         The first page.
     """
-    found = numbers(read_tables(tables))
-    save_as(over_load({str(disks): course for disks, course in found["sizes"].items()}), folder / "sizes.png")
+    found, package = numbers(read_tables(tables)), __package__ or ""
     power = found["powers"]["load of share 0.1"]["power"]
-    save_as(collapse(found["sizes"], power[0], found["random"]), folder / "collapse.png")
-    write_text(folder / "modes.json", json.dumps(finite(found), indent=1) + "\n")
-    save_as(over_load({str(disks): course for disks, course in found["loss"].items()}, LOSSES), folder / "loss.png")
+    figures = {
+        "sizes": lambda: over_load({str(disks): course for disks, course in found["sizes"].items()}),
+        "collapse": lambda: collapse(found["sizes"], power[0], found["random"]),
+        "loss": lambda: over_load({str(disks): course for disks, course in found["loss"].items()}, LOSSES),
+    }
     names = {"planned": SIZES, "compared": COMPARED, "qualities": QUALITIES, **told(found)}
     formats = {"middle": interval, "exponent": partial(interval, digits=".2f"), "plain": plain, "part": part}
-    names |= formats | {"critical": critical}
-    for name in PAGES:
-        write_text(folder / name, render(__package__ or "", f"{name}.j2", **found, **names))
-    return folder / PAGES[0]
+    page = found | names | formats | {"critical": critical}
+    write_text(folder / "tables.md", render(package, "tables.md.j2", **page))
+    return leave(folder, package, "modes", finite(found), page, figures, print, save_png)
 
 
 def told(found: dict[str, Any]) -> dict[str, Any]:

@@ -68,9 +68,7 @@ def predicted(packing: Packing) -> dict[str, Any]:
     ratios = np.minimum(gaps[1:], gaps[:-1]) / np.maximum(gaps[1:], gaps[:-1])
     pencil = Pencil(values, np.zeros_like(couplings), couplings, basis)
     generator = np.random.default_rng(SEED)
-    drawn = [
-        Counted.of(np.asarray(eigvals(randomized(pencil, generator).at(1.0)), complex)).as_dict() for _ in range(DRAWS)
-    ]
+    drawn = [Counted.of(eigvals(randomized(pencil, generator).at(1.0))).as_dict() for _ in range(DRAWS)]
     least = [each["least_q"] for each in drawn if each["least_q"] is not None]
     return {
         "ratio": float(np.mean(ratios)),

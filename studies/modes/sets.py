@@ -41,26 +41,18 @@ CHECKS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
 }
 """Packings of 100 disks once more: which seeds, and what differs."""
 
-RANDOM = {50: 20, 100: 20, 200: 10, 400: 4}
-"""Packings whose levels and couplings make random matrices, by number of disks; they are the first ones of `SIZES`."""
-
-AT = [0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3]
-"""F_x/F_y of these."""
-
-LOSSY = {50: 40, 100: 40, 200: 20, 400: 8}
-"""Packings whose critical losses are found, by number of disks; they are the first ones of `SIZES`."""
-
-LOSSY_AT = [0.02, 0.05, 0.1, 0.2, 0.3]
-"""F_x/F_y of these."""
+TASKED: Mapping[str, tuple[str, Mapping[int, int], list[float]]] = {
+    "random": ("random matrices", {50: 20, 100: 20, 200: 10, 400: 4}, [0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3]),
+    "loss": ("loss", {50: 40, 100: 40, 200: 20, 400: 8}, [0.02, 0.05, 0.1, 0.2, 0.3]),
+    "runs": ("lossy runs", {100: 6, 400: 1}, [0.1, 0.2]),
+}
+"""Other tasks than "modes": packings by number of disks, which are the first ones of `SIZES`, and F_x/F_y."""
 
 QUARTZ = {"1 MPa": 20, "10 MPa": 20, "100 MPa": 20}
 """Packings of the shipped scenes quartz_1MPa.toml and so on, with other seeds."""
 
 THICK = {50: 20, 200: 10, 400: 4}
 """The same at 10 MPa with other numbers of disks in the same width: other thicknesses of the layer."""
-
-RUNS = {100: 6, 400: 1}
-"""Packings whose growth with dashpots is measured in LAMMPS, at F_x/F_y of 0.1 and 0.2."""
 
 SHARES = (0.2, 0.5, 1.0)
 """Rounds, so that a study that is cut off has something of all."""
@@ -89,12 +81,9 @@ def sets(share: float = 1.0) -> dict[str, Sweep]:
             found[f"pressure {disks}"] = _sweep(disks, _first(most, share), pressed)
     for name, (most, changes) in KINDS.items():
         found[name] = _sweep(100, _first(most, share), changes)
-    for disks, most in RANDOM.items():
-        found[f"random {disks}"] = _sweep(disks, _first(most, share), {"modes": {"fx_over_fy": AT}}, "random matrices")
-    for disks, most in LOSSY.items():
-        found[f"loss {disks}"] = _sweep(disks, _first(most, share), {"modes": {"fx_over_fy": LOSSY_AT}}, "loss")
-    for disks, most in RUNS.items():
-        found[f"runs {disks}"] = _sweep(disks, _first(most, share), {"modes": {"fx_over_fy": [0.1, 0.2]}}, "lossy runs")
+    for name, (task, packings, loads) in TASKED.items():
+        for disks, most in packings.items():
+            found[f"{name} {disks}"] = _sweep(disks, _first(most, share), {"modes": {"fx_over_fy": loads}}, task)
     for depth, most in QUARTZ.items():
         found[f"quartz {depth}"] = _shipped(depth, _first(most, share))
     for disks, most in THICK.items():

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-from ...analysis.files.wholefile import write_text
+from ...analysis.files.wholefile import write_json
 from ...figures.style import save, spared
 from ...figures.writers import write_film
 from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.refusals import read_toml
 from ..hands import Progress, Say
-from ..sweep.compute import Row, run_sweep
+from ..sweep.compute import run_sweep
 from ..sweep.points import Sweep
-from ..sweep.table import write_csv
+from ..sweep.table import Row, write_csv
 from ..sweep.tasks import TASKS
 from .draw import PlaneFilm, over_load, plane
 from .numbers import along
 from .tables import Table
 
 COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q", "pairs_error")
+
+KEPT = ("ends", "reach", "contacts")
+"""What modes.json has of a packing beside its loads."""
 
 PANELS = 4
 """Loads whose frequencies are drawn side by side."""
@@ -75,9 +77,11 @@ def modes(
         return {}
     by_key = {point.key: point for point in sweep.points}
     lines = [line for row in rows for line in _lines(row, by_key[row["key"]].scene)]
-    ends = [{"values": row["values"], "says": row["says"], **_end(row)} for row in rows]
+    ends = [
+        {"values": row["values"], "says": row["says"]} | {key: row["result"].get(key) for key in KEPT} for row in rows
+    ]
     result = {"asked": sweep.as_dict(), "rows": lines, "packings": ends}
-    write_text(output / "modes.json", json.dumps(result, indent=1) + "\n")
+    write_json(output / "modes.json", result)
     write_csv(output / "modes.csv", COLUMNS, lines)
     with spared("a picture of the modes", say):
         _draw(rows, lines, output, say)
@@ -93,25 +97,19 @@ def _lines(row: Row, scene: Scene | None) -> list[dict[str, Any]]:
     return [known | {k: v for k, v in load.items() if k != "frequencies"} for load in row["result"]["loads"]]
 
 
-def _end(row: Row) -> dict[str, Any]:
-    return {key: row["result"].get(key) for key in ("ends", "reach", "contacts")}
-
-
 def _draw(rows: list[Row], lines: list[dict[str, Any]], output: Path, say: Say) -> None:
     """Pictures of all packings over the load, and of the first packing in the plane of frequencies."""
-    found = [{"cpu_seconds": row["cpu_seconds"], **row["result"]} for row in rows if row["says"] is None]
+    good = [row for row in rows if row["says"] is None]
     if not lines:
         say("no packing bears any of the loads: there is nothing to draw")
         return
     sizes = sorted({line["disks"] for line in lines if line["disks"] is not None})
-    if len(sizes) < 2:
-        courses = {"all": along(Table("all", tuple(found)))}
-    else:
-        of_size = {n: {line["seed"] for line in lines if line["disks"] == n} for n in sizes}
-        keyed = [(row["values"].get("packing.disks"), row["result"]) for row in rows if row["says"] is None]
-        courses = {str(n): along(Table(str(n), tuple(each for disks, each in keyed if disks == n))) for n in of_size}
+    groups = {"all": good}
+    if len(sizes) > 1:
+        groups = {str(n): [row for row in good if row["values"].get("packing.disks") == n] for n in sizes}
+    courses = {name: along(Table(name, tuple(row["result"] for row in group))) for name, group in groups.items()}
     save(over_load(courses), output / "modes")
-    complex_loads = [load for load in found[0]["loads"] if load["pairs"]]
+    complex_loads = [load for load in good[0]["result"]["loads"] if load["pairs"]]
     if not complex_loads:
         say("the first packing has no complex pair at these loads: its plane of frequencies is not drawn")
         return

@@ -1,9 +1,9 @@
-"""The tables of the study: a line for each packing and load, and medians over packings with their intervals."""
+"""The tables of the study: a line for each packing, with its loads."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,12 +12,10 @@ import numpy as np
 
 from ...analysis.files.wholefile import write_text
 from ...analysis.packing.packing import Floats
+from ..rows import read_rows
 from ..sweep.compute import LINES, stored
 
 ENDING = ".jsonl"
-
-DRAWS = 2000
-"""Resamples of the packings for an interval."""
 
 DIGITS = 7
 """Of the numbers in a table."""
@@ -50,8 +48,7 @@ def table_of(tables: Path, name: str) -> Path:
 def known(tables: Path, name: str) -> dict[int, dict[str, Any]]:
     """The rows of a set's table by seed; none where there is no table."""
     path = table_of(tables, name)
-    rows = map(json.loads, path.read_text().splitlines()) if path.exists() else ()
-    return {row["seed"]: row for row in rows}
+    return {row["seed"]: row for row in read_rows(path)} if path.exists() else {}
 
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:
@@ -96,38 +93,23 @@ class Table:
         """F_x/F_y that some packing has borne."""
         return sorted({load["fx_over_fy"] for row in self.rows for load in row.get("loads", ())})
 
+    def borne(self, fx_over_fy: float) -> list[dict[str, Any]]:
+        """What there is of a load, of every packing that has borne it."""
+        return [load for row in self.rows for load in row.get("loads", ()) if load["fx_over_fy"] == fx_over_fy]
+
     def at(self, fx_over_fy: float, key: str) -> Floats:
         """A number of every packing that has borne a load, shape (n,): least Q is inf where there is no pair."""
-        found = [load[key] for row in self.rows for load in row.get("loads", ()) if load["fx_over_fy"] == fx_over_fy]
-        return np.array([np.inf if value is None else value for value in found], dtype=float)
+        return np.array([np.inf if load[key] is None else load[key] for load in self.borne(fx_over_fy)], dtype=float)
+
+    def of_seeds(self, seeds: Collection[int]) -> Table:
+        """The packings of these seeds."""
+        return Table(self.name, tuple(row for row in self.rows if row["seed"] in seeds))
 
 
 def read_tables(folder: Path) -> dict[str, Table]:
     """The tables of a folder by name; packings that failed are left out, and counted by `failures`."""
     found = {}
     for path in sorted(folder.glob(f"*{ENDING}")):
-        rows = [json.loads(line) for line in path.read_text().splitlines()]
         name = path.stem.replace("_", " ")
-        found[name] = Table(name, tuple(row for row in rows if row["says"] is None))
+        found[name] = Table(name, tuple(row for row in read_rows(path) if row["says"] is None))
     return found
-
-
-def median(values: Sequence[float] | Floats, seed: int = 0) -> list[float]:
-    """Median with its 95 % interval from resampled packings: [median, low, high]; inf where half have no pair."""
-    values = np.sort(np.asarray(values, dtype=float))
-    if len(values) == 0:
-        return [np.nan] * 3
-    chosen = np.sort(np.random.default_rng(seed).integers(len(values), size=(DRAWS, len(values))), axis=1)
-    middles = np.sort(values[chosen[:, len(values) // 2]])
-    return [float(values[len(values) // 2]), float(middles[int(0.025 * DRAWS)]), float(middles[int(0.975 * DRAWS)])]
-
-
-def power(sizes: Iterable[int], samples: Sequence[Floats], seed: int = 0) -> list[float]:
-    """Exponent p of medians that go as N^p, with its 95 % interval from resampled packings: [p, low, high]."""
-    logs, generator = np.log(list(sizes)), np.random.default_rng(seed)
-
-    def fitted(each: Sequence[Floats]) -> float:
-        return float(np.polyfit(logs, np.log([np.median(one) for one in each]), 1)[0])
-
-    drawn = [fitted([generator.choice(one, len(one)) for one in samples]) for _ in range(DRAWS)]
-    return [fitted(samples), *(float(each) for each in np.quantile(drawn, [0.025, 0.975]))]

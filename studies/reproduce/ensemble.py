@@ -6,7 +6,7 @@ shares, intervals and distributions.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,9 @@ from ...pywrap.scenes.refusals import needed
 from ..frame import draw_all
 from ..hands import Progress, Say
 from ..statistics import quartiles, share
-from ..sweep.compute import Row, run_sweep
+from ..sweep.compute import run_sweep
 from ..sweep.points import Sweep
+from ..sweep.table import Row
 from ..sweep.tasks import TASKS
 from ..sweep.triggering import economical, frictions, grows, rise
 from .ensemble_figure import ensemble_figure
@@ -71,9 +72,12 @@ def ensemble(
     first, scene = scene.packing.seed, economical(scene)
     mapping = {"task": "triggering", "sweep": {"packing.seed": f"{first}:{first + members - 1}"}}
     sweep = Sweep.from_mapping(mapping | {"scene": scene.resolved()}, TASKS)
-    rows = run_sweep(
-        sweep, output, say=say, progress=lambda ended, count: progress(_told(ended, say), count), workers=workers
-    )
+
+    def told(row: Row) -> Row:
+        say(sentence(row))
+        return row
+
+    rows = run_sweep(sweep, output, (1, 1), say, lambda ended, count: progress(map(told, ended), count), workers)
     if not rows:
         return {}
     result = summary(scene, rows)
@@ -82,12 +86,6 @@ def ensemble(
     for line in lines(__package__ or "", "ensemble.j2", result=result):
         say(line)
     return result
-
-
-def _told(rows: Iterable[Row], say: Say) -> Iterator[Row]:
-    for row in rows:
-        say(sentence(row))
-        yield row
 
 
 def summary(scene: Scene, rows: list[Row]) -> dict[str, Any]:

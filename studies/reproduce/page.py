@@ -5,12 +5,14 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from ...figures.pages import render
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
+from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.units import dashpot, quality_factor, real_units
-from ..triggering.compute import Triggering, largest
-from ..triggering.page import section
+from ..triggering.compute import ABOVE_NOISE, Triggering, largest, summary
 from .compute import GrowthRun
 
 
@@ -27,6 +29,7 @@ def report(
     of the packing that is triggered, if it is another one.
     """
     order = sorted(runs, key=lambda run: run.mu)
+    triggering = found if isinstance(found, Triggering) else None
     return render(
         __package__ or "",
         "report.md.j2",
@@ -37,15 +40,25 @@ def report(
         residual=max(each.residual for run in runs for each in run.equilibria),
         mus_rise=all(a.onset.fx_c < b.onset.fx_c for a, b in pairwise(order)),
         growth=growth,
-        triggering=section(found)
-        if isinstance(found, Triggering)
-        else f"## Triggering\n\n{found}\n\n"
-        if found
-        else "",
+        triggering=triggering,
+        says=found,
         another=another,
         settled_with_friction=getattr(scene.packing, "settle_friction", False),
-        **_in_si(scene, growth, found if isinstance(found, Triggering) and another is None else None),
+        **({} if triggering is None else _triggered(triggering)),
+        **_in_si(scene, growth, triggering if another is None else None),
     )
+
+
+def _triggered(found: Triggering) -> dict[str, Any]:
+    """What the section on triggering needs beside the runs."""
+    numbers = summary(found)
+    return {
+        "numbers": numbers,
+        "calibrated": isinstance(needed(found.scene.friction, "friction").v0, str),
+        "highest_speed": float(np.abs(found.runs["erupting"]["layer_velocity"]).max()),
+        "jumped": float(np.log10(numbers["jump"] / numbers["largest_D"]["perturbed"])),
+        "above_noise": ABOVE_NOISE,
+    }
 
 
 def _in_si(scene: Scene, growth: GrowthRun, wave: Triggering | None) -> dict[str, Any]:
@@ -64,5 +77,5 @@ def _in_si(scene: Scene, growth: GrowthRun, wave: Triggering | None) -> dict[str
         "quality": quality_factor(0.5 * fastest.growth_rate + 1j * fastest.frequency),
         "dashpot": constant,
         "wave": wave,
-        "erupted": None if wave is None else largest(wave.erupting),
+        "erupted": None if wave is None else largest(wave.runs["erupting"]),
     }

@@ -1,5 +1,7 @@
 """Run a sweep: every point is a line of results.jsonl as soon as it has ended, and results.csv the table of all.
 
+Shards of a sweep, each with a folder of its own, are put together by `merge`.
+
 Points are handed out to workers (:mod:`.workers`), each with one thread. The table does not depend on the number of
 workers, on shards, or on where a run was cut off.
 
@@ -10,20 +12,22 @@ point of this sweep are not computed again. A last line that a kill has cut is c
 from __future__ import annotations
 
 import fcntl
-from collections.abc import Iterable, Iterator
+import json
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 
-from ...analysis.files.wholefile import make_folder, write_json
+from ...analysis.files.wholefile import make_folder, write_json, write_text
 from ...pywrap import SceneError
 from .. import rows
 from ..hands import Progress, Say, hands
-from .examine import Row
 from .points import Sweep, shard
-from .table import write_tables
+from .table import Row, write_tables
+from .tasks import TASKS
 from .workers import computed
 
 LINES, ASKED, LOCK = "results.jsonl", "sweep.json", "sweep.lock"
@@ -82,23 +86,75 @@ def run_sweep(
             if len(missing) < len(points):
                 say(f"{len(points) - len(missing)} of {len(points)} points are in {output / LINES} already")
             with closing(computed(pool, sweep.task, missing)) as ended:
-                for row in progress(_kept(ended, output / LINES), len(missing)):
+                for row in progress(rows.kept(output / LINES, ended), len(missing)):
                     known[row["key"]] = row
             table = [known[point.key] for point in points]
             write_tables(table, sweep.names, output)
     return table
 
 
-def _kept(ended: Iterable[Row], path: Path) -> Iterator[Row]:
-    """The rows, each in the file before it is handed on."""
-    for row in ended:
-        rows.append(path, row)
-        yield row
-
-
 def stored(path: Path) -> dict[str, Row]:
     """The rows of results.jsonl by key."""
     return {row["key"]: row for row in rows.stored(path, "key", "a sweep")}
+
+
+def merge(parts: Sequence[Path], output: Path, say: Say = print) -> list[Row]:
+    """Merge folders of sweeps into one.
+
+    Parameters
+    ----------
+    parts : sequence of Path
+        Folders that `sweep` has left.
+    output : Path
+        The folder, made if need be.
+    say : callable
+        Takes a line of words.
+
+    Returns
+    -------
+    list of dict
+        The rows.
+
+    Raises
+    ------
+    SceneError
+        If the parts do not belong together, or are no parts.
+    """
+    for part in parts:
+        if not (part / ASKED).is_file():
+            raise SceneError(
+                f"{part} is no folder of a sweep (it has no {ASKED}): give folders that `faultgouge sweep` has left"
+            )
+    asked = [_read(part / ASKED) for part in parts]
+    for part, each in zip(parts, asked, strict=True):
+        each.pop("shard", None)
+        if each != asked[0]:
+            raise SceneError(f"{part} is of another sweep than {parts[0]}: merge parts of one sweep")
+    sweep = Sweep.from_mapping(asked[0], TASKS, name=str(parts[0] / ASKED))
+    known: dict[str, Row] = {}
+    for part in parts:
+        known |= stored(part / LINES)
+    table = [known[point.key] for point in sweep.points if point.key in known]
+    make_folder(output)
+    write_json(output / ASKED, sweep.as_dict() | {"shard": [1, 1]})
+    write_text(output / LINES, "".join(json.dumps(row) + "\n" for row in table))
+    write_tables(table, sweep.names, output)
+    say(f"{len(table)} of {len(sweep.points)} scenes from {len(parts)} folders; written: {output}/results.csv")
+    if len(table) < len(sweep.points):
+        say(f"the other {len(sweep.points) - len(table)} are in none of them: `faultgouge sweep` goes on from here")
+    return table
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SceneError(f"{path} cannot be read ({error.strerror}): correct its path") from None
+    except ValueError as error:
+        raise SceneError(f"{path} is not valid JSON ({error}): give a file that faultgouge has written") from None
+    if not isinstance(value, dict):
+        raise SceneError(f"{path} is no result of faultgouge: give a file that it has written")
+    return value
 
 
 @contextmanager

@@ -9,12 +9,11 @@ two is censored. Where both are known and leave a window between them, three und
 the packing erupts (:mod:`~faultgouge.studies.triggering`): unperturbed, perturbed, perturbed with mu(v). The *rise* is
 the distance in decades between the largest D of the last two.
 
-A rise alone is no instability. As soon as mu(v) has fallen, every contact that carries tangential load carries less of
-it, and the equilibrium is elsewhere: D *jumps* to the square of that distance, in a packing that is stable with the
-weakened friction as well. How far, a *control* shows: mu(v) at a force as far below the lower onset as the middle of
-the window is above it. What tells an instability from the jump is that D goes on to *grow* after it, at the rate that
-the spectrum has there with the weakened friction, until it levels off. The pair may also be real again at
-the middle of the window, or grow too slowly for the length of the run; so the rate is kept beside all this.
+A rise alone is no instability: D *jumps* in a packing that is stable with the weakened friction, too
+(:mod:`~faultgouge.studies.triggering.compute`), and how far, a *control* shows: mu(v) at a force as far below the lower
+onset as the middle of the window is above it. An instability goes on to *grow* after the jump, at the rate of the
+spectrum with the weakened friction. The pair may also be real again at the middle of the window, or grow too slowly for
+the length of the run; so the rate is kept beside all this.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ v_0 is the user's. The paper takes the largest velocity of the run that nobody p
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,12 +57,11 @@ CLOSE = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class Wave:
-    """A wave on a packing in equilibrium, but for its amplitude: what K says of it, how long it lasts, and v_0."""
+    """A wave of a scene on a packing in equilibrium, but for its amplitude, and what K says of it."""
 
+    scene: Scene
     packing: Packing
     expected: Row
-    given: Trigger
-    v0: float
 
 
 def middle(below: float, above: float) -> float:
@@ -148,11 +147,6 @@ def chosen(predicted: list[Row], runs: int) -> list[Row]:
     return picked
 
 
-def waves(scene: Scene, packings: Mapping[float, Packing], wanted: Iterable[Row]) -> list[Wave]:
-    """The waves of predictions that are to be bisected, on the packings at their loads."""
-    return [Wave(packings[each["fx"]], each, settings(scene), threshold(scene)) for each in wanted]
-
-
 def bisected(wave: Wave) -> Row:
     """a_c in LAMMPS, on this process alone.
 
@@ -194,13 +188,13 @@ def _bracket(wave: Wave) -> tuple[float, float, int, float]:
 
 def _triggers(wave: Wave, amplitude: float) -> float | None:
     """When a wave brings the layer above v_0; None if it does not."""
-    dt = time_step(wave.packing)
-    steps = int(wave.given.time / dt)
-    target = None if wave.given.on == "layer" else range(len(wave.packing))
+    dt, given = time_step(wave.packing), settings(wave.scene)
+    steps = int(given.time / dt)
+    target = None if given.on == "layer" else range(len(wave.packing))
     with (
         Engine(wave.packing, MPI.COMM_SELF) as engine,
         engine.undamped(dt, amplitude, wave.expected["omega"], target) as dynamics,
-        dynamics.halted(wave.v0),
+        dynamics.halted(threshold(wave.scene)),
     ):
         dynamics.advance(steps)
         return dynamics.steps * dt if dynamics.steps < steps else None

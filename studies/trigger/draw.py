@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from ...analysis.packing.packing import Floats
 from ...figures.style import INK, styled
+from ..rows import columns
 
 WAVE = {"layer": "amplitude of the force $a$", "floor": "acceleration of the floor $a$"}
 
@@ -27,16 +28,8 @@ def map_figure(result: dict[str, Any]) -> Figure:
     norm = LogNorm(np.nanmin(amplitude), np.nanmax(amplitude))
     colours = axes.pcolormesh(_edges(omega), _edges(distance), amplitude, norm=norm, cmap="viridis_r")
     runs = [row for row in result["map"] if row["measured"] is not None]
-    axes.scatter(
-        [row["omega"] for row in runs],
-        [row["distance"] for row in runs],
-        c=[row["measured"] for row in runs],
-        norm=norm,
-        cmap="viridis_r",
-        s=22,
-        edgecolors="white",
-        linewidths=0.9,
-    )
+    across, up, measured = columns(runs, "omega", "distance", "measured")
+    axes.scatter(across, up, c=measured, norm=norm, cmap="viridis_r", s=22, edgecolors="white", linewidths=0.9)
     axes.minorticks_off()
     bar = figure.colorbar(colours, ax=axes)
     bar.set_label(rf"{WAVE[result['on']]}$_c$ that triggers")
@@ -58,24 +51,24 @@ def threshold_figure(result: dict[str, Any]) -> Figure:
         axes.plot(omega, curve, color=colour, linewidth=3.2 - 2.4 * k / len(distance), label=f"${_power(each)}$")
         _runs(axes, [row for row in result["map"] if row["distance"] == each and row["measured"] is not None], colour)
     nearest = [row for row in result["map"] if row["distance"] == distance[0]]
-    axes.plot([row["omega"] for row in nearest], [row["stationary"] for row in nearest], ":", color=INK, linewidth=0.8)
+    axes.plot(*columns(nearest, "omega", "stationary"), ":", color=INK, linewidth=0.8)
     axes.legend(title="$1 - F_x/F_x^c$", ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return figure
 
 
 def _runs(axes: Axes, rows: list[dict[str, Any]], colour: str) -> None:
     """The bracket of each bisection, so far apart that both triangles are seen."""
-    omega = [row["omega"] for row in rows]
-    axes.plot(omega, [1.12 * row["above"] for row in rows], "^", color=colour, markersize=3.5)
-    axes.plot(omega, [row["below"] / 1.12 for row in rows], "v", color=colour, markersize=3.5, markerfacecolor="white")
+    omega, below, above = columns(rows, "omega", "below", "above")
+    axes.plot(omega, 1.12 * above, "^", color=colour, markersize=3.5)
+    axes.plot(omega, below / 1.12, "v", color=colour, markersize=3.5, markerfacecolor="white")
 
 
 def _grid(rows: list[dict[str, Any]]) -> tuple[Floats, Floats, Floats]:
     """Distances and frequencies, increasing, and a_c of the two."""
-    distance, omega = (np.unique([row[key] for row in rows]) for key in ("distance", "omega"))
+    at, of, predicted = columns(rows, "distance", "omega", "predicted")
+    distance, omega = np.unique(at), np.unique(of)
     amplitude = np.full((len(distance), len(omega)), np.nan)
-    for row in rows:
-        amplitude[np.searchsorted(distance, row["distance"]), np.searchsorted(omega, row["omega"])] = row["predicted"]
+    amplitude[np.searchsorted(distance, at), np.searchsorted(omega, of)] = predicted
     return distance, omega, amplitude
 
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from ...analysis import Packing
 from ...analysis.digits import with_uncertainty
 from ...pywrap import Scene
+from ...pywrap.onset.damped import damped_onset_run
+from ...pywrap.onset.undamped import onset_run
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.units import real_units
 from ..frame import Result, Study, Work
@@ -14,6 +16,7 @@ from ..packings import Start
 from ..sweep.onset import onset
 from .compute import (
     Row,
+    Wave,
     bisected,
     chosen,
     equilibria,
@@ -23,7 +26,6 @@ from .compute import (
     predictions,
     settings,
     threshold,
-    waves,
 )
 from .draw import map_figure, threshold_figure
 
@@ -83,13 +85,9 @@ def _onset(scene: Scene, work: Work) -> Row:
     work.say("onset")
     mu, undamped = scene.law.mus[0], None
     if scene.damping is None:
-        from ...pywrap.onset.undamped import onset_run
-
-        onset = onset_run(scene, mu).onset
-        fx_c, error = onset.fx_c, onset.error
+        found = onset_run(scene, mu).onset
+        fx_c, error = found.fx_c, found.error
     else:
-        from ...pywrap.onset.damped import damped_onset_run
-
         run = damped_onset_run(scene, mu)
         fx_c, error, undamped = run.fx_c, run.error, None if run.undamped is None else run.undamped.fx_c
     work.say(f"F_x^c = {with_uncertainty(fx_c, error)}")
@@ -133,7 +131,8 @@ def _measured(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
         work.say(f"{len(wanted) - len(missing)} of {len(wanted)} bisections are in {work.rows.path} already")
     if missing:
         packings = equilibria(scene, {each["fx"] for each in wanted})  # all: the path is that of one run of the command
-        for found in work.progress(work.share(bisected, waves(scene, packings, missing)), len(missing)):
+        waves = [Wave(scene, packings[each["fx"]], each) for each in missing]
+        for found in work.progress(work.share(bisected, waves), len(waves)):
             work.rows.append(kind="measured", **found)
             at = f"omega = {found['omega']:.4g} at {found['distance']:g}"
             work.say(f"{at}: triggers from {middle(found['below'], found['above']):.4g} on in LAMMPS")
@@ -154,7 +153,7 @@ def trigger(scene: Scene, start: Start) -> Row:
         return {"ends": first["ends"], "fx_c": None, "map": [], "measured": []}
     packings = equilibria(scene, [first["fx_c"] * (1 - each) for each in wave.distance])
     predicted = [row for _, rows in _mapped(scene, packings, first["fx_c"], wave.distance) for row in rows]
-    measured = [bisected(each) for each in waves(scene, packings, chosen(predicted, wave.runs))]
+    measured = [bisected(Wave(scene, packings[each["fx"]], each)) for each in chosen(predicted, wave.runs)]
     return {
         "ends": "onset",
         "fx_c": first["fx_c"],

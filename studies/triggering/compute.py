@@ -78,13 +78,10 @@ class Triggering:
         Linearly stable.
     weakening : Weakening
         mu(v), with v_0 the largest velocity of the unperturbed run.
-    unperturbed, perturbed, erupting : dict
-        Without perturbation, with it, and with it and mu(v).
-    control : dict or None
-        As the last, at a force where the packing is stable with the weakened friction, too; None if none is known.
-    strong : dict
-        With a perturbation `ABOVE_NOISE` as strong, for a shorter time: its D stands out of the noise of doubles and is
-        compared with the linear response.
+    runs : dict
+        By name: unperturbed; perturbed; erupting, with mu(v) as well; control, the same at a force where the packing
+        is stable with the weakened friction, too, if one is known; strong, with a perturbation `ABOVE_NOISE` as
+        strong, for a shorter time: its D stands out of the noise of doubles and is compared with the linear response.
     response : Response
         Of the linearised packing to that perturbation, time step included.
     foreseen : Forecast
@@ -96,11 +93,7 @@ class Triggering:
     scene: Scene
     start: Equilibrium
     weakening: Weakening
-    unperturbed: Series
-    perturbed: Series
-    erupting: Series
-    control: Series | None
-    strong: Series
+    runs: dict[str, Series]
     response: Response
     foreseen: Forecast
     sensitive: Sensitivity
@@ -108,8 +101,9 @@ class Triggering:
     @property
     def crossing(self) -> float | None:
         """The time at which the layer of the run with mu(v) first exceeds v_0, or None."""
-        faster = np.abs(self.erupting["layer_velocity"]) > self.weakening.v0
-        return float(self.erupting["time"][np.argmax(faster)]) if faster.any() else None
+        run = self.runs["erupting"]
+        faster = np.abs(run["layer_velocity"]) > self.weakening.v0
+        return float(run["time"][np.argmax(faster)]) if faster.any() else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +174,7 @@ def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: O
         run.h5 of the ramp; gets the series unperturbed, perturbed, erupting, control and strong.
     """
     settings, friction = needed(scene.perturb, "perturb"), needed(scene.friction, "friction")
+    runs: dict[str, Series] = {}
 
     def run(
         name: str,
@@ -188,30 +183,30 @@ def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: O
         time: float = settings.time,
         start: Equilibrium = start,
         early: int = EARLY,
-    ) -> Series:
+    ) -> None:
         one = settings.model_copy(update={"amplitude": amplitude, "time": time})
         series = series_of(perturb(scene.model_copy(update={"perturb": one}), start, early=early, weakening=weakening))
         with RunFile(path, "a") as file:
             file.append_series(name, **series)
-        return series
+        runs[name] = series
 
-    unperturbed = run("unperturbed", 0.0, early=200)  # as `perturb` calibrates v_0
-    weakening = calibrated(friction, unperturbed)
-    perturbed = run("perturbed", settings.amplitude)
-    erupting = run("erupting", settings.amplitude, weakening, early=FALL)
-    control = None if below is None else run("control", settings.amplitude, weakening, start=below)
+    run("unperturbed", 0.0, early=200)  # as `perturb` calibrates v_0
+    weakening = calibrated(friction, runs["unperturbed"])
+    run("perturbed", settings.amplitude)
+    run("erupting", settings.amplitude, weakening, early=FALL)
+    if below is not None:
+        run("control", settings.amplitude, weakening, start=below)
     packing, amplitude = start.packing, ABOVE_NOISE * settings.amplitude
-    strong = run("strong", amplitude, time=min(settings.time, COMPARED_TIME))
+    run("strong", amplitude, time=min(settings.time, COMPARED_TIME))
     response = linear_response(
         packing,
-        strong["time"],
+        runs["strong"]["time"],
         force=layer_force(packing, amplitude),
         omega=settings.omega or 0.0,
         dt=time_step(packing, settings.time_step),
     )
     foreseen = forecast(start, packing.law.mu * friction.mu_ss, settings.time)
-    runs = unperturbed, perturbed, erupting, control, strong
-    return Triggering(scene, start, weakening, *runs, response, foreseen, sensitivity(ramp))
+    return Triggering(scene, start, weakening, runs, response, foreseen, sensitivity(ramp))
 
 
 def equilibrium_at(
@@ -237,8 +232,9 @@ def sensitivity(run: OnsetRun) -> Sensitivity:
 
 def summary(triggering: Triggering) -> dict[str, Any]:
     """Numbers for summary.json."""
-    sensitive, erupting, strong = triggering.sensitive, triggering.erupting, triggering.strong["msd"]
-    most = {name: largest(getattr(triggering, name)) for name in ("unperturbed", "perturbed", "erupting")}
+    sensitive, runs = triggering.sensitive, triggering.runs
+    erupting, strong = runs["erupting"], runs["strong"]["msd"]
+    most = {name: largest(runs[name]) for name in ("unperturbed", "perturbed", "erupting")}
     growth = float(np.log10(most["erupting"] / jump(erupting)))
     return {
         "fx": triggering.start.fx,
@@ -251,7 +247,7 @@ def summary(triggering: Triggering) -> dict[str, Any]:
         "growth_in_decades": growth,
         "growth_after_the_jump": _fitted(erupting),
         "forecast": asdict(triggering.foreseen),
-        "largest_D_of_the_control": None if triggering.control is None else largest(triggering.control),
+        "largest_D_of_the_control": largest(runs["control"]) if "control" in runs else None,
         "linear_response_deviation": float(np.abs(strong - triggering.response.msd).max() / strong.max()),
         "smallest_mu": float(erupting["friction"].min()),
         "amplitude_exponent": sensitive.fit.exponent,

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -41,10 +42,8 @@ DAMPING = np.geomspace(1e-2, 1e2, 33)
 def figures(found: Triggering) -> Figures:
     """The paper's figures 2, 5 and 6, and three of the response: in time, over the distance from the onset, and over
     damping."""
-    weak, mu, near, erupting = found.weakening, found.start.packing.law.mu, found.sensitive.near, found.erupting
-    names = ("unperturbed", "perturbed", "erupting", "control", "strong")
-    series = {name: getattr(found, name) for name in names if getattr(found, name) is not None}
-    runs = {name: (run["time"], run["msd"]) for name, run in series.items()}
+    weak, mu, near, erupting = found.weakening, found.start.packing.law.mu, found.sensitive.near, found.runs["erupting"]
+    runs = {name: (run["time"], run["msd"]) for name, run in found.runs.items()}
     three = runs["unperturbed"], runs["perturbed"], runs["erupting"]
     chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, 4).astype(int))] if near else []
     return {
@@ -85,8 +84,9 @@ def eruption_figure(
             draw_series(*run, axes, label=name, color=colour)
         if crossing is not None:
             axes.axvline(crossing, color=INK, linewidth=0.6, linestyle=":")
-    if crossing is not None:
-        _name_line(early, crossing, "$|v| > v_0$")
+    if crossing is not None:  # the name to the left of the line: before the crossing D is small
+        place, head = (crossing, 0.97), {"ha": "right", "va": "top", "rotation": 90, "fontsize": 7}
+        _note(early, "$|v| > v_0$", place, (-2, 0), early.get_xaxis_transform(), **head)
     early.set_xscale("log")
     late.set_ylabel("")
     late.set_xlim(0, float(weakening[0][-1]))
@@ -98,19 +98,11 @@ def eruption_figure(
     return figure
 
 
-def _name_line(axes: Axes, place: float, name: str) -> None:
-    """A name at the head of a vertical line, to its left: before the crossing D is small."""
-    axes.annotate(
-        name,
-        (place, 0.97),
-        xycoords=axes.get_xaxis_transform(),
-        xytext=(-2, 0),
-        textcoords="offset points",
-        ha="right",
-        rotation=90,
-        va="top",
-        fontsize=7,
-    )
+def _note(
+    axes: Axes, words: str, place: tuple[float, float], off: tuple[int, int], of: Any = "data", **style: Any
+) -> None:
+    """Words so many points off a place, which is in the coordinates `of`."""
+    axes.annotate(words, place, xycoords=of, xytext=off, textcoords="offset points", **style)
 
 
 def share(law: Weakening, velocity: ArrayLike) -> Floats:
@@ -156,13 +148,7 @@ def weakening_figure(velocity: ArrayLike, mu: ArrayLike, law: Weakening, mu_0: f
     for value, name in ((law.v0, "$v_0$"), (law.v_ss, "$v_{ss}$")):
         if velocity.min() < value < velocity.max():
             axes.axvline(value, color=INK, linewidth=0.6, linestyle=":")
-            axes.annotate(
-                name,
-                (value, 0.03),
-                xycoords=axes.get_xaxis_transform(),
-                xytext=(2, 0),
-                textcoords="offset points",
-            )
+            _note(axes, name, (value, 0.03), (2, 0), axes.get_xaxis_transform())
     steady = mu_0 * law.mu_ss
     axes.set_ylim(steady - 0.12 * (mu_0 - steady), mu_0 + 0.12 * (mu_0 - steady))
     axes.xaxis.set_major_locator(LogLocator(numticks=7))
@@ -237,15 +223,8 @@ def damping_figure(pairs: Sequence[PairForm]) -> Figure:
         at = np.exp(np.interp(np.log(pair.tau_d), np.log(damping), np.log(amplitude)))
         axes.plot([pair.tau_d], [at], "o", color=colour, label=r"$\tau = \tau_d$")
         axes.plot([pair.half_gain_time()], [0.5 * undamped], "o", color=colour, fillstyle="none", label="half")
-        axes.annotate(
-            rf"$\varepsilon = {scientific(pair.form.epsilon)}$",
-            (last, undamped),
-            xytext=(-2, 2),
-            textcoords="offset points",
-            ha="right",
-            va="bottom",
-            color=colour,
-        )
+        words = rf"$\varepsilon = {scientific(pair.form.epsilon)}$"
+        _note(axes, words, (last, undamped), (-2, 2), ha="right", va="bottom", color=colour)
     axes.set_xlim(min(pair.tau_d * DAMPING[0] for pair in pairs), last)
     axes.set_ylim(top=3 * max(pair.amplitude() for pair in pairs))
     few_decades(axes)

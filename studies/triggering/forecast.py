@@ -21,6 +21,7 @@ from ...analysis.motion.response import LinearMotion
 from ...pywrap import Equilibrium, Scene, SceneError, reach
 from ...pywrap.onset.undamped import onset_run
 from ...pywrap.scenes.refusals import needed
+from ..packings import seeded
 
 JUMP_SHARE = 0.05
 """Share of the run with mu(v) that shows the jump: 10 of 200 time units, where the slowest modes of 100 disks have
@@ -104,8 +105,7 @@ def chosen(scene: Scene, seeds: Iterable[int]) -> Iterator[dict[str, Any]]:
         forecast : of a run there, as a dict, or None.
     """
     for seed in seeds:
-        packing = scene.packing.model_copy(update={"seed": seed})
-        found = _tried(scene.model_copy(update={"packing": packing}), seed)
+        found = _tried(seeded(scene, seed), seed)
         yield found
         if not found["says"]:
             return

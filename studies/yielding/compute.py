@@ -71,29 +71,33 @@ def yielding(scene: Scene, start: Start) -> dict[str, Any]:
     settled = start(scene.law.mus[0])
     path = branch(settled)
     fy, last = scene.load.fy, path.kept[-1].fx
-    result: dict[str, Any] = {
+    return {
         "newton": path.newton / fy,
         "static": last / fy,
         "static_by_increment": [[step, branch(settled, step).kept[-1].fx / fy] for step in INCREMENTS],
         "jumps": [[fx / fy, moved] for fx, moved in path.jumps],
-        "dynamic": [],
+        "dynamic": dynamic_runs(scene, path),
+        "loading": [
+            {"rate": rate, "restitution": loss} | loaded(path, dashpots(scene, loss), rate) for rate, loss in LOADINGS
+        ],
     }
 
-    def dashpots(restitution: float) -> float:
-        return dashpot(scene.law.kn, restitution, 1.0, impact_velocity(scene))
 
-    for share in SHARES:
-        try:
-            here = path.at(share * last)
-        except FailedError:
-            continue  # between two loads that are borne
-        for loss in LOSSES:
-            run = dynamic(here, dashpots(loss), scene.packing.model_dump().get("seed", 0))
-            result["dynamic"].append({"share": share, "restitution": loss, "fx_over_fy": here.fx / fy} | run)
-    result["loading"] = [
-        {"rate": rate, "restitution": loss} | loaded(path, dashpots(loss), rate) for rate, loss in LOADINGS
+def dynamic_runs(scene: Scene, path: Branch) -> list[dict[str, Any]]:
+    """The runs from the equilibria at `SHARES` with each of `LOSSES`; loads between two that are borne may be none."""
+    seed, last = scene.packing.model_dump().get("seed", 0), path.kept[-1].fx
+    return [
+        {"share": share, "restitution": loss, "fx_over_fy": here.fx / scene.load.fy}
+        | dynamic(here, dashpots(scene, loss), seed)
+        for share in SHARES
+        if (here := path.borne(share * last)) is not None
+        for loss in LOSSES
     ]
-    return result
+
+
+def dashpots(scene: Scene, restitution: float) -> float:
+    """C_N of a restitution in a scene."""
+    return dashpot(scene.law.kn, restitution, 1.0, impact_velocity(scene))
 
 
 def dynamic(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:

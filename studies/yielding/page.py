@@ -1,19 +1,23 @@
-"""The page of the study of yield, from its table: numbers with intervals, the picture, the text."""
+"""The pages of the study of yield, from its tables: numbers with intervals, the picture, the texts.
+
+yield.md is on static and dynamic yield. further.md is on layers that are left to themselves: which rest, with which
+history of the slip.
+"""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.stats import binomtest
 
 from ...analysis.packing.packing import Floats
 from ...figures.pages import render
 from ...figures.style import INK, save, styled
-from ..modes.tables import median
-from ..statistics import interval, share
+from ..rows import columns, read_rows
+from ..statistics import interval, median, share
 from .compute import CONTROLLED, LOADINGS, LOSSES, SHARES
 
 FLOWING = ("flows", "bursts", "fails at rest")
@@ -22,10 +26,9 @@ FLOWING = ("flows", "bursts", "fails at rest")
 ELSEWHERE = 1e-8
 """D beyond which the layer rests in another equilibrium: a ten-thousandth of a small disk's diameter, squared."""
 
-
-def read_rows(table: Path) -> list[dict[str, Any]]:
-    """The rows of a table."""
-    return [json.loads(line) for line in table.read_text().splitlines()]
+LASTS = 0.5
+"""Share of its early kinetic energy from which on a layer vibrates without slowing down; the others lose 57 % and more
+in the same time."""
 
 
 def rows_of(table: Path) -> tuple[list[dict[str, Any]], int]:
@@ -138,11 +141,10 @@ def figure(found: dict[str, Any]) -> Figure:
     left.legend(loc="lower right")
     for k, loss in enumerate(LOSSES):
         rows = [row for row in found["dynamic"] if row["restitution"] == loss and row["flow"]["of"]]
-        middle = np.array([row["flow"]["share"] for row in rows])
-        bars = [[m - row["flow"]["low"], row["flow"]["high"] - m] for m, row in zip(middle, rows, strict=True)]
-        place = np.array([row["share"] for row in rows]) + 0.01 * (k - 1)
+        middle, low, high = columns([row["flow"] for row in rows], "share", "low", "high")
+        bars = np.clip([middle - low, high - middle], 0, 1)
         label = "undamped" if loss == 1 else f"restitution {loss}"
-        axes.errorbar(place, middle, yerr=np.clip(np.array(bars).T, 0, 1), fmt="o-", capsize=3, label=label)
+        axes.errorbar(columns(rows, "share")[0] + 0.01 * (k - 1), middle, yerr=bars, fmt="o-", capsize=3, label=label)
     axes.axvline(1.0, color="black", linestyle="--", label="static yield")
     axes.set(xlabel="$F_x$ over static yield", ylabel="share of packings that flow", ylim=(-0.02, 1.02))
     axes.legend(loc="upper left")
@@ -159,3 +161,73 @@ def write_page(folder: Path) -> Path:
     page = folder / "yield.md"
     page.write_text(text(found, len(rows), failed))
     return page
+
+
+def write_lasting(folder: Path) -> Path:
+    """further.md of a folder with tables/lasting.jsonl, quartz_100.jsonl and quartz_400.jsonl."""
+    tables = folder / "tables"
+    rows, large = (read_rows(tables / f"{name}.jsonl") for name in ("lasting", "quartz_400"))
+    lossy = [row for row in rows if row["restitution"] < 1]
+    page = render(
+        __package__ or "",
+        "further.md.j2",
+        percent=percent,
+        lossy=lossy,
+        **_lasting(lossy),
+        free=_without_loss(rows, tables / "quartz_100.jsonl"),
+        large=[of_runs(large, load, loss) for load in SHARES for loss in LOSSES],
+        large_flow=[_flowing(large, loss) for loss in LOSSES],
+        large_static=interval(median([row["static"] for row in large])),
+    )
+    (folder / "further.md").write_text(page)
+    return folder / "further.md"
+
+
+def lasts(row: dict[str, Any]) -> bool:
+    """Whether a layer vibrates without slowing down."""
+    return bool(row["late"] > LASTS * row["early"])
+
+
+def _lasting(lossy: list[dict[str, Any]]) -> dict[str, Any]:
+    """Who vibrates with either history, and the test of signs of the packings in which the histories differ."""
+    most = {
+        history: {row["seed"]: lasts(row) for row in lossy if (row["history"], row["restitution"]) == (history, 0.9)}
+        for history in ("total", "rescaled")
+    }
+    differ = [total for seed, total in most["total"].items() if total != most["rescaled"][seed]]
+    vibrating = [row for row in lossy if lasts(row)]
+    return {
+        **{history: share(sum(found.values()), len(found)) for history, found in most.items()},
+        "chance": binomtest(sum(differ), len(differ)).pvalue,
+        "seeds": sorted({row["seed"] for row in vibrating}),
+        "energies": sorted(row["late"] for row in vibrating),
+        "moves": max(row["moves"] for row in vibrating),
+        "quiet": max(row["late"] for row in lossy if row["history"] == "rescaled"),
+        "slowest": max((row for row in lossy if not lasts(row)), key=lambda row: row["late"] / row["early"]),
+    }
+
+
+def _without_loss(rows: list[dict[str, Any]], table: Path) -> dict[str, Any]:
+    """Runs without loss, those with total slips and with rescaled ones from the same states, and how many flow."""
+    total = {
+        (row["values"]["packing.seed"], run["share"]): run
+        for row in read_rows(table)
+        if row["result"]
+        for run in row["result"]["dynamic"]
+        if run["restitution"] == 1
+    }
+    runs = [row | {"total": total[row["seed"], row["share"]]} for row in rows if row["restitution"] == 1]
+    flow = {}
+    for load in (0.97, 0.9):
+        here = [row for row in runs if row["share"] == load]
+        flow[load] = [
+            share(sum(each["ends"] in FLOWING for each in ends), len(ends))
+            for ends in ([row["total"] for row in here], here)
+        ]
+    return {"runs": runs, "flow": flow}
+
+
+def _flowing(large: list[dict[str, Any]], restitution: float) -> dict[str, Any]:
+    """Packings that flow at a load below their static yield."""
+    flow = [any(run["ends"] in FLOWING for run in row["dynamic"] if run["restitution"] == restitution) for row in large]
+    return share(sum(flow), len(flow))

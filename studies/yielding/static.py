@@ -65,10 +65,13 @@ class Branch:
     newton: float
     jumps: list[tuple[float, float]]
 
-    def at(self, fx: float) -> Equilibrium:
-        """The equilibrium at a load, from the kept one below it."""
+    def borne(self, fx: float) -> Equilibrium | None:
+        """The equilibrium at a load, from the kept one below it; None if the packing fails between two of these."""
         below = next(each for each in reversed(self.kept) if each.fx <= fx)
-        return below if below.fx == fx else following(below, fx)[0]
+        try:
+            return below if below.fx == fx else following(below, fx)[0]
+        except FailedError:
+            return None
 
 
 def branch(start: Equilibrium, increment: float = STEP) -> Branch:

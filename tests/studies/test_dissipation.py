@@ -7,7 +7,8 @@ import pytest
 
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.onset.damped import damped_onset_run, ramped
-from faultgouge.studies.dissipation.compute import RATIOS, over_distance, over_strength, seeded, weak_cases
+from faultgouge.studies.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
+from faultgouge.studies.packings import seeded
 
 TABLES = Path(__file__).parents[2] / "docs" / "dissipation"
 

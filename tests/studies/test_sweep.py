@@ -13,9 +13,8 @@ from reference_layer import BIN, REFERENCE, SMALL, toml
 
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
-from faultgouge.studies.sweep.compute import run_sweep, stored
+from faultgouge.studies.sweep.compute import merge, run_sweep, stored
 from faultgouge.studies.sweep.draw import draw_sweep
-from faultgouge.studies.sweep.merge import merge
 from faultgouge.studies.sweep.points import Sweep, shard
 from faultgouge.studies.sweep.tasks import TASKS
 
@@ -118,11 +117,11 @@ def test_a_row_is_what_the_onset_of_its_scene_is(tmp_path):
 
 @pytest.mark.slow
 def test_a_settled_packing_is_shared(tmp_path, monkeypatch):
-    from faultgouge.studies.sweep import examine
+    from faultgouge.studies.sweep import workers
 
     settled = []
-    original = examine.settled_bed
-    monkeypatch.setattr(examine, "settled_bed", lambda *given: settled.append(given) or original(*given))
+    original = workers.settled_bed
+    monkeypatch.setattr(workers, "settled_bed", lambda *given: settled.append(given) or original(*given))
     run_sweep(sweep_of({"packing.seed": "1:2", "law.mu": [0.5, 1.0]}), tmp_path, say=id)
     assert len(settled) == 2
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from faultgouge.studies.yielding.lasting import write_lasting
+from faultgouge.studies.yielding.page import write_lasting
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -65,8 +65,8 @@ def merge(
     output: Annotated[Path, typer.Option("-o", "--output", help="The folder to write.")] = Path("merged"),
 ) -> None:
     """Shards of a sweep put together: the table of a sweep that was never divided."""
+    from faultgouge.studies.sweep.compute import merge as merge_parts
     from faultgouge.studies.sweep.draw import draw_sweep
-    from faultgouge.studies.sweep.merge import merge as merge_parts
 
     if is_root():
         draw_sweep(merge_parts(parts, output, say), output, say)
