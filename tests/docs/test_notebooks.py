@@ -48,14 +48,12 @@ def number(text, before):
     return float(re.search(re.escape(before) + r" (\d[-+.\de]*)", text)[1])
 
 
-@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("name", PICTURES)
 def test_every_figure_is_shown(printed, name):
     assert printed(name)[1] == PICTURES[name]
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_the_exceptional_point(printed, faultgouge_in, tmp_path):
     """The pair of three disks opens as a square root; the hundred disks have the onset of the command."""
@@ -70,7 +68,6 @@ def test_the_exceptional_point(printed, faultgouge_in, tmp_path):
     assert number(text, "a hundred disks: F_x^c =") == pytest.approx(found["fx_c"], abs=5e-12)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_a_packing_of_ones_own(printed, faultgouge_in, tmp_path):
     """The commands of the how-to find the same onset: their path has other increments, whose error they state."""

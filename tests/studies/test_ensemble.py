@@ -169,7 +169,6 @@ def test_stored_packings_make_no_ensemble(tmp_path):
 
 
 @pytest.mark.ranks
-@pytest.mark.slow
 @pytest.mark.long
 def test_ranks_share_the_packings(faultgouge, tmp_path):
     changes = {"law": SCENE["law"], "ramp": {"step": 5e-3, "until": 1e-2}}

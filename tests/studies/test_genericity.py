@@ -53,7 +53,6 @@ def test_the_sweep_that_ships_is_that_of_the_study():
     assert [point.key for point in shipped.points] == [point.key for point in sets(1.0)["onsets"].points]
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_rows_come_out_again():
     """The onsets of a random tenth of the packings, of those that this build settles as the build of the tables did."""

@@ -64,7 +64,6 @@ def test_without_b_no_pair_is_complex(loaded):
     assert counted(packing).as_dict()["pairs"] >= found["sticking"]["pairs"]
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_the_command_leaves_rows_pictures_and_a_film(faultgouge, tmp_path):
     (tmp_path / "scene.toml").write_text(toml(SCENE))

@@ -24,7 +24,6 @@ def found():
     return json.loads((DOCS / "modes.json").read_text())
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_the_page_comes_out_of_the_tables(tmp_path):
     write_page(DOCS / "tables", tmp_path)

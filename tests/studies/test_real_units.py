@@ -36,7 +36,6 @@ def test_onset_in_si(faultgouge_here, tmp_path, damping):
         assert f"{number:.4g}" in done.stderr
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_another_packing_may_be_the_one_that_is_triggered(tmp_path):
     """Its onsets, runs and scene are in files and in the summary of their own, and the report says so.

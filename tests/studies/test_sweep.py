@@ -176,7 +176,6 @@ def test_the_dry_run_counts_and_computes_nothing(faultgouge, tmp_path):
 
 
 @pytest.mark.ranks
-@pytest.mark.slow
 @pytest.mark.long
 def test_one_table_after_kills_on_workers_and_in_shards(tmp_path):
     """Five kills at random moments with one process and with two workers, and three shards: one table to the byte."""
