@@ -66,9 +66,8 @@ def test_rows_come_out_again():
     for found in computed(None, "onset", [named[name] for name in wanted]):
         row = wanted[str(found["values"]["packing.seed"]), found["values"]["law.mu"]]
         result = found["result"]
-        if "contacts" not in result or not row["contacts"]:
-            continue  # one that did not settle, here or there
-        if (str(result["contacts"]), str(result["rattlers"])) == (row["contacts"], row["rattlers"]):
+        # one that did not settle, here or there, has no contacts
+        if (str(result.get("contacts")), str(result.get("rattlers"))) == (row["contacts"], row["rattlers"]):
             same += 1
             assert result["ends"] == row["ends"]
             assert result["reach"] == pytest.approx(float(row["reach"]), rel=1e-6)

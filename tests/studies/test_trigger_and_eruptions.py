@@ -3,18 +3,14 @@
 import json
 
 import pytest
-from reference_layer import REFERENCE, toml
+import tomllib
+from reference_layer import LAYER, toml
 
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.studies.eruptions import eruptions
 from faultgouge.studies.trigger import trigger_map
 
-BASE = {
-    "packing": {"file": str(REFERENCE)},
-    "law": {"kn": 2e5},
-    "load": {"fy": 3.0},
-    "ramp": {"step": 1e-3, "until": 0.025},
-}
+BASE = tomllib.loads(LAYER) | {"ramp": {"step": 1e-3, "until": 0.025}}
 
 
 def cut_off(folder, lines, name):

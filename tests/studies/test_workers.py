@@ -33,16 +33,13 @@ def stripped(row):
     return str({name: value for name, value in row.items() if "seconds" not in name})
 
 
-def test_processes_give_the_rows_of_one(sweep, rows, tmp_path):
-    found = run_sweep(sweep, tmp_path / "out", say=lambda _: None, workers=2)
+def test_processes_and_an_executor_of_somebody_else_give_the_rows_of_one(sweep, rows, tmp_path):
+    found = run_sweep(sweep, tmp_path / "processes", say=id, workers=2)
     assert [row["key"] for row in found] == [point.key for point in sweep.points]
-    assert sorted(stripped(row) for row in found) == rows
-
-
-def test_an_executor_of_somebody_else(sweep, rows, tmp_path):
     with ThreadPoolExecutor(1) as executor:
-        found = run_sweep(sweep, tmp_path / "out", say=lambda _: None, executor=executor)
-    assert sorted(stripped(row) for row in found) == rows
+        others = run_sweep(sweep, tmp_path / "executor", say=id, executor=executor)
+    for each in (found, others):
+        assert sorted(stripped(row) for row in each) == rows
 
 
 def kill_a_worker():
@@ -83,7 +80,7 @@ def test_a_distributed_engine_whose_worker_is_killed_loses_nothing(tmp_path):
     from benchmarks.killed_worker import sweep_of, with_a_killed_worker, without_times
 
     sweep = sweep_of(40)
-    alone = run_sweep(sweep, tmp_path / "alone", say=lambda _: None, workers=1)
+    alone = run_sweep(sweep, tmp_path / "alone", say=id, workers=1)
     found, killed = with_a_killed_worker(sweep, tmp_path / "cluster", 4)
     assert killed > 0
     assert [row["key"] for row in found] == [point.key for point in sweep.points]
