@@ -8,6 +8,7 @@ from time import sleep
 import numpy as np
 import pytest
 from mpi4py import MPI
+from reference_layer import SMALL
 
 from faultgouge.assessment.left_out.explain import _affordable, _switched, explain
 from faultgouge.assessment.left_out.parts import Cost
@@ -96,14 +97,9 @@ def test_json_holds_everything(paper):
 
 
 def test_of_a_large_packing_a_strip_is_explained():
-    scene = Scene.from_mapping(
-        {
-            "packing": {"disks": 3000, "top": 62, "width": 65.3},
-            "law": {"kn": 2e5},
-            "load": {"fy": 3.0},
-            "perturb": {"fx": 0.0, "time": 1.0, "amplitude": 1e-9, "omega": 1.0, "target": [2999]},
-        }
-    )
+    push = {"fx": 0.0, "time": 1.0, "amplitude": 1e-9, "omega": 1.0, "target": [2999]}
+    large = {"packing": {"disks": 3000, "top": 62, "width": 65.3}, "perturb": push}
+    scene = Scene.from_mapping(SMALL | large)
     strip, remark = _affordable(scene)
     assert "a strip of 400 of the 3000 disks" in remark
     whole = scene.packing

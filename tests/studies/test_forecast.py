@@ -5,19 +5,18 @@ from importlib.resources import files
 from itertools import takewhile
 
 import pytest
-import tomllib
-from reference_layer import LAYER
+from reference_layer import REFERENCE, SMALL
 
 from faultgouge.pywrap import Scene, perturb, reach
 from faultgouge.studies.triggering.forecast import JUMP_SHARE, chosen, forecast
 
-SECTIONS = {"ramp": {"step": 1e-3, "until": 0.004}, "perturb": {"fx": 0.002, "time": 40.0}}
+SCENE = SMALL | {"packing": {"file": str(REFERENCE)}, "ramp": {"step": 1e-3, "until": 0.004}}
 
 
 @pytest.mark.slow
 def test_the_jump_is_that_of_a_run_in_lammps():
     """Weak friction from the first step on, and a load so small that disks move by far less than they overlap."""
-    scene = Scene.from_mapping(tomllib.loads(LAYER) | SECTIONS)
+    scene = Scene.from_mapping(SCENE | {"perturb": {"fx": 0.002, "time": 40.0}})
     *_, start = reach(scene, 0.002)
     foreseen = forecast(start, 0.8, 40.0)
     weak = replace(start, packing=replace(start.packing, law=replace(start.packing.law, mu=0.8)))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference_layer import toml
+from reference_layer import SMALL, toml
 
 from faultgouge.analysis import spectrum, stiffness_matrix
 from faultgouge.analysis.onset import LIMITS
@@ -17,10 +17,8 @@ from faultgouge.studies.modes.sets import sets
 from faultgouge.studies.modes.sliced import sliced
 from faultgouge.studies.packings import sliding
 
-SCENE = {
+SCENE = SMALL | {
     "packing": {"disks": 60, "width": 9.2, "seed": 77},
-    "law": {"kn": 2e5},
-    "load": {"fy": 3.0},
     "ramp": {"step": 0.03, "until": 0.9},
     "modes": {"fx_over_fy": [0.02, 0.1, 0.2]},
 }

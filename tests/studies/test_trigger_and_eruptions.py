@@ -3,14 +3,13 @@
 import json
 
 import pytest
-import tomllib
-from reference_layer import LAYER, toml
+from reference_layer import REFERENCE, SMALL, toml
 
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.studies.eruptions import eruptions
 from faultgouge.studies.trigger import trigger_map
 
-BASE = tomllib.loads(LAYER) | {"ramp": {"step": 1e-3, "until": 0.025}}
+BASE = SMALL | {"packing": {"file": str(REFERENCE)}, "ramp": {"step": 1e-3, "until": 0.025}}
 
 
 def cut_off(folder, lines, name):

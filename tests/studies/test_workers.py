@@ -15,12 +15,11 @@ from faultgouge.studies.sweep.workers import WorkerError, computed
 
 pytestmark = pytest.mark.slow
 
-SWEEP = {"task": "onset", "sweep": {"packing.seed": "1:3", "law.mu": [1.0, 0.5, -1.0]}, "scene": SMALL}
-
 
 @pytest.fixture(scope="module")
 def sweep():
-    return Sweep.from_mapping(SWEEP, TASKS)
+    axes = {"packing.seed": "1:3", "law.mu": [1.0, 0.5, -1.0]}
+    return Sweep.from_mapping({"task": "onset", "sweep": axes, "scene": SMALL}, TASKS)
 
 
 @pytest.fixture(scope="module")
@@ -42,19 +41,14 @@ def test_processes_and_an_executor_of_somebody_else_give_the_rows_of_one(sweep, 
         assert sorted(stripped(row) for row in each) == rows
 
 
-def kill_a_worker():
-    workers = [process for process in multiprocessing.active_children() if process.is_alive()]
-    assert len(workers) == 2
-    workers[0].kill()
-
-
 @pytest.mark.long
 def test_a_killed_worker_takes_nothing_with_it(sweep, rows):
     found = []
     with hands(2) as pool:
         for row in computed(pool, sweep.task, sweep.points):
             if not found:
-                kill_a_worker()
+                one, _ = multiprocessing.active_children()
+                one.kill()
             found.append(stripped(row))
     assert sorted(found) == rows
 
