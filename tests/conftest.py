@@ -32,9 +32,13 @@ LIMIT = 1800
 """Seconds for one command on a busy machine."""
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of several ranks come first: xdist begins with a long run of tests for each worker, so that one worker has
-    all of these and the other does not wait for its turn."""
+    """What is long is slow, too. Tests of several ranks come first: xdist begins with a long run of tests for each
+    worker, so that one worker has all of these and the other does not wait for its turn."""
+    for item in items:
+        if item.get_closest_marker("long") is not None:
+            item.add_marker("slow")
     items.sort(key=lambda item: item.get_closest_marker("ranks") is None)
 
 

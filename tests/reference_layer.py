@@ -9,6 +9,12 @@ BIN = Path(sys.executable).parent
 REFERENCE = Path(__file__).parent / "reference" / "packing7.json"
 
 
+def parted(path):
+    """A JSON file without its numbers, and these: logarithms and sums differ by the processor, by 4e-14 at the most."""
+    numbers = []
+    return json.loads(path.read_text(), parse_float=lambda number: numbers.append(float(number))), numbers
+
+
 def toml(scene, prefix=""):
     """A scene as the text of a TOML file, each section with a prefix to its name."""
     return "".join(

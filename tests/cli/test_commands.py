@@ -41,7 +41,6 @@ def test_ramp_as_json(whole):
         assert json.loads(file.attributes["scene"])["ramp"]["until"] == 4e-3
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_a_ramp_says_which_way_it_took(faultgouge, tmp_path):
     """Of this packing, halved increments end before 0.0785; the same command again reads the way from the file."""
@@ -137,7 +136,6 @@ def test_spectrum_from_run_file_and_from_memory(faultgouge_here, whole):
     assert [float(word) for word in first.split()] == printed["eigenvalues"][0]
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_spectrum_says_how_far_a_stable_packing_moves(faultgouge, tmp_path):
     small = {"packing": {"disks": 30, "seed": 4}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}

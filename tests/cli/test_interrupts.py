@@ -113,7 +113,6 @@ def simulates(folder):
         ("sweep sweep.toml -o out", "out/results.jsonl has the scenes that have ended; the same command goes on from"),
     ],
 )
-@pytest.mark.slow
 @pytest.mark.long
 def test_what_is_kept_is_said(tmp_path, command, says):
     (tmp_path / "sweep.toml").write_text(SWEEP)
@@ -126,7 +125,6 @@ def test_what_is_kept_is_said(tmp_path, command, says):
 LARGE = SWEPT | {"packing": {"disks": 5000, "seed": 1, "width": 84.3}, "ramp": {"step": 4e-4, "until": 0.02}}
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_a_long_search_goes_on_to_the_bit(faultgouge, tmp_path):
     """Killed, interrupted and continued on one process; and in one piece."""

@@ -22,7 +22,6 @@ def test_a_packing(beyond, suffix, faultgouge_in):
     assert (beyond / f"packing.{suffix}").stat().st_size > 10_000
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_the_pair_before_and_after_the_onset(beyond, faultgouge_in):
     before = faultgouge_in(beyond, "draw", "ramp.h5", "--frame", "3", "--mode", "pair", "-o", "before.png")
@@ -31,7 +30,6 @@ def test_the_pair_before_and_after_the_onset(beyond, faultgouge_in):
     assert re.search(r"mode \d+: lambda = [\d.]+ \+- [\d.]+ i, participation ratio 0\.\d+, rotation", after.stderr)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_films_of_a_run_a_ramp_and_a_mode(beyond, faultgouge_in):
     for name, more in (("perturb", ()), ("ramp", ()), ("ramp", ("--mode", "pair"))):

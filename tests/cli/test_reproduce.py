@@ -24,7 +24,6 @@ def is_complete(path):
         return file.complete
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_reproduce(faultgouge, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)

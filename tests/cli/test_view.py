@@ -22,7 +22,6 @@ def test_one_packing_has_a_pair(reference_packing):
         assert abs(course.values[0] - value).min() < 1e-6 * abs(value)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_few_eigenvalues_show_the_pair_that_all_show(beyond):
     """What a large packing has: the same pair at each load, and the eigenvalues that are closest to the pair."""
@@ -60,7 +59,6 @@ MARKS = """(() => { const m = Bokeh.documents[0].get_model_by_name('marks').data
 """Angles of the marks on the disks, from the vertical."""
 
 
-@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1440, 390])

@@ -12,7 +12,6 @@ from faultgouge.analysis import RunFile
 HOWTO = Path(__file__).parents[2] / "docs" / "howto_own_packing.md"
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_from_a_pour_to_the_film_of_the_mode(tmp_path):
     text = HOWTO.read_text()

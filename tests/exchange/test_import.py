@@ -170,7 +170,6 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge_here, reference_
 
 
 @pytest.mark.ranks
-@pytest.mark.slow
 @pytest.mark.long
 def test_disks_with_slips_come_to_rest_with_friction_on_any_number_of_ranks(tmp_path, faultgouge, sheared):
     rounded = replace(sheared, position=np.round(sheared.position, 6))  # forces of 1e-2 out of balance

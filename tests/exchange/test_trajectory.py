@@ -73,7 +73,6 @@ def test_a_universe_of_the_file_has_radii_masses_and_layer(run, mdanalysis, ours
             np.testing.assert_array_equal(frame.data["position_low"], low[k - 1])
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_d_of_t_in_mdanalysis_is_that_of_the_run(run, mdanalysis, ours):
     path, packing, _ = run

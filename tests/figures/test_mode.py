@@ -33,14 +33,10 @@ def test_participation_and_rotation_of_plain_motions():
     np.testing.assert_allclose(rotation_share(columns), [0, 0, 1], rtol=1e-15)
 
 
-def test_normal_modes_are_those_of_the_spectrum(pyramid):
+def test_normal_modes_are_those_of_the_spectrum_and_the_closest_have_the_largest_cosine(pyramid):
     modes = normal_modes(pyramid)
     np.testing.assert_array_equal(modes.values.real, spectrum(pyramid).eigenvalues.real)
     assert np.all((modes.participation >= 1 / 3) & (modes.participation <= 1 + 1e-12))
-
-
-def test_the_two_closest_to_meeting_have_the_largest_cosine(pyramid):
-    modes = normal_modes(pyramid)
     first, second, cosine = closest_to_meeting(modes)
     right = modes.right.real
     others = [abs(right[:, a] @ right[:, b]) for a in range(len(right.T)) for b in range(a)]

@@ -21,10 +21,7 @@ def curves() -> list[PairCurve]:
 
 def test_coalescence_shows_both_members_of_every_pair(curves):
     real, imaginary = draw_pair(curves).axes[:2]
-    assert (real.get_ylabel(), imaginary.get_ylabel()) == (
-        r"$\mathrm{Re}\,\lambda$",
-        r"$\mathrm{Im}\,\lambda$",
-    )
+    assert [each.get_ylabel() for each in (real, imaginary)] == [r"$\mathrm{Re}\,\lambda$", r"$\mathrm{Im}\,\lambda$"]
     assert imaginary.get_xlabel() == "$F_x$"
     drawn = [line for line in real.lines if len(line.get_xdata()) == len(curves[0].fx)]
     assert len(drawn) == 4
@@ -43,7 +40,7 @@ def test_conjugates_have_both_halves_in_one_colour(curves):
         assert above.get_ydata()[-1] == pytest.approx(np.sqrt(0.03 - curve.fx_c), rel=1e-12)  # one root
 
 
-def test_the_inset_counts_from_the_first_onset(curves):
+def test_the_inset_counts_from_the_first_onset_if_there_is_one(curves):
     (inset,) = draw_pair(curves).axes[1].child_axes
     left, right = inset.get_xlim()
     assert left == -right
@@ -51,8 +48,5 @@ def test_the_inset_counts_from_the_first_onset(curves):
     upper = inset.lines[1]
     beyond = upper.get_xdata() > 1e-9
     np.testing.assert_allclose(upper.get_ydata()[beyond], np.sqrt(1e-3 * upper.get_xdata()[beyond]), rtol=1e-9)
-
-
-def test_without_an_onset_there_is_no_inset(curves):
     stable = replace(curves[0], fx_c=None)
     assert draw_pair([stable]).axes[1].child_axes == []

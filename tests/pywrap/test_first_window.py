@@ -11,7 +11,6 @@ from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.runs.path import EquilibriumPath, loads
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_no_pair_is_complex_below_the_first_window():
     """360 disks, whose first pair is complex by 3e-5 of itself: by less than clusters of modes may be in error."""

@@ -44,7 +44,6 @@ def frequency(time, signal):
     return abs(np.log(0.5 * (a + np.sqrt(complex(a * a + 4 * b)))).imag) / np.diff(time).mean()
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_growth_rate_and_frequency_are_those_of_the_spectrum(loaded):
     """Over six decades of D, from a small start along the pair that coalesces first."""
@@ -64,7 +63,6 @@ def test_growth_rate_and_frequency_are_those_of_the_spectrum(loaded):
     assert frequency(time[linear], velocity[linear]) == pytest.approx(omega.real, rel=1e-3)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_rounding_noise_grows_by_fifteen_decades(loaded):
     """Nothing but noise to begin with: D rises from 1e-25 by fifteen decades, most of them at the spectrum's rate."""
@@ -84,7 +82,6 @@ def displacement(packing, reference):
     return np.concatenate([moved[:, 0], moved[:, 1], packing.scaled_angle - reference.scaled_angle])
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_the_worst_start_grows_as_predicted(loaded):
     """A start of 1e-8 along it, below the onset at 0.02183: far below the slip limits, and far above rounding."""
@@ -114,7 +111,6 @@ def path():
         yield found
 
 
-@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize(("fx", "cn", "unstable"), [(0.0155, 3.0, 1), (0.015, 3.0, 0)])
 def test_growth_with_dashpots_is_that_of_the_eigenvalue(path, fx, cn, unstable):

@@ -73,7 +73,6 @@ def test_the_way_to_an_equilibrium_is_kept(tmp_path, equilibria):
 
 
 @pytest.mark.parametrize("share", [1e-9, math.inf], ids=["saved at the end", "saved at once"])
-@pytest.mark.slow
 @pytest.mark.long
 def test_what_is_said_is_what_is_stored(tmp_path, monkeypatch, begun, equilibria, share):
     monkeypatch.setattr(sealedfile, "SHARE_OF_SAVING", share)

@@ -24,9 +24,7 @@ def test_the_limits_are_known_better_than_the_errors_that_they_judge():
     assert FINER >= 20
     assert all(case.uncertain < 0.1 * case.stated for case in CASES if case.precision == "compensated")
     assert all(case.uncertain < 1.5 * case.stated for case in CASES)
-
-
-def test_the_limit_of_an_independent_code():
+    # of an independent code
     named = next(case for case in CASES if case.number == 0)
     assert named.kind == "damped"
     assert named.limit == pytest.approx(0.039834, abs=8e-6)

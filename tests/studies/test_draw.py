@@ -1,4 +1,4 @@
-"""What the figures of the protocol contain: laws, runs, fits, and names on their axes."""
+"""What the figures of studies contain: laws, runs, fits, and names on their axes."""
 
 from dataclasses import replace
 
@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Growth
-from faultgouge.analysis.motion.power_law import PowerLaw, fit_power_law
+from faultgouge.analysis.motion.power_law import PowerLaw
 from faultgouge.analysis.onset.pair_form import PairForm
 from faultgouge.analysis.spectrum.normal_form import NormalForm
 from faultgouge.pywrap.lammps.dynamics import Weakening
+from faultgouge.studies.dissipation.draw import dissipation_figure
 from faultgouge.studies.reproduce.draw import growth_figure
 from faultgouge.studies.triggering.compute import Sensitivity
 from faultgouge.studies.triggering.draw import (
@@ -86,13 +87,15 @@ def normal_pairs(*epsilons):
 
 
 def test_amplitudes_carry_their_exponent():
-    distance = np.geomspace(1e-7, 1e-1, 3)
+    distance = np.array([1e-7, 1e-2, 0.5])
     found = Sensitivity(distance, normal_pairs(*distance), PowerLaw(-0.49989, 3e-5, 1.4))
     figure = amplitude_figure(found)
     _, fitted, points = figure.axes[0].lines
-    np.testing.assert_allclose(fitted.get_ydata(), 1.4 * np.array([1e-7, 1e-1]) ** -0.49989)
+    np.testing.assert_allclose(fitted.get_ydata(), 1.4 * np.array([1e-7, 0.5]) ** -0.49989)
     np.testing.assert_array_equal(points.get_ydata(), [pair.amplitude() for pair in found.pairs])
     assert "slope $-0.49989(3)$" in texts(figure)
+    # of a response of less than four times the start no damping takes half
+    assert found.near == found.pairs[:2]
 
 
 def test_damping_marks_its_crossover():
@@ -133,9 +136,23 @@ def test_growth_draws_the_predicted_slope_beside_the_data():
     assert all(words in texts(axes.figure) for words in ("= 0.4$", "= 0.402$", "+0.5"))
 
 
-def test_pairs_far_from_coalescence_have_no_crossover_with_damping():
-    """The report leaves out what half of a response of less than four times the start would be."""
-    pairs = normal_pairs(0.01, 0.5)
-    found = Sensitivity(np.array([0.01, 0.5]), pairs, fit_power_law([0.01, 0.1, 0.5], [10.0, 3.0, 1.5]))
-    assert found.near == pairs[:1]
-    assert found.near[0].half_gain_time() > 0
+def test_dissipation_shows_predictions_and_onsets_and_where_there_is_no_gain():
+    strength, limit, undamped = np.geomspace(1e-4, 1e2, 7), 0.0148, 0.015
+    crossover, distance = undamped + 1e-3 * strength**2, np.geomspace(1e-6, 1e-1, 6)
+    lowered = [{"strength": x, "onset": limit + 1e-5 * x, "predicted": limit, "undamped": undamped} for x in strength]
+    raised = [
+        {"strength": x, "onset": fx, "predicted": fx, "undamped": undamped}
+        for x, fx in zip(strength, crossover, strict=True)
+    ]
+    gains = {
+        "none": [{"distance": x, "gain": 2 / x} for x in distance],
+        "dashpots": [{"distance": x, "gain": None if x < 1e-3 else 1 / x} for x in distance],
+    }
+    dashpots, drag, gain = dissipation_figure(lowered, raised, gains).axes
+    assert dashpots.get_xscale() == "log"
+    assert [set(line.get_ydata()) for line in dashpots.lines[:2]] == [{undamped}, {limit}]
+    assert np.array_equal(dashpots.lines[2].get_ydata(), limit + 1e-5 * strength)
+    predicted, measured = (line.get_ydata() for line in drag.lines)
+    assert measured == pytest.approx(1e-3 * strength**2, rel=1e-6)
+    assert predicted == pytest.approx(measured)
+    assert [np.isnan(line.get_ydata()).sum() for line in gain.lines] == [0, 3]

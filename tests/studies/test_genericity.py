@@ -53,7 +53,6 @@ def test_the_sweep_that_ships_is_that_of_the_study():
     assert [point.key for point in shipped.points] == [point.key for point in sets(1.0)["onsets"].points]
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_rows_come_out_again():
     """The onsets of a random tenth of the packings, of those that this build settles as the build of the tables did."""
@@ -67,9 +66,8 @@ def test_rows_come_out_again():
     for found in computed(None, "onset", [named[name] for name in wanted]):
         row = wanted[str(found["values"]["packing.seed"]), found["values"]["law.mu"]]
         result = found["result"]
-        if "contacts" not in result or not row["contacts"]:
-            continue  # one that did not settle, here or there
-        if (str(result["contacts"]), str(result["rattlers"])) == (row["contacts"], row["rattlers"]):
+        # one that did not settle, here or there, has no contacts
+        if (str(result.get("contacts")), str(result.get("rattlers"))) == (row["contacts"], row["rattlers"]):
             same += 1
             assert result["ends"] == row["ends"]
             assert result["reach"] == pytest.approx(float(row["reach"]), rel=1e-6)

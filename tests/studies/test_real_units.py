@@ -3,17 +3,15 @@
 import json
 
 import pytest
-from reference_layer import UNITS, toml
+from reference_layer import SMALL, UNITS, toml
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.scenes.units import real_units
 from faultgouge.studies.reproduce import reproduce
 
-SECTIONS = {
+SECTIONS = SMALL | {
     "packing": {"disks": 30, "seed": 4},
-    "law": {"kn": 2e5},
-    "load": {"fy": 3.0},
     "ramp": {"step": 4e-3, "until": 0.012},
     "perturb": {"fx": 0.011, "time": 1.0, "amplitude": 5e-10, "omega": 0.01},
     "friction": {"v_ss": "10 v0"},
@@ -36,7 +34,6 @@ def test_onset_in_si(faultgouge_here, tmp_path, damping):
         assert f"{number:.4g}" in done.stderr
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_another_packing_may_be_the_one_that_is_triggered(tmp_path):
     """Its onsets, runs and scene are in files and in the summary of their own, and the report says so.

@@ -33,33 +33,20 @@ def test_the_shipped_packing_is_the_reference(settings, reference):
     assert settings.scene.law.mus[0] == reference["cases"][0]["mu"]
 
 
-@pytest.fixture(scope="module")
-def sheared(settings):
-    """The packing at F_x = 0.02, some of its contacts brought to sliding, and one disk turned."""
-    packing = settings.at(0.02).packing
-    limit = packing.law.slip_limit(packing.geometry.overlap)
-    slip = np.where(np.arange(len(limit)) % 7 == 0, np.sign(packing.contacts.slip) * 2 * limit, packing.contacts.slip)
-    return replace(packing, contacts=replace(packing.contacts, slip=slip))
-
-
-@pytest.fixture(scope="module")
-def exact_end():
-    """Where the three disks are in the end: LAMMPS with 51,200 steps errs by 2e-9."""
-    packing = trajectory.three_disks()
+def test_order_of_the_tangent_which_needs_three_points():
+    """Of the end of a run of three disks, where LAMMPS with 51,200 steps errs by 2e-9."""
+    packing, points = trajectory.three_disks(), []
     with Engine(packing) as engine:
-        return trajectory.in_lammps(engine, packing, 51_200)
-
-
-@pytest.mark.parametrize(("tangent", "order"), [("midpoint", 2), ("end", 1)])
-def test_order_of_the_tangent(exact_end, tangent, order):
-    packing = trajectory.three_disks()
-    points = []
-    for steps in (200, 400, 800, 1600):
-        end = trajectory.verlet(packing, tangent, trajectory.TIME / steps, steps)
-        points.append(Point(tangent, trajectory.TIME / steps, np.abs(end - exact_end).max(), 1.0, steps))
-    fitted = fit_order(points, tangent, order)
-    assert fitted.order == pytest.approx(order, abs=0.05)
-    assert fitted.error < 0.05
+        exact = trajectory.in_lammps(engine, packing, 51_200)
+    for tangent, order in (("midpoint", 2), ("end", 1)):
+        for steps in (200, 400, 800, 1600):
+            end = trajectory.verlet(packing, tangent, trajectory.TIME / steps, steps)
+            points.append(Point(tangent, trajectory.TIME / steps, np.abs(end - exact).max(), 1.0, steps))
+        fitted = fit_order(points, tangent, order)
+        assert fitted.order == pytest.approx(order, abs=0.05)
+        assert fitted.error < 0.05
+    with pytest.raises(ValueError, match="an order needs 3"):
+        fit_order(points, "end", 1, least=1.0)
 
 
 def test_the_three_disks_slide_and_stick():
@@ -73,23 +60,20 @@ def test_the_three_disks_slide_and_stick():
     assert np.sum(shares[-1] < 0.9) == 2
 
 
-def test_an_order_needs_three_points_of_its_method():
-    points = [Point("m", 0.1 * 2.0**-k, 3 * 4.0**-k, 1.0, k) for k in range(4)]
-    assert fit_order([*points, Point("other", 1.0, 1.0, 1.0, 1)], "m", 2).order == pytest.approx(2)
-    with pytest.raises(ValueError, match="an order needs 3"):
-        fit_order(points, "m", 2, least=0.5)
-
-
 def test_jobs_take_turns_that_begin_with_either():
     calls = []
     results, seconds = in_turns([lambda: calls.append("a") or "A", lambda: calls.append("b") or "B"], 3)
     assert calls == ["a", "b", "b", "a", "a", "b"]
     assert results == ["A", "B"]
-    assert seconds.shape == (3, 2)
-    assert np.all(seconds > 0)
+    assert seconds.min() > 0
 
 
-def test_complex_steps_and_differences_give_the_jacobian(sheared):
+def test_complex_steps_and_differences_give_the_jacobian(settings):
+    """With some of the contacts brought to sliding."""
+    packing = settings.at(0.02).packing
+    limit = packing.law.slip_limit(packing.geometry.overlap)
+    slip = np.where(np.arange(len(limit)) % 7 == 0, np.sign(packing.contacts.slip) * 2 * limit, packing.contacts.slip)
+    sheared = replace(packing, contacts=replace(packing.contacts, slip=slip))
     analytic = stiffness_matrix(sheared).toarray()
     scale = np.abs(analytic).max()
     # the rounding of the smallest overlap, 5e-6, in units of the largest element
@@ -107,15 +91,11 @@ def test_refined_eigenvalue_has_the_digits_it_says():
         exact = mpmath.eig(mpmath.matrix(matrix.tolist()))[0]
         for value, vector in zip(values, vectors.T, strict=True):
             found = refined(matrix, complex(value), vector.astype(complex), condition=3.0)
-            number = mpmath.mpc(*(mpmath.mpf(_exact(part)) for part in (found.value.real, found.value.imag)))
+            # a long double is the sum of two doubles
+            high = complex(found.value)
+            number = mpmath.mpc(high) + mpmath.mpc(complex(found.value - np.clongdouble(high)))
             assert min(abs(number - each) for each in exact) < found.error
             assert found.error < 1e3 * np.finfo(np.longdouble).eps
-
-
-def _exact(number):
-    """A longdouble as a sum of two doubles, as text with all its digits."""
-    high = float(number)
-    return mpmath.mpf(high) + mpmath.mpf(float(number - np.longdouble(high)))
 
 
 def test_fire_finds_the_root_of_forces_without_energy():
@@ -129,30 +109,22 @@ def test_fire_finds_the_root_of_forces_without_energy():
     assert 10 < evaluations < 2000
 
 
-@pytest.fixture
-def increment(settings):
-    start = settings.at(relaxation.FROM)
-    with Engine(start.packing) as engine:
-        end = settings.at(relaxation.TO).packing
-        yield relaxation.Increment(engine, start, end)
-
-
 @pytest.mark.slow
-def test_all_ways_lead_to_one_equilibrium(increment):
-    step = 0.9 * 2 / spectrum(increment.end).omega_max
-    for way, least in (
-        (lambda: increment.verlet(step, 10.0, 1000), 1e-12),
-        (lambda: increment.fire(step, 1e-6), 1e-7),
-        (lambda: increment.newton(None), 1e-12),
-        (lambda: increment.overdamped(None, 1e-8), 1e-9),
-    ):
-        packing, evaluations = way()
-        assert increment.distance(packing) < least < increment.distance(increment.start.packing)
-        assert evaluations > 0
-
-
-def test_a_relaxations_time_step_is_its_own(increment):
-    steps = [increment.overdamped(time_step, 1e-4)[1] for time_step in (None, 4e-5, None)]
+def test_all_ways_lead_to_one_equilibrium_and_a_relaxations_time_step_is_its_own(settings):
+    start, end = settings.at(relaxation.FROM), settings.at(relaxation.TO).packing
+    step = 0.9 * 2 / spectrum(end).omega_max
+    with Engine(start.packing) as engine:
+        increment = relaxation.Increment(engine, start, end)
+        for way, least in (
+            (lambda: increment.verlet(step, 10.0, 1000), 1e-12),
+            (lambda: increment.fire(step, 1e-6), 1e-7),
+            (lambda: increment.newton(None), 1e-12),
+            (lambda: increment.overdamped(None, 1e-8), 1e-9),
+        ):
+            packing, evaluations = way()
+            assert increment.distance(packing) < least < increment.distance(start.packing)
+            assert evaluations > 0
+        steps = [increment.overdamped(time_step, 1e-4)[1] for time_step in (None, 4e-5, None)]
     assert steps[0] == steps[2] > steps[1]
 
 
@@ -179,8 +151,6 @@ def test_a_study_that_fails_does_not_take_the_others_along(tmp_path):
     result = json.loads((tmp_path / "report.json").read_text())
     assert result["failed"] == [{"name": "broken", "says": "ValueError: the reason"}]
     (study,) = result["studies"]
-    assert study["name"] == "files"
-    assert study["reference_error"] > 0
     assert all(set(point) == POINT for point in study["points"])
     errors = {(point["method"], point["parameter"]): point["error"] for point in study["points"]}
     assert errors[dumps.HDF5, None] == errors[dumps.TEXT, 17] == 0
@@ -191,44 +161,38 @@ def test_a_study_that_fails_does_not_take_the_others_along(tmp_path):
     text = (tmp_path / "report.md").read_text()
     assert "the reason" in text
     assert "(files.png)" in text
-    assert (tmp_path / "files.png").stat().st_size > 10_000
     assert len(said) == 2
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_quick_report(faultgouge, tmp_path):
     faultgouge("report", "--quick", "-o", "report")
-    result = json.loads((tmp_path / "report" / "report.json").read_text())
-    assert [study["name"] for study in result["studies"]] == list(page.STUDIES)
-    orders = [order for study in result["studies"] for order in study["orders"]]
+    folder = tmp_path / "report"
+    studies = {study["name"]: study for study in json.loads((folder / "report.json").read_text())["studies"]}
+    assert list(studies) == list(page.STUDIES)
+    orders = [order for study in studies.values() for order in study["orders"]]
     assert len(orders) == 5
     for order in orders:
         assert order["order"] == pytest.approx(order["expected"], abs=0.05)
-    for study in result["studies"]:
+    best = {}
+    for name, study in studies.items():
         assert study["reference_error"] > 0
         assert all(point["error"] >= 0 and point["seconds"] > 0 for point in study["points"])
-        assert (tmp_path / "report" / f"{page.stem(study['name'])}.png").stat().st_size > 10_000
-    (onset,) = (study for study in result["studies"] if study["name"] == "onset")
+        assert (folder / f"{page.stem(name)}.png").stat().st_size > 10_000
+        for point in study["points"]:
+            key = name, point["method"]
+            best[key] = min(point["error"], best.get(key, np.inf))
+    onset = studies["onset"]
     assert {(case["arithmetic"], case["increment"]) for case in onset["covered"]} == {
         (arithmetic, increment) for arithmetic in ("doubles", "compensated") for increment in (2e-3, 1e-3)
     }
     assert all(case["true"] <= case["stated"] for case in onset["covered"])
-    assert "covers the true one in 4 of 4 cases" in (tmp_path / "report" / "report.md").read_text()
-    assert (tmp_path / "report" / "onset-coverage.png").stat().st_size > 10_000
-    best = {
-        study["name"]: {
-            method: min(point["error"] for point in study["points"] if point["method"] == method)
-            for method in {point["method"] for point in study["points"]}
-        }
-        for study in result["studies"]
-    }
+    assert "covers the true one in 4 of 4 cases" in (folder / "report.md").read_text()
+    assert (folder / "onset-coverage.png").stat().st_size > 10_000
     assert all(case["limit"] is not None for case in onset["changing"])
     assert onset["again"]
-    assert best["onset"]["root of the discriminant"] < 1e-8 < best["onset"]["scan, Newton"]
-    # that of an independent code
-    question = next(study["question"] for study in result["studies"] if study["name"] == "onset")
-    assert "F_x^c = 0.02183305641" in question
-    assert best["relaxation"]["Newton, compensated"] < 1e-18
-    assert best["relaxation"]["Newton"] < 1e-12
-    assert best["Jacobian"]["analytic"] < 1e-11 < best["Jacobian"]["central differences"]
+    assert "F_x^c = 0.02183305641" in onset["question"]  # that of an independent code
+    assert best["onset", "root of the discriminant"] < 1e-8 < best["onset", "scan, Newton"]
+    assert best["relaxation", "Newton, compensated"] < 1e-18
+    assert best["relaxation", "Newton"] < 1e-12
+    assert best["Jacobian", "analytic"] < 1e-11 < best["Jacobian", "central differences"]

@@ -3,18 +3,13 @@
 import json
 
 import pytest
-from reference_layer import REFERENCE, toml
+from reference_layer import REFERENCE, SMALL, toml
 
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.studies.eruptions import eruptions
 from faultgouge.studies.trigger import trigger_map
 
-BASE = {
-    "packing": {"file": str(REFERENCE)},
-    "law": {"kn": 2e5},
-    "load": {"fy": 3.0},
-    "ramp": {"step": 1e-3, "until": 0.025},
-}
+BASE = SMALL | {"packing": {"file": str(REFERENCE)}, "ramp": {"step": 1e-3, "until": 0.025}}
 
 
 def cut_off(folder, lines, name):
@@ -25,7 +20,6 @@ def cut_off(folder, lines, name):
     return cut
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_prediction_is_what_lammps_bisects(tmp_path):
     trigger = {"distance": [0.1, 1e-3], "omega": [1.0, 14.0], "time": 4.0, "runs": 2}
@@ -71,7 +65,6 @@ def test_trigger_needs_a_threshold(tmp_path, friction, says):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_eruptions_that_were_cut_off_are_those_of_one_run(tmp_path):
     """To the bit, though the loads that are known are not run again."""
@@ -84,7 +77,6 @@ def test_eruptions_that_were_cut_off_are_those_of_one_run(tmp_path):
 
 
 @pytest.mark.ranks
-@pytest.mark.slow
 @pytest.mark.long
 def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(faultgouge, tmp_path):
     """Above the onset, 0.0218, D grows, but not to its end in the time that is given; with strong drag nothing does."""

@@ -15,12 +15,11 @@ from faultgouge.studies.sweep.workers import WorkerError, computed
 
 pytestmark = pytest.mark.slow
 
-SWEEP = {"task": "onset", "sweep": {"packing.seed": "1:3", "law.mu": [1.0, 0.5, -1.0]}, "scene": SMALL}
-
 
 @pytest.fixture(scope="module")
 def sweep():
-    return Sweep.from_mapping(SWEEP, TASKS)
+    axes = {"packing.seed": "1:3", "law.mu": [1.0, 0.5, -1.0]}
+    return Sweep.from_mapping({"task": "onset", "sweep": axes, "scene": SMALL}, TASKS)
 
 
 @pytest.fixture(scope="module")
@@ -33,22 +32,13 @@ def stripped(row):
     return str({name: value for name, value in row.items() if "seconds" not in name})
 
 
-def test_processes_give_the_rows_of_one(sweep, rows, tmp_path):
-    found = run_sweep(sweep, tmp_path / "out", say=lambda _: None, workers=2)
+def test_processes_and_an_executor_of_somebody_else_give_the_rows_of_one(sweep, rows, tmp_path):
+    found = run_sweep(sweep, tmp_path / "processes", say=id, workers=2)
     assert [row["key"] for row in found] == [point.key for point in sweep.points]
-    assert sorted(stripped(row) for row in found) == rows
-
-
-def test_an_executor_of_somebody_else(sweep, rows, tmp_path):
     with ThreadPoolExecutor(1) as executor:
-        found = run_sweep(sweep, tmp_path / "out", say=lambda _: None, executor=executor)
-    assert sorted(stripped(row) for row in found) == rows
-
-
-def kill_a_worker():
-    workers = [process for process in multiprocessing.active_children() if process.is_alive()]
-    assert len(workers) == 2
-    workers[0].kill()
+        others = run_sweep(sweep, tmp_path / "executor", say=id, executor=executor)
+    for each in (found, others):
+        assert sorted(stripped(row) for row in each) == rows
 
 
 @pytest.mark.long
@@ -57,7 +47,8 @@ def test_a_killed_worker_takes_nothing_with_it(sweep, rows):
     with hands(2) as pool:
         for row in computed(pool, sweep.task, sweep.points):
             if not found:
-                kill_a_worker()
+                one, _ = multiprocessing.active_children()
+                one.kill()
             found.append(stripped(row))
     assert sorted(found) == rows
 
@@ -83,7 +74,7 @@ def test_a_distributed_engine_whose_worker_is_killed_loses_nothing(tmp_path):
     from benchmarks.killed_worker import sweep_of, with_a_killed_worker, without_times
 
     sweep = sweep_of(40)
-    alone = run_sweep(sweep, tmp_path / "alone", say=lambda _: None, workers=1)
+    alone = run_sweep(sweep, tmp_path / "alone", say=id, workers=1)
     found, killed = with_a_killed_worker(sweep, tmp_path / "cluster", 4)
     assert killed > 0
     assert [row["key"] for row in found] == [point.key for point in sweep.points]

@@ -1,5 +1,6 @@
-"""The page of the study of yield says what its table says."""
+"""The pages of the study of yield say what its tables say, and other pages say the same."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,44 +8,33 @@ import pytest
 
 from faultgouge.studies.packings import distance
 from faultgouge.studies.yielding.compute import CONTROLLED
-from faultgouge.studies.yielding.page import numbers, rows_of, text
+from faultgouge.studies.yielding.page import numbers, rows_of, text, write_lasting
 
-FOLDER = Path(__file__).parents[2] / "docs" / "yield"
+DOCS = Path(__file__).parents[2] / "docs"
+ROWS, FAILED = rows_of(DOCS / "yield" / "tables" / "quartz_100.jsonl")
 
 
 def test_the_page_is_that_of_its_table():
-    rows, failed = rows_of(FOLDER / "tables" / "quartz_100.jsonl")
-    assert (FOLDER / "yield.md").read_text() == text(numbers(rows), len(rows), failed)
-
-
-def test_the_static_yield_lies_beyond_the_end_of_newtons_branch():
-    rows, _ = rows_of(FOLDER / "tables" / "quartz_100.jsonl")
-    assert all(row["static"] >= row["newton"] for row in rows)
+    assert (DOCS / "yield" / "yield.md").read_text() == text(numbers(ROWS), len(ROWS), FAILED)
 
 
 def test_layers_without_loss_flow_below_their_static_yield_and_lossy_ones_do_not():
-    rows, _ = rows_of(FOLDER / "tables" / "quartz_100.jsonl")
-    undamped, *lossy = numbers(rows)["yields"]
-    assert undamped["flow"] > len(rows) / 2
+    assert all(row["static"] >= row["newton"] for row in ROWS)
+    undamped, *lossy = numbers(ROWS)["yields"]
+    assert undamped["flow"] > len(ROWS) / 2
     assert undamped["share"][2] < 1
-    assert all(each["flow"] == 0 for each in lossy)
-    assert all(each["share"] == [1, 1, 1] for each in lossy)
+    assert all(each["flow"] == 0 and each["share"] == [1, 1, 1] for each in lossy)
 
 
 def test_with_more_loss_the_same_layers_flow_as_the_load_rises():
     """And all of them beyond the end of Newton's branch."""
-    rows, _ = rows_of(FOLDER / "tables" / "quartz_100.jsonl")
-
-    def flowing(loss):
-        runs = [
-            [run for run in row["loading"] if (run["rate"], run["restitution"]) == (CONTROLLED, loss)] for row in rows
-        ]
-        return [k for k, (run,) in enumerate(runs) if run["flows"] is not None]
-
-    assert flowing(0.9) == flowing(0.5) == flowing(0.1) != []
-    for row in rows:
+    flowing = {0.9: [], 0.5: [], 0.1: []}
+    for k, row in enumerate(ROWS):
         for run in row["loading"]:
             assert run["flows"] is None or row["newton"] < run["flows"] < row["static"]
+            if run["rate"] == CONTROLLED and run["flows"] is not None and run["restitution"] in flowing:
+                flowing[run["restitution"]].append(k)
+    assert flowing[0.9] == flowing[0.5] == flowing[0.1] != []
 
 
 def test_disks_that_carry_nothing_have_no_part_in_d(reference_packing):
@@ -53,3 +43,13 @@ def test_disks_that_carry_nothing_have_no_part_in_d(reference_packing):
     position[packing.rattlers] += 1.0
     assert len(packing.rattlers) > 0
     assert distance(packing, replace(packing, position=position)) == pytest.approx(2e-6, rel=1e-9)
+
+
+def test_the_page_of_layers_left_to_themselves_is_that_of_its_tables_and_other_pages_say_the_same(tmp_path):
+    shutil.copytree(DOCS / "yield" / "tables", tmp_path / "tables")
+    written = write_lasting(tmp_path).read_text()
+    assert (DOCS / "yield" / "further.md").read_text() == written
+    referee = " ".join((DOCS / "modes" / "referee.md").read_text().split())
+    assert "restitution 0.9, 5 of 20 (11 to 47 %) layers vibrate" in " ".join(written.split())
+    assert "[lossy layers](../yield/further.md), 5 of 20, vibrate" in referee
+    assert "5 of 20 vibrate on" in referee

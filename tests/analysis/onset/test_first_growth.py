@@ -112,7 +112,6 @@ def test_what_grows_near_a_frequency_is_what_grows_of_all(path):
         assert growing_near(Pencil.of(damped(0.02)), float(rate.imag), 12) == []
 
 
-@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("disks", "seed", "kind"), [(200, 7, {"cn": 1.0}), (200, 4, {"drag_time": 100.0}), (300, 3, {"cn": 0.1})]
@@ -125,7 +124,6 @@ def test_packings_against_all_eigenvalues(disks, seed, kind):
     assert below < 1e-11 < above
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_a_packing_that_dissipation_holds_has_no_window():
     window, rates = first_window_and_rates(200, 1, {"cn": 10.0, "ct": 5.0}, lambda _: [0.0, 0.01, 0.02, 0.03, 0.04])

@@ -299,7 +299,7 @@ def test_modes_that_cross_keep_their_names():
 def test_error_follows_the_noise_of_the_equilibria(noise):
     """Operators only known to `noise`, as from equilibria of finite balance: the error says what is lost."""
     clean, d, errors, misses = normal_form(0.3), 0.3, [], []
-    for seed in range(5):
+    for seed in range(12):
 
         def operator(e, seed=seed):
             rng = np.random.default_rng((abs(hash(e)) + seed) % 2**32)
@@ -312,7 +312,7 @@ def test_error_follows_the_noise_of_the_equilibria(noise):
         assert window.kind == "coalescence"
         errors.append(window.error)
         misses.append(abs(window.fx_onset - d) / window.error)
-    assert len(errors) >= 3
+    assert len(errors) >= 6  # fewer in one of ten thousand; what is drawn depends on the processor's last digits
     # Entries of 50 in a basis of condition 10: noise in D some 1e3 times that of an entry, slope 2.4.
     assert noise < np.median(errors) < 1e4 * noise
     # Two degrees of freedom make a single error uncertain by a factor of two or three: a median of 60 is 0.3.
