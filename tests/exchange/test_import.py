@@ -267,7 +267,7 @@ def test_options_that_do_not_fit(tmp_path, refusal, sheared):
         (("a.dump", "--top", "type:2"), "add --kn --fy"),
         (("a.dump", "--top", "type:2", "--kn", "2e5"), "add --fy"),
         (("a.dump", "--top", "type:2", "--kn", "-1", "--fy", "3"), "law.kn = -1.0 is refused"),
-        (("a.dump", "--top", "type:2", "--scene", "scene.toml", "--kn", "1"), "cannot stand beside --scene"),
+        (("a.dump", "--scene", "scene.toml", "--fx", "0", "--kn", "1"), "--kn cannot stand beside --scene"),
         (("a.dump", "--top", "type:2", *LAW, "--width", "wide"), "--width wide"),
         (("a.dump", "--top", "type:2", *LAW, "--frame", "2"), "no --frame 2"),
         (("b.dump", "--top", "type:2", *LAW), "does not exist"),

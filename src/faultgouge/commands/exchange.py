@@ -194,8 +194,9 @@ def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[st
     from faultgouge.pywrap.settling.bed import law_of, load_of
 
     options = {key: value for key, value in options.items() if value is not None}
-    if scene is not None and options.keys() - {"fx"}:
-        raise typer.BadParameter(f"--{min(options)} cannot stand beside --scene, which decides it: leave one out")
+    decided = [f"--{key.removesuffix('_factor')}" for key in options if key != "fx"]
+    if scene is not None and decided:
+        raise typer.BadParameter(f"{decided[0]} cannot stand beside --scene, which decides it: leave one out")
     values = options if scene else {**disks.given, **options}
     _refuse_gaps(disks, top, scene, values)
     layer = upper_layer(disks, top)
