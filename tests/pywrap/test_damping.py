@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import damping_matrix, largest_damping_rate, largest_frequency, stable_timestep
-from faultgouge.pywrap import Engine, Scene, SceneError, perturb, ramp
+from faultgouge.pywrap import Scene, SceneError, ramp
 from faultgouge.pywrap.runs.undamped import time_step
 
 SCENE = {
@@ -14,49 +14,15 @@ SCENE = {
     "law": {"kn": 2e5},
     "load": {"fy": 3.0},
     "ramp": {"step": 1e-3, "until": 2e-3},
-    "perturb": {"fx": 0.0, "time": 1.0, "amplitude": 1e-6, "omega": 5.0},
 }
-DAMPING = {"cn": 30.0, "ct": 20.0, "tau": 0.2}
+DAMPING = {"damping": {"cn": 30.0, "ct": 20.0, "tau": 0.2}}
 
 
-@pytest.fixture(scope="module")
-def runs():
-    """Equilibria and time series without and with damping."""
-    found = []
-    for scene in (Scene.from_mapping(SCENE), Scene.from_mapping(SCENE | {"damping": DAMPING})):
-        equilibria = list(ramp(scene))
-        found.append((scene, equilibria, list(perturb(scene, equilibria[0], samples=50))))
-    return found
-
-
-def test_equilibria_are_the_same_to_the_bit(runs):
-    (_, plain, _), (_, damped, _) = runs
+def test_equilibria_are_the_same_to_the_bit_and_time_steps_stay_below_what_dashpots_allow():
+    plain, damped = (list(ramp(Scene.from_mapping(SCENE | more))) for more in ({}, DAMPING))
     for a, b in zip(plain, damped, strict=True):
         assert a.packing == replace(b.packing, law=a.packing.law, drag_time=None)
-
-
-def test_runs_are_damped(runs):
-    (_, _, plain), (_, _, damped) = runs
-    late = [np.mean([sample.kinetic_energy for sample in run[-20:]]) for run in (plain, damped)]
-    assert 0 < late[1] < 0.7 * late[0]
-
-
-def test_an_engine_goes_on_undamped(runs):
-    """Dashpots are on in dynamics alone: what the engine does after it is as if there had been none."""
-    _, equilibria, _ = runs[1]
-    packing = equilibria[1].packing
-    displacement = 1e-6 * np.random.default_rng(1).standard_normal(3 * len(packing))
-    with Engine(packing) as engine:
-        before = engine.displace(packing, displacement), engine.net_force
-        with engine.undamped(1e-3) as dynamics:
-            dynamics.advance(20)
-        after = engine.displace(packing, displacement), engine.net_force
-    assert before[0] == after[0]
-    assert np.array_equal(before[1], after[1])
-
-
-def test_time_step_stays_below_what_dashpots_allow(runs):
-    packing = runs[1][1][0].packing
+    packing = damped[0].packing
     rate, limit = largest_damping_rate(packing), stable_timestep(largest_frequency(packing))
     dense = damping_matrix(packing).toarray() - np.eye(60) / packing.drag_time  # masses and I0 are 1
     assert rate == pytest.approx(np.linalg.eigvalsh(dense).max(), rel=1e-10)

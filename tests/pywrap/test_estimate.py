@@ -28,23 +28,6 @@ def test_runs_without_end_are_refused(key, value):
     assert foreseen(scene, "settle") == ""
 
 
-@pytest.mark.parametrize(("key", "value"), [("time", 1e5), ("time_step", 1e-8)])
-def test_long_work_is_said(key, value):
-    scene = Scene.from_mapping(with_key("perturb", key, value))
-    assert foreseen(scene, "perturb").startswith("perturb: about ")
-    assert "time steps" in foreseen(scene, "perturb")
-
-
-def test_work_is_counted():
-    scene = Scene.from_mapping(SCENE)
-    work = estimated(scene, "ramp")
-    assert work.increments == pytest.approx(10)
-    assert work.seconds < 2
-    assert foreseen(scene, "ramp") == ""
-    halved = estimated(Scene.from_mapping(with_key("ramp", "step", 5e-4)), "ramp")
-    assert halved.increments == pytest.approx(2 * work.increments)
-
-
 def test_a_reproduction_counts_what_it_runs():
     scene = Scene.from_mapping(SCENE)
     one, onset = estimated(scene, "reproduce"), estimated(scene, "onset")

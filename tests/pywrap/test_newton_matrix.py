@@ -10,7 +10,6 @@ from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix,
 from faultgouge.pywrap import Engine
 from faultgouge.pywrap.equilibria.newton import iterated
 from faultgouge.pywrap.equilibria.newton_matrix import AFLOAT, factored
-from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 from faultgouge.pywrap.lammps.contact_graph import ContactGraph
 from faultgouge.pywrap.lammps.trial import Trial
 
@@ -78,20 +77,6 @@ def test_nothing_that_holds():
     assert trial_of(apart).floor == 0.0
 
 
-def test_a_trial_is_its_packing(reference_packing):
-    start = reference_packing(1.0)
-    with Engine(start) as engine:
-        trial = engine.displaced(start, 1e-5 * np.random.default_rng(6).standard_normal(300))
-    packing = trial.packing
-    geometry = packing.geometry
-    assert trial.floor == pytest.approx(rounding_floor(packing), rel=1e-12)
-    assert_allclose(trial.branches.overlap, geometry.overlap, rtol=0, atol=1e-14)
-    assert_allclose(trial.branches.normal.T, geometry.normal, rtol=0, atol=1e-14)
-    assert_allclose(trial.branches.distance, geometry.distance, rtol=1e-14)
-    assert np.array_equal(trial.branches.overlap > 0, geometry.overlap > 0)
-    assert trial.residual == pytest.approx(packing.residual, rel=1e-6)
-
-
 def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
     """A change of forces from changed displacements, and back: with what K knows of new contacts, and without."""
     base = reference_packing(1.0)
@@ -120,17 +105,6 @@ def without(packing, disk, kept):
     c = packing.contacts
     mine = np.flatnonzero((c.i == disk) | (c.j == disk))
     return replace(packing, contacts=of(c, np.setdiff1d(np.arange(len(c)), mine[kept:])))
-
-
-def test_expelled_are_disks_with_one_contact_and_with_two_new_ones(reference_packing):
-    whole = reference_packing(1.0)
-    one, two, new = np.flatnonzero((ContactGraph(whole.contacts, whole.radius).degree > 2) & ~whole.top)[[0, 30, 60]]
-    trial = without(without(without(whole, one, 1), two, 2), new, 2)
-    since = without(trial, new, 0).contacts
-    expelled = factored(trial_of(trial), 0.0, ContactGraph(since, whole.radius)).expelled
-    assert expelled[one]
-    assert not expelled[two]
-    assert expelled[new]
 
 
 def test_a_disk_between_two_new_contacts_takes_a_longer_step(reference_packing):

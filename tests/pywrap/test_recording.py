@@ -11,7 +11,6 @@ from reference_layer import REFERENCE
 from faultgouge.analysis import RunFile
 from faultgouge.analysis.files import sealedfile
 from faultgouge.pywrap import Equilibrium, Record, Scene
-from faultgouge.pywrap.runs.recording import ways_of
 
 SCENE = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
 WRITERS = {"recording.py", "runfile.py", "sealedfile.py", "wholefile.py"}
@@ -59,17 +58,6 @@ def begun(tmp_path_factory, equilibria):
     with opened(path, []) as record:
         record.append(equilibria[0])
     return path.read_bytes()
-
-
-def test_the_way_to_an_equilibrium_is_kept(tmp_path, equilibria):
-    found = [equilibria[0], replace(equilibria[1], way="3 increments from F_x = 0")]
-    with opened(tmp_path / "run.h5", []) as record:
-        for each in found:
-            record.append(each)
-    with opened(tmp_path / "run.h5", []) as record:
-        assert (record.last.packing, record.last.way) == (found[1].packing, found[1].way)
-    with RunFile(tmp_path / "run.h5") as run:
-        assert ways_of(run) == {1: found[1].way}
 
 
 @pytest.mark.parametrize("share", [1e-9, math.inf], ids=["saved at the end", "saved at once"])

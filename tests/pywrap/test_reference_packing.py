@@ -89,7 +89,9 @@ def test_newton_is_quadratic(reference_packing):
         for _ in range(5):
             trial = engine.displaced(packing, displacement)
             residuals.append(trial.residual)
+            assert trial.floor == pytest.approx(rounding_floor(trial.packing), rel=1e-12)
             displacement += factored(trial, trial.floor).solve(trial.force)
+    assert residuals[0] == pytest.approx(replace(packing, fx=1e-2).residual, rel=1e-6)
     falling = [r for r in residuals if r > 1e-9]
     assert len(falling) == 3
     assert all(after < before**1.5 for before, after in pairwise(falling))

@@ -6,7 +6,6 @@ import re
 from copy import deepcopy
 from pathlib import Path
 
-import h5py
 import pytest
 from reference_layer import REFERENCE
 
@@ -62,31 +61,19 @@ def merged(changes: dict) -> dict:
     return scene
 
 
-def test_absent_sections_are_absent_features():
-    scene = Scene.from_mapping(LEAST)
-    assert (scene.ramp, scene.perturb, scene.friction, scene.output) == (None, None, None, None)
-    assert (scene.damping, scene.law.exponent) == (None, 1.5)
-    assert isinstance(scene.packing, GeneratedPacking)
-    assert (scene.packing.disks, scene.packing.radii, scene.packing.periodic) == (100, (0.5, 0.7), True)
-    assert (scene.law.mus, scene.inertia_factor) == ((1.0,), 1.0)
+DAMPED = {"damping": {"cn": 1.5, "ct": 0.5, "tau": 100.0}}
 
 
-def test_every_key_reaches_the_scene():
-    scene = Scene.from_mapping(FULL)
-    assert scene.resolved() == FULL
-    assert (scene.law.mus, scene.inertia_factor) == ((1.0, 0.8), 0.5)
-
-
-def test_damping_reaches_the_scene():
-    section = {"cn": 1.5, "ct": 0.5, "tau": 100.0}
-    assert Scene.from_mapping(merged({"damping": section})).resolved()["damping"] == section
-    assert Scene.from_mapping(merged({"damping.tau": 2.0})).resolved()["damping"] == {"cn": 0, "ct": 0, "tau": 2.0}
-
-
-@pytest.mark.parametrize("changes", [{}, FULL, {"packing.disks": 1000, "packing.width": 37.7}])
-def test_resolved_scene_is_plain_and_gives_the_same_scene(changes):
+@pytest.mark.parametrize(
+    ("changes", "top"), [(FULL, 5), (DAMPED, 10), ({"packing.disks": 1000, "packing.width": 37.7}, 100)]
+)
+def test_every_key_reaches_the_scene_and_the_resolved_scene_gives_the_same(changes, top):
     scene = Scene.from_mapping(merged(changes))
-    assert Scene.from_mapping(json.loads(json.dumps(scene.resolved()))) == scene
+    resolved = json.loads(json.dumps(scene.resolved()))
+    sections = {name: section for name, section in changes.items() if "." not in name}
+    assert resolved == resolved | sections
+    assert resolved["packing"]["top"] == top
+    assert Scene.from_mapping(resolved) == scene
 
 
 @pytest.mark.parametrize(
@@ -109,11 +96,6 @@ def test_velocity_scale_is_a_number_or_a_multiple_of_the_threshold(v_ss, scale):
     friction = Scene.from_mapping(merged({"friction.v_ss": v_ss})).friction
     assert friction is not None
     assert friction.velocity_scale(2e-11) == pytest.approx(scale, rel=1e-15)  # one product: one rounding
-
-
-def test_upper_layer_that_is_left_out_is_a_number_in_the_resolved_scene():
-    scene = Scene.from_mapping(merged({"packing.disks": 1000, "packing.width": 37.7}))
-    assert scene.resolved()["packing"]["top"] == 100
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "scenes").glob("*.toml")), ids=lambda path: path.stem)
@@ -152,7 +134,6 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
             {"law.history": "rescaled", "law.exponent": 1},
             'law.history = "rescaled" needs law.exponent = 1.5: harmonic disks have one stiffness',
         ),
-        ({"damping.cn": -1.0}, "damping.cn = -1.0 is refused: give a number of at least 0"),
         ({"damping.tau": 0.0}, "damping.tau = 0.0 is refused: give a number above 0"),
         ({"damping": {}}, "damping has nothing in it: give cn, ct or tau, or leave the section out"),
         ({"damping.cm": 1.0}, "damping.cm is no key of [damping]: the nearest is damping.c"),
@@ -166,7 +147,6 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"packing.kn": 1.0}, "packing.kn is no key of [packing]: the nearest is law.kn."),
         ({"kn": 200000.0}, "kn stands outside of its section: move it below [law]."),
         ({"precison": "double"}, "precison is no key of a scene: the nearest is precision."),
-        ({"law": None, "lwa.kn": 200000.0}, "lwa is no key of a scene: the nearest is law."),
         ({"law": None}, "law is missing: add the section [law]."),
         ({"ramp": {}}, "ramp.until is missing: add until to [ramp]."),
         ({"load": 3.0}, "load is not a section: write [load] and its keys below."),
@@ -181,22 +161,15 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"packing.radii": 0.5}, "packing.radii = 0.5 is refused: give a list of numbers."),
         ({"packing.periodic": 1}, "packing.periodic = 1 is refused: give true or false."),
         ({"law.kn": math.nan}, "law.kn = nan is refused: give a finite number."),
-        ({"law.kn": -1.0}, "law.kn = -1.0 is refused: give a number above 0."),
         ({"law.kn": -1.0, "law.kt": "2/7 kn"}, "law.kn = -1.0 is refused: give a number above 0."),
         ({"law.kn": "2e5"}, "law.kn = '2e5' is refused: give a number."),
         ({"law.kt": -1.0}, "law.kt = -1.0 is refused: give a number of at least 0."),
         ({"law.mu": [1.0, math.nan]}, "law.mu = [1.0, nan] is refused"),
-        ({"law.mu": []}, "law.mu = [] is refused"),
         ({"law.mu": 10**400}, "is refused: give a number of at least 0, or a list"),
         ({"law.mu": [1.0, 1]}, "law.mu = [1.0, 1] names one value twice: give each once."),
-        ({"load.fy": 0.0}, "load.fy = 0.0 is refused: give a number above 0."),
-        ({"ramp.force_tolerance": 0}, "ramp.force_tolerance = 0 is refused: give a number above 0."),
-        ({"relax.damping": 0.0}, "relax.damping = 0.0 is refused: give a number above 0."),
-        ({"perturb.amplitude": math.nan}, "perturb.amplitude = nan is refused"),
         # what no packing bears
         ({"law.kn": 5e-324}, "law.kn = 5e-324 is refused: give a number between 1e-100 and 1e+100"),
         ({"law.kt": 1e-320}, "law.kt"),
-        ({"law.mu": 5e-324}, "law.mu"),
         ({"load.fy": 1e-300}, "load.fy = 1e-300 is refused"),
         ({"load.fy": 1e9}, "presses two disks 2.9e+02 into each other, deeper than the smallest radius 0.5"),
         ({"law.kn": 1e14}, "settling takes about"),
@@ -206,7 +179,6 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"packing.width": 1e10}, "packing.width = 1e+10 is"),
         ({"packing.seed": 2**64}, "packing.seed"),
         ({"ramp.step": 1e-12}, "ramp.step = 1e-12 makes 1e+12 equilibria"),
-        ({"ramp.step": 1e-3, "ramp.until": 1e6}, "ramp.step = 0.001 makes 1e+09 equilibria"),
         ({"perturb.time_step": 1e-200}, "perturb.time_step"),
         ({"friction.v_ss": "1e400 v0"}, "friction.v_ss"),
         # choices
@@ -269,12 +241,6 @@ def test_a_loop_of_links_is_refused(refused_scene, tmp_path):
     (tmp_path / "a.json").symlink_to(tmp_path / "b.json")
     (tmp_path / "b.json").symlink_to(tmp_path / "a.json")
     assert "a.json" in refused_scene(merged({"packing": {"file": "a.json"}}), tmp_path)
-
-
-def test_an_hdf5_file_is_taken(tmp_path):
-    h5py.File(tmp_path / "run.h5", "w").close()
-    scene = Scene.from_mapping(merged({"packing": {"file": "run.h5"}}), folder=tmp_path)
-    assert isinstance(scene.packing, StoredPacking)
 
 
 @pytest.mark.parametrize(

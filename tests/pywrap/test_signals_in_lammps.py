@@ -6,7 +6,7 @@ import pytest
 from faultgouge.analysis.files.signal_files import of_trace, read_signal
 from faultgouge.analysis.motion.forcing import floor_force, sampled_response
 from faultgouge.analysis.motion.response import layer_force
-from faultgouge.analysis.motion.signals import Signal, SignalError
+from faultgouge.analysis.motion.signals import SignalError
 from faultgouge.pywrap import Engine, Scene
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.runs.undamped import time_step
@@ -55,17 +55,6 @@ def test_lammps_refuses_a_bad_table(lmp, tmp_path, text, says):
     (tmp_path / "bad.txt").write_text(text)
     done = lmp(DECKS / "perturb.in", fails=True, decks=DECKS, signal="bad.txt")
     assert says in done.stdout + done.stderr
-
-
-def test_signal_in_pieces_is_that_of_one_run(packing):
-    signal, dt = Signal([0.0, 0.01, 0.05], [0.0, 1e-6, -1e-6]), time_step(packing)
-    ends = []
-    for pieces in ([100], [30, 70]):
-        with Engine(packing) as engine, engine.undamped(dt, signal=signal) as dynamics:
-            for steps in pieces:
-                motion = dynamics.advance(steps)
-        ends.append(motion.position)
-    np.testing.assert_array_equal(*ends)
 
 
 def test_two_columns_and_records_are_read(tmp_path):
