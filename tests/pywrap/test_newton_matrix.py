@@ -107,6 +107,17 @@ def without(packing, disk, kept):
     return replace(packing, contacts=of(c, np.setdiff1d(np.arange(len(c)), mine[kept:])))
 
 
+def test_expelled_are_disks_with_one_contact_and_with_two_new_ones(reference_packing):
+    whole = reference_packing(1.0)
+    one, two, new = np.flatnonzero((ContactGraph(whole.contacts, whole.radius).degree > 2) & ~whole.top)[[0, 30, 60]]
+    trial = without(without(without(whole, one, 1), two, 2), new, 2)
+    since = without(trial, new, 0).contacts
+    expelled = factored(trial_of(trial), 0.0, ContactGraph(since, whole.radius)).expelled
+    assert expelled[one]
+    assert not expelled[two]
+    assert expelled[new]
+
+
 def test_a_disk_between_two_new_contacts_takes_a_longer_step(reference_packing):
     """The force goes as delta^(3/2), and a root of that order is met by so many times Newton's step."""
     there = reference_packing(1.0)

@@ -122,7 +122,7 @@ def test_onset(reference, reference_packing, number):
 
 
 def test_rattler_on_which_a_contact_slides_is_not_thrown(reference_packing):
-    """Nothing holds it across the contact, along which friction drags it: Newton's own step is hundreds of lengths."""
+    """Nothing holds it across the contact, along which friction drags it."""
     bed = reference_packing(1.0)
     rattler, near = bed.rattlers[0], 0
     place = bed.position.copy()
@@ -135,5 +135,5 @@ def test_rattler_on_which_a_contact_slides_is_not_thrown(reference_packing):
     force = np.zeros(3 * len(packing))
     force[np.flatnonzero(packing.top)] = 1e-3
     step = factored(Trial.of(packing), rounding_floor(packing)).solve(force).reshape(3, -1)
-    # what moves the rattler is its neighbour
-    assert np.abs(step[:, rattler]).max() < 10 * np.abs(step[:, near]).max()
+    # what moves the rattler is its neighbour; with K alone it would go as far
+    assert np.abs(step[:, rattler]).max() < 0.1 * np.abs(step[:, near]).max()

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from reference_layer import REFERENCE
 
-from faultgouge.pywrap.scenes.packing_section import GeneratedPacking, StoredPacking
+from faultgouge.pywrap.scenes.packing_section import StoredPacking
 from faultgouge.pywrap.scenes.scene import Scene, SceneError
 
 ROOT = Path(__file__).parents[2]
