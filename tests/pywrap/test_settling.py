@@ -5,7 +5,6 @@ Newton's method with implicit steps goes down to a minimum, and what floats does
 
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from scipy.linalg import eigvalsh
 
 from faultgouge.analysis import MindlinLaw, Packing, spectrum, stiffness_matrix, touching
 from faultgouge.pywrap import NoEquilibriumError, Scene, settle
-from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 from faultgouge.pywrap.runs.undamped import ACCURATE_SHARE, time_step
 from faultgouge.pywrap.settling import settling
 from faultgouge.pywrap.settling.settling import minimized
@@ -91,18 +89,6 @@ def lowest(packing: Packing) -> np.ndarray:
     matrix = stiffness_matrix(packing).toarray()[:size, :size]
     held = np.flatnonzero(matrix.diagonal())
     return eigvalsh(matrix[np.ix_(held, held)])
-
-
-def test_floating_packing_goes_down_to_the_floor(reference_packing):
-    packing = reference_packing(0.0)
-    # it may slide: a mode without stiffness, on which K is singular
-    assert abs(lowest(packing)[0]) < 1e-6
-    position = packing.position + 1e-4 * np.random.default_rng(0).standard_normal(packing.position.shape)
-    start = replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
-    assert start.residual > 1
-    packing, found = minimized(start)
-    assert found
-    assert packing.residual < 3 * rounding_floor(packing)
 
 
 def test_disk_on_top_of_another_rolls_down():

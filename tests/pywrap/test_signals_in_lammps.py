@@ -76,8 +76,6 @@ def test_two_columns_and_records_are_read(tmp_path):
     [
         (None, {}, "cannot be read (No such file or directory)"),
         ("0 1\n1 nan\n", {}, "row 2 of the signal has the value nan"),
-        ("0 1\n2 1\n1 1\n", {}, "is not later than the 2 before it: sort the rows"),
-        ("0 1\n", {}, "two rows or more"),
         ("0 1 2\n1 2 3\n", {}, "line 1 has something else than two numbers"),
         ("0 1\n1 1\n", {"amplitude": 1.0}, "perturb.amplitude cannot stand beside a signal from a file"),
         ("0 1\n1 1\n", {"quantity": "velocity"}, 'perturb.quantity belongs to on = "floor"'),
