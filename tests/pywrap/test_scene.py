@@ -166,7 +166,6 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"packing.width": 1e10}, "packing.width = 1e+10 is"),
         ({"packing.seed": 2**64}, "packing.seed"),
         ({"ramp.step": 1e-12}, "ramp.step = 1e-12 makes 1e+12 equilibria"),
-        ({"perturb.time_step": 1e-200}, "perturb.time_step"),
         ({"friction.v_ss": "1e400 v0"}, "friction.v_ss"),
         # choices
         ({"precision": "single"}, "precision = 'single' is refused: give 'double' or 'compensated'."),
