@@ -1,7 +1,5 @@
 """A loose start touches nothing, keeps to its box and its shares, and is the same for one seed."""
 
-from collections import Counter
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -33,6 +31,7 @@ def smallest_gap(start: Disks) -> float:
     periodic=st.booleans(),
 )
 def test_nothing_overlaps_and_the_upper_layer_lies_above(disks, radii, top, width, seed, periodic):
+    """Radii have equal shares; those of the upper layer take turns, in equal steps along x."""
     top = int(top * disks)
     start = loose_start(disks, tuple(radii), top, width, seed, periodic=periodic)
     # Places are sums of a few numbers below 1000, each rounded once: 1e-12 is ten times that.
@@ -41,22 +40,13 @@ def test_nothing_overlaps_and_the_upper_layer_lies_above(disks, radii, top, widt
     x = start.position[:, 0]
     assert np.all((x >= 0) & (x < width))
     assert np.array_equal(start.top, np.arange(disks) >= disks - top)
+    shares = np.resize(sorted(radii), disks)
+    assert np.array_equal(np.sort(start.radius), np.sort(shares))
+    assert np.array_equal(start.radius[start.top], shares[:top])
+    assert np.allclose(np.diff(x[start.top]), width / max(top, 1), rtol=0, atol=1e-12)
     if 0 < top < disks:
         highest = (start.position[:, 1] + start.radius)[~start.top].max()
         assert (start.position[:, 1] - start.radius)[start.top].min() >= highest - 1e-12
-
-
-@pytest.mark.parametrize(("disks", "shares"), [(100, {0.5: 50, 0.7: 50}), (101, {0.5: 51, 0.7: 50}), (1, {0.5: 1})])
-def test_radii_have_equal_shares(disks, shares):
-    start = loose_start(disks, (0.5, 0.7), 1, 11.9, 7)
-    assert Counter(start.radius.tolist()) == shares
-
-
-def test_radii_take_turns_in_the_upper_layer_which_is_evenly_spaced():
-    start = loose_start(100, (0.7, 0.5), 10, 11.9, 7)
-    assert start.radius[start.top].tolist() == 5 * [0.5, 0.7]
-    # Ten equal steps in a box of 11.9; differences of numbers of order 10 are rounded at 2e-15.
-    assert np.diff(start.position[start.top, 0]) == pytest.approx(np.full(9, 1.19), abs=1e-14)
 
 
 def test_a_seed_has_loose_starts_of_its_own():

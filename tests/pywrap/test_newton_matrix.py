@@ -1,16 +1,22 @@
-"""Newton's matrix, small packings: a band, which solves as K does, with and without what carries nothing."""
+"""Newton's matrix: a band, which solves as K does, with and without what carries nothing.
+
+Of large packings: the order of elimination, its fill, and solutions with factors from nearby.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.sparse import coo_array, csc_array, csr_array, triu
+from scipy.sparse.linalg import splu
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix, touching
+from faultgouge.analysis.factors.linear import ACCURATE, SparseSolver, elimination_order
+from faultgouge.assessment.stability.cases.packings import crystal
 from faultgouge.pywrap import Engine
 from faultgouge.pywrap.equilibria.newton import iterated
 from faultgouge.pywrap.equilibria.newton_matrix import AFLOAT, factored
-from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 from faultgouge.pywrap.lammps.contact_graph import ContactGraph
 from faultgouge.pywrap.lammps.trial import Trial
 
@@ -78,20 +84,6 @@ def test_nothing_that_holds():
     assert trial_of(apart).floor == 0.0
 
 
-def test_a_trial_is_its_packing(reference_packing):
-    start = reference_packing(1.0)
-    with Engine(start) as engine:
-        trial = engine.displaced(start, 1e-5 * np.random.default_rng(6).standard_normal(300))
-    packing = trial.packing
-    geometry = packing.geometry
-    assert trial.floor == pytest.approx(rounding_floor(packing), rel=1e-12)
-    assert_allclose(trial.branches.overlap, geometry.overlap, rtol=0, atol=1e-14)
-    assert_allclose(trial.branches.normal.T, geometry.normal, rtol=0, atol=1e-14)
-    assert_allclose(trial.branches.distance, geometry.distance, rtol=1e-14)
-    assert np.array_equal(trial.branches.overlap > 0, geometry.overlap > 0)
-    assert trial.residual == pytest.approx(packing.residual, rel=1e-6)
-
-
 def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
     """A change of forces from changed displacements, and back: with what K knows of new contacts, and without."""
     base = reference_packing(1.0)
@@ -154,3 +146,72 @@ def test_a_disk_between_two_new_contacts_takes_a_longer_step(reference_packing):
     expected = factored(trial, trial.floor, ContactGraph(start.contacts, start.radius)).solve(trial.force)
     expected[[disk, 100 + disk, 200 + disk]] *= 1.5
     np.testing.assert_array_equal(asked[1], expected)
+
+
+@pytest.fixture(scope="module")
+def large():
+    """A packing, its K, and its pairs of disks."""
+    packing = crystal(60, 60)
+    c = packing.contacts
+    return packing, stiffness_matrix(packing), (c.i[~c.floor], c.j[~c.floor])
+
+
+def test_fill_is_no_more_than_that_of_minimum_degree_on_the_matrix(large):
+    packing, matrix, pairs = large
+    order = elimination_order(*pairs, len(packing), np.arange(3 * len(packing)))
+    options = {"diag_pivot_thresh": 0.01, "options": {"SymmetricMode": True}}
+    ours = splu(csc_array(matrix[order][:, order]), permc_spec="NATURAL", **options)
+    # on a crystal, where entries vanish by symmetry, it is little more than half
+    assert ours.nnz < 0.7 * splu(csc_array(matrix), permc_spec="MMD_AT_PLUS_A", **options).nnz
+
+
+def scaled(matrix, scale):
+    other = csr_array((matrix * scale).T * scale)
+    other.eliminate_zeros()
+    return other
+
+
+def far_from_symmetric(matrix):
+    upper = triu(matrix, k=1)
+    return csr_array(matrix + 3 * (upper - upper.T))
+
+
+def some_disks_changed(matrix):
+    """Other stiffnesses of some disks, and none of another one."""
+    scale = np.ones((3, matrix.shape[0] // 3))
+    scale[:, [17, 2100]] = 3.0
+    scale[:, 1234] = 0.0
+    return scaled(matrix, scale.ravel())
+
+
+def half_of_the_disks_softer_by_far(matrix):
+    return scaled(matrix, np.tile(10.0 ** np.random.default_rng(4).uniform(-3, 0, matrix.shape[0] // 3), 3))
+
+
+@pytest.mark.parametrize(
+    ("other", "own", "accurate"),
+    [
+        (far_from_symmetric, True, 1e-8),
+        (some_disks_changed, False, ACCURATE),
+        pytest.param(half_of_the_disks_softer_by_far, True, ACCURATE, marks=pytest.mark.slow),
+    ],
+)
+def test_factors_of_a_matrix_nearby_solve_as_long_as_they_serve(large, other, own, accurate):
+    """Factors of its own are those of the symmetric part, and, where these do not serve either, of the matrix."""
+    _, matrix, pairs = large
+    force = np.random.default_rng(3).standard_normal(matrix.shape[0])
+    first = SparseSolver(matrix, *pairs)
+    # friction makes K of sheared packings nonsymmetric; this one is at rest, and GMRES has nothing to do
+    assert np.abs(matrix @ first.solve(force) - force).max() < 1e-10  # a condition number of some 1e4
+    changed = other(matrix)
+    solver = SparseSolver(changed, *pairs, first)
+    step = solver.solve(force)
+    assert (first.own, solver.own) == (True, own)
+    held = changed.diagonal() != 0
+    assert not step[~held].any()
+    assert np.linalg.norm((changed @ step - force)[held]) <= accurate * np.linalg.norm(force)
+
+
+def test_singular_matrix_has_no_solution():
+    floating = coo_array(([1.0, -1.0, -1.0, 1.0], ([0, 0, 1, 1], [0, 1, 0, 1])), shape=(6, 6)).tocsr()
+    assert SparseSolver(floating, np.array([0]), np.array([1])).solve(np.ones(6)) is None

@@ -33,37 +33,29 @@ def ramped(packing, method, increment):
     return reached
 
 
-def compare(packing, case, rtol, rtol_asymmetry):
-    assert len(packing.contacts) == case["contacts"]
-    assert packing.contacts.floor.sum() == case["floor_contacts"]
-    assert len(packing.rattlers) == case["rattlers"]
-    matrix = stiffness_matrix(packing).toarray()
-    eigenvalues = spectrum(packing).eigenvalues.real
-    assert np.trace(matrix) == pytest.approx(case["trace_K"], rel=rtol)
-    assert np.linalg.norm(matrix) == pytest.approx(case["fro_K"], rel=rtol)
-    assert np.linalg.norm(matrix - matrix.T) == pytest.approx(case["fro_asym"], rel=rtol_asymmetry)
-    assert np.abs(packing.contacts.slip).sum() == pytest.approx(case["slip_sum_abs"], rel=rtol)
-    np.testing.assert_allclose(eigenvalues[::-1][:20], case["eigenvalues_largest_20"], rtol=rtol)
-    # the zero of a frictionless translation is no zero with friction: all eigenvalues are above 1
-    np.testing.assert_allclose(eigenvalues[eigenvalues > 1][:10], case["smallest_positive_10"], rtol=rtol)
-
-
 @pytest.mark.parametrize("number", [0, 1])
 @pytest.mark.parametrize("increment", [1e-3, 2.5e-4])
 def test_newton_ramp(reference, reference_packing, number, increment):
     case = reference["cases"][number]
     reached = ramped(reference_packing(case["mu"]), "newton", increment)
+    packing = reached[-1].packing
+    assert len(packing.contacts) == case["contacts"]
+    assert packing.contacts.floor.sum() == case["floor_contacts"]
+    assert len(packing.rattlers) == case["rattlers"]
+    matrix = stiffness_matrix(packing).toarray()
+    eigenvalues = spectrum(packing).eigenvalues.real
+    assert np.trace(matrix) == pytest.approx(case["trace_K"], rel=1e-9)
+    assert np.linalg.norm(matrix) == pytest.approx(case["fro_K"], rel=1e-9)
     # The asymmetry is 0.2 % of K, all of it from slips, whose path is resolved to second order in the increment: ten
     # times the reference's increment squared and it is felt.
-    compare(reached[-1].packing, case, rtol=1e-9, rtol_asymmetry=1e-9 if increment == case["increment"] else 5e-9)
+    known = 1e-9 if increment == case["increment"] else 5e-9
+    assert np.linalg.norm(matrix - matrix.T) == pytest.approx(case["fro_asym"], rel=known)
+    assert np.abs(packing.contacts.slip).sum() == pytest.approx(case["slip_sum_abs"], rel=1e-9)
+    np.testing.assert_allclose(eigenvalues[::-1][:20], case["eigenvalues_largest_20"], rtol=1e-9)
+    # the zero of a frictionless translation is no zero with friction: all eigenvalues are above 1
+    np.testing.assert_allclose(eigenvalues[eigenvalues > 1][:10], case["smallest_positive_10"], rtol=1e-9)
     assert np.median([each.evaluations for each in reached]) <= 6
     assert max(each.residual for each in reached) < 1.5 * reached[-1].floor
-
-
-@pytest.mark.slow
-def test_overdamped_ramp(reference, reference_packing):
-    case = reference["cases"][1]
-    compare(ramped(reference_packing(case["mu"]), "overdamped", 1e-3)[-1].packing, case, rtol=1e-6, rtol_asymmetry=1e-6)
 
 
 @pytest.mark.slow
@@ -89,7 +81,9 @@ def test_newton_is_quadratic(reference_packing):
         for _ in range(5):
             trial = engine.displaced(packing, displacement)
             residuals.append(trial.residual)
+            assert trial.floor == pytest.approx(rounding_floor(trial.packing), rel=1e-12)
             displacement += factored(trial, trial.floor).solve(trial.force)
+    assert residuals[0] == pytest.approx(replace(packing, fx=1e-2).residual, rel=1e-6)
     falling = [r for r in residuals if r > 1e-9]
     assert len(falling) == 3
     assert all(after < before**1.5 for before, after in pairwise(falling))
@@ -120,7 +114,7 @@ def test_onset(reference, reference_packing, number):
 
 
 def test_rattler_on_which_a_contact_slides_is_not_thrown(reference_packing):
-    """Nothing holds it across the contact, along which friction drags it: Newton's own step is hundreds of lengths."""
+    """Nothing holds it across the contact, along which friction drags it."""
     bed = reference_packing(1.0)
     rattler, near = bed.rattlers[0], 0
     place = bed.position.copy()
@@ -133,5 +127,5 @@ def test_rattler_on_which_a_contact_slides_is_not_thrown(reference_packing):
     force = np.zeros(3 * len(packing))
     force[np.flatnonzero(packing.top)] = 1e-3
     step = factored(Trial.of(packing), rounding_floor(packing)).solve(force).reshape(3, -1)
-    # what moves the rattler is its neighbour
-    assert np.abs(step[:, rattler]).max() < 10 * np.abs(step[:, near]).max()
+    # what moves the rattler is its neighbour; with K alone it would go as far
+    assert np.abs(step[:, rattler]).max() < 0.1 * np.abs(step[:, near]).max()

@@ -1,4 +1,4 @@
-"""A scene says one thing, keeps it to the bit, and refuses what cannot be run in one sentence."""
+"""A scene says one thing, keeps it to the bit, and refuses what cannot be run, or has no end, in one sentence."""
 
 import json
 import math
@@ -6,11 +6,10 @@ import re
 from copy import deepcopy
 from pathlib import Path
 
-import h5py
 import pytest
 from reference_layer import REFERENCE
 
-from faultgouge.pywrap.scenes.packing_section import GeneratedPacking, StoredPacking
+from faultgouge.pywrap.scenes.estimate import estimated, foreseen
 from faultgouge.pywrap.scenes.scene import Scene, SceneError
 
 ROOT = Path(__file__).parents[2]
@@ -62,42 +61,23 @@ def merged(changes: dict) -> dict:
     return scene
 
 
-def test_absent_sections_are_absent_features():
-    scene = Scene.from_mapping(LEAST)
-    assert (scene.ramp, scene.perturb, scene.friction, scene.output) == (None, None, None, None)
-    assert (scene.damping, scene.law.exponent) == (None, 1.5)
-    assert isinstance(scene.packing, GeneratedPacking)
-    assert (scene.packing.disks, scene.packing.radii, scene.packing.periodic) == (100, (0.5, 0.7), True)
-    assert (scene.law.mus, scene.inertia_factor) == ((1.0,), 1.0)
-
-
-def test_every_key_reaches_the_scene():
-    scene = Scene.from_mapping(FULL)
-    assert scene.resolved() == FULL
-    assert (scene.law.mus, scene.inertia_factor) == ((1.0, 0.8), 0.5)
-
-
-def test_damping_reaches_the_scene():
-    section = {"cn": 1.5, "ct": 0.5, "tau": 100.0}
-    assert Scene.from_mapping(merged({"damping": section})).resolved()["damping"] == section
-    assert Scene.from_mapping(merged({"damping.tau": 2.0})).resolved()["damping"] == {"cn": 0, "ct": 0, "tau": 2.0}
-
-
-@pytest.mark.parametrize("changes", [{}, FULL, {"packing.disks": 1000, "packing.width": 37.7}])
-def test_resolved_scene_is_plain_and_gives_the_same_scene(changes):
-    scene = Scene.from_mapping(merged(changes))
-    assert Scene.from_mapping(json.loads(json.dumps(scene.resolved()))) == scene
+DAMPED = {"damping": {"cn": 1.5, "ct": 0.5, "tau": 100.0}}
 
 
 @pytest.mark.parametrize(
-    ("kt", "number"),
-    [
-        ("2/7 kn", 57142.857142857145),  # the reference packing's k_t, to the bit
-        ("0.5 kn", 1e5),
-        ("kn", 2e5),
-        (0, 0.0),
-        (57000, 57000.0),
-    ],
+    ("changes", "top"), [(FULL, 5), (DAMPED, 10), ({"packing.disks": 1000, "packing.width": 37.7}, 100)]
+)
+def test_every_key_reaches_the_scene_and_the_resolved_scene_gives_the_same(changes, top):
+    scene = Scene.from_mapping(merged(changes))
+    resolved = json.loads(json.dumps(scene.resolved()))
+    sections = {name: section for name, section in changes.items() if "." not in name}
+    assert resolved == resolved | sections
+    assert resolved["packing"]["top"] == top
+    assert Scene.from_mapping(resolved) == scene
+
+
+@pytest.mark.parametrize(
+    ("kt", "number"), [("2/7 kn", 57142.857142857145), ("0.5 kn", 1e5), ("kn", 2e5), (0, 0.0), (57000, 57000.0)]
 )
 def test_kt_is_a_number_or_a_share_of_kn(kt, number):
     assert Scene.from_mapping(merged({"law.kt": kt})).law.kt == number
@@ -107,13 +87,7 @@ def test_kt_is_a_number_or_a_share_of_kn(kt, number):
 @pytest.mark.parametrize(("v_ss", "scale"), [("10 v0", 2e-10), ("1e4 v0", 2e-7), ("v0", 2e-11), (3e-9, 3e-9)])
 def test_velocity_scale_is_a_number_or_a_multiple_of_the_threshold(v_ss, scale):
     friction = Scene.from_mapping(merged({"friction.v_ss": v_ss})).friction
-    assert friction is not None
     assert friction.velocity_scale(2e-11) == pytest.approx(scale, rel=1e-15)  # one product: one rounding
-
-
-def test_upper_layer_that_is_left_out_is_a_number_in_the_resolved_scene():
-    scene = Scene.from_mapping(merged({"packing.disks": 1000, "packing.width": 37.7}))
-    assert scene.resolved()["packing"]["top"] == 100
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "scenes").glob("*.toml")), ids=lambda path: path.stem)
@@ -127,7 +101,6 @@ def test_shipped_scenes_are_scenes(path):
 def test_the_paper_scene_holds_the_papers_numbers():
     scene = Scene.from_toml(ROOT / "scenes" / "paper.toml")
     assert (scene.law.mus, scene.law.kt) == ((1.0, 0.8), 2 * 2e5 / 7)
-    assert scene.ramp is not None
     assert (scene.friction.B, scene.friction.w, scene.friction.mu_ss) == (0.2, 0.4, 0.8)
 
 
@@ -137,7 +110,6 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
     toml = tmp_path / "scene.toml"
     toml.write_text('[packing]\nfile = "data/packing.json"\n[law]\nkn = 2e5\n[load]\nfy = 3\n')
     scene = Scene.from_toml(toml)
-    assert isinstance(scene.packing, StoredPacking)
     assert scene.packing.file == (tmp_path / "data" / "packing.json").resolve()
     assert Scene.from_mapping(scene.resolved()) == scene
 
@@ -152,7 +124,6 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
             {"law.history": "rescaled", "law.exponent": 1},
             'law.history = "rescaled" needs law.exponent = 1.5: harmonic disks have one stiffness',
         ),
-        ({"damping.cn": -1.0}, "damping.cn = -1.0 is refused: give a number of at least 0"),
         ({"damping.tau": 0.0}, "damping.tau = 0.0 is refused: give a number above 0"),
         ({"damping": {}}, "damping has nothing in it: give cn, ct or tau, or leave the section out"),
         ({"damping.cm": 1.0}, "damping.cm is no key of [damping]: the nearest is damping.c"),
@@ -166,7 +137,6 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"packing.kn": 1.0}, "packing.kn is no key of [packing]: the nearest is law.kn."),
         ({"kn": 200000.0}, "kn stands outside of its section: move it below [law]."),
         ({"precison": "double"}, "precison is no key of a scene: the nearest is precision."),
-        ({"law": None, "lwa.kn": 200000.0}, "lwa is no key of a scene: the nearest is law."),
         ({"law": None}, "law is missing: add the section [law]."),
         ({"ramp": {}}, "ramp.until is missing: add until to [ramp]."),
         ({"load": 3.0}, "load is not a section: write [load] and its keys below."),
@@ -181,33 +151,21 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"packing.radii": 0.5}, "packing.radii = 0.5 is refused: give a list of numbers."),
         ({"packing.periodic": 1}, "packing.periodic = 1 is refused: give true or false."),
         ({"law.kn": math.nan}, "law.kn = nan is refused: give a finite number."),
-        ({"law.kn": -1.0}, "law.kn = -1.0 is refused: give a number above 0."),
         ({"law.kn": -1.0, "law.kt": "2/7 kn"}, "law.kn = -1.0 is refused: give a number above 0."),
         ({"law.kn": "2e5"}, "law.kn = '2e5' is refused: give a number."),
         ({"law.kt": -1.0}, "law.kt = -1.0 is refused: give a number of at least 0."),
         ({"law.mu": [1.0, math.nan]}, "law.mu = [1.0, nan] is refused"),
-        ({"law.mu": []}, "law.mu = [] is refused"),
         ({"law.mu": 10**400}, "is refused: give a number of at least 0, or a list"),
         ({"law.mu": [1.0, 1]}, "law.mu = [1.0, 1] names one value twice: give each once."),
-        ({"load.fy": 0.0}, "load.fy = 0.0 is refused: give a number above 0."),
-        ({"ramp.force_tolerance": 0}, "ramp.force_tolerance = 0 is refused: give a number above 0."),
-        ({"relax.damping": 0.0}, "relax.damping = 0.0 is refused: give a number above 0."),
-        ({"perturb.amplitude": math.nan}, "perturb.amplitude = nan is refused"),
         # what no packing bears
         ({"law.kn": 5e-324}, "law.kn = 5e-324 is refused: give a number between 1e-100 and 1e+100"),
         ({"law.kt": 1e-320}, "law.kt"),
-        ({"law.mu": 5e-324}, "law.mu"),
-        ({"load.fy": 1e-300}, "load.fy = 1e-300 is refused"),
         ({"load.fy": 1e9}, "presses two disks 2.9e+02 into each other, deeper than the smallest radius 0.5"),
         ({"law.kn": 1e14}, "settling takes about"),
         ({"law.kn": 1e20}, "no packing comes to rest"),
-        ({"packing.radii": [5e-324]}, "packing.radii"),
-        ({"packing.radii": [0.5, 1e-9]}, "deeper than the smallest radius"),
         ({"packing.width": 1e10}, "packing.width = 1e+10 is"),
         ({"packing.seed": 2**64}, "packing.seed"),
         ({"ramp.step": 1e-12}, "ramp.step = 1e-12 makes 1e+12 equilibria"),
-        ({"ramp.step": 1e-3, "ramp.until": 1e6}, "ramp.step = 0.001 makes 1e+09 equilibria"),
-        ({"perturb.time_step": 1e-200}, "perturb.time_step"),
         ({"friction.v_ss": "1e400 v0"}, "friction.v_ss"),
         # choices
         ({"precision": "single"}, "precision = 'single' is refused: give 'double' or 'compensated'."),
@@ -215,7 +173,6 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"perturb.target": "floor"}, "perturb.target = 'floor' is refused"),
         ({"perturb.target": [-1]}, "perturb.target = [-1] is refused"),
         ({"law.kt": "2/0 kn"}, 'law.kt = "2/0 kn" is no share of kn'),
-        ({"law.kt": "-1 kn"}, 'law.kt = "-1 kn" is no share of kn'),
         ({"friction.v_ss": "0 v0"}, "friction.v_ss = '0 v0' is refused"),
         ({"friction.v_ss": 1.0, "friction.v0": "measured"}, "friction.v0 = 'measured' is refused"),
         # what does not go together
@@ -266,15 +223,8 @@ def test_a_packing_file_is_looked_at_before_any_work(refused_scene, tmp_path, na
 
 
 def test_a_loop_of_links_is_refused(refused_scene, tmp_path):
-    (tmp_path / "a.json").symlink_to(tmp_path / "b.json")
-    (tmp_path / "b.json").symlink_to(tmp_path / "a.json")
+    (tmp_path / "a.json").symlink_to("a.json")
     assert "a.json" in refused_scene(merged({"packing": {"file": "a.json"}}), tmp_path)
-
-
-def test_an_hdf5_file_is_taken(tmp_path):
-    h5py.File(tmp_path / "run.h5", "w").close()
-    scene = Scene.from_mapping(merged({"packing": {"file": "run.h5"}}), folder=tmp_path)
-    assert isinstance(scene.packing, StoredPacking)
 
 
 @pytest.mark.parametrize(
@@ -293,3 +243,68 @@ def test_a_refused_file_is_named(tmp_path, content, says):
     with pytest.raises(SceneError, match=says) as refusal:
         Scene.from_toml(path)
     assert str(refusal.value).startswith(str(path))
+
+
+SHORT = {
+    "packing": {"disks": 30, "top": 6, "width": 6.5, "seed": 3},
+    "law": {"kn": 2e5},
+    "load": {"fy": 3.0},
+    "ramp": {"step": 1e-3, "until": 0.01},
+    "perturb": {"fx": 2e-3, "time": 1.0},
+}
+
+
+def with_key(section, key, value):
+    return SHORT | {section: SHORT[section] | {key: value}}
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("time", 2.0**63), ("time_step", 1e-30), ("inertia_factor", 1e-50), ("time", 1e13)]
+)
+def test_runs_without_end_are_refused(key, value):
+    scene = Scene.from_mapping(with_key("perturb", key, value))
+    with pytest.raises(SceneError, match="the scene asks perturb for a year and more"):
+        foreseen(scene, "perturb")
+    assert foreseen(scene, "settle") == ""
+
+
+def test_a_reproduction_counts_what_it_runs():
+    scene = Scene.from_mapping(SHORT)
+    one, onset = estimated(scene, "reproduce"), estimated(scene, "onset")
+    assert one.steps > onset.steps + 1e5
+    assert foreseen(scene, "reproduce", 1000).startswith("reproduce, 1000 packings: about ")
+    with pytest.raises(SceneError, match="the scene asks reproduce for a year and more"):
+        foreseen(scene, "reproduce", 10**9)
+
+
+@pytest.mark.parametrize(
+    ("disks", "fy", "step", "until", "cn", "measured"),
+    [
+        (100, 3.0, 1e-3, 0.12, None, 29.0),
+        (100, 74.7, 1.0, 26.0, None, 137.0),
+        (100, 74.7, 1.0, 26.0, 50.0, 431.0),
+        (100, 3.0, 1e-3, 0.06, 1.0, 20.0),
+        (400, 3.0, 1e-3, 0.1, 1.0, 15.0),
+        (1000, 3.0, 2e-3, 0.1, None, 8.0),
+        (1000, 3.0, 2e-3, 0.1, 1.0, 32.0),
+        (3000, 3.0, 5e-4, 0.02, 1.0, 124.0),
+        (10_000, 3.0, 2e-4, 0.02, None, 275.0),
+        (10_000, 3.0, 2e-4, 0.02, 1.0, 1680.0),
+        (30_000, 3.0, 6.7e-5, 0.002, None, 3198.0),
+    ],
+)
+def test_time_of_a_search(disks, fy, step, until, cn, measured):
+    """Against processor time (docs/benchmarks.md, seed 11 and quartz), within a factor of three, settling apart."""
+    packing = {"disks": disks, "width": 1.192 * disks**0.5, "seed": 1}
+    scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": fy}, "ramp": {"step": step, "until": until}}
+    scene |= {} if cn is None else {"damping": {"cn": cn}}
+    search, settling = (estimated(Scene.from_mapping(scene), command).seconds for command in ("onset", "settle"))
+    assert measured / 3 < search - settling < 3 * measured
+
+
+@pytest.mark.parametrize(("disks", "measured"), [(3000, 1.7e9), (10_000, 0.9e9), (30_000, 1.7e9), (100_000, 5.2e9)])
+def test_memory_of_a_search_in_slices(disks, measured):
+    """Against peaks of the whole process in two threads (docs/benchmarks.md), within a factor of two."""
+    scene = SHORT | {"packing": {"disks": disks, "width": 1.2 * disks**0.5, "seed": 3}}
+    memory = estimated(Scene.from_mapping(scene), "onset").memory
+    assert measured / 2 < memory < 2 * measured

@@ -6,7 +6,7 @@ import pytest
 from faultgouge.analysis.files.signal_files import of_trace, read_signal
 from faultgouge.analysis.motion.forcing import floor_force, sampled_response
 from faultgouge.analysis.motion.response import layer_force
-from faultgouge.analysis.motion.signals import Signal, SignalError
+from faultgouge.analysis.motion.signals import SignalError
 from faultgouge.pywrap import Engine, Scene
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.runs.undamped import time_step
@@ -57,17 +57,6 @@ def test_lammps_refuses_a_bad_table(lmp, tmp_path, text, says):
     assert says in done.stdout + done.stderr
 
 
-def test_signal_in_pieces_is_that_of_one_run(packing):
-    signal, dt = Signal([0.0, 0.01, 0.05], [0.0, 1e-6, -1e-6]), time_step(packing)
-    ends = []
-    for pieces in ([100], [30, 70]):
-        with Engine(packing) as engine, engine.undamped(dt, signal=signal) as dynamics:
-            for steps in pieces:
-                motion = dynamics.advance(steps)
-        ends.append(motion.position)
-    np.testing.assert_array_equal(*ends)
-
-
 def test_two_columns_and_records_are_read(tmp_path):
     table = tmp_path / "table.csv"
     table.write_text("# time, value\n0, 1.5\n\n0.5, -2 # a comment\n")
@@ -87,8 +76,6 @@ def test_two_columns_and_records_are_read(tmp_path):
     [
         (None, {}, "cannot be read (No such file or directory)"),
         ("0 1\n1 nan\n", {}, "row 2 of the signal has the value nan"),
-        ("0 1\n2 1\n1 1\n", {}, "is not later than the 2 before it: sort the rows"),
-        ("0 1\n", {}, "two rows or more"),
         ("0 1 2\n1 2 3\n", {}, "line 1 has something else than two numbers"),
         ("0 1\n1 1\n", {"amplitude": 1.0}, "perturb.amplitude cannot stand beside a signal from a file"),
         ("0 1\n1 1\n", {"quantity": "velocity"}, 'perturb.quantity belongs to on = "floor"'),

@@ -32,6 +32,10 @@ def test_units_are_those_of_hertz_and_of_the_grains():
     in_units_of_the_scene = stiffness * real.length**1.5 / real.force
     assert in_units_of_the_scene == pytest.approx(2e5, rel=1e-12)
     assert real.overburden == pytest.approx(10 * 3.0 * real.force / (11.9 * 1e-4 * 1e-4), rel=1e-12)
+    # the force scales with k_n alone, so that the stress falls as the area grows
+    thin, thick = (real_units(scene(thickness=t)) for t in ("0.1 mm", "1 mm"))
+    assert thick.mass == pytest.approx(10 * thin.mass, rel=1e-12)
+    assert thick.overburden == pytest.approx(thin.overburden / 10, rel=1e-12)
     assert real.frequency(2 * np.pi) == pytest.approx(1 / real.time, rel=1e-12)
     # sigma = rho c v of a plane shear wave
     shear = 95e9 / 2 / 1.08
@@ -52,13 +56,6 @@ def test_units_of_a_file_are_those_of_its_smallest_disk_whatever_the_format(tmp_
     assert other == own
 
 
-def test_thickness_changes_mass_and_area():
-    thin, thick = (real_units(scene(thickness=t)) for t in ("0.1 mm", "1 mm"))
-    assert thick.mass == pytest.approx(10 * thin.mass, rel=1e-12)
-    # the force scales with k_n alone, so that the stress falls as the area grows
-    assert thick.overburden == pytest.approx(thin.overburden / 10, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("keys", "says"),
     [
@@ -74,11 +71,6 @@ def test_thickness_changes_mass_and_area():
 )
 def test_units_that_do_not_convert_are_refused_in_one_sentence(refused_scene, keys, says):
     assert says in refused_scene({**LEAST, "units": {**QUARTZ, **keys}})
-
-
-def test_the_load_that_the_refusal_names_is_accepted():
-    load = {"load": {"fy": 74.677}}
-    assert real_units(Scene.from_mapping({**LEAST, **load, "units": {**QUARTZ, "overburden": "10 MPa"}})) is not None
 
 
 def test_restitution_is_one_without_dashpot_and_falls_with_the_velocity_as_it_should():

@@ -1,0 +1,105 @@
+"""LAMMPS as the engine has it: what was done before leaves no trace, and what it cannot do is said in one sentence."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from reference_layer import SMALL, toml
+
+from faultgouge.analysis import nearest_image
+from faultgouge.pywrap import Engine, EngineError
+from faultgouge.pywrap.lammps.decks import Decks
+
+
+@pytest.mark.parametrize("compensated", [False, True])
+def test_a_displacement_does_not_depend_on_those_before(reference_packing, compensated):
+    """Disks cross the periodic boundary, and neighbour lists are built in some displacements and not in others."""
+    base = reference_packing(1.0)
+    if compensated:
+        base = replace(base, position_low=np.zeros_like(base.position))
+    rng = np.random.default_rng(1)
+    crossed = 0
+    with Engine(base) as engine:
+        for _ in range(6):
+            displacement = 1e-4 * rng.standard_normal((3, len(base)))
+            displacement[0] += rng.uniform(-0.2, 0.2)
+            engine.displace(base, np.repeat([rng.uniform(-0.1, 0.1), 0.0, 0.0], len(base)))
+            later = engine.displace(base, displacement.ravel())
+            force = engine.net_force
+            with Engine(base) as other:
+                assert base != later == other.displace(base, displacement.ravel())
+                np.testing.assert_array_equal(force, other.net_force)
+            moved = later.position[:, 0] - base.position[:, 0]
+            crossed += np.count_nonzero(np.abs(moved) > 0.5 * base.box_length)
+            base = later
+    assert crossed > 0
+
+
+def test_the_load_and_the_disks_are_free_again_after_displacements(reference_packing):
+    """What stays in LAMMPS between increments is gone when something else is asked for."""
+    packing = reference_packing(1.0)
+    with Engine(packing) as engine:
+        engine.displace(packing, np.zeros(3 * len(packing)))
+        engine.set_fx(1e-3)
+        engine.displace(packing, np.zeros(3 * len(packing)))
+        pushed = engine.net_force
+        instance = engine.lammps
+        assert not instance.has_id("fix", "move")
+        assert not instance.has_id("variable", "load")
+        instance.command("run 0 post no")
+        np.testing.assert_array_equal(engine.net_force, pushed)
+        engine.restore(packing)
+        with engine.undamped(1e-4) as dynamics:
+            still = dynamics.advance(0)
+        moved = nearest_image(still.position - packing.position, packing.box_length)
+        np.testing.assert_allclose(moved, 0.0, atol=1e-14)
+
+
+def test_an_engine_goes_on_undamped(reference_packing):
+    """Dashpots are on in dynamics alone: what the engine does after it is as if there had been none."""
+    packing = reference_packing(1.0)
+    packing = replace(packing, law=replace(packing.law, cn=30.0, ct=20.0), drag_time=0.2, fx=3.0)
+    relaxed = []
+    for steps in (0, 20):
+        with Engine(packing) as engine:
+            if steps:
+                with engine.undamped(1e-3) as dynamics:
+                    dynamics.advance(steps)
+            engine.restore(packing)
+            engine.relax(1.0)
+            relaxed.append(engine.packing)
+    assert packing != relaxed[0] == relaxed[1]
+
+
+def test_forces_without_friction_are_zero_until_the_first_run(reference_packing):
+    """LAMMPS does not set them; with MALLOC_PERTURB_ in the environment they would be numbers of any size."""
+    with Engine(reference_packing(0.0)) as engine:
+        assert not engine.net_force.any()
+
+
+def test_what_stops_a_run_is_what_is_said(reference_packing):
+    engine = Engine(reference_packing(1.0))
+    with pytest.raises(EngineError, match="Unknown command: nonsense"), engine.undamped(1e-4):
+        Decks(engine.lammps).command("nonsense")
+
+
+@pytest.mark.parametrize(
+    ("library", "says"),
+    [
+        (None, "mindlinsmoothplugin.so is not there"),
+        (b"of another machine", "was built for another release, MPI or size of atom IDs"),
+    ],
+    ids=["no plugin", "a plugin that LAMMPS cannot load"],
+)
+@pytest.mark.slow
+def test_a_plugin_that_does_not_fit_is_refused(faultgouge, tmp_path, monkeypatch, library, says):
+    if library:
+        (tmp_path / "mindlinsmoothplugin.so").write_bytes(library)
+    (tmp_path / "scene.toml").write_text(toml(SMALL))
+    monkeypatch.setenv("FAULTGOUGE_PLUGIN", str(tmp_path))
+    # where the LAMMPS of an earlier test found plugins: its module tells all processes that follow
+    monkeypatch.delenv("LAMMPS_PLUGIN_PATH", raising=False)
+    done = faultgouge("settle", "scene.toml", "-o", "run.h5", code=1)
+    (line,) = (line for line in done.stderr.splitlines() if line.startswith("Error:"))
+    for words in (says, str(tmp_path), "build the plugin for this LAMMPS", "FAULTGOUGE_PLUGIN"):
+        assert words in line
