@@ -1,6 +1,7 @@
-"""A picture that cannot be drawn is told in one sentence, and costs no number and no page."""
+"""What studies leave: pages that fit a screen; a picture that cannot be drawn costs no number and no page."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -11,8 +12,7 @@ from reference_layer import SMALL, parted
 from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import RunFile
-from faultgouge.assessment.stability.cases.case import Case, Outcome
-from faultgouge.assessment.stability.compute import stability
+from faultgouge.figures.pages import WIDTH, filled
 from faultgouge.figures.style import spared
 from faultgouge.pywrap import Scene
 from faultgouge.studies.frame import Study
@@ -33,10 +33,22 @@ def said():
     return []
 
 
-@pytest.fixture
-def stored(tmp_path, reference_packing):
-    with RunFile.create(tmp_path / "run.h5", reference_packing(1.0)) as run:
-        run.append(reference_packing(1.0), floor=1e-11, evaluations=1)
+PROSE = "The exponent is 0.5 - 0.001 + 0.002 > 0, as in 1. and in # 2, over all of the many loads that are there. " * 3
+
+
+def test_prose_and_items_are_folded_where_no_line_begins_a_list():
+    lines = filled(PROSE).split("\n")
+    assert max(map(len, lines)) <= WIDTH
+    assert not [line for line in lines if re.match(r"([-+>#]|\d+\.) ", line)]
+    assert " ".join(lines).split() == PROSE.split()
+    first, *more = filled("- " + PROSE).split("\n")
+    assert first.startswith("- ")
+    assert all(re.match(r"  \S", line) for line in more)
+
+
+def test_tables_pictures_code_and_formulas_stay():
+    text = "\n".join(["| " + PROSE, "![" + PROSE + "](a.png)", "```", PROSE, "```", "$$", PROSE, "$$", "    " + PROSE])
+    assert filled(text) == text
 
 
 def test_an_interrupt_is_no_failed_picture(said):
@@ -59,30 +71,21 @@ def test_genericity_keeps_its_numbers_and_its_page_which_are_those_of_the_docs(t
     assert all("was not drawn (RuntimeError: no font at all)" in sentence for sentence in said)
 
 
-def test_a_spectrum_keeps_its_eigenvalues(stored, faultgouge_here, monkeypatch):
+def test_a_spectrum_keeps_its_eigenvalues_and_draw_its_words(
+    tmp_path, reference_packing, faultgouge_here, no_pictures, monkeypatch
+):
     def fails(*_):
         raise LinAlgError("no convergence")
 
+    with RunFile.create(tmp_path / "run.h5", reference_packing(1.0)) as run:
+        run.append(reference_packing(1.0), floor=1e-11, evaluations=1)
     monkeypatch.setattr("faultgouge.analysis.motion.transient.transient_gains", fails)
     done = faultgouge_here("spectrum", "run.h5", "--json")
     result = json.loads(done.stdout)
     assert len(result["eigenvalues"]) > 200
     assert result["transient_gain"] is None
     assert "the transient gain was not found (LinAlgError: no convergence); the eigenvalues are complete" in done.stderr
-
-
-def test_draw_says_its_words_before_the_picture(stored, faultgouge_here, no_pictures):
-    done = faultgouge_here("draw", "run.h5", code=1)
-    assert "100 disks" in done.stderr
-
-
-def test_stability_keeps_its_cases(tmp_path, no_pictures, said):
-    case = Case("one", "group", lambda: Outcome("holds", 0.5, 1.0, "half of the bound"))
-    stability(tmp_path, say=said.append, cases=[case])
-    assert json.loads((tmp_path / "stability.json").read_text())["cases"][0]["figure"] == 0.5
-    assert (tmp_path / "stability.md").exists()
-    assert len(said) == 1
-    assert "stability.png was not drawn (RuntimeError: no font at all)" in said[0]
+    assert "100 disks" in faultgouge_here("draw", "run.h5", code=1).stderr
 
 
 def test_a_sweep_keeps_its_rows(tmp_path, no_pictures, said):
