@@ -236,18 +236,3 @@ def test_shares_of_larger_packings_are_those_that_the_law_of_smaller_ones_tells(
     shares = counted[3000, 0.03]
     left = [k / 100 for k in range(120) if mannwhitneyu(shares, shares_told(0.03, 3, k / 100)).pvalue >= 0.05]
     assert f"at 0.03 from {min(left):.2f} to {max(left):.2f}" in " ".join(REFEREE.split())
-
-
-def test_packings_that_bear_more_are_no_others_from_the_start():
-    """Share and rate at 0.1 of those that bear 0.2, and of those that do not."""
-    found = []
-    for disks in (50, 100, 200, 400):
-        packings = rows(f"tables/force_{disks}.jsonl")
-        loads = [{load["fx_over_fy"]: load for load in row.get("loads", ())} for row in packings]
-        for key in ("share", "growth_rate"):
-            on = [each[0.1][key] for each in loads if 0.2 in each]
-            ended = [each[0.1][key] for each in loads if 0.1 in each and 0.2 not in each]
-            found.append(mannwhitneyu(on, ended).pvalue)
-    stated = re.search(r"none has a probability below\s+([\d.]+\d)", REFEREE)
-    assert stated
-    assert min(found) >= float(stated[1]) > 0.02

@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import time
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ from faultgouge.studies.hands import Processes, hands
 from faultgouge.studies.sweep import workers
 from faultgouge.studies.sweep.compute import merge, run_sweep, stored
 from faultgouge.studies.sweep.draw import draw_sweep
-from faultgouge.studies.sweep.points import Sweep, shard
+from faultgouge.studies.sweep.points import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
 from faultgouge.studies.sweep.workers import WorkerError, computed
 
@@ -96,14 +95,6 @@ def test_a_stored_packing_is_found_from_another_folder(tmp_path):
     assert sweep.points[0].scene.packing.file == tmp_path / "packing.json"
 
 
-def test_shards_are_a_partition_and_keep_settlings_together():
-    points = sweep_of({"packing.seed": "1:5", "law.mu": [0.5, 1.0, -1.0]}).points
-    parts = [shard(points, (k, 3)) for k in (1, 2, 3)]
-    assert sorted(p.number for part in parts for p in part) == list(range(15))
-    homes = [{p.settling for p in part if p.scene is not None} for part in parts]
-    assert sum(map(len, homes)) == len(set.union(*homes))
-
-
 @pytest.mark.slow
 def test_rows_are_the_onsets_of_their_scenes_and_share_settled_packings(tmp_path, monkeypatch):
     settled, original = [], workers.settled_bed
@@ -129,7 +120,7 @@ def test_a_cut_line_is_computed_again_and_a_longer_sweep_goes_on(tmp_path):
     lines, said = tmp_path / "results.jsonl", []
     first = lines.read_text()
     lines.write_text(first + first[:40])
-    run_sweep(sweep_of({"packing.seed": "1:2"}), tmp_path, say=said.append)
+    run_sweep(sweep_of({"packing.seed": "1:2"}), tmp_path, say=said.append, workers=2)
     assert said == [f"1 of 2 points are in {lines} already"]
     assert lines.read_text().startswith(first)
     assert [row["values"]["packing.seed"] for row in stored(lines).values()] == [1, 2]  # nothing of the cut line
@@ -159,11 +150,6 @@ def test_the_dry_run_counts_and_computes_nothing(faultgouge, tmp_path):
     assert "8 scenes to compute, 4 packings to settle" in done.stderr
     assert "4 points make no scene" in done.stderr
     assert not (tmp_path / "out").exists()
-    hundred, thousand = (
-        TASKS["onset"].seconds(Scene.from_mapping(SMALL | {"packing": {"disks": n, "width": 60.0}}))
-        for n in (100, 1000)
-    )
-    assert thousand / hundred == pytest.approx(10**1.6)
 
 
 @pytest.mark.ranks
@@ -212,7 +198,6 @@ def test_trigger_and_eruptions_as_tasks(tmp_path):
         wanted = Sweep.from_mapping({"task": task, "sweep": {"packing.seed": [2]}, "scene": scene}, TASKS)
         (row,) = run_sweep(wanted, tmp_path / task, say=id)
         assert draw_sweep([row], tmp_path / task, print).endswith("results.png")
-        assert (tmp_path / task / "results.svg").exists()
         found[task] = row["result"]
     (predicted,), (run,) = found["trigger"]["map"], found["eruptions"]["runs"]
     assert found["trigger"]["ends"] == "onset"
@@ -226,29 +211,14 @@ def sweep():
     return sweep_of({"packing.seed": "1:3", "law.mu": [1.0, 0.5, -1.0]})
 
 
-@pytest.fixture(scope="module")
-def rows(sweep):
-    return sorted(stripped(row) for row in computed(None, sweep.task, sweep.points))
-
-
 def stripped(row):
     """A row without its times, as text."""
     return str({name: value for name, value in row.items() if "seconds" not in name})
 
 
-@pytest.mark.slow
-def test_processes_and_an_executor_of_somebody_else_give_the_rows_of_one(sweep, rows, tmp_path):
-    found = run_sweep(sweep, tmp_path / "processes", say=id, workers=2)
-    assert [row["key"] for row in found] == [point.key for point in sweep.points]
-    with ThreadPoolExecutor(1) as executor:
-        others = run_sweep(sweep, tmp_path / "executor", say=id, executor=executor)
-    for each in (found, others):
-        assert sorted(stripped(row) for row in each) == rows
-
-
 @pytest.mark.long
-def test_a_killed_worker_takes_nothing_with_it(sweep, rows):
-    found = []
+def test_a_killed_worker_takes_nothing_with_it(sweep):
+    rows, found = sorted(stripped(row) for row in computed(None, sweep.task, sweep.points)), []
     with hands(2) as pool:
         for row in computed(pool, sweep.task, sweep.points):
             if not found:
