@@ -1,13 +1,20 @@
-"""Links between pages lead somewhere, and lines fit a screen."""
+"""Links between pages lead somewhere, lines fit a screen, commands print what a page shows, and notebooks run."""
 
+import json
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
+from reference_layer import BIN, toml
+
+from docs.run_page import commands, run
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 PROSE = [*PAGES, *sorted((ROOT / "docs").glob("*/*.md"))]
+NOTEBOOKS = ROOT / "docs" / "notebooks"
+NAMES = ("exceptional_point", "own_packing")
 EXPLANATIONS = ("physics", "numerics", "complex_pairs", "arithmetic", "dissipation")
 NO_PROSE = re.compile(r"^(```|\$\$).*?^(```|\$\$)$|^(\||    ).*?$", re.MULTILINE | re.DOTALL)
 """Blocks of code and formulas, and rows of tables."""
@@ -19,7 +26,11 @@ def anchors(page):
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("page", PROSE, ids=lambda page: page.name)
+@pytest.fixture(params=PROSE, ids=lambda page: page.name)
+def page(request):
+    return request.param
+
+
 def test_links_lead_somewhere(page):
     lost = []
     for link, anchor in re.findall(r"\]\((?!https?:)([^)#\s]*)(?:#([^)\s]*))?\)", page.read_text()):
@@ -29,7 +40,6 @@ def test_links_lead_somewhere(page):
     assert lost == []
 
 
-@pytest.mark.parametrize("page", PROSE, ids=lambda page: page.name)
 def test_no_line_of_prose_is_longer_than_a_screen(page):
     prose = NO_PROSE.sub("", page.read_text())
     assert [line for line in prose.splitlines() if len(line) > 120] == []
@@ -43,11 +53,87 @@ def test_explanations_are_two_screens_with_a_picture_before_any_number(page):
     assert re.findall(r"\d\.\d|10\^|\b\d\d+", before) == []
 
 
-def test_no_page_has_the_name_of_a_page_that_sphinx_makes():
-    assert {page.stem for page in PAGES} & {"search", "genindex", "py-modindex"} == set()
+def test_a_wrong_page_is_found_out(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("```console\n$ echo mu = 1.01\nmu = 1.0\n$ echo mu = 1.0001\nmu = 1.0\n$ false\n```\n")
+    number, code = run(page, tmp_path)
+    assert "1.01" in number
+    assert "exit code 1" in code
 
 
-def test_films_are_small_enough_to_open_with_the_page():
-    films = sorted((ROOT / "docs").rglob("pictures/**/*.gif"))
-    assert films
-    assert [film.name for film in films if film.stat().st_size > 2_000_000] == []
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("page", "count", "pictures"),
+    [
+        # two ranks that share their cores with others take ten times as long
+        pytest.param("README.md", 4, 0, marks=pytest.mark.ranks),
+        pytest.param("docs/decks.md", 4, 0, marks=pytest.mark.ranks),
+        ("docs/tutorial.md", None, 5),
+        ("docs/api.md", None, 1),
+    ],
+)
+def test_a_page_shows_what_its_commands_print(tmp_path, page, count, pictures):
+    path = ROOT / page
+    assert count in (None, len(list(commands(path))))
+    assert run(path, tmp_path) == []
+    shown = re.findall(r"\]\((pictures/tutorial/[\w.]+)\)", path.read_text())
+    assert all((path.parent / picture).exists() for picture in shown)
+    made = [Path(picture).name for picture in shown] or [path.name for path in tmp_path.glob("*.png")]
+    assert len(made) == pictures
+    assert all((tmp_path / picture).stat().st_size > 10_000 for picture in made)
+
+
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 150
+
+
+def test_no_output_is_stored():
+    nbformat = pytest.importorskip("nbformat")
+    assert sorted(path.stem for path in NOTEBOOKS.glob("*.ipynb")) == sorted(NAMES)
+    cells = [cell for name in NAMES for cell in nbformat.read(NOTEBOOKS / f"{name}.ipynb", 4).cells]
+    assert [cell for cell in cells if cell.get("outputs") or cell.get("execution_count")] == []
+
+
+def printed_and_shown(name):
+    """What a notebook prints, and how many pictures it shows: a cell that ends with a figure shows it."""
+    nbformat, nbclient = map(pytest.importorskip, ("nbformat", "nbclient"))
+    pytest.importorskip("ipykernel")
+    notebook = nbformat.read(NOTEBOOKS / f"{name}.ipynb", 4)
+    nbclient.NotebookClient(notebook, timeout=300).execute()
+    outputs = [each for cell in notebook.cells for each in cell.get("outputs", [])]
+    text = "".join(each["text"] for each in outputs if each.output_type == "stream" and each.name == "stdout")
+    return text, sum("image/png" in each.get("data", {}) for each in outputs)
+
+
+def number(text, before):
+    return float(re.search(re.escape(before) + r" (\d[-+.\de]*)", text)[1])
+
+
+@pytest.mark.long
+def test_the_exceptional_point(faultgouge, tmp_path):
+    """The pair of three disks opens as a square root; the hundred disks have the onset of the command."""
+    text, pictures = printed_and_shown("exceptional_point")
+    assert pictures == 6
+    # beside the root stands a term that is proportional to the distance: a hundredth of the load at the most
+    assert number(text, "exponent") == pytest.approx(0.5, abs=0.01)
+    sections = {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 1e-3, "until": 0.02}}
+    (tmp_path / "scene.toml").write_text(toml(sections))
+    found = json.loads(faultgouge("onset", "scene.toml", "--json").stdout)
+    # the same search in the same arithmetic, printed with ten digits
+    assert number(text, "a hundred disks: F_x^c =") == pytest.approx(found["fx_c"], abs=5e-12)
+
+
+@pytest.mark.long
+def test_a_packing_of_ones_own(faultgouge, tmp_path):
+    """The commands of the how-to find the same onset: their path has other increments, whose error they state."""
+    page = (ROOT / "docs" / "howto_own_packing.md").read_text()
+    deck, scene = re.findall(r"```\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "pour.in").write_text(deck)
+    (tmp_path / "own.toml").write_text(scene)
+    subprocess.run([BIN / "lmp", "-in", "pour.in"], cwd=tmp_path, capture_output=True, check=True)
+    [relaxing] = re.findall(r"^    faultgouge (import .*)$", page, re.MULTILINE)
+    faultgouge(*relaxing.split())
+    found = json.loads(faultgouge("onset", "own.toml", "--json").stdout)
+    text, pictures = printed_and_shown("own_packing")
+    assert pictures == 3
+    assert number(text, "own packing: F_x^c =") == pytest.approx(found["fx_c"], abs=found["error"] + 5e-12)

@@ -1,12 +1,14 @@
-"""What dissipation does to the onset and to the transient gain: README's packing, and the tables of the docs."""
+"""What dissipation does to the onset, also in SI, and to the gain: README's packing, and the tables of the docs."""
 
 import json
 from pathlib import Path
 
 import pytest
+from reference_layer import SMALL, UNITS, toml
 
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.onset.damped import damped_onset_run, ramped
+from faultgouge.pywrap.scenes.units import real_units
 from faultgouge.studies.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
 from faultgouge.studies.packings import seeded
 
@@ -85,3 +87,20 @@ def test_scenes_without_a_section():
         damped_onset_run(SCENE, 1.0)
     with pytest.raises(SceneError, match=r"no section \[ramp\]"), ramped(SCENE.model_copy(update={"ramp": None})):
         pass
+
+
+@pytest.mark.parametrize("damping", ["", "[damping]\ncn = 1.0\n"])
+@pytest.mark.slow
+def test_onset_in_si(faultgouge_here, tmp_path, damping):
+    (tmp_path / "scene.toml").write_text(
+        toml(SMALL | {"packing": {"disks": 30, "seed": 4}, "ramp": {"step": 4e-3, "until": 0.012}}) + UNITS + damping
+    )
+    done = faultgouge_here("onset", "scene.toml", "--json")
+    found = json.loads(done.stdout)
+    real = real_units(Scene.from_toml(tmp_path / "scene.toml"))
+    window = found["windows"][0]
+    omega = window["frequency"] if damping else window["lambda"] ** 0.5
+    assert found["si"][0] == real.onset(found["fx_c"], omega)
+    assert found["si"][0]["shear_stress_Pa"] == pytest.approx(found["fx_c"] / 3.0 * real.overburden, rel=1e-12)
+    for number in found["si"][0].values():
+        assert f"{number:.4g}" in done.stderr

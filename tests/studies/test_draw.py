@@ -1,4 +1,4 @@
-"""What the figures of studies contain: laws, runs, fits, and names on their axes."""
+"""What the figures of studies contain: laws, runs and fits."""
 
 from dataclasses import replace
 
@@ -28,56 +28,39 @@ from faultgouge.studies.triggering.draw import (
 PAPERS = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=0.0, v_ss=1.0)
 
 
-def texts(figure):
-    legends = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
-    words = [text for legend in legends for text in (*legend.get_texts(), legend.get_title())]
-    return " ".join(text.get_text() for text in (*words, *(text for axes in figure.axes for text in axes.texts)))
-
-
 @pytest.fixture
 def runs():
     time = np.geomspace(0.01, 100, 300)
     return [(time, level * (1 + np.sin(time) ** 2)) for level in (1e-25, 1e-22, 1e-10)]
 
 
-def test_law_is_drawn_from_its_threshold_on():
-    axes = friction_law_figure(replace(PAPERS, v0=3.0, v_ss=7.0), 0.5).axes[0]
-    reduced, mu = axes.lines[0].get_data()
+def test_laws_are_drawn_from_their_thresholds_on():
+    """The paper's law, and those that it fitted to measurements."""
+    reduced, mu = friction_law_figure(replace(PAPERS, v0=3.0, v_ss=7.0), 0.5).axes[0].lines[0].get_data()
     assert np.all(mu[reduced <= 0] == 0.5)
     np.testing.assert_allclose(mu[reduced > 0], 0.1 * np.exp(-0.4 * reduced[reduced > 0]) + 0.4, rtol=1e-12)
-    assert "B = 0.2$, $w = 0.4" in texts(axes.figure)
-
-
-def test_measured_friction_says_what_is_missing():
-    figure = measured_friction_figure()
-    for line, mu_ss in zip(figure.axes[0].lines, (0.78, 0.74), strict=True):
+    for line, mu_ss in zip(measured_friction_figure().axes[0].lines, (0.78, 0.74), strict=True):
         v, mu = line.get_data()
         assert np.all(mu[v <= 0.05] == 1)
         np.testing.assert_allclose(mu[v > 0.05], 0.22 * np.exp(-4 * (v[v > 0.05] - 0.05)) + mu_ss, rtol=1e-12)
-    assert "are not public and are not drawn" in texts(figure)
 
 
 def test_eruption_draws_its_runs_their_control_and_the_crossing(runs):
     runs[0][1][:5] = 0.0
     axes, late = eruption_figure(*runs, control=runs[1], crossing=2.5).axes
-    assert [each.get_xscale() + each.get_yscale() for each in (axes, late)] == ["loglog", "linearlog"]
-    *drawn, threshold = axes.lines
-    levels = {line.get_label(): line.get_ydata() for line in drawn}
-    assert list(levels)[1] == r"$\mu(v)$ below both onsets"
-    assert len(levels[r"left alone, $\mu_0$"]) == 295
-    np.testing.assert_array_equal(levels[r"perturbed, friction $\mu(v)$"], runs[2][1])
-    assert len({line.get_color() for line in drawn}) == 4
-    assert set(threshold.get_xdata()) == {2.5}
+    for panel in (axes, late):
+        *drawn, threshold = panel.lines
+        for line, (_, msd) in zip(drawn, (runs[2], runs[1], runs[1], runs[0]), strict=True):
+            np.testing.assert_array_equal(line.get_ydata(), msd[msd > 0])
+        assert set(threshold.get_xdata()) == {2.5}
 
 
 def test_weakening_draws_the_run_over_its_law():
     law = replace(PAPERS, v0=1e-11, v_ss=1e-9)
     velocity = np.concatenate([np.geomspace(1e-13, 1e-6, 50), [-1e-9, 0.0]])
-    axes = weakening_figure(velocity, 0.5 * share(law, velocity), law, 0.5).axes[0]
-    smooth, run = axes.lines[:2]
+    smooth, run = weakening_figure(velocity, 0.5 * share(law, velocity), law, 0.5).axes[0].lines[:2]
     np.testing.assert_array_equal(run.get_ydata(), 0.5 * share(law, velocity[:50]))
     np.testing.assert_array_equal(smooth.get_ydata(), 0.5 * share(law, smooth.get_xdata()))
-    assert "$v_0$ $v_{ss}$" in texts(axes.figure)
 
 
 def normal_pairs(*epsilons):
@@ -89,27 +72,24 @@ def normal_pairs(*epsilons):
 def test_amplitudes_carry_their_exponent():
     distance = np.array([1e-7, 1e-2, 0.5])
     found = Sensitivity(distance, normal_pairs(*distance), PowerLaw(-0.49989, 3e-5, 1.4))
-    figure = amplitude_figure(found)
-    _, fitted, points = figure.axes[0].lines
+    _, fitted, points = amplitude_figure(found).axes[0].lines
     np.testing.assert_allclose(fitted.get_ydata(), 1.4 * np.array([1e-7, 0.5]) ** -0.49989)
     np.testing.assert_array_equal(points.get_ydata(), [pair.amplitude() for pair in found.pairs])
-    assert "slope $-0.49989(3)$" in texts(figure)
     # of a response of less than four times the start no damping takes half
     assert found.near == found.pairs[:2]
 
 
 def test_damping_marks_its_crossover():
     pairs = normal_pairs(1e-3, 1e-5)
-    figure = damping_figure(pairs)
+    lines = damping_figure(pairs).axes[0].lines
     for number, pair in enumerate(pairs):
-        line, plateau, dot, ring = figure.axes[0].lines[4 * number : 4 * number + 4]
+        line, plateau, dot, ring = lines[4 * number : 4 * number + 4]
         np.testing.assert_array_equal(line.get_xdata(), pair.tau_d * DAMPING)
         np.testing.assert_array_equal(line.get_ydata(), [pair.form.amplitude(tau) for tau in line.get_xdata()])
         assert set(plateau.get_ydata()) == {pair.form.amplitude()}
         # between two points the curve bends by a few per cent
         assert dot.get_xydata()[0] == pytest.approx((pair.tau_d, 0.4155 * pair.form.amplitude()), rel=0.05)
         assert tuple(ring.get_xydata()[0]) == (pair.form.half_gain_time(), 0.5 * pair.form.amplitude())
-    assert r"\varepsilon = 1.0 \times 10^{-3}" in texts(figure)
 
 
 def test_response_lies_over_the_run(runs):
@@ -124,16 +104,12 @@ def test_response_lies_over_the_run(runs):
 def test_growth_draws_the_predicted_slope_beside_the_data():
     time = np.linspace(0, 100, 501)
     msd = 1e-25 * (1 + np.exp(0.4 * time))
-    msd[0] = 0.0
-    axes = growth_figure(time, msd, 0.4, Growth(0.402, 1e-3, 12.0, 20.0, 90.0)).axes[0]
-    data, predicted = axes.lines
-    assert len(data.get_xdata()) == 500
+    _, predicted = growth_figure(time, msd, 0.4, Growth(0.402, 1e-3, 12.0, 20.0, 90.0)).axes[0].lines
     (t0, t1), (d0, d1) = predicted.get_data()
     assert (t0, t1) == (20.0, 90.0)
     assert np.log(d1 / d0) / (t1 - t0) == pytest.approx(0.4, rel=1e-12)  # rounding of exp and log
     # A decade and a half above; where the floor still adds 3e-4 of D to the first point of the window.
     assert d0 / msd[100] == pytest.approx(10**1.5, rel=1e-3)
-    assert all(words in texts(axes.figure) for words in ("= 0.4$", "= 0.402$", "+0.5"))
 
 
 def test_dissipation_shows_predictions_and_onsets_and_where_there_is_no_gain():
@@ -149,10 +125,8 @@ def test_dissipation_shows_predictions_and_onsets_and_where_there_is_no_gain():
         "dashpots": [{"distance": x, "gain": None if x < 1e-3 else 1 / x} for x in distance],
     }
     dashpots, drag, gain = dissipation_figure(lowered, raised, gains).axes
-    assert dashpots.get_xscale() == "log"
     assert [set(line.get_ydata()) for line in dashpots.lines[:2]] == [{undamped}, {limit}]
     assert np.array_equal(dashpots.lines[2].get_ydata(), limit + 1e-5 * strength)
-    predicted, measured = (line.get_ydata() for line in drag.lines)
-    assert measured == pytest.approx(1e-3 * strength**2, rel=1e-6)
-    assert predicted == pytest.approx(measured)
+    for line in drag.lines:
+        assert line.get_ydata() == pytest.approx(1e-3 * strength**2, rel=1e-6)
     assert [np.isnan(line.get_ydata()).sum() for line in gain.lines] == [0, 3]

@@ -1,4 +1,4 @@
-"""Ensembles: what is counted, what is kept, and that nothing is dropped."""
+"""The study of the protocol: one packing, another that is triggered, and ensembles, of which nothing is dropped."""
 
 import json
 
@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from reference_layer import REFERENCE, SMALL, toml
 
+from faultgouge.analysis import RunFile
 from faultgouge.pywrap import NoEquilibriumError, Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.studies.reproduce import ensemble as study
+from faultgouge.studies.reproduce import reproduce
 from faultgouge.studies.reproduce.ensemble_figure import ensemble_figure
 from faultgouge.studies.statistics import distribution, lowers, median_interval, quartiles, share
 from faultgouge.studies.sweep import triggering
@@ -17,6 +19,13 @@ SCENE = SMALL | {
     "packing": SMALL["packing"] | {"seed": 2},
     "law": {"kn": 2e5, "mu": [1.0, 0.8]},
     "perturb": {"fx": 0.0, "time": 0.5, "amplitude": 5e-10, "omega": 0.01},
+    "friction": {"v_ss": "10 v0"},
+}
+
+TRIGGERED = SMALL | {
+    "packing": {"disks": 30, "seed": 4},
+    "ramp": {"step": 4e-3, "until": 0.012},
+    "perturb": {"fx": 0.011, "time": 1.0, "amplitude": 5e-10, "omega": 0.01},
     "friction": {"v_ss": "10 v0"},
 }
 
@@ -65,18 +74,10 @@ def test_wilson_interval():
     assert share(0, 0) == {"count": 0, "of": 0, "share": None, "low": None, "high": None}
 
 
-@pytest.mark.parametrize(
-    ("strong", "weak", "expected"),
-    [
-        (("onset", 0.02), ("onset", 0.01), True),
-        (("onset", 0.01), ("onset", 0.02), False),
-        (("until", 0.03), ("onset", 0.02), True),
-        (("flows", 0.01), ("onset", 0.02), None),
-        (("onset", 0.02), ("flows", 0.01), None),
-    ],
-)
-def test_what_is_known_of_censored_onsets(strong, weak, expected):
-    assert lowers(*ramps(strong, weak)) is expected
+def test_what_is_known_of_censored_onsets():
+    low, high, later, flows = ("onset", 0.01), ("onset", 0.02), ("until", 0.03), ("flows", 0.01)
+    pairs = ((high, low), (low, high), (later, high), (flows, high), (high, flows))
+    assert [lowers(*ramps(strong, weak)) for strong, weak in pairs] == [True, False, True, None, None]
 
 
 def of_ends(function, ends):
@@ -114,15 +115,6 @@ def test_first_onset_is_that_of_the_whole_ramp(scene):
     assert path[-1].fx - scene.ramp.step <= found["reach"] <= path[-1].fx
 
 
-@pytest.mark.slow
-def test_an_ensemble_goes_on_where_it_was_cut_off(scene, tmp_path):
-    first, said = study.ensemble(scene, 1, tmp_path, id), []
-    second = study.ensemble(scene, 2, tmp_path, said.append)
-    assert said[0].startswith("1 of 2 points are in")
-    assert (first["seeds"], second["seeds"]) == ([2], [2, 3])
-    assert json.loads((tmp_path / "ensemble.json").read_text()) == second
-
-
 def test_what_was_found_before_a_failure_is_kept(scene, monkeypatch):
     def fail(*_):
         raise NoEquilibriumError("no eruption today")
@@ -148,32 +140,52 @@ def test_eruptions_are_counted(scene):
 
 def test_figure_shows_pairs_and_rises():
     onsets, pairs, rises = ensemble_figure([each["result"] for each in MEMBERS]).axes
-    assert [line.get_label() for line in onsets.lines[::2]] == [r"$\mu = 1$", r"$\mu = 0.8$"]
     # level where packings are lost from sight
     assert onsets.lines[0].get_ydata() == pytest.approx(np.array([0, 1, 5, 5]) / 7)
     drawn = [(*line.get_xydata()[0], line.get_marker(), line.get_markerfacecolor()) for line in pairs.lines[:6]]
     assert drawn[:4] == [(0.02, 0.01, "o", face) for face in ("none", "none", "C0", "C0")]
     assert drawn[4:] == [(0.01, 0.02, "o", "none"), (0.03, 0.02, ">", "none")]
-    assert pairs.get_xlabel() == r"$F_x^c(\mu = 1)$"
     assert len(rises.patches) == 2  # the packings and their controls
-    assert len(ensemble_figure([]).axes) == 3
 
 
-def test_stored_packings_make_no_ensemble(tmp_path):
+@pytest.mark.slow
+def test_what_cannot_be_studied_is_refused(tmp_path):
     stored = Scene.from_mapping(SCENE | {"packing": {"file": str(REFERENCE)}})
     with pytest.raises(SceneError, match="stored one"):
         study.ensemble(stored, 2, tmp_path)
+    # the window is narrow: from 0.01159 to 0.01217
+    coarse = Scene.from_mapping(TRIGGERED | {"ramp": {"step": 1e-2, "until": 0.02}})
+    with pytest.raises(SceneError, match="no load of the ramp lies in a window"):
+        reproduce(coarse, tmp_path / "out", say=id)
 
 
 @pytest.mark.ranks
 @pytest.mark.long
-def test_ranks_share_the_packings(faultgouge, tmp_path):
+def test_ranks_share_the_packings_and_go_on_where_an_ensemble_ended(faultgouge, tmp_path):
     changes = {"law": SCENE["law"], "ramp": {"step": 5e-3, "until": 1e-2}}
     (tmp_path / "scene.toml").write_text(toml(SMALL | changes | {"packing": SMALL["packing"] | {"seed": 3}}))
-    for name, ranks in (("one", None), ("shared", 2)):
-        faultgouge("reproduce", "scene.toml", "--ensemble", "2", "-o", name, ranks=ranks)
+    for name, number, ranks in (("one", 1, None), ("one", 2, None), ("shared", 2, 2)):
+        done = faultgouge("reproduce", "scene.toml", "--ensemble", number, "-o", name, ranks=ranks)
+        assert ("1 of 2 points are in one" in done.stderr) is ((name, number) == ("one", 2))
     one, shared = (json.loads((tmp_path / name / "ensemble.json").read_text()) for name in ("one", "shared"))
     assert one == shared
     assert one["seeds"] == [3, 4]
     for ending in ("png", "svg"):
         assert (tmp_path / "shared" / f"ensemble.{ending}").stat().st_size > 0
+
+
+@pytest.mark.long
+def test_another_packing_may_be_the_one_that_is_triggered(tmp_path):
+    """Its onsets, runs and scene are in files and in the summary of their own, and the report says so.
+
+    Slow because of ten figures.
+    """
+    triggered = Scene.from_mapping(TRIGGERED)
+    scene = triggered.model_copy(update={"perturb": None, "friction": None})
+    summary = reproduce(scene, tmp_path, say=lambda _: None, triggered=triggered)
+    assert summary["triggering"]["scene"] == triggered.resolved()
+    assert summary["triggering"]["fx"] == 0.011
+    assert summary["triggering"]["onsets"][0]["onset"] == summary["ramps"][0]["onset"]
+    with RunFile(tmp_path / "triggered.h5") as file:
+        assert file.series("erupting")["msd"].max() == summary["triggering"]["largest_D"]["erupting"]
+    assert "The packing that is triggered" in (tmp_path / "report.md").read_text()

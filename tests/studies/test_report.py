@@ -1,87 +1,24 @@
 """Error against run time: the pieces that a study is made of, the report's contract, and the quick report."""
 
 import json
-from dataclasses import replace
 
 import mpmath
 import numpy as np
 import pytest
 
-from faultgouge.analysis import discrete_frequency, spectrum, stiffness_matrix
+from faultgouge.analysis import discrete_frequency, spectrum
 from faultgouge.assessment import error_and_time as page
-from faultgouge.assessment.error_and_time.work_precision import dumps, relaxation, trajectory
+from faultgouge.assessment.error_and_time.work_precision import dumps, relaxation
 from faultgouge.assessment.error_and_time.work_precision.extended import refined
 from faultgouge.assessment.error_and_time.work_precision.frequency import Mode, corrected
-from faultgouge.assessment.error_and_time.work_precision.jacobian import central_differences, complex_step
-from faultgouge.assessment.error_and_time.work_precision.study import Point, Settings, compensated, fit_order
-from faultgouge.assessment.timing import in_turns
+from faultgouge.assessment.error_and_time.work_precision.study import Settings, compensated
 from faultgouge.pywrap import Engine, Scene, ramp
-
-POINT = {"method", "parameter", "error", "seconds", "evaluations"}
 
 
 @pytest.fixture(scope="module")
 def settings():
     scene = Scene.from_toml(page.SCENE)
     return Settings(scene, tuple(ramp(scene)), quick=True, repeats=1)
-
-
-def test_the_shipped_packing_is_the_reference(settings, reference):
-    packing = settings.scene.packing.file
-    stored = json.loads(packing.read_text())
-    assert all(stored[name] == reference[name] for name in stored)
-    assert settings.scene.law.mus[0] == reference["cases"][0]["mu"]
-
-
-def test_order_of_the_tangent_which_needs_three_points():
-    """Of the end of a run of three disks, where LAMMPS with 51,200 steps errs by 2e-9."""
-    packing, points = trajectory.three_disks(), []
-    with Engine(packing) as engine:
-        exact = trajectory.in_lammps(engine, packing, 51_200)
-    for tangent, order in (("midpoint", 2), ("end", 1)):
-        for steps in (200, 400, 800, 1600):
-            end = trajectory.verlet(packing, tangent, trajectory.TIME / steps, steps)
-            points.append(Point(tangent, trajectory.TIME / steps, np.abs(end - exact).max(), 1.0, steps))
-        fitted = fit_order(points, tangent, order)
-        assert fitted.order == pytest.approx(order, abs=0.05)
-        assert fitted.error < 0.05
-    with pytest.raises(ValueError, match="an order needs 3"):
-        fit_order(points, "end", 1, least=1.0)
-
-
-def test_the_three_disks_slide_and_stick():
-    packing, shares = trajectory.three_disks(), []
-    with Engine(packing) as engine, engine.undamped(2.5e-3) as dynamics:
-        for _ in range(40):
-            dynamics.advance(20)
-            now = engine.packing
-            shares.append(np.abs(now.contacts.slip) / now.law.slip_limit(now.geometry.overlap))
-    np.testing.assert_allclose(np.max(shares, axis=0), np.ones(4), rtol=1e-12)  # of four contacts, none opens or forms
-    assert np.sum(shares[-1] < 0.9) == 2
-
-
-def test_jobs_take_turns_that_begin_with_either():
-    calls = []
-    results, seconds = in_turns([lambda: calls.append("a") or "A", lambda: calls.append("b") or "B"], 3)
-    assert calls == ["a", "b", "b", "a", "a", "b"]
-    assert results == ["A", "B"]
-    assert seconds.min() > 0
-
-
-def test_complex_steps_and_differences_give_the_jacobian(settings):
-    """With some of the contacts brought to sliding."""
-    packing = settings.at(0.02).packing
-    limit = packing.law.slip_limit(packing.geometry.overlap)
-    slip = np.where(np.arange(len(limit)) % 7 == 0, np.sign(packing.contacts.slip) * 2 * limit, packing.contacts.slip)
-    sheared = replace(packing, contacts=replace(packing.contacts, slip=slip))
-    analytic = stiffness_matrix(sheared).toarray()
-    scale = np.abs(analytic).max()
-    # the rounding of the smallest overlap, 5e-6, in units of the largest element
-    assert np.abs(complex_step(sheared) - analytic).max() < 5e-12 * scale
-    assert np.abs(complex_step(sheared, np.clongdouble) - analytic).max() < 5e-12 * scale
-    # the smallest of truncation and rounding; at the bound the second derivative jumps, an error of first order
-    assert np.abs(central_differences(sheared, 1e-8) - analytic).max() < 1e-5 * scale
-    assert np.abs(stiffness_matrix(sheared, "paper").toarray() - analytic).max() > 1e-7 * scale
 
 
 def test_refined_eigenvalue_has_the_digits_it_says():
@@ -96,17 +33,6 @@ def test_refined_eigenvalue_has_the_digits_it_says():
             number = mpmath.mpc(high) + mpmath.mpc(complex(found.value - np.clongdouble(high)))
             assert min(abs(number - each) for each in exact) < found.error
             assert found.error < 1e3 * np.finfo(np.longdouble).eps
-
-
-def test_fire_finds_the_root_of_forces_without_energy():
-    rng = np.random.default_rng(5)
-    slope = rng.standard_normal((6, 6))
-    slope = slope @ slope.T + np.eye(6) + 0.1 * rng.standard_normal((6, 6))
-    root = rng.standard_normal(6)
-    longest = 1.8 / np.sqrt(np.abs(np.linalg.eigvals(slope)).max())
-    found, evaluations = relaxation.fire(lambda q: slope @ (root - q), np.zeros(6), longest, 1e-12)
-    np.testing.assert_allclose(found, root, atol=1e-11)
-    assert 10 < evaluations < 2000
 
 
 @pytest.mark.slow
@@ -151,16 +77,13 @@ def test_a_study_that_fails_does_not_take_the_others_along(tmp_path):
     result = json.loads((tmp_path / "report.json").read_text())
     assert result["failed"] == [{"name": "broken", "says": "ValueError: the reason"}]
     (study,) = result["studies"]
-    assert all(set(point) == POINT for point in study["points"])
+    assert all(set(point) == {"method", "parameter", "error", "seconds", "evaluations"} for point in study["points"])
     errors = {(point["method"], point["parameter"]): point["error"] for point in study["points"]}
     assert errors[dumps.HDF5, None] == errors[dumps.TEXT, 17] == 0
-    assert errors[dumps.TEXT, 6] > 1e-4
     assert 1e-6 < errors[dumps.SINGLE, None] < 1e-2
     assert errors[dumps.NO_SLIPS, None] > 1e-5
     assert {"cpu", "cores", "load", "versions"} <= set(result["machine"])
-    text = (tmp_path / "report.md").read_text()
-    assert "the reason" in text
-    assert "(files.png)" in text
+    assert "the reason" in (tmp_path / "report.md").read_text()
     assert len(said) == 2
 
 
@@ -178,21 +101,21 @@ def test_quick_report(faultgouge, tmp_path):
     for name, study in studies.items():
         assert study["reference_error"] > 0
         assert all(point["error"] >= 0 and point["seconds"] > 0 for point in study["points"])
-        assert (folder / f"{page.stem(name)}.png").stat().st_size > 10_000
         for point in study["points"]:
             key = name, point["method"]
             best[key] = min(point["error"], best.get(key, np.inf))
+    for name in (*map(page.stem, studies), "onset-coverage"):
+        assert (folder / f"{name}.png").stat().st_size > 10_000
     onset = studies["onset"]
-    assert {(case["arithmetic"], case["increment"]) for case in onset["covered"]} == {
-        (arithmetic, increment) for arithmetic in ("doubles", "compensated") for increment in (2e-3, 1e-3)
-    }
     assert all(case["true"] <= case["stated"] for case in onset["covered"])
     assert "covers the true one in 4 of 4 cases" in (folder / "report.md").read_text()
-    assert (folder / "onset-coverage.png").stat().st_size > 10_000
     assert all(case["limit"] is not None for case in onset["changing"])
     assert onset["again"]
     assert "F_x^c = 0.02183305641" in onset["question"]  # that of an independent code
     assert best["onset", "root of the discriminant"] < 1e-8 < best["onset", "scan, Newton"]
     assert best["relaxation", "Newton, compensated"] < 1e-18
     assert best["relaxation", "Newton"] < 1e-12
-    assert best["Jacobian", "analytic"] < 1e-11 < best["Jacobian", "central differences"]
+    # the rounding of the smallest overlap, and the smallest of truncation and rounding
+    assert best["Jacobian", "analytic"] < 5e-12 < best["Jacobian", "central differences"] < 1e-5
+    assert best["Jacobian", "complex step"] < 5e-12
+    assert best["Jacobian", "analytic, paper's form"] > 1e-7

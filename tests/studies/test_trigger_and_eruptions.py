@@ -1,13 +1,17 @@
-"""The commands trigger and eruptions on a small scale: what they find, and that they go on where they were cut off."""
+"""What triggers on a small scale: the commands trigger and eruptions, also cut off, and the forecast of a jump."""
 
 import json
+from dataclasses import replace
+from importlib.resources import files
+from itertools import takewhile
 
 import pytest
 from reference_layer import REFERENCE, SMALL, toml
 
-from faultgouge.pywrap import Scene, SceneError
+from faultgouge.pywrap import Scene, SceneError, perturb, reach
 from faultgouge.studies.eruptions import eruptions
 from faultgouge.studies.trigger import trigger_map
+from faultgouge.studies.triggering.forecast import JUMP_SHARE, chosen, forecast
 
 BASE = SMALL | {"packing": {"file": str(REFERENCE)}, "ramp": {"step": 1e-3, "until": 0.025}}
 
@@ -55,11 +59,14 @@ def test_distances_count_from_the_onset_with_dissipation(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("friction", "says"),
-    [(None, r"no section \[friction\]"), ({"v_ss": 1e-6}, "rounding noise: give a velocity above 0")],
+    ("more", "says"),
+    [
+        ({}, r"no section \[friction\]"),
+        ({"friction": {"v_ss": 1e-6}}, "rounding noise: give a velocity above 0"),
+    ],
 )
-def test_trigger_needs_a_threshold(tmp_path, friction, says):
-    scene = Scene.from_mapping({**BASE, **({} if friction is None else {"friction": friction})})
+def test_trigger_needs_a_threshold(tmp_path, more, says):
+    scene = Scene.from_mapping(BASE | more)
     with pytest.raises(SceneError, match=says):
         trigger_map(scene, tmp_path)
     assert not list(tmp_path.iterdir())
@@ -94,3 +101,26 @@ def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(faultgouge, t
     assert all(run["noise"] < 1e-25 for run in one["runs"])
     done = faultgouge("eruptions", "scene.toml", "-o", "two", "--json", ranks=2)
     assert json.loads(done.stdout) == one == json.loads((tmp_path / "two/eruptions.json").read_text())
+
+
+@pytest.mark.slow
+def test_the_jump_is_that_of_a_run_in_lammps():
+    """Weak friction from the first step on, and a load so small that disks move by far less than they overlap."""
+    more = {"ramp": {"step": 1e-3, "until": 0.004}, "perturb": {"fx": 0.002, "time": 40.0}}
+    scene = Scene.from_mapping(BASE | more)
+    *_, start = reach(scene, 0.002)
+    foreseen = forecast(start, 0.8, 40.0)
+    weak = replace(start, packing=replace(start.packing, law=replace(start.packing.law, mu=0.8)))
+    samples = takewhile(lambda sample: sample.time <= JUMP_SHARE * 40.0, perturb(scene, weak))
+    assert max(sample.msd for sample in samples) == pytest.approx(foreseen.jump, rel=0.01)
+    assert foreseen.rate == 0.0
+    assert foreseen.growth < 0.2
+
+
+@pytest.mark.slow
+def test_the_shipped_packing_is_the_one_of_the_rule():
+    """`python docs/triggered.py` begins with seed 1."""
+    scene = Scene.from_toml(files("faultgouge") / "scenes/triggered.toml")
+    (last,) = chosen(scene, [37, 38])
+    assert (last["seed"], last["fx"], last["says"]) == (scene.packing.seed, scene.perturb.fx, "")
+    assert last["forecast"]["growth"] > 4
