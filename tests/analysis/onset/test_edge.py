@@ -94,13 +94,6 @@ def test_root_of_any_smooth_function_of_the_load(power):
     assert root.loads[0] < 0.3 < root.loads[-1]
 
 
-def test_a_jump_is_no_root():
-    jump = sign_change(lambda f: 1.0 if f > 0.3 else -1.0, 0.0, 1.0)
-    assert not jump.smooth
-    assert abs(jump.fx - 0.3) <= jump.error < 1e-9
-    assert jump.loads[0] <= 0.3 < jump.loads[1]
-
-
 def test_forces_out_of_balance_at_random_are_an_error_of_the_load(path):
     packing = path(0.02)
     assert load_error(packing) < 1e-10

@@ -14,7 +14,6 @@ from faultgouge.analysis import (
     OnsetError,
     complex_windows,
     find_onset,
-    spectrum,
 )
 from faultgouge.analysis.digits import with_uncertainty
 from faultgouge.analysis.onset import Family, Limits, Modes, force_bearing, full_operator
@@ -53,24 +52,32 @@ def test_window_behind_a_bend():
     assert (second.fx_onset, second.fx_end) == (pytest.approx(1.11, abs=DIGITS), pytest.approx(1.13, abs=DIGITS))
 
 
-def test_third_mode_that_is_met_before_an_onset():
-    """On one increment a level meets a third one, and is then complex with another."""
+def among_all_modes(operator, loads):
+    """The windows, without a screening."""
+    return all_windows(Family(operator, 1e-7), np.array(loads), no_few)
+
+
+@pytest.mark.parametrize("search", [complex_windows, among_all_modes])
+@pytest.mark.parametrize(
+    ("speed", "others", "couplings", "last"), [(5, (13.0, 10.7), (1.1, 0.02), 1.0), (2, (11.0, 12.0), (0.1, 0.05), 1.5)]
+)
+def test_partners_may_change(search, speed, others, couplings, last):
+    """One level meets another one, parts, and meets a third: two windows of two pairs within one increment."""
 
     def three(f):
-        levels = np.diag([10 + 5 * f, 13.0, 10.7, *OTHERS])
-        levels[0, 1], levels[1, 0] = 1.1, -1.1
-        levels[0, 2], levels[2, 0] = 0.02, -0.02
+        levels = np.diag([10 + speed * f, *others, *OTHERS])
+        levels[0, [1, 2]] = couplings
+        levels[[1, 2], 0] = np.negative(couplings)
         return levels
 
-    def complex_at(f):
-        return np.count_nonzero(np.linalg.eigvals(three(f)).imag > 1e-9)
+    def complex_beside(edge):
+        return [np.count_nonzero(np.linalg.eigvals(three(edge + side)).imag > 1e-9) for side in (-1e-6, 1e-6)]
 
-    narrow, wide = all_windows(Family(three, 1e-7), np.array([0.0, 1.0]), no_few)
-    assert narrow.fx_end < wide.fx_onset < 1.0
-    for window, before in ((narrow, 0), (wide, 0)):
-        assert complex_at(window.fx_onset - 1e-6) == before
-        assert complex_at(window.fx_onset + 1e-6) == before + 1
-    assert complex_at(narrow.fx_end + 1e-6) == 0
+    first, second = search(three, [0.0, last])
+    assert first.fx_end < second.fx_onset < last
+    for window in (first, second):
+        assert complex_beside(window.fx_onset) == [0, 1]
+        assert window.fx_end is None or complex_beside(window.fx_end) == [1, 0]
 
 
 @pytest.mark.parametrize("half_width", [2e-1, 1e-2, 1e-4, 1e-6])
@@ -120,26 +127,6 @@ def test_jump_is_no_coalescence():
     assert window.kind == "contact change"
     # Bracketed to 1e-9 of the increment; the middle of the bracket is in error by half of it.
     assert abs(window.fx_onset - 0.321) <= window.error < 1e-9
-
-
-def test_partners_may_change():
-    """One level meets a second, parts, and meets a third: two windows of two pairs within one increment."""
-
-    def operator(f):
-        inner = np.diag([1.0 + 2 * f, 2.0, 3.0])
-        inner[0, 1], inner[1, 0] = 0.1, -0.1
-        inner[0, 2], inner[2, 0] = 0.05, -0.05
-        return inner
-
-    first, second = complex_windows(operator, [0.0, 1.5])
-    fine = np.linspace(0, 1.5, 15001)
-    split = [np.abs(np.linalg.eigvals(operator(f)).imag).max() > 1e-9 for f in fine]
-    edges = fine[np.flatnonzero(np.diff(split))]
-    found = [first.fx_onset, first.fx_end, second.fx_onset, second.fx_end]
-    np.testing.assert_allclose(found, edges, atol=1.1e-4)  # the scan's increment
-    for edge in found:  # the eigenvalues do meet there, to the root of the rounding
-        values = np.linalg.eigvals(operator(edge))
-        assert np.abs(values[:, None] - values[None, :])[np.triu_indices(3, 1)].min() < 1e-5
 
 
 @pytest.mark.parametrize("loads", [[1.0], [0.0, 0.0], [1.0, 0.0], [0.0, np.nan]])
@@ -233,13 +220,8 @@ def test_what_the_screening_misses_is_walked_again():
 
 
 @pytest.mark.slow
-def test_json(path):
+def test_an_onset_in_words(path):
     onset = find_onset(path, path.grid[20:])
-    as_dict = onset.as_dict()
-    assert as_dict["fx_c"] == onset.fx_c
-    assert as_dict["error"] == onset.error
-    assert as_dict["windows"][0].keys() >= {"fx_onset", "fx_end", "lambda", "error"}
-    assert as_dict["windows"][0]["lambda"] == onset.windows[0].eigenvalue
     written = with_uncertainty(onset.fx_c, onset.error)
     assert repr(onset).startswith(f"<Onset: F_x^c = {written}, ")
     assert f"from {written}</th>" in onset._repr_html_()
