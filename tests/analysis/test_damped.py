@@ -118,11 +118,6 @@ def test_what_grows_from_the_beginning_says_so():
     assert 0.15 < window.fx_end < 0.25
 
 
-def largest_growth(packing):
-    """Largest Re s, from K, C and M alone."""
-    return np.linalg.eigvals(motion_matrix(packing)).real.max()
-
-
 @pytest.mark.parametrize(("cn", "onset", "digits"), [(1.0, 0.0218328, 1e-7), (10.0, 0.02235, 1e-5)])
 @pytest.mark.slow
 def test_reference_packing_with_normal_dashpots(path, cn, onset, digits):
@@ -134,7 +129,11 @@ def test_reference_packing_with_normal_dashpots(path, cn, onset, digits):
     assert window.fx_onset == pytest.approx(onset, abs=digits)
     assert window.kind == "hopf"
     near = 1e-6
-    root = brentq(lambda fx: largest_growth(damped(fx)), window.fx_onset - near, window.fx_onset + near, xtol=1e-13)
+
+    def largest_growth(fx):
+        return np.linalg.eigvals(motion_matrix(damped(fx))).real.max()
+
+    root = brentq(largest_growth, window.fx_onset - near, window.fx_onset + near, xtol=1e-13)
     assert window.fx_onset == pytest.approx(root, abs=1e-9)
     assert window.error < 1e-9
 

@@ -282,14 +282,13 @@ def test_contacts_without_force_are_left_out(reference_packing):
     """A rattler brought to touch by 1e-12 of a length: a stiffness of 0.3 that no force stands for."""
     packing = reference_packing(1.0)
     rattler = packing.rattlers[0]
-    gap = np.hypot(*(packing.position - packing.position[rattler]).T) - packing.radius - packing.radius[rattler]
+    apart = packing.position[rattler] - packing.position
+    distance, reach = np.hypot(*apart.T), packing.radius + packing.radius[rattler]
+    gap = distance - reach
     gap[packing.rattlers] = np.inf
     neighbour = int(np.argmin(gap))
-    direction = packing.position[rattler] - packing.position[neighbour]
-    direction /= np.hypot(*direction)
     position = packing.position.copy()
-    reach = packing.radius[rattler] + packing.radius[neighbour]
-    position[rattler] = position[neighbour] + (reach - 1e-12) * direction
+    position[rattler] -= (gap[neighbour] + 1e-12) * apart[neighbour] / distance[neighbour]
     contacts = packing.contacts
     more = Contacts(np.append(contacts.i, rattler), np.append(contacts.j, neighbour), np.append(contacts.slip, 0.0))
     touching = replace(packing, position=position, contacts=more)
