@@ -7,7 +7,7 @@ from scipy.linalg import block_diag
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import NoEquilibriumError, find_onset, stiffness_matrix
-from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil
+from faultgouge.analysis.damped_onset.modes import Pencil
 from faultgouge.analysis.damped_onset.weak import balancing_ratio, drag_onset, weak_limit
 from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating, growing_windows
 
@@ -178,17 +178,6 @@ def test_drag_shifts_the_onset_to_where_the_growth_exceeds_it(path, undamped):
     rates = np.linalg.eigvals(stiffness_matrix(path(predicted)).toarray())
     fastest = np.abs(np.sqrt(rates.astype(complex)).imag).max()
     assert 2 * fastest == pytest.approx(1 / tau, rel=1e-4)
-
-
-def test_modes_are_those_of_the_quadratic_problem(path):
-    packing = dissipating(path, cn=3.0, ct=1.0, drag_time=30.0)(0.02)
-    modes = DampedModes.of(Pencil.of(packing))
-    a, g = modes.pencil.stiffness, modes.pencil.damping
-    residual = a @ modes.right + (g @ modes.right) * modes.rates + modes.right * modes.rates**2
-    mirror = modes.left.conj().T @ a + modes.rates[:, None] * (modes.left.conj().T @ (g + 0j))
-    mirror += modes.rates[:, None] ** 2 * modes.left.conj().T
-    assert max(np.abs(residual).max(), np.abs(mirror).max()) < 1e-9 * np.abs(a).max()
-    assert len(modes.growing) == 0
 
 
 @pytest.mark.parametrize(
