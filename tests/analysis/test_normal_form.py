@@ -70,16 +70,12 @@ def damped(form, tau):
 
 
 def test_damping_competes_with_the_beat():
-    """One function of tau/tau_d: half at 1.3455, 0.4155 at 1, the rise (2/e) g d tau below, g above."""
+    """One function of tau/tau_d: half at 1.3455, 0.4155 at 1."""
     for delta, epsilon in ((0.1, 1e-7), (0.05, 1e-8), (0.001, 1e-9)):
         form = NormalForm(delta, epsilon)
         assert form.half_gain_time() / form.tau_d == pytest.approx(1.34552, rel=1e-3)
         assert form.amplitude(form.tau_d) / form.gain == pytest.approx(0.41551, rel=1e-3)
-        strong, weak = form.tau_d / 100, form.tau_d * 1000
-        rise = 2 / np.e * np.sqrt(2 / epsilon) * strong / (np.sqrt(2) * form.tau_d)
-        assert form.amplitude(strong) == pytest.approx(rise, rel=1e-3)
-        assert form.amplitude(weak) == pytest.approx(form.gain, rel=2e-3)  # exp(-(pi/2^(1/2))/2000)
-        for tau in (strong, form.tau_d, weak):
+        for tau in (form.tau_d / 100, form.tau_d, form.tau_d * 1000):
             assert form.amplitude(tau) == pytest.approx(damped(form, tau), rel=1e-3)
 
 
@@ -94,22 +90,22 @@ def test_complex_pairs_grow():
     assert form.amplitude(0.9 / (2 * rate)) == pytest.approx(damped, rel=1e-4)
 
 
-@pytest.mark.parametrize(("delta", "epsilon"), [(0.0, 0.1), (1.0, 0.1), (0.1, 1.1), (0.1, np.nan)])
-def test_impossible_forms(delta, epsilon):
-    with pytest.raises(ValueError, match="must"):
-        NormalForm(delta, epsilon)
-
-
-def test_impossible_questions():
-    form = NormalForm(0.1, 0.5)
-    with pytest.raises(ValueError, match="crossover"):
-        form.half_gain_time()
-    with pytest.raises(ValueError, match="no beat"):
-        form.amplitude(0.3)
-    with pytest.raises(ValueError, match="positive"):
-        form.amplitude(0.0)
-    with pytest.raises(ValueError, match="three points"):
-        fit_power_law([1, 2, -3], [1, 2, 3])
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        (lambda: NormalForm(0.0, 0.1), "must"),
+        (lambda: NormalForm(1.0, 0.1), "must"),
+        (lambda: NormalForm(0.1, 1.1), "must"),
+        (lambda: NormalForm(0.1, np.nan), "must"),
+        (lambda: NormalForm(0.1, 0.5).half_gain_time(), "crossover"),
+        (lambda: NormalForm(0.1, 0.5).amplitude(0.3), "no beat"),
+        (lambda: NormalForm(0.1, 0.5).amplitude(0.0), "positive"),
+        (lambda: fit_power_law([1, 2, -3], [1, 2, 3]), "three points"),
+    ],
+)
+def test_impossible_questions(asked, says):
+    with pytest.raises(ValueError, match=says):
+        asked()
 
 
 def test_power_law_and_its_error():

@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import csr_array
 
 from faultgouge.analysis.onset import Family, Limits, LostPairError, Modes, Pair
-from faultgouge.analysis.onset.edge import edge_from_inside, load_error, locate, sign_change
+from faultgouge.analysis.onset.edge import edge_from_inside, load_error, locate
 from faultgouge.analysis.onset.pair import continued
 
 BASIS = np.eye(12) + 0.1 * np.random.default_rng(2).normal(size=(12, 12))
@@ -82,23 +82,6 @@ def test_edge_where_the_equilibrium_jumps():
     assert edge.kind == "contact change"
     assert edge.fx == pytest.approx(0.37, abs=2 * edge.error + 1e-12)
     assert edge.error < 1e-9
-
-
-@pytest.mark.parametrize("power", [1, 3])
-def test_root_of_any_smooth_function_of_the_load(power):
-    """Through zero along a straight line, or along one that bends: the root of the parabola, with its error."""
-    root = sign_change(lambda f: (f - 0.3) * (1 + f**power), 0.0, 1.0)
-    assert root.smooth
-    assert root.fx == pytest.approx(0.3, abs=1e-14)
-    assert abs(root.fx - 0.3) <= root.error < 1e-12
-    assert root.loads[0] < 0.3 < root.loads[-1]
-
-
-def test_a_jump_is_no_root():
-    jump = sign_change(lambda f: 1.0 if f > 0.3 else -1.0, 0.0, 1.0)
-    assert not jump.smooth
-    assert abs(jump.fx - 0.3) <= jump.error < 1e-9
-    assert jump.loads[0] <= 0.3 < jump.loads[1]
 
 
 def test_forces_out_of_balance_at_random_are_an_error_of_the_load(path):

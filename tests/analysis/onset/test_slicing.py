@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array, diags_array
 
-from faultgouge.analysis.onset import LIMITS, Family, Limits, Ranks, full_operator
-from faultgouge.analysis.onset.sliced import first_window
+from faultgouge.analysis.onset import LIMITS, Limits, Ranks
 from faultgouge.analysis.onset.slicing import SliceError, factored, slices
 
 FEW = Limits(own=24, coarse=60, first_look=20, one_basis=50)
@@ -202,13 +201,3 @@ def test_an_error_of_one_rank_is_that_of_all(factorise, says):
     for each in on_ranks(2, of):
         with pytest.raises(SliceError, match=says):
             each.result()
-
-
-@pytest.mark.slow
-def test_ranks_find_the_same_first_window_to_the_bit(path):
-    family, loads = Family(lambda fx: full_operator(path(fx)), 0.0, FEW), np.array(path.grid[12:])
-    alone = first_window(family, loads)
-    assert alone[0] is not None
-    assert alone[1] == ()  # FEW has the margins of slices converge, else every increment is in doubt
-    for each in on_ranks(2, lambda ranks: first_window(family, loads, ranks=ranks)):
-        assert each.result() == alone
