@@ -139,3 +139,10 @@ def test_negative_eigenvalues_grow():
     assert result.unstable == pytest.approx(np.array([slope]), rel=1e-12)
     assert result.growth_rate() == pytest.approx(2 * np.sqrt(-slope), rel=1e-12)
     assert result.growth_rate(dt=1e-3) == pytest.approx(2 * abs(discrete_frequency(slope, 1e-3).imag), rel=1e-12)
+
+
+def test_imaginary_part_grows_as_the_root_of_the_distance(path):
+    onset = 0.021833056408868
+    near, nearer = (spectrum(path(onset + distance)).pairs[0].eigenvalue.imag for distance in (1e-5, 1e-7))
+    # The next order is the distance over the width of the window, 1e-2.
+    assert near / nearer == pytest.approx(10, rel=1e-2)

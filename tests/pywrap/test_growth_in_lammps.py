@@ -63,6 +63,20 @@ def test_growth_rate_and_frequency_are_those_of_the_spectrum(loaded):
     assert frequency(time[linear], velocity[linear]) == pytest.approx(omega.real, rel=1e-3)
 
 
+@pytest.mark.long
+def test_rounding_noise_grows_by_fifteen_decades(loaded):
+    """Nothing but noise to begin with: D rises from 1e-25 by fifteen decades, most of them at the spectrum's rate."""
+    packing = loaded(0.024)
+    dt = time_step(packing)
+    time, msd, _ = run(packing, packing, 1400.0, 7000, dt)
+    noise = np.median(msd[time < 100])
+    assert msd.max() / noise > 1e15
+    # three decades above the noise one pair is alone; at 1e-11 D begins to level off
+    growth = fit_growth(time, msd, lower=1e3 * noise, upper=1e-11)
+    assert growth.decades > 9
+    assert growth.rate == pytest.approx(spectrum(packing).growth_rate(dt), rel=5e-3)
+
+
 def displacement(packing, reference):
     moved = nearest_image(packing.position - reference.position, reference.box_length)
     return np.concatenate([moved[:, 0], moved[:, 1], packing.scaled_angle - reference.scaled_angle])

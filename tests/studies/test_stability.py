@@ -13,6 +13,20 @@ from faultgouge.assessment.stability.cases.packings import crystal, sheared
 from faultgouge.pywrap import Equilibrium
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 
+QUICK = [case for case in CASES if case.quick]
+
+
+@pytest.mark.parametrize("case", QUICK, ids=lambda case: f"{case.group}: {case.name}")
+def test_case(case):
+    outcome = case.outcome()
+    assert outcome.status in ("holds", "refused"), outcome.says
+    assert outcome.says
+    if outcome.status == "holds":
+        assert outcome.figure <= outcome.bound
+    else:
+        assert outcome.figure is None
+        assert "\n" not in outcome.says
+
 
 def crash():
     raise ZeroDivisionError("in the middle of it\nand more")
