@@ -1,4 +1,4 @@
-"""Modes: what takes part in them, which two are about to meet, and how they are drawn."""
+"""Modes: what takes part in them, which two are about to meet, how they are drawn, and a pair over the load."""
 
 from dataclasses import replace
 
@@ -9,7 +9,8 @@ from matplotlib.quiver import Quiver
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, closest_to_meeting, normal_modes, spectrum, touching
 from faultgouge.analysis.spectrum.spectrum import participation_ratio, rotation_share
-from faultgouge.figures.mode import Mode, ModeError, draw_modes, unstable_pair
+from faultgouge.figures import PairCurve, draw_pair
+from faultgouge.figures.mode import Mode, draw_modes
 
 
 @pytest.fixture(scope="module")
@@ -45,16 +46,9 @@ def test_normal_modes_are_those_of_the_spectrum_and_the_closest_have_the_largest
     assert modes.values[first].real < modes.values[second].real
 
 
-def test_a_symmetric_operator_has_no_pair_that_is_about_to_meet(pyramid):
-    still = replace(pyramid, contacts=touching(pyramid.position, pyramid.radius), fx=0.0, fy=0.0)
-    with pytest.raises(ModeError, match="no two of them are about to meet"):
-        unstable_pair(still, normal_modes(still), [])
-
-
-def test_a_complex_mode_is_drawn_at_two_moments(pyramid):
-    modes = normal_modes(pyramid)
+def test_a_complex_mode_is_drawn_at_two_moments_with_arrows_and_the_colour_of_rotation(pyramid):
     moved = np.zeros((3, 3), dtype=complex)
-    moved[0, 2], moved[1, 2] = 1.0, 1j
+    moved[0, 2], moved[1, 2], moved[2] = 1.0, 1j, [2.0, -1.0, 0.0]
     figure = draw_modes(pyramid, [Mode(4, 10 + 2j, moved, 0.3, 0.1)], "a pair")
     first, second = (axes.findobj(Quiver)[0] for axes in figure.axes[:2])
     at_top = np.argmax(np.abs(first.U))
@@ -63,13 +57,21 @@ def test_a_complex_mode_is_drawn_at_two_moments(pyramid):
     # a quarter of a period later exp(i pi/2) has turned x into -y
     assert second.U[at_top] == pytest.approx(0, abs=1e-15)
     assert second.V[at_top] == pytest.approx(-first.U[at_top], rel=1e-12)
-    assert r"\pm 2" in figure.axes[0].get_title()
-    assert len(draw_modes(pyramid, [Mode.of(pyramid, modes, k) for k in (0, 1)], "two").axes) == 3
-
-
-def test_colour_is_the_rotation(pyramid):
-    moved = np.zeros((3, 3), dtype=complex)
-    moved[0, 0], moved[2] = 1.0, [2.0, -1.0, 0.0]
-    axes = draw_modes(pyramid, [Mode(0, 1 + 0j, moved, 1.0, 0.5)], "one").axes[0]
-    (disks,) = axes.findobj(EllipseCollection)
+    (disks,) = figure.axes[0].findobj(EllipseCollection)
     np.testing.assert_allclose(disks.get_array(), [1.0, -0.5, 0.0])
+
+
+def test_the_pair_over_the_load_has_both_members_and_an_inset_about_its_onset():
+    """The normal form: eigenvalues 1 -+ sqrt(fx_c - fx)."""
+    fx, fx_c = np.linspace(0, 0.03, 61), 0.02
+    root = np.sqrt(fx_c - fx + 0j)
+    curve = PairCurve(1.0, fx, np.column_stack([1 + root, 1 - root]), fx_c)
+    real, imaginary = draw_pair([curve]).axes[:2]
+    drawn = {real: (1 - root.real, 1 + root.real), imaginary: (-root.imag, root.imag)}
+    for axes, members in drawn.items():
+        for line, member in zip(axes.lines[:2], members, strict=True):
+            np.testing.assert_array_equal(line.get_xydata(), np.column_stack([fx, member]))
+    upper = imaginary.child_axes[0].lines[1]
+    beyond = upper.get_xdata() > 1e-9
+    np.testing.assert_allclose(upper.get_ydata()[beyond], np.sqrt(1e-3 * upper.get_xdata()[beyond]), rtol=1e-9)
+    assert draw_pair([replace(curve, fx_c=None)]).axes[1].child_axes == []
