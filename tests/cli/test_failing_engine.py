@@ -70,10 +70,7 @@ def with_failing_engine(folder, ranks, script, *arguments):
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize(
-    ("ranks", "rank"), [(1, -1), (2, 1), *(pytest.param(2, k, marks=pytest.mark.long) for k in (-1, 0))]
-)
-@pytest.mark.parametrize("call", [1, pytest.param(30, marks=pytest.mark.long)])
+@pytest.mark.parametrize(("ranks", "rank", "call"), [(1, -1, 1), (2, 1, 1), (2, -1, 30), (2, 0, 30)])
 @pytest.mark.slow
 def test_its_sentence_reaches_the_command(settled, ranks, rank, call):
     done = with_failing_engine(settled, ranks, ONCE, call, rank)
