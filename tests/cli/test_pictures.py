@@ -12,24 +12,27 @@ from PIL import Image
 from reference_layer import BIN
 
 from faultgouge.analysis import RunFile
-from faultgouge.figures.view import equally_spaced
 from faultgouge.figures.view_pair import followed
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.refusals import read_toml
 
+PACKING = "F_x = 0.012, F_y = 3: 100 disks"
+MODE = r"mode \d+: lambda = [\d.]+, participation ratio 0\.\d+, rotation"
 
-@pytest.mark.parametrize("suffix", ["png", *(pytest.param(s, marks=pytest.mark.long) for s in ("svg", "pdf"))])
+
+@pytest.mark.parametrize(
+    ("options", "name", "says", "times"),
+    [
+        ("--frame 2", "packing.png", PACKING, 1),
+        pytest.param("--frame 2", "packing.pdf", PACKING, 1, marks=pytest.mark.long),
+        pytest.param("--frame 3 --mode pair", "about_to_meet.png", MODE, 2, marks=pytest.mark.long),
+    ],
+)
 @pytest.mark.slow
-def test_a_packing(beyond, suffix, faultgouge_in):
-    done = faultgouge_in(beyond, "draw", "ramp.h5", "--frame", "2", "-o", f"packing.{suffix}")
-    assert "F_x = 0.012, F_y = 3: 100 disks" in done.stderr
-    assert (beyond / f"packing.{suffix}").stat().st_size > 10_000
-
-
-@pytest.mark.long
-def test_the_two_modes_that_are_about_to_meet(beyond, faultgouge_in):
-    done = faultgouge_in(beyond, "draw", "ramp.h5", "--frame", "3", "--mode", "pair", "-o", "before.png")
-    assert len(re.findall(r"mode \d+: lambda = [\d.]+, participation ratio 0\.\d+, rotation", done.stderr)) == 2
+def test_a_packing_and_modes(beyond, faultgouge_in, options, name, says, times):
+    done = faultgouge_in(beyond, "draw", "ramp.h5", *options.split(), "-o", name)
+    assert len(re.findall(says, done.stderr)) == times
+    assert (beyond / name).stat().st_size > 10_000
 
 
 @pytest.mark.long
@@ -60,17 +63,6 @@ def test_version_in_both_ways():
     for command in ([BIN / "faultgouge"], [sys.executable, "-m", "faultgouge"]):
         done = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=100)
         assert re.fullmatch(r"faultgouge \S+ \(LAMMPS \S+\)\n", done.stdout), done.stderr
-
-
-def test_loads_are_equally_spaced_with_first_and_last():
-    assert equally_spaced(4, 60) == [0, 1, 2, 3]
-    assert equally_spaced(101, 5) == [0, 25, 50, 75, 100]
-
-
-def test_one_packing_has_a_pair(reference_packing):
-    course = followed([reference_packing(1.0)])
-    for value in course.pair[0]:
-        assert abs(course.values[0] - value).min() < 1e-6 * abs(value)
 
 
 @pytest.mark.long

@@ -71,6 +71,7 @@ def test_force_of_two_disks(overlap, radii, mu, exponent):
         with Engine(packing) as engine:
             engine.displace(packing, np.zeros(6))
             force = engine.net_force.reshape(3, 2)
+        assert np.array_equal(force[:2, 0], -force[:2, 1])  # momentum, exactly
         true = true_net_force(packing).astype(np.float64)
         # The last place of the double that is handed out. An overlap is known to 2^-77 of 2^e, e.g. to 1e-11 at 1e-12,
         # and the force to p of that.

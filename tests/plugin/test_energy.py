@@ -125,17 +125,6 @@ def test_work_of_the_load_is_stored_moves_or_is_dissipated(seen, dashpots, compe
 
 
 @arithmetics
-def test_counting_changes_nothing_else(seen, compensated):
-    settings = {"every": 100, "compensated": compensated, "column": 7 + bool(compensated)}
-    without, counted = (seen(MODEL + LOOK + "run 1000\n", energy=energy, **settings) for energy in ("", "energy yes"))
-    for bare, full in zip(without[0], counted[0], strict=True):
-        assert np.array_equal(bare[:, :4], full[:, :4])
-        assert not bare[:, 4].any()
-    assert all(np.array_equal(*both) for both in zip(without[1], counted[1], strict=True))
-    assert counted[0][-1][:, 4].max() > 0
-
-
-@arithmetics
 @pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_energies_go_through_a_restart(seen, compensated, ranks):
@@ -150,13 +139,16 @@ def test_energies_go_through_a_restart(seen, compensated, ranks):
     assert max(row[2] for row in straight.values()) > 0
 
 
+@arithmetics
 @pytest.mark.parametrize(("first", "second"), [("yes", "no"), ("no", "yes")])
-def test_slips_stay_where_a_restart_begins_or_ends_to_count(seen, first, second):
+def test_counting_changes_nothing_else_also_where_a_restart_begins_or_ends_it(seen, first, second, compensated):
     """Energies begin at zero then, or are left out; a wall without them has no column for them."""
-    begin, end = f"{MODEL}run 500\n", f"{LOOK}run 0\n"
-    again = AGAIN + LAW.replace("${energy}", f"energy {second}")
-    (pairs,), (disks,) = seen(begin + again + end, energy=f"energy {first}", every=500, column=7 + (second == "yes"))
-    (bare_pairs,), (bare_disks,) = seen(begin + end, energy="", every=500, column=7)
+    begin, end, column = f"{MODEL}run 500\n", f"{LOOK}run 0\n", 7 + bool(compensated)
+    again, settings = AGAIN + LAW.replace("${energy}", f"energy {second}"), {"every": 500, "compensated": compensated}
+    (pairs,), (disks,) = seen(
+        begin + again + end, energy=f"energy {first}", column=column + (second == "yes"), **settings
+    )
+    (bare_pairs,), (bare_disks,) = seen(begin + end, energy="", column=column, **settings)
     assert np.array_equal(pairs, bare_pairs)
     assert np.array_equal(disks[:, :9], bare_disks[:, :9])
     assert not pairs[:, 4].any()
