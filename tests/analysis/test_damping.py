@@ -1,4 +1,4 @@
-"""The damping matrix: the sum of the outer products of each contact and the drag; differences are in tests/plugin."""
+"""The damping matrix is the sum of the outer products of each contact and the drag."""
 
 from dataclasses import replace
 

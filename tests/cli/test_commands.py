@@ -1,6 +1,7 @@
-"""The command line as a user types it: what it prints and what it leaves behind."""
+"""The command line as a user types it: what it prints, what it leaves behind, and what it refuses in one sentence."""
 
 import json
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -8,11 +9,17 @@ import pytest
 from reference_layer import LAYER, toml
 
 from faultgouge.analysis import RunFile, eigenvalues, mean_square_displacement, read_dump, spectrum
-from faultgouge.analysis.motion.transient import transient_gain
+from faultgouge.analysis.motion.transient import transient_gains
+from faultgouge.commands import terminal
 from faultgouge.pywrap import Record, Scene, settle
 from fuzz.kills import difference, results
 
-SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 0.004}, "perturb": {"fx": 1.5e-3, "time": 0.5}})
+SECTIONS = {
+    "ramp": {"step": 1e-3, "until": 0.004},
+    "perturb": {"fx": 1.5e-3, "time": 0.5},
+    "output": {"trajectory": True},
+}
+SCENE = LAYER + toml(SECTIONS)
 
 
 @pytest.fixture(autouse=True)
@@ -59,16 +66,10 @@ def test_a_ramp_says_which_way_it_took(faultgouge, tmp_path):
 
 @pytest.mark.ranks
 @pytest.mark.slow
-def test_two_ranks_write_the_same_run(faultgouge, tmp_path, whole):
-    faultgouge("ramp", "scene.toml", ranks=2)
-    assert difference(results(whole[0]), results(tmp_path)) == ""
-
-
-@pytest.mark.slow
-def test_a_ramp_that_was_cut_off_goes_on(faultgouge, tmp_path, whole):
+def test_a_ramp_that_was_cut_off_goes_on_and_two_ranks_write_the_same(faultgouge, tmp_path, whole):
     for until in ("until = 0.002", "until = 0.004"):
         (tmp_path / "scene.toml").write_text(SCENE.replace("until = 0.004", until))
-        faultgouge("ramp", "scene.toml")
+        faultgouge("ramp", "scene.toml", ranks=2)
     assert difference(results(whole[0]), results(tmp_path)) == ""
 
 
@@ -87,7 +88,7 @@ def test_settle_finishes_a_settling_and_no_ramp(faultgouge, tmp_path, loads):
 
 
 @pytest.mark.slow
-def test_perturb_writes_the_series(faultgouge, tmp_path):
+def test_perturb_writes_the_series_and_the_trajectory_that_is_asked_for(faultgouge, tmp_path):
     done = faultgouge("perturb", "scene.toml", "--json")
     series = json.loads(done.stdout)
     assert ", at most " in done.stderr
@@ -96,8 +97,11 @@ def test_perturb_writes_the_series(faultgouge, tmp_path):
     assert 0 < max(series["msd"]) < 1e-22
     with RunFile(tmp_path / "perturb.h5") as file:
         assert file.fx.tolist() == [1.5e-3]
-        assert list(file.names_of_series) == ["undamped"]
+        path, start = file.series("trajectory"), file.packing()
         assert file.series("undamped")["msd"].tolist() == series["msd"]
+    assert path["time"].tolist() == series["time"]
+    moved = mean_square_displacement(path["position"], start.position, start.box_length)
+    assert moved.tolist() == series["msd"]
 
 
 @pytest.mark.slow
@@ -116,41 +120,22 @@ def test_dumps_that_are_asked_for_hold_the_equilibria(faultgouge_here, beyond):
 
 
 @pytest.mark.slow
-def test_a_trajectory_that_is_asked_for_is_that_of_the_displacements(beyond):
-    with RunFile(beyond / "perturb.h5") as file:
-        path, series, start = file.series("trajectory"), file.series("undamped"), file.packing()
-    assert np.array_equal(path["time"], series["time"])
-    assert np.array_equal(mean_square_displacement(path["position"], start.position, start.box_length), series["msd"])
-
-
-@pytest.mark.slow
-def test_spectrum_from_run_file_and_from_memory(faultgouge_here, whole):
+def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves(faultgouge_here, whole):
     run = whole[0] / "run.h5"
     with RunFile(run) as file:
         packing = file.packing()
-    for more, values in ((), spectrum(packing).eigenvalues), (("--values",), eigenvalues(packing)):
-        printed = json.loads(faultgouge_here("spectrum", run, *more, "--json").stdout)
-        assert printed["eigenvalues"] == [[value.real, value.imag] for value in values.tolist()]
-        assert printed["rattlers"] == packing.rattlers.tolist()
+    printed, fast = (
+        json.loads(faultgouge_here("spectrum", run, *more).stdout) for more in (["--json"], ["--values", "--json"])
+    )
+    for found, values in ((printed, spectrum(packing).eigenvalues), (fast, eigenvalues(packing))):
+        assert found["eigenvalues"] == [[value.real, value.imag] for value in values.tolist()]
+        assert found["rattlers"] == packing.rattlers.tolist()
     first = faultgouge_here("spectrum", run, "--values").stdout.splitlines()[0]
-    assert [float(word) for word in first.split()] == printed["eigenvalues"][0]
-
-
-@pytest.mark.long
-def test_spectrum_says_how_far_a_stable_packing_moves(faultgouge, tmp_path):
-    small = {"packing": {"disks": 30, "seed": 4}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
-    (tmp_path / "scene.toml").write_text(toml(small | {"ramp": {"step": 1e-3, "until": 4e-3}}))
-    faultgouge("ramp", "scene.toml")
-    printed = json.loads(faultgouge("spectrum", "run.h5", "--json").stdout)["transient_gain"]
-    with RunFile(tmp_path / "run.h5") as file:
-        packing = file.packing()
-    displacement, energy = transient_gain(packing), transient_gain(packing, "energy")
-    assert printed["displacement"] == displacement.gain > 1
-    assert printed["time"] == displacement.time
-    assert printed["energy"] == energy.gain > 1
-    said = faultgouge("spectrum", "run.h5").stdout
+    assert [float(word) for word in first.split()] == fast["eigenvalues"][0]
+    gain, (displacement, energy) = printed["transient_gain"], transient_gains(packing)
+    assert (gain["displacement"], gain["time"], gain["energy"]) == (displacement.gain, displacement.time, energy.gain)
+    said = faultgouge_here("spectrum", run).stdout
     assert f"a start at rest grows by up to {displacement.gain:.6g} times in |q|^2" in said
-    assert f"{energy.gain:.6g} in energy" in said
 
 
 @pytest.mark.slow
@@ -190,3 +175,74 @@ def test_every_command_has_help_with_an_example(faultgouge, faultgouge_here):
         done = faultgouge_here(command, "--help")
         assert "Example" in done.stdout
         assert "\\" not in done.stdout  # plain text escapes no brackets
+
+
+@pytest.mark.slow
+def test_off_a_terminal_progress_is_a_line_a_minute_until_it_is_left(monkeypatch, capsys):
+    """Also within one long item."""
+    monkeypatch.setattr(terminal, "EVERY", 0.02)
+    for item in terminal.progress([1, 2, 3], "equilibria", 5, done=2):
+        time.sleep(0.5)
+        if item == 2:
+            break
+    lines = capsys.readouterr().err.splitlines()
+    assert set(lines) - {"equilibria: 2 of 5"} == {"equilibria: 3 of 5", "equilibria: 4 of 5"}
+    time.sleep(0.2)
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("command", "change", "code", "says"),
+    [
+        ("perturb", ("kn = 2e5", "kn = -1.0"), 2, "law.kn = -1.0 is refused: give a number above 0"),
+        ("perturb", ("fy = 3.0", "fy = 300.0"), 2, "the packing is not in balance, a disk feels"),
+        ("perturb", ("time = 0.5", "time = 0.5\ntime_step = 0.1"), 2, "over the limit 2/omega_max"),
+        ("perturb", ("time = 0.5", "time = 1e-9"), 2, "shorter than one step"),
+        ("onset", ("", ""), 1, "No pair of eigenvalues is complex up to F_x = 0.004"),
+        ("onset", ("[ramp]", "[damping]\ncn = 1.0\n[ramp]"), 1, "No motion grows up to F_x = 0.004"),
+        ("onset", ("[ramp]", "[damping]\n[ramp]"), 2, "damping"),
+        ("onset --modes 0:10", ("[ramp]", "[damping]\nct = 1.0\n[ramp]"), 2, "--modes goes without [damping]"),
+    ],
+)
+@pytest.mark.slow
+def test_a_scene_that_cannot_be_run(refusal, tmp_path, command, change, code, says):
+    (tmp_path / "scene.toml").write_text(SCENE.replace(*change))
+    assert says in refusal(*command.split(), "scene.toml", code=code)
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
+
+
+@pytest.mark.parametrize(
+    ("command", "code", "says"),
+    [
+        ("init", 2, "scene.toml exists"),
+        ("ramp scene.toml -o ramp.h5", 2, "holds a run of another scene (load.fy is 3.0 there and 3.00001 here)"),
+        ("rampp scene.toml", 2, "rampp"),
+        ("spectrum no.h5", 2, "no.h5 does not exist"),
+        ("spectrum scene.toml", 2, "scene.toml is not a readable HDF5 file"),
+        ("spectrum no.disks", 2, "no.disks cannot be read"),
+        ("onset scene.toml --modes 600", 2, "as in --modes 0:600"),
+        ("onset scene.toml --modes 900:910", 2, "are no part of"),
+        ("draw ramp.h5 -o p.bmp", 2, "a .png, a .svg or a .pdf"),
+        ("draw ramp.h5 --mode all", 2, "--mode all: give pair, or the number of a mode, from 0"),
+        ("draw ramp.h5 --mode 9999", 2, "modes, counted from 0"),
+        ("draw ramp.h5 --mode pair --frame 0", 2, "no two of them are about to meet"),
+        ("movie ramp.h5 -o film.avi", 2, "a .gif or an .mp4"),
+        ("movie perturb.h5 --span 5 6", 2, "its times go from 0 to"),
+        ("export ramp.h5 -o packing.pdb", 2, "exports are .vtp, .xyz, .data, .gsd"),
+        ("export ramp.h5 -o packing.data --mode pair", 2, "has no room for modes"),
+        ("export ramp.h5 --frame 9", 2, "there is no frame 9"),
+        ("export ramp.h5 -o nowhere/packing.vtp", 1, "cannot be written"),
+        ("export ramp.h5 -o film.pvd", 2, "add --frames all"),
+        ("export ramp.h5 -o film.vtp --frames all", 2, "several frames go into .xyz, .gsd, .pvd"),
+        ("export ramp.h5 -o film.xyz --frames 3", 2, "give all, START:STOP or START:STOP:STEP"),
+        ("export ramp.h5 -o film.xyz --frames 5:9", 2, "has 5 frames, and none of them is meant"),
+        ("export ramp.h5 -o film.xyz --frames all --mode pair", 2, "without --frame and --mode"),
+    ],
+)
+@pytest.mark.slow
+def test_a_command_that_cannot_be_run(refusal, tmp_path, beyond, command, code, says):
+    (tmp_path / "scene.toml").write_text((beyond / "scene.toml").read_text().replace("fy = 3.0", "fy = 3.00001"))
+    for name in ("ramp.h5", "perturb.h5"):
+        (tmp_path / name).symlink_to(beyond / name)
+    assert says in refusal(*command.split(), code=code)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["perturb.h5", "ramp.h5", "scene.toml"]

@@ -1,33 +1,38 @@
-"""draw, movie, init, --version and python -m faultgouge, as a user types them."""
+"""draw, movie, init and --version, as a user types them; and the page of view, in a browser that has no network."""
 
 import re
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 from reference_layer import BIN
 
 from faultgouge.analysis import RunFile
-from faultgouge.notebook import picture
+from faultgouge.figures.view_pair import followed
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.refusals import read_toml
 
+PACKING = "F_x = 0.012, F_y = 3: 100 disks"
+MODE = r"mode \d+: lambda = [\d.]+, participation ratio 0\.\d+, rotation"
 
-@pytest.mark.parametrize("suffix", ["png", *(pytest.param(s, marks=pytest.mark.long) for s in ("svg", "pdf"))])
+
+@pytest.mark.parametrize(
+    ("options", "name", "says", "times"),
+    [
+        ("--frame 2", "packing.png", PACKING, 1),
+        pytest.param("--frame 2", "packing.pdf", PACKING, 1, marks=pytest.mark.long),
+        pytest.param("--frame 3 --mode pair", "about_to_meet.png", MODE, 2, marks=pytest.mark.long),
+    ],
+)
 @pytest.mark.slow
-def test_a_packing(beyond, suffix, faultgouge_in):
-    done = faultgouge_in(beyond, "draw", "ramp.h5", "--frame", "2", "-o", f"packing.{suffix}")
-    assert "F_x = 0.012, F_y = 3: 100 disks" in done.stderr
-    assert (beyond / f"packing.{suffix}").stat().st_size > 10_000
-
-
-@pytest.mark.long
-def test_the_pair_before_and_after_the_onset(beyond, faultgouge_in):
-    before = faultgouge_in(beyond, "draw", "ramp.h5", "--frame", "3", "--mode", "pair", "-o", "before.png")
-    assert len(re.findall(r"mode \d+: lambda = [\d.]+, participation", before.stderr)) == 2
-    after = faultgouge_in(beyond, "draw", "ramp.h5", "--mode", "pair", "-o", "after.png")
-    assert re.search(r"mode \d+: lambda = [\d.]+ \+- [\d.]+ i, participation ratio 0\.\d+, rotation", after.stderr)
+def test_a_packing_and_modes(beyond, faultgouge_in, options, name, says, times):
+    done = faultgouge_in(beyond, "draw", "ramp.h5", *options.split(), "-o", name)
+    assert len(re.findall(says, done.stderr)) == times
+    assert (beyond / name).stat().st_size > 10_000
 
 
 @pytest.mark.long
@@ -60,12 +65,72 @@ def test_version_in_both_ways():
         assert re.fullmatch(r"faultgouge \S+ \(LAMMPS \S+\)\n", done.stdout), done.stderr
 
 
-@pytest.mark.slow
-def test_a_packing_shows_itself(beyond):
-    with RunFile(beyond / "ramp.h5") as file:
-        packing, same, other = file.packing(1), file.packing(1), file.packing(2)
-    assert len(repr(packing)) < 200
-    assert picture(packing).startswith(b"\x89PNG")
-    assert packing == same
-    assert packing != other
-    assert packing.contacts == same.contacts
+@pytest.mark.long
+def test_few_eigenvalues_show_the_pair_that_all_show(beyond):
+    """What a large packing has: the same pair at each load, and the eigenvalues that are closest to the pair."""
+    with RunFile(beyond / "ramp.h5") as run:
+        packings = [run.packing(k) for k in range(len(run))]
+    some, everything = (followed(packings, everything=each) for each in (False, True))
+    # one pair of one matrix by two iterations: their planes agree to rounding, which a split pair takes in as its root
+    scale = np.abs(everything.pair).max()
+    assert np.allclose(some.pair, everything.pair, rtol=0, atol=1e-7 * scale)
+    for few, values in zip(some.values, everything.values, strict=True):
+        assert all(np.abs(values - each).min() < 1e-9 * values.real.max() for each in few)
+
+
+@pytest.fixture(scope="module")
+def pages(beyond, faultgouge_in):
+    """The folder, with a page of either file."""
+    for name in ("ramp", "perturb"):
+        faultgouge_in(beyond, "view", f"{name}.h5", "-o", f"{name}.html")
+    return beyond
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as p:
+        chromium = shutil.which("chromium") or shutil.which("google-chrome") or p.chromium.executable_path
+        if not Path(chromium).exists():
+            pytest.skip("no Chromium is installed: python -m playwright install chromium")
+        yield p.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+
+
+DISKS = "[...Bokeh.documents[0].get_model_by_name('disks').data.x]"
+MARKS = """(() => { const m = Bokeh.documents[0].get_model_by_name('marks').data
+  return Array.from(m.x0, (x, k) => Math.atan2(x - m.x1[k], m.y1[k] - m.y0[k])) })()"""
+"""Angles of the marks on the disks, from the vertical."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1440, 390])
+@pytest.mark.parametrize("name", ["ramp", "perturb"])
+def test_the_page_offline(pages, browser, name, width, scheme):
+    page = browser.new_page(viewport={"width": width, "height": 800}, color_scheme=scheme)
+    wrong, asked = [], []
+    page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto((pages / f"{name}.html").as_uri())
+    page.wait_for_function("document.getElementById('says')?.textContent.includes('λ')")
+    pair = "Object.values(Bokeh.documents[0].get_model_by_name('members').data).slice(0, 2).map((x) => [...x])"
+    before = page.evaluate(pair)
+    if name == "ramp":
+        assert before[1] == [0, 0]
+        page.focus("#load")
+        page.keyboard.press("End")
+        assert "complex" in page.inner_text("#says")
+    after = page.evaluate(pair)
+    assert after[1][0] > 0 > after[1][1]
+    assert (before != after) == (name == "ramp")
+    still, upright = page.evaluate(DISKS), page.evaluate(MARKS)
+    assert max(map(abs, upright)) < 0.1
+    page.select_option("#mode", "0")
+    page.wait_for_timeout(300)
+    assert page.evaluate(DISKS) != still
+    assert max(map(abs, page.evaluate(MARKS))) > 0.1
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert wrong == []
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    page.close()

@@ -59,8 +59,5 @@ def test_reproduce(faultgouge, tmp_path):
     rows = {cells[1].strip(): cells[3].strip() for line in report.splitlines() if len(cells := line.split("|")) == 5}
     real = real_units(Scene.from_toml(tmp_path / "scene.toml"))
     assert rows["F_x^c for mu = 1, a shear stress"].startswith(f"{1e-6 * real.stress(first['onset']['fx_c']):.4g} MPa")
-    assert rows["frequency of the pair there"].endswith("Hz")
     assert rows["dashpot C_N of the restitution"] == "0.9 at 1 m/s"
     assert rows["amplitude of the wave, as ground velocity"] == f"{real.ground_velocity(1e-9, 0.01, 'layer'):.3g} m/s"
-    assert rows["v_0, above which friction weakens"].endswith("m/s")
-    assert rows["time in which the fastest motion grows e-fold"].endswith(" s")

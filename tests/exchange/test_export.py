@@ -1,12 +1,21 @@
-"""What is exported is read by the programs that it is for, and comes back to the bit: packings, and films of frames."""
+"""What is exported is read by the programs that it is for, and comes back to the bit: packings, and films of frames.
+
+A trajectory in run.h5 is H5MD: MDAnalysis steps through it, and its analyses agree with ours.
+"""
 
 import re
+import sys
 from dataclasses import replace
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_layer import LAYER, toml
 
 from faultgouge.analysis import Contacts, MindlinLaw, RunFile, nearest_image, normal_modes
+from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.exchange import (
     ModeVectors,
     chosen_frames,
@@ -19,8 +28,21 @@ from faultgouge.pywrap.exchange import (
 )
 
 FILMS = pytest.mark.parametrize("suffix", [".xyz", ".gsd"], indirect=True)
-EXTRA = "needs the extra export: pip install 'faultgouge[export]'"
 READERS = "needs a large library that is no dependency: make readers"
+
+PUSHED = {"fx": 1e-3, "time": 0.3, "amplitude": 1.0, "omega": 5.0}
+SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 2e-3}, "perturb": PUSHED, "output": {"trajectory": True}})
+
+
+@pytest.fixture
+def mdanalysis():
+    return pytest.importorskip("MDAnalysis", reason="needs the extra export: pip install 'faultgouge[export]'")
+
+
+@pytest.fixture
+def ours(mdanalysis):
+    """The module that registers parser and reader of run.h5."""
+    return import_module("faultgouge.pywrap.exchange.mdanalysis")
 
 
 def back(disks):
@@ -70,11 +92,16 @@ def film(path, suffix, says="all"):
 
 
 @FILMS
-def test_each_equilibrium_of_a_ramp_comes_back_to_the_bit(ramp, suffix):
-    target = film(ramp, suffix)
+@pytest.mark.slow
+def test_each_equilibrium_of_a_ramp_comes_back_to_the_bit(faultgouge_here, tmp_path, ramp, sheared, suffix):
+    done = faultgouge_here("export", ramp, "--frames", "all", "-o", f"film{suffix}")
+    assert f"2 frames of equilibria; written to film{suffix}" in done.stderr
     with RunFile(ramp) as run:
         for number in range(2):
-            assert back(read_disks(target, number)) == run.packing(number)
+            assert back(read_disks(tmp_path / f"film{suffix}", number)) == run.packing(number)
+    list_of_frames = film(ramp, ".pvd")
+    assert sorted(path.name for path in list_of_frames.with_suffix("").iterdir()) == ["00000.vtp", "00001.vtp"]
+    assert f'timestep="{sheared.fx!r}"' in list_of_frames.read_text()
 
 
 @pytest.fixture
@@ -99,14 +126,6 @@ def test_an_undamped_run_has_positions_and_no_slips(motion, suffix):
     np.testing.assert_array_equal(some.position, places[3])
     times = re.findall('timestep="(.*?)"', film(path, ".pvd").read_text())
     assert [float(time) for time in times] == [0.0, 0.5, 1.0, 1.5]
-
-
-@pytest.mark.slow
-def test_the_command_writes_a_list_of_frames(faultgouge_here, tmp_path, ramp, sheared):
-    done = faultgouge_here("export", ramp, "--frames", "all", "-o", "film.pvd")
-    assert "2 frames of equilibria; written to film.pvd" in done.stderr
-    assert sorted(path.name for path in (tmp_path / "film").iterdir()) == ["00000.vtp", "00001.vtp"]
-    assert f'timestep="{sheared.fx!r}"' in (tmp_path / "film.pvd").read_text()
 
 
 def test_pyvista_reads_disks_contacts_and_modes(tmp_path, sheared):
@@ -176,18 +195,100 @@ def test_ovito_steps_through_it(ramp, suffix):
 
 
 @FILMS
-def test_mdanalysis_reads_it(tmp_path, sheared, suffix):
-    library = pytest.importorskip("MDAnalysis", reason=EXTRA)
-    write_packing(tmp_path / f"packing{suffix}", sheared)
-    atoms = library.Universe(str(tmp_path / f"packing{suffix}")).atoms
-    assert_same_places(atoms.positions, sheared.position, sheared.box_length, 2e-6)  # float32
+def test_mdanalysis_and_gsd_read_it(tmp_path, sheared, suffix, mdanalysis):
+    path = str(tmp_path / f"packing{suffix}")
+    write_packing(Path(path), sheared)
+    assert_same_places(mdanalysis.Universe(path).atoms.positions, sheared.position, sheared.box_length, 2e-6)  # float32
+    if suffix == ".gsd":
+        with pytest.importorskip("gsd.hoomd").open(path) as file:
+            frame = file[0]
+        assert frame.configuration.dimensions == 2
+        np.testing.assert_array_equal(frame.particles.diameter, np.float32(2 * sheared.radius))
+        np.testing.assert_array_equal(frame.log["particles/net_force"][:, :2], sheared.net_force.reshape(3, -1)[:2].T)
 
 
-def test_gsd_reads_it(tmp_path, sheared):
-    hoomd = pytest.importorskip("gsd.hoomd", reason=EXTRA)
-    write_packing(tmp_path / "packing.gsd", sheared)
-    with hoomd.open(str(tmp_path / "packing.gsd")) as file:
-        frame = file[0]
-    assert frame.configuration.dimensions == 2
-    np.testing.assert_array_equal(frame.particles.diameter, np.float32(2 * sheared.radius))
-    np.testing.assert_array_equal(frame.log["particles/net_force"][:, :2], sheared.net_force.reshape(3, -1)[:2].T)
+@pytest.fixture(scope="module", params=["double", pytest.param("compensated", marks=pytest.mark.long)])
+def run(tmp_path_factory, faultgouge_in, request):
+    """perturb.h5 of a strong push, with displacements that float32 still tells; its start, and all places of disks."""
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "scene.toml").write_text(f'precision = "{request.param}"\n' + SCENE)
+    faultgouge_in(folder, "perturb", "scene.toml")
+    with RunFile(folder / "perturb.h5") as file:
+        start, moved = file.packing(), file.series("trajectory")["position"]
+    return folder / "perturb.h5", start, np.insert(moved, 0, start.position, axis=0)
+
+
+@pytest.mark.slow
+def test_mdanalysis_steps_through_it_as_h5md_and_as_a_universe_with_radii_masses_and_layer(run, mdanalysis, ours):
+    path, packing, place = run
+    bare, universe = mdanalysis.Universe.empty(len(packing), trajectory=True), mdanalysis.Universe(str(path))
+    bare.load_new(str(path), format="H5MD", convert_units=False)
+    np.testing.assert_array_equal(universe.atoms.radii, packing.radius)
+    np.testing.assert_array_equal(universe.atoms.masses, packing.mass)
+    np.testing.assert_array_equal(universe.select_atoms("type top").indices, np.flatnonzero(packing.top))
+    np.testing.assert_array_equal(universe.select_atoms("type bed").indices, np.flatnonzero(~packing.top))
+    with RunFile(path) as file:
+        assert len(file) == 1
+        series = file.series("trajectory")
+        np.testing.assert_array_equal(series["time"], file.series("undamped")["time"])
+    time = np.insert(series["time"], 0, 0.0)
+    assert len(bare.trajectory) == len(universe.trajectory) == len(time) > 100
+    for k, (frame, exact) in enumerate(zip(bare.trajectory, universe.trajectory, strict=True)):
+        assert frame.time == time[k]
+        assert frame.dimensions[0] == np.float32(packing.box_length)
+        assert frame.data["fx"] == packing.fx
+        np.testing.assert_array_equal(frame.positions[:, :2], place[k].astype(np.float32))
+        assert exact.data["position"].dtype == np.float64
+        np.testing.assert_array_equal(exact.data["position"][:, :2], place[k])
+        if packing.compensated and k:
+            np.testing.assert_array_equal(exact.data["position_low"], series["position_low"][k - 1])
+
+
+@pytest.mark.long
+def test_d_of_t_in_mdanalysis_is_that_of_the_run(run, mdanalysis, ours):
+    path, packing, _ = run
+    universe = mdanalysis.Universe(str(path))
+    everything = ours.MeanSquareDisplacement(universe.atoms).run()
+    with RunFile(path) as file:
+        sampled = file.series("undamped")
+    np.testing.assert_array_equal(everything.times[1:], sampled["time"])
+    # sums over the disks are rounded; LAMMPS's positions are those of the file to the bit
+    np.testing.assert_allclose(everything.results.msd[1:], sampled["msd"], rtol=1e-13)
+    layer = ours.MeanSquareDisplacement(universe.select_atoms("type top")).run()
+    bed = ours.MeanSquareDisplacement(universe.select_atoms("type bed")).run()
+    share = packing.top.mean()
+    weighted = share * layer.results.msd + (1 - share) * bed.results.msd
+    np.testing.assert_allclose(weighted, everything.results.msd, rtol=1e-13)
+
+
+@pytest.mark.slow
+def test_no_equilibrium_follows_a_trajectory(run):
+    path, packing, _ = run
+    with RunFile(path, "a") as file, pytest.raises(ValueError, match="no equilibrium can follow"):
+        file.append(packing, floor=0.0, evaluations=0)
+
+
+def test_positions_are_an_observable_too_and_a_file_without_that_link_is_continued(tmp_path, reference_packing):
+    packing = reference_packing(1.0)
+    with RunFile.create(tmp_path / "run.h5", packing) as file:
+        assert file._file["observables/position"] == file._file["particles/disks/position"]  # one object, two names
+        assert file._file["h5md/creator"].attrs["version"] == version("faultgouge")
+        del file._file["observables/position"]
+        file.append(packing)
+    with RunFile(tmp_path / "run.h5", "a") as file:
+        file.append(packing)
+    with RunFile(tmp_path / "run.h5") as file:
+        np.testing.assert_array_equal(file.packing(1).position, packing.position)
+
+
+def test_without_mdanalysis_the_import_says_the_one_command(monkeypatch):
+    monkeypatch.delitem(sys.modules, "faultgouge.pywrap.exchange.mdanalysis", raising=False)
+    monkeypatch.setitem(sys.modules, "MDAnalysis.analysis.base", None)
+    with pytest.raises(ImportError, match=r"pip install 'faultgouge\[export\]'"):
+        import_module("faultgouge.pywrap.exchange.mdanalysis")
+
+
+def test_a_file_that_only_claims_to_be_a_run_is_refused_when_the_parser_is_there(tmp_path, ours):
+    (tmp_path / "run.h5").write_bytes(b"no HDF5")
+    with pytest.raises(SceneError, match="is of no format that is read: give"):
+        Scene.from_mapping({"packing": {"file": str(tmp_path / "run.h5")}})

@@ -1,10 +1,14 @@
-"""Packings of other codes: what is read, what is brought to rest, and what is refused in one sentence."""
+"""Packings of other codes: what is read, brought to rest, and refused in one sentence; docs/howto_own_packing.md."""
 
 import json
+import re
+import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_layer import BIN
 
 from faultgouge.analysis import BadInputError, RunFile, nearest_image
 from faultgouge.analysis.files.wholefile import MAGIC
@@ -146,22 +150,36 @@ def test_what_mdanalysis_reads_with_radii(tmp_path, sheared):
     assert "float32" in disks.remark
 
 
+@pytest.mark.ranks
+@pytest.mark.parametrize("slips", [False, pytest.param(True, marks=pytest.mark.long)])
 @pytest.mark.slow
-def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge_here, reference_packing):
-    """Numbers with five digits: a hundredth of an overlap, and forces of the order of the load."""
-    packing = reference_packing(1.0)
-    rounded = replace(packing, position=np.round(packing.position, 3))
+def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packing, sheared, slips):
+    """Without friction, or with slips, and then with friction; on any number of ranks."""
+    packing, digits = (sheared, 6) if slips else (reference_packing(1.0), 3)
+    # with 3 digits, a hundredth of an overlap, forces of the order of the load; with 6, forces of 1e-2
+    rounded = replace(packing, position=np.round(packing.position, digits))
     (tmp_path / "rough.csv").write_text(csv(rounded, "x,y,radius,top"))
-    words = ("import", "rough.csv", "--width", packing.box_length, *LAW, "-o", "rest.h5")
-    done = faultgouge_here(*words, code=2)
-    assert "not in balance under fy = 3" in done.stderr
-    assert "--relax" in done.stderr
-    assert not (tmp_path / "rest.h5").exists()
-    done = faultgouge_here(*words, "--relax")
-    assert "brought to rest" in done.stderr
-    with RunFile(tmp_path / "rest.h5") as file:
-        rest = file.packing()
+    words, c = ["import", "rough.csv", "--width", packing.box_length, *LAW, "--fx", packing.fx], packing.contacts
+    if slips:
+        table_of_slips = np.column_stack([c.i + 1, c.j + 1, c.slip])
+        np.savetxt(tmp_path / "slips.csv", table_of_slips, "%.17g", ",", header="id1,id2,slip", comments="")
+        words += ["--contacts", "slips.csv"]
+    refused = faultgouge(*words, "-o", "one.h5", code=2)
+    assert re.search("not in balance under .*fy = 3.*--relax", refused.stderr)
+    assert not (tmp_path / "one.h5").exists()
+    found = []
+    for name, ranks in (("one.h5", None), ("two.h5", 2)):
+        assert "brought to rest" in faultgouge(*words, "--relax", "-o", name, ranks=ranks).stderr
+        with RunFile(tmp_path / name) as file:
+            found.append(file.packing())
+    rest = found[0]
+    assert rest == found[1]
+    assert rest.fx == packing.fx
     assert rest.residual < 1e-9
+    if slips:
+        # friction keeps the slips to within what the disks have moved
+        np.testing.assert_allclose(rest.contacts.slip, c.slip, atol=1e-6)
+        return
     assert not rest.contacts.slip.any()
     # the packing is the one that was rounded: the reference is an equilibrium of the same law
     moved = nearest_image(rest.position - packing.position, packing.box_length)
@@ -169,35 +187,10 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge_here, reference_
     assert np.abs(moved[held]).max() < 0.01
 
 
-@pytest.mark.ranks
-@pytest.mark.long
-def test_disks_with_slips_come_to_rest_with_friction_on_any_number_of_ranks(tmp_path, faultgouge, sheared):
-    rounded = replace(sheared, position=np.round(sheared.position, 6))  # forces of 1e-2 out of balance
-    (tmp_path / "packing.csv").write_text(csv(rounded, "x,y,radius,top"))
-    c = sheared.contacts
-    slips = np.column_stack([c.i + 1, c.j + 1, c.slip])
-    np.savetxt(tmp_path / "slips.csv", slips, "%.17g", ",", header="id1,id2,slip", comments="")
-    width, shear = ("--width", sheared.box_length), ("--fx", sheared.fx)
-    words = ("import", "packing.csv", *width, "--contacts", "slips.csv", *LAW, *shear)
-    found = []
-    for name, ranks in (("one.h5", None), ("two.h5", 2)):
-        done = faultgouge(*words, "--relax", "-o", name, ranks=ranks)
-        assert "brought to rest" in done.stderr
-        with RunFile(tmp_path / name) as file:
-            found.append(file.packing())
-    one, two = found
-    assert one == two
-    assert one.fx == sheared.fx
-    assert one.residual < 1e-9
-    # friction keeps the slips to within what the disks have moved
-    np.testing.assert_allclose(one.contacts.slip, c.slip, atol=1e-6)
-
-
 def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
     packing = reference_packing(1.0)
     (tmp_path / "packing.dump").write_text(dump(packing))
     (tmp_path / "packing.json").write_text(json.dumps(reference))
-    (tmp_path / "packing.doc").write_text("?")
     rest = {"law": {"kn": 2e5}, "load": {"fy": 3.0}}
 
     def settled(**section):
@@ -205,15 +198,8 @@ def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
 
     expected = settled(file="packing.json")
     assert settled(file="packing.dump", top="type:2") == expected
-    for section, says in (
-        ({"file": "packing.dump"}, "does not say which disks are the upper layer"),
-        ({"file": "packing.dump", "top": "type:9"}, "holds no disk"),
-        ({"file": "packing.dump", "top": 10, "frame": 3}, "no --frame 3"),
-        ({"file": "none.doc"}, "cannot be read"),
-        ({"file": "packing.doc"}, r"is of no format that is read: give .*LAMMPS data .*GSD .*run\.h5"),
-    ):
-        with pytest.raises(SceneError, match=says):
-            settled(**section)
+    with pytest.raises(SceneError, match="does not say which disks are the upper layer"):
+        settled(file="packing.dump")
 
 
 BAD = {
@@ -262,10 +248,7 @@ def test_options_that_do_not_fit(tmp_path, refusal, sheared):
     (tmp_path / "scene.toml").write_text("[law]\nkn = 2e5\n[load]\nfy = 3.0\n")
     for words, says in (
         (("a.dump", *LAW), "does not say which disks are the upper layer: add --top"),
-        (("a.dump", "--top", "y>99", *LAW), "the upper layer holds no disk"),
         (("a.dump",), "add --top --kn --fy, as in `faultgouge import ... --top 10 --kn 2e5 --fy 3`"),
-        (("a.dump", "--top", "type:2"), "add --kn --fy"),
-        (("a.dump", "--top", "type:2", "--kn", "2e5"), "add --fy"),
         (("a.dump", "--top", "type:2", "--kn", "-1", "--fy", "3"), "law.kn = -1.0 is refused"),
         (("a.dump", "--scene", "scene.toml", "--fx", "0", "--kn", "1"), "--kn cannot stand beside --scene"),
         (("a.dump", "--top", "type:2", *LAW, "--width", "wide"), "--width wide"),
@@ -274,3 +257,31 @@ def test_options_that_do_not_fit(tmp_path, refusal, sheared):
         (("a.dump", "--top", "type:2", *LAW, "-o", "a.dump"), "exists"),
     ):
         assert says in refusal("import", *words)
+
+
+HOWTO = Path(__file__).parents[2] / "docs" / "howto_own_packing.md"
+
+
+@pytest.mark.long
+def test_from_a_pour_to_the_film_of_the_mode(tmp_path):
+    """The commands of the page, as they stand there."""
+    text = HOWTO.read_text()
+    deck, scene = re.findall(r"```\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "pour.in").write_text(deck)
+    (tmp_path / "own.toml").write_text(scene)
+    commands = re.findall(r"^    (\w.*)$", text, re.MULTILINE)
+    assert len(commands) == 6
+    said = {}
+    for command in commands:
+        program, *words = command.split()
+        done = subprocess.run([BIN / program, *words], cwd=tmp_path, capture_output=True, text=True, timeout=600)
+        assert done.returncode == 0, done.stderr
+        said[" ".join([program, *words[:1]])] = done.stderr
+    assert "brought to rest" in said["faultgouge import"]
+    onset = re.search(r"F_x\^c = ([\d.]+)", said["faultgouge onset"])
+    assert onset
+    with RunFile(tmp_path / "run.h5") as run:
+        assert 0 < float(onset[1]) < run.fx[-1]
+    assert "complex pair" in said["faultgouge draw"]
+    assert (tmp_path / "mode.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "mode.gif").read_bytes().startswith(b"GIF89a")

@@ -1,12 +1,16 @@
-"""Input decks: as they stand, on two ranks; and the sentences with which LAMMPS refuses what cannot work."""
+"""Input decks: on two ranks, on one page each, in another LAMMPS; and what LAMMPS refuses, in one sentence."""
 
+import os
 import re
+import subprocess
 from contextlib import closing
 
+import numpy as np
 import pytest
 from mpi4py import MPI
+from reference_layer import BIN
 
-from faultgouge.analysis import read_dump
+from faultgouge.analysis import read_dump, spectrum
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.lammps.instance import lammps_instance
 
@@ -44,6 +48,52 @@ def test_ranks_share_the_disks_evenly(lmp):
     assert "1 by 2 by 1 MPI processor grid" in done.stdout
     (share,) = (line.split() for line in done.stdout.splitlines() if line.startswith("Nlocal:"))
     assert float(share[3]) <= 1.1 * float(share[1])  # the most beside the mean
+
+
+TEACHING = {
+    "settle": ("loose100.data", "settled", "settled", {}),
+    "ramp": ("packing100.data", "ramp.2", "ramp.2", {"until": 2e-3}),
+    "perturb": ("packing100.data", "perturb", "perturb.end", {"time": 5, "amplitude": 1e-9}),
+}
+
+
+def positions(dump):
+    """ID, x and y of each disk, as they stand in a dump."""
+    header, rows = dump.read_text().split("ITEM: ATOMS ")[1].split("\n", 1)
+    columns = [header.split().index(name) for name in ("id", "x", "y")]
+    return np.array([row.split() for row in rows.splitlines()])[:, columns]
+
+
+@pytest.mark.parametrize("stage", TEACHING)
+@pytest.mark.slow
+def test_teaching_deck_of_one_page_is_to_the_bit_the_deck_of_parts(lmp, tmp_path, stage):
+    data, taught, composed, variables = TEACHING[stage]
+    done = lmp(DECKS / "teaching" / f"{stage}.in", data=DECKS / data)
+    assert "WARNING" not in done.stdout
+    lmp(DECKS / f"{stage}.in", decks=DECKS, force_tolerance=1e-9, **variables)
+    assert np.array_equal(positions(tmp_path / f"{taught}.dump"), positions(tmp_path / f"{composed}.disks"))
+
+
+RAMP = ("-var", "decks", str(DECKS), "-var", "until", "2e-3")
+
+
+@pytest.mark.skipif("LAMMPS_PROGRAM" not in os.environ, reason="LAMMPS_PROGRAM names no LAMMPS")
+def test_same_eigenvalues_and_forces_in_a_lammps_of_ones_own(lmp, tmp_path):
+    """A ramp in that of the environment, and in the one that tests/with_lammps.sh names and builds the plugin for."""
+    environment = tmp_path / "environment"
+    environment.mkdir()
+    wheel = {key: value for key, value in os.environ.items() if key not in ("LAMMPS_PLUGIN_PATH", "LD_LIBRARY_PATH")}
+    command = [BIN / "lmp", "-in", DECKS / "ramp.in", "-log", "none", *RAMP]
+    subprocess.run(command, cwd=environment, env=wheel, check=True, capture_output=True, timeout=300)
+    lmp(DECKS / "ramp.in", *RAMP)
+    names = sorted(path.name for path in tmp_path.glob("*.disks"))
+    assert len(names) > 1
+    for name in names:
+        here, there = read_dump(tmp_path / name), read_dump(environment / name)
+        # one arithmetic, compiled twice
+        np.testing.assert_allclose(here.net_force, there.net_force, rtol=0, atol=1e-12 * np.abs(here.fy))
+        ours, others = (spectrum(each).eigenvalues for each in (here, there))
+        np.testing.assert_allclose(ours, others, rtol=1e-12)
 
 
 MODEL = """

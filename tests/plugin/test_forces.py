@@ -1,28 +1,18 @@
-"""The bound of the force in LAMMPS, and how slips are counted; test_damping.py has the law in ten lines."""
+"""Forces in LAMMPS: how slips are counted, and K against differences; test_damping.py has the law in ten lines."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix
 from faultgouge.pywrap.lammps.engine import Engine
 
 
-def two_disks(distance, mu, contacts, radius=(0.5, 0.5), exponent=1.5):
+def two_disks(distance, mu, contacts, radius=(0.5, 0.5)):
     """One above the other."""
-    law = MindlinLaw(2e5, 2e5 * 2 / 7, mu, exponent)
+    law = MindlinLaw(2e5, 2e5 * 2 / 7, mu)
     return Packing(position=[[1.0, 3.0], [1.0, 3.0 + distance]], radius=radius, law=law, contacts=contacts)
-
-
-@pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
-@pytest.mark.parametrize("mu", [0.1, 1.0])
-def test_coulomb_bound_is_reached_exactly(mu, exponent):
-    packing = two_disks(0.999, mu, Contacts([0], [1], [1.0]), exponent=exponent)
-    with Engine(packing) as engine:
-        engine.displace(packing, np.zeros(6))
-        force = engine.net_force.reshape(3, 2)
-    assert np.array_equal(force[:2, 0], -force[:2, 1])  # momentum, exactly
-    # n is along y here, so that the components are the forces themselves
-    assert abs(force[2, 0]) == abs(force[0, 0]) == mu * abs(force[1, 0])
 
 
 def test_slip_is_taken_along_the_tangent_at_the_middle_of_the_step():
@@ -49,3 +39,72 @@ def test_new_contact_starts_without_slip_and_lost_one_forgets():
     assert abs(slid.contacts.slip[0]) > 9e-5
     assert len(opened.contacts) == 0
     assert np.array_equal(again.contacts.slip, [0.0])
+
+
+STEP = 2.0**-27
+"""About 1e-8, and a power of two, so that coordinates move by it exactly."""
+
+
+def differences(packing, sign):
+    """-dF/dq to one side by differences of width h and h/2, extrapolated.
+
+    f'' jumps at s = 0 and at the bound, so that a central difference there is off by h times the jump, which is large
+    for a contact that hardly touches. The extrapolation removes what is linear in h.
+    """
+    size = 3 * len(packing)
+    matrix = np.empty((size, size))
+    with Engine(packing) as engine:
+
+        def force(displacement):
+            engine.displace(packing, displacement)
+            return engine.net_force
+
+        rest = force(np.zeros(size))
+        for k, column in enumerate(sign * np.eye(size)):
+            wide, narrow = ((rest - force(h * column)) / h for h in (STEP, STEP / 2))
+            matrix[:, k] = sign * (2 * narrow - wide)
+    return matrix
+
+
+def with_slips(packing, fractions):
+    """The packing with slips that are the given fractions of the Coulomb limit in turn."""
+    slip = np.resize(fractions, len(packing.contacts)) * packing.law.slip_limit(packing.geometry.overlap)
+    return replace(packing, contacts=packing.contacts.slipped(slip))
+
+
+@pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
+@pytest.mark.parametrize(
+    ("mu", "fractions"),
+    [(1.0, [0.1, -0.3, 0.02, 0.4]), (1.0, [-1.0, 0.0, 0.5, 0.99, 1.0, -0.2, 0.1]), (0.3, [1.0, -1.0])],
+    ids=["sticking", "all kinds", "sliding"],
+)
+def test_consistent_form_is_the_derivative_of_the_forces(reference_packing, mu, fractions, exponent):
+    packing = reference_packing(mu)
+    packing = with_slips(replace(packing, law=replace(packing.law, exponent=exponent)), fractions)
+    assert packing.contacts.floor.any()
+    matrix, central = stiffness_matrix(packing).toarray(), (differences(packing, 1) + differences(packing, -1)) / 2
+    # A force is rounded at K * 1e-16, which a difference divides by STEP: 1e-8 of K; a disk has several contacts, and
+    # the extrapolation adds two differences. Of harmonic disks every contact is as stiff as the stiffest one.
+    tolerance = 1e-7 if exponent > 1 else 2e-7
+    assert np.abs(central - matrix).max() < tolerance * np.abs(matrix).max()
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("mu", [1.0, 0.3])
+def test_matrix_of_rescaled_slips_is_the_one_sided_derivative(reference_packing, mu, sign):
+    """Each column with the derivative of each contact that its displacement asks for: it closes, or it parts."""
+    packing = with_slips(reference_packing(mu), [-1.0, 0.05, 0.5, 0.99, 1.0, -0.2, 0.1])
+    packing = replace(packing, law=replace(packing.law, rescaled=True))
+    contacts, difference = packing.contacts, differences(packing, sign)
+    matrix = np.empty_like(difference)
+    for k, column in enumerate(sign * np.eye(len(matrix))):
+        moved = column.reshape(3, -1)[:2].T
+        branch = moved[contacts.i] - np.where(contacts.floor[:, None], 0.0, moved[contacts.j])
+        opens = np.einsum("cd,cd->c", packing.geometry.normal, branch)
+        matrix[:, k] = stiffness_matrix(packing, parting=opens > 0)[:, [k]].toarray()[:, 0]
+    # as above; differences to one side are divided by half the width
+    assert np.abs(difference - matrix).max() < 4e-7 * np.abs(matrix).max()
+    closing, parting = (stiffness_matrix(packing, parting=share).toarray() for share in (0.0, 1.0))
+    assert np.abs(difference - closing).max() > 1e-3 * np.abs(matrix).max()
+    total = stiffness_matrix(replace(packing, law=replace(packing.law, rescaled=False))).toarray()
+    np.testing.assert_allclose(parting, total, rtol=0, atol=4e-16 * np.abs(matrix).max())  # b is summed otherwise

@@ -72,20 +72,12 @@ dump            seen all local 1 seen.* index c_seen[*]
 @pytest.mark.parametrize(
     "changes",
     [
-        pytest.param({"ranks": 2}, marks=pytest.mark.long),
-        {"newton": "off", "sort": 0},
-        {"newton": "off", "sort": 50, "ranks": 2},
-        {"extra": "run 0\n" * 20 + LOOKS},
-        {"middle": AGAIN},
-        pytest.param({"middle": AGAIN, "ranks": 2}, marks=pytest.mark.long),
-    ],
-    ids=[
-        "2 ranks",
-        "newton off, no sorting",
-        "newton off, sorting, 2 ranks",
-        "looking on",
-        "restart in the same process",
-        "restart in the same process, 2 ranks",
+        pytest.param({"ranks": 2}, id="2 ranks", marks=pytest.mark.long),
+        pytest.param({"newton": "off", "sort": 0}, id="newton off, no sorting"),
+        pytest.param({"newton": "off", "sort": 50, "ranks": 2}, id="newton off, sorting, 2 ranks"),
+        pytest.param({"extra": "run 0\n" * 20 + LOOKS}, id="looking on"),
+        pytest.param({"middle": AGAIN}, id="restart in the same process"),
+        pytest.param({"middle": AGAIN, "ranks": 2}, id="the same, 2 ranks", marks=pytest.mark.long),
     ],
 )
 @pytest.mark.slow
@@ -116,11 +108,3 @@ def test_compensated_run_in_one_piece_or_two(lmp, tmp_path, unchanged, variables
     """Disks are wrapped into the box at every set-up: on the grid that is exact."""
     lmp(START + SECOND.replace("1000", "2000"), **variables)
     assert (tmp_path / "end").read_text() == unchanged[1]
-
-
-@pytest.mark.slow
-def test_restart_without_the_plugin_says_so(lmp, trajectory):
-    trajectory(middle=RESTART)
-    # the entry point prepends the plugin's folder, so that it is unloaded here instead
-    done = lmp("plugin unload pair mindlin/smooth\nread_restart middle.restart\n", fails=True)
-    assert "mindlin/smooth" in done.stdout

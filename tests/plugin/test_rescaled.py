@@ -14,16 +14,12 @@ LAW = MindlinLaw(KN, KT, 1.0, rescaled=True)
 arithmetics = pytest.mark.parametrize("compensated", [False, True], ids=["double", "compensated"])
 
 
-def two_disks(overlap, slip, compensated=False):
-    low = np.zeros((2, 2)) if compensated else None
-    position, contact = [[1.0, 3.0], [1.0, 4.0 - overlap]], Contacts([0], [1], [slip])
-    return Packing(position=position, radius=[0.5, 0.5], contacts=contact, law=LAW, position_low=low)
-
-
-def on_floor(overlap, slip, compensated=False):
-    low = np.zeros((1, 2)) if compensated else None
-    contact = Contacts([0], [-1], [slip])
-    return Packing(position=[[1.0, 0.5 - overlap]], radius=[0.5], contacts=contact, law=LAW, position_low=low)
+def on(other, overlap, slip, compensated=False):
+    """Disk 0 on another disk, whose number is 1, or on the floor, which has -1."""
+    position = np.array([[1.0, 3.0], [1.0, 4.0 - overlap]] if other == 1 else [[1.0, 0.5 - overlap]])
+    low = np.zeros_like(position) if compensated else None
+    contact, radius = Contacts([0], [other], [slip]), [0.5] * len(position)
+    return Packing(position=position, radius=radius, contacts=contact, law=LAW, position_low=low)
 
 
 def moved(packing, closer=0.0, turned=0.0):
@@ -34,10 +30,10 @@ def moved(packing, closer=0.0, turned=0.0):
 
 
 @arithmetics
-@pytest.mark.parametrize("start", [two_disks, on_floor])
+@pytest.mark.parametrize("other", [1, -1], ids=["two disks", "floor"])
 @pytest.mark.parametrize("closer", [3e-3, 1e-6, -1e-6, -5e-4])
-def test_slip_is_rescaled_while_the_overlap_grows(start, closer, compensated):
-    packing = start(1e-3, 2e-4, compensated=compensated)
+def test_slip_is_rescaled_while_the_overlap_grows(other, closer, compensated):
+    packing = on(other, 1e-3, 2e-4, compensated=compensated)
     with Engine(packing) as engine:
         after = engine.displace(packing, moved(packing, closer))
         again = engine.displace(packing, np.zeros(3 * len(packing)))
@@ -50,11 +46,11 @@ def test_slip_is_rescaled_while_the_overlap_grows(start, closer, compensated):
     assert -force[-1] == pytest.approx(float(packing.tangential_force[0]), rel=1e-12)
 
 
-@pytest.mark.parametrize("start", [two_disks, on_floor])
-def test_slipping_and_pressing_at_once_is_second_order_in_the_step(start):
+@pytest.mark.parametrize("other", [1, -1], ids=["two disks", "floor"])
+def test_slipping_and_pressing_at_once_is_second_order_in_the_step(other):
     errors = []
     for steps in (8, 16, 32):
-        packing = start(1e-3, 0.0)
+        packing = on(other, 1e-3, 0.0)
         with Engine(packing) as engine:
             for _ in range(steps):
                 packing = engine.displace(packing, moved(packing, 3e-3 / steps, 1e-4 / steps))
