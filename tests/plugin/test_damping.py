@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from faultgouge.analysis import MindlinLaw, Packing, touching
+from faultgouge.analysis import MindlinLaw, Packing, damping_matrix, touching
 from faultgouge.analysis.files.dumps import dump_frames
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.lammps.engine import Engine
@@ -42,6 +42,24 @@ class Moving:
             self.lammps.scatter_atoms(name, 1, 3, (c_double * flat.size)(*flat))
         self.lammps.command("run 0 post no")
         return self.engine.net_force
+
+
+@exponents
+@arithmetics
+def test_matrix_is_the_derivative_of_the_forces_over_velocities(reference_packing, exponent, compensated):
+    packing = damped(reference_packing(1.0), exponent, cn=1.3, ct=0.7, compensated=compensated)
+    limit = packing.law.slip_limit(packing.geometry.overlap)
+    slip = np.resize([0.1, -0.3, 0.6, 0.0], len(limit)) * limit
+    packing = replace(packing, contacts=packing.contacts.slipped(slip))
+    matrix, step = damping_matrix(packing).toarray(), 2.0**-10
+    measured = np.empty_like(matrix)
+    with Engine(packing) as engine:
+        run = Moving(engine)
+        for k, unit in enumerate(np.eye(len(matrix))):
+            measured[:, k] = (run.force(-step * unit) - run.force(step * unit)) / (2 * step)
+    assert packing.contacts.floor.any()
+    # the forces are linear in the velocity; they are known to the last place of a sum of order 3, over the step
+    assert np.abs(measured - matrix).max() < 1e-9 * np.abs(matrix).max()
 
 
 @exponents
