@@ -164,17 +164,15 @@ def test_a_file_without_a_checksum_is_read_and_not_continued(sound, states):
         RunFile(sound, "a")
 
 
-def replaced(name, value):
+def put(name, value, place=None):
+    """Another dataset in place of one, or another number in it."""
+
     def edit(file):
-        del file[name]
-        file[name] = value
-
-    return edit
-
-
-def changed(name, place, value):
-    def edit(file):
-        file[name][place] = value
+        if place is None:
+            del file[name]
+            file[name] = value
+        else:
+            file[name][place] = value
 
     return edit
 
@@ -189,23 +187,23 @@ def changed(name, place, value):
         lambda file: file["particles/disks/box"].attrs.__delitem__("boundary"),
         lambda file: file["particles/disks/box"].attrs.__setitem__("boundary", 3.0),
         lambda file: file["particles/disks/position/step"].resize(7, axis=0),
-        replaced("parameters/mass", np.ones(5)),
-        replaced("parameters/kn", np.inf),
-        replaced("parameters/kn", "2e5"),
-        replaced("parameters/kn", -1.0),
-        replaced("parameters/top", np.ones(6)),
-        replaced("observables/fx/value", np.zeros((4, 2))),
-        replaced("observables/angle", 1.0),
-        replaced("observables/contacts/value", np.zeros((4, 3))),
-        replaced("particles/disks/position/value", np.zeros((4, 6, 2))),
-        replaced("particles/disks/position/value", np.zeros((4, 6, 3), np.float32)),
-        replaced("particles/disks/position/step", np.array([0, 1, 1, 3])),
-        changed("particles/disks/position/value", (2, 3, 1), np.nan),
-        changed("particles/disks/position/value", (2, 3, 2), 1.0),
-        changed("observables/contacts/value", (0, 0, 1), 1e300),
-        changed("observables/contacts/value", (0, 0, 0), 1.5),
-        changed("observables/contacts/value", (0, 0, 2), np.nan),
-        changed("faultgouge/undamped/msd", 3, np.inf),
+        put("parameters/mass", np.ones(5)),
+        put("parameters/kn", np.inf),
+        put("parameters/kn", "2e5"),
+        put("parameters/kn", -1.0),
+        put("parameters/top", np.ones(6)),
+        put("observables/fx/value", np.zeros((4, 2))),
+        put("observables/angle", 1.0),
+        put("observables/contacts/value", np.zeros((4, 3))),
+        put("particles/disks/position/value", np.zeros((4, 6, 2))),
+        put("particles/disks/position/value", np.zeros((4, 6, 3), np.float32)),
+        put("particles/disks/position/step", np.array([0, 1, 1, 3])),
+        put("particles/disks/position/value", np.nan, (2, 3, 1)),
+        put("particles/disks/position/value", 1.0, (2, 3, 2)),
+        put("observables/contacts/value", 1e300, (0, 0, 1)),
+        put("observables/contacts/value", 1.5, (0, 0, 0)),
+        put("observables/contacts/value", np.nan, (0, 0, 2)),
+        put("faultgouge/undamped/msd", np.inf, 3),
         lambda file: file.create_dataset("faultgouge/undamped/huge", (10**13,), "f8", chunks=(1000,)),
         lambda file: file.create_dataset("faultgouge/undamped/empty", (5000,), "f8", chunks=(1000,)),
     ],
@@ -247,22 +245,20 @@ def test_a_file_holds_one_set_of_disks(tmp_path, states):
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not HDF5", "truncated", "foreign", "other h5md"])
-def test_broken_missing_and_foreign_files(tmp_path, states, content):
-    path = tmp_path / "run.h5"
+def test_broken_missing_and_foreign_files(sound, content):
     if content == "truncated":
-        with RunFile.create(path, states[0]) as run:
-            run.append(states[0])
-        path.write_bytes(path.read_bytes()[:3000])
-    elif content in ("foreign", "other h5md"):
-        with h5py.File(path, "w") as file:
+        content = sound.read_bytes()[:3000]
+    sound.unlink()
+    if content in ("foreign", "other h5md"):
+        with h5py.File(sound, "w") as file:
             file["x"] = 1
             if content == "other h5md":
                 file.create_group("h5md/creator").attrs["name"] = "somebody"
     elif content is not None:
-        path.write_bytes(content)
+        sound.write_bytes(content)
     for mode in ("r", "a"):
         with pytest.raises(PackingFileError, match=r"run\.h5"):
-            RunFile(path, mode)
+            RunFile(sound, mode)
 
 
 def test_a_file_that_cannot_be_written(tmp_path, states):
