@@ -57,9 +57,9 @@ def test_what_was_written_is_what_is_read(tmp_path, states):
 @pytest.mark.parametrize(
     ("law", "changes", "stored"),
     [
-        ({}, {}, set()),
-        ({"cn": 0.1, "ct": 0.2}, {"drag_time": 0.3}, {"cn", "ct", "drag_time"}),
-        ({"exponent": 1.5, "rescaled": True}, {}, {"rescaled"}),
+        ({"exponent": 1.5}, {}, {"box_length"}),
+        ({"exponent": 1.5, "cn": 0.1, "ct": 0.2}, {"drag_time": 0.3}, {"box_length", "cn", "ct", "drag_time"}),
+        ({"exponent": 1.5, "rescaled": True}, {}, {"box_length", "rescaled"}),
         ({"exponent": 1.0, "kt": 0.0}, {"box_length": None}, {"exponent"}),
     ],
     ids=["undamped", "damped", "rescaled", "open sides, harmonic, without friction"],
@@ -72,9 +72,8 @@ def test_what_is_not_there_is_not_in_the_file(tmp_path, cluster, law, changes, s
         run.append(state)
         assert [run.packing(k) for k in (0, 1)] == [state, state]
     always = {"radius", "mass", "top", "kn", "kt", "mu", "inertia_factor"}
-    optional = ({"box_length"} if state.box_length else set()) | ({"exponent"} if state.law.exponent == 1 else set())
     with h5py.File(tmp_path / "run.h5") as file:
-        assert set(file["parameters"]) == always | optional | stored
+        assert set(file["parameters"]) == always | stored
 
 
 def write_and_die(path, states):
