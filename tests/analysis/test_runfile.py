@@ -81,7 +81,7 @@ def write_and_die(path, states):
     run = RunFile.create(path, states[0])
     for state in states[:2]:
         run.append(state)
-    run.append_series("msd", time=[0.0, 1.0], value=[1e-20, 2e-20])
+    run.append_series("msd", time=[0.0, 1.0], value=[[1e-20, 1.0], [2e-20, 2.0]])
     run.save()
     run.append(states[2])
     os._exit(9)
@@ -98,32 +98,14 @@ def test_a_killed_run_keeps_its_frames(tmp_path, states):
         assert not run.complete
         for state in states[len(run) : 3]:
             run.append(state)
-        run.append_series("msd", time=[2.0], value=[3e-20])
+        run.append_series("msd", time=[2.0], value=[[3e-20, 3.0]])
         run.complete = True
     with RunFile(path) as run:
         assert run.complete
         for k in range(3):
             assert run.packing(k) == states[k]
-        np.testing.assert_array_equal(run.series("msd")["value"], [1e-20, 2e-20, 3e-20])
-
-
-def test_what_an_error_leaves_half_done_is_not_saved(tmp_path, states):
-    path = tmp_path / "run.h5"
-    run = RunFile.create(path, states[0])
-    run.append(states[0])
-    run.save()
-
-    def cut_short():
-        with run.change():
-            run.append(states[1])
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        cut_short()
-    run.close()
-    with RunFile(path) as run:
-        assert len(run) == 1
-    assert [each.name for each in tmp_path.iterdir()] == ["run.h5"]
+        np.testing.assert_array_equal(run.series("msd")["time"], [0, 1, 2])
+        np.testing.assert_array_equal(run.series("msd")["value"], [[1e-20, 1], [2e-20, 2], [3e-20, 3]])
 
 
 @pytest.fixture
@@ -134,6 +116,19 @@ def sound(tmp_path, states):
             run.append(state, floor=2.0)
         run.append_series("undamped", time=np.arange(50.0), msd=np.linspace(0, 1, 50))
     return path
+
+
+def test_what_an_error_leaves_half_done_is_not_saved(sound, states):
+    def cut_short():
+        with RunFile(sound, "a") as run, run.change():
+            run.append(states[1], floor=2.0)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        cut_short()
+    with RunFile(sound) as run:
+        assert len(run) == 4
+    assert [each.name for each in sound.parent.iterdir()] == ["run.h5"]
 
 
 def test_every_flipped_byte_is_noticed(sound):
@@ -216,23 +211,8 @@ def test_what_is_not_as_it_should_be_is_refused(sound, edit):
         RunFile(sound)
 
 
-def test_series(tmp_path, states):
-    with RunFile.create(tmp_path / "run.h5", states[0]) as run:
-        run.append_series("growth", time=[0.0, 0.1], velocity=[[1.0, 2.0], [3.0, 4.0]])
-        run.append_series("growth", time=[0.2], velocity=[[5.0, 6.0]])
-        series = run.series("growth")
-        np.testing.assert_array_equal(series["time"], [0, 0.1, 0.2])
-        np.testing.assert_array_equal(series["velocity"], [[1, 2], [3, 4], [5, 6]])
-        for columns in ({"time": [1.0]}, {"time": [1.0], "velocity": []}, {"time": 1.0, "velocity": 1.0}):
-            with pytest.raises(ValueError, match="growth"):
-                run.append_series("growth", **columns)
-        with pytest.raises(PackingFileError, match="no series msd"):
-            run.series("msd")
-
-
-def test_a_file_holds_one_set_of_disks(tmp_path, states):
-    with RunFile.create(tmp_path / "run.h5", states[0]) as run:
-        run.append(states[0], floor=1.0)
+def test_a_file_holds_one_set_of_disks_and_of_names(sound, states):
+    with RunFile(sound, "a") as run:
         for change in ({"law": MindlinLaw(1, 1, 1)}, {"box_length": None}, {"mass": np.full(6, 3.0)}):
             with pytest.raises(ValueError, match="another"):
                 run.append(replace(states[1], **change), floor=1.0)
@@ -240,7 +220,12 @@ def test_a_file_holds_one_set_of_disks(tmp_path, states):
             run.append(states[1])
         with pytest.raises(ValueError, match="residual is taken"):
             run.append(states[1], residual=0.0)
-        assert len(run) == 1
+        for columns in ({"time": [1.0]}, {"time": [1.0], "msd": []}, {"time": 1.0, "msd": 1.0}):
+            with pytest.raises(ValueError, match="undamped"):
+                run.append_series("undamped", **columns)
+        with pytest.raises(PackingFileError, match="no series growth"):
+            run.series("growth")
+        assert len(run) == 4
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not HDF5", "truncated", "foreign", "other h5md"])
