@@ -34,19 +34,6 @@ def test_rate_of_a_complex_pair(eigenvalue, shape):
     assert abs(growth.rate - rate) < 5 * growth.error + 1e-9 * rate
 
 
-def test_error_is_the_scatter():
-    rng = np.random.default_rng(3)
-    time = np.arange(4800.0)
-    rates = []
-    for _ in range(40):
-        msd = np.exp(0.01 * time) * rng.uniform(0.5, 1.5, time.shape)
-        rates.append(fit_growth(time, msd, 1.0, 1e18))
-    spread = np.std([growth.rate for growth in rates])
-    mean_error = np.mean([growth.error for growth in rates])
-    # Forty draws give a spread to about a tenth.
-    assert spread == pytest.approx(mean_error, rel=0.4)
-
-
 @pytest.mark.parametrize(
     ("time", "msd", "says"),
     [

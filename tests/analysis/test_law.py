@@ -22,7 +22,6 @@ def derivatives(law, overlap, slip, parting=0.5):
     return type(found)(*(float(part[0]) for part in found))
 
 
-exponents = st.sampled_from([1.5, 1.0])
 stiffness = st.floats(1e-6, 1e6)
 shares = st.integers(-3000, 3000).map(lambda thousandths: thousandths / 1000)
 
@@ -31,7 +30,7 @@ shares = st.integers(-3000, 3000).map(lambda thousandths: thousandths / 1000)
     kn=stiffness,
     kt=st.just(0.0) | stiffness,
     mu=st.just(0.0) | st.floats(1e-3, 10),
-    exponent=exponents,
+    exponent=st.sampled_from([1.5, 1.0]),
     overlap=st.sampled_from([-0.1, 0.0]) | st.floats(1e-8, 1.0),
     share=shares,
 )
@@ -45,7 +44,7 @@ def test_forces(kn, kt, mu, exponent, overlap, share):
     assert law.tangential_force(overlap, law.clamped(overlap, slip)) == law.tangential_force(overlap, slip)
     together = derivatives(law, overlap, slip)
     assert together[:2] == pytest.approx((normal, tangential), rel=2e-15)
-    assert law.frictional or together[3:] == (0, 0)
+    assert (kt > 0 and mu > 0) or together[3:] == (0, 0)
     assert together.slip_derivative <= 0
 
 
@@ -135,9 +134,6 @@ def test_contacts_that_slide_or_are_open_have_no_dashpots(exponent):
     for slip in (clamped, -clamped):
         assert not law.dashpots(np.full(5, 1e-3), slip)[1].any()
     assert not np.any(law.dashpots(np.array([0.0, -1e-3]), np.zeros(2)))
-    assert law.damped
-    assert not MindlinLaw(2e5, 6e4, 0.8, exponent).damped
-    assert not MindlinLaw(2e5, 6e4, 0.0, exponent, ct=5.0).damped
 
 
 @pytest.mark.parametrize(
