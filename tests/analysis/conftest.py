@@ -3,6 +3,7 @@
 import bisect
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -33,13 +34,10 @@ class Ramp:
 @pytest.fixture(scope="session")
 def ramp(reference_packing: Callable[[float], Packing]) -> Callable[[float, float, int], Ramp]:
     """Ramps of the reference packing by friction, increment and number of increments, computed once."""
-    known: dict[tuple[float, float, int], Ramp] = {}
 
+    @cache
     def make(mu: float, increment: float, count: int) -> Ramp:
-        key = (mu, increment, count)
-        if key not in known:
-            known[key] = Ramp(reference_packing(mu), increment * np.arange(1, count + 1))
-        return known[key]
+        return Ramp(reference_packing(mu), increment * np.arange(1, count + 1))
 
     return make
 

@@ -30,25 +30,19 @@ def plain_force(kn, kt, mu, overlap, slip, exponent=1.5):
 
 def moved(old: Packing, q: np.ndarray, fx: float) -> Packing:
     """The packing after the displacement q = (dx.., dy.., R dtheta..) from the equilibrium `old`."""
-    dx, dy, du = q.reshape(3, -1)
-    position = old.position + np.column_stack([dx, dy])
+    shift, du = q[: 2 * len(old)].reshape(2, -1).T, q[2 * len(old) :]
+    position = old.position + shift
     now = touching(position, old.radius, old.box_length)
     remembered = {(i, j): s for i, j, s in zip(old.contacts.i, old.contacts.j, old.contacts.slip, strict=True)}
     slips = []
     for i, j in zip(now.i, now.j, strict=True):
-        if j == FLOOR:
-            overlap = old.radius[i] - position[i, 1]
-            increment = -dx[i] - du[i]
-        else:
-            before, after = branch(old.position, old.box_length, i, j), branch(position, old.box_length, i, j)
-            middle = before + after
-            normal = middle / np.hypot(*middle)
-            tangent = np.array([-normal[1], normal[0]])
-            overlap = old.radius[i] + old.radius[j] - np.hypot(*after)
-            relative = np.array([dx[i] - dx[j], dy[i] - dy[j]])
-            increment = tangent @ relative - du[i] - du[j]
+        before, after = (branch(place, old.box_length, i, j) for place in (old.position, position))
+        tangent = turned((before + after) / np.hypot(*(before + after)))
+        disks = [i] if j == FLOOR else [i, j]
+        relative = shift[i] - (0 if j == FLOOR else shift[j])
         start = remembered.get((i, j))
-        slip = 0.0 if start is None else start + increment
+        slip = 0.0 if start is None else start + tangent @ relative - du[disks].sum()
+        overlap = old.radius[disks].sum() - np.hypot(*after)
         limit = old.law.mu * old.law.kn / old.law.kt * overlap if old.law.frictional else 0.0
         slips.append(min(max(slip, -limit), limit))
     angle = old.angle + du / old.radius
@@ -56,33 +50,36 @@ def moved(old: Packing, q: np.ndarray, fx: float) -> Packing:
 
 
 def branch(position: np.ndarray, box_length: float | None, i: int, j: int) -> np.ndarray:
-    """r_i - r_j, nearest image along x."""
+    """r_i - r_j, nearest image along x; from the floor, the height."""
+    if j == FLOOR:
+        return np.array([0.0, position[i, 1]])
     difference = position[i] - position[j]
     if box_length is not None:
         difference[0] -= box_length * round(difference[0] / box_length)
     return difference
 
 
+def turned(normal: np.ndarray) -> np.ndarray:
+    """The tangent of a normal."""
+    return np.array([-normal[1], normal[0]])
+
+
 def forces(packing: Packing) -> np.ndarray:
     """Net forces (Fx.., Fy.., T/R..), contact by contact."""
-    law, n = packing.law, len(packing)
-    total = np.zeros((3, n))
+    law, total = packing.law, np.zeros((3, len(packing)))
     total[0, packing.top] += packing.fx
     total[1, packing.top] -= packing.fy
     for i, j, slip in zip(packing.contacts.i, packing.contacts.j, packing.contacts.slip, strict=True):
-        if j == FLOOR:
-            normal, overlap = np.array([0.0, 1.0]), packing.radius[i] - packing.position[i, 1]
-        else:
-            between = branch(packing.position, packing.box_length, i, j)
-            distance = np.hypot(*between)
-            normal, overlap = between / distance, packing.radius[i] + packing.radius[j] - distance
+        disks = [i] if j == FLOOR else [i, j]
+        between = branch(packing.position, packing.box_length, i, j)
+        distance = np.hypot(*between)
+        normal, overlap = between / distance, packing.radius[disks].sum() - distance
         fn, ft = plain_force(law.kn, law.kt, law.mu, overlap, slip, law.exponent)
-        force = fn * normal + ft * np.array([-normal[1], normal[0]])
+        force = fn * normal + ft * turned(normal)
         total[:2, i] += force
-        total[2, i] -= ft
         if j != FLOOR:
             total[:2, j] -= force
-            total[2, j] -= ft
+        total[2, disks] -= ft
     return total.ravel()
 
 

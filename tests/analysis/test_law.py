@@ -1,8 +1,5 @@
 """The contact law against ten lines of arithmetic, against 30-digit derivatives, and in its properties."""
 
-from dataclasses import replace
-from itertools import pairwise
-
 import mpmath
 import numpy as np
 import pytest
@@ -12,13 +9,7 @@ from quasistatic import plain_force
 
 from faultgouge.analysis import MindlinLaw
 
-LAWS = [
-    MindlinLaw(kn, kt, mu, exponent)
-    for kn in (1.0, 2e5)
-    for kt in (0.0, 0.3, 5e4)
-    for mu in (0.0, 0.2, 1.0)
-    for exponent in (1.5, 1.0)
-]
+LAWS = [MindlinLaw(kn, kt, 0.2, exponent) for kn in (1.0, 2e5) for kt in (0.3, 5e4) for exponent in (1.5, 1.0)]
 RESCALED = MindlinLaw(2e5, 6e4, 0.8, rescaled=True)
 both_exponents = pytest.mark.parametrize("exponent", [1.5, 1.0])
 OVERLAPS = (1e-9, 6e-4, 0.2)
@@ -31,32 +22,45 @@ def derivatives(law, overlap, slip, parting=0.5):
     return type(found)(*(float(part[0]) for part in found))
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_forces(law):
-    for overlap in (*OVERLAPS, 0.0, -0.1):
-        for share in SHARES:
-            slip = share * (float(law.slip_limit(overlap)) or 1e-3)
-            normal, tangential = plain_force(law.kn, law.kt, law.mu, overlap, slip, law.exponent)
-            # A handful of rounded operations each.
-            assert law.normal_force(overlap) == pytest.approx(normal, rel=1e-15)
-            assert law.tangential_force(overlap, slip) == pytest.approx(tangential, rel=2e-15)
-            together = derivatives(law, overlap, slip)
-            assert together[:2] == pytest.approx((normal, tangential), rel=2e-15)
-            assert law.frictional or together[3:] == (0, 0)
+stiffness = st.floats(1e-6, 1e6)
+shares = st.integers(-3000, 3000).map(lambda thousandths: thousandths / 1000)
 
 
-@pytest.mark.parametrize("law", [*(law for law in LAWS if law.frictional), RESCALED])
+@given(
+    kn=stiffness,
+    kt=st.just(0.0) | stiffness,
+    mu=st.just(0.0) | st.floats(1e-3, 10),
+    exponent=st.sampled_from([1.5, 1.0]),
+    overlap=st.sampled_from([-0.1, 0.0]) | st.floats(1e-8, 1.0),
+    share=shares,
+)
+def test_forces(kn, kt, mu, exponent, overlap, share):
+    law = MindlinLaw(kn, kt, mu, exponent)
+    slip = share * (float(law.slip_limit(overlap)) or 1e-3)
+    normal, tangential = plain_force(kn, kt, mu, overlap, slip, exponent)
+    # A handful of rounded operations each.
+    assert law.normal_force(overlap) == pytest.approx(normal, rel=1e-15)
+    assert law.tangential_force(overlap, slip) == pytest.approx(tangential, rel=2e-15)
+    assert law.tangential_force(overlap, law.clamped(overlap, slip)) == law.tangential_force(overlap, slip)
+    together = derivatives(law, overlap, slip)
+    assert together[:2] == pytest.approx((normal, tangential), rel=2e-15)
+    assert (kt > 0 and mu > 0) or together[3:] == (0, 0)
+    assert together.slip_derivative <= 0
+
+
+@pytest.mark.parametrize("law", [*LAWS, RESCALED])
 @pytest.mark.parametrize("overlap", OVERLAPS)
-@pytest.mark.parametrize("share", [s for s in SHARES if s not in (-1.0, 0.0, 1.0)])
+@pytest.mark.parametrize("share", SHARES)
 def test_derivatives_have_all_digits(law, overlap, share):
-    """Rescaled slips are smaller when the overlap grows, and as they are when it shrinks; the mean is that of both."""
+    """Also at the bound, where they are continuous. Rescaled slips are smaller when the overlap grows, and as they are
+    when it shrinks; the mean is that of both."""
     slip = share * float(law.slip_limit(overlap))
     with mpmath.workdps(40):
         kn, kt, mu, p, d, s = (mpmath.mpf(v) for v in (law.kn, law.kt, law.mu, law.exponent, overlap, slip))
         normal = mpmath.diff(lambda v: plain_force(kn, kt, mu, v, s, p)[0], d)
         by_slip = mpmath.diff(lambda v: plain_force(kn, kt, mu, d, v, p)[1], s)
         closing = parting = mpmath.diff(lambda v: plain_force(kn, kt, mu, v, s, p)[1], d)
-        if law.rescaled and abs(share) > 1:  # what slides slides on
+        if law.rescaled and abs(share) >= 1:  # what slides slides on
             closing = parting = -mpmath.sign(s) * mu * normal
         elif law.rescaled:
             closing = mpmath.diff(lambda v: plain_force(kn, kt, mu, v, s * mpmath.sqrt(d / v))[1], d)
@@ -69,71 +73,21 @@ def test_derivatives_have_all_digits(law, overlap, share):
         assert found.overlap_derivative == pytest.approx(float(by_overlap), abs=scale * law.mu * law.kn / law.kt)
 
 
-@both_exponents
-@pytest.mark.parametrize("sign", [-1, 1])
-def test_derivatives_are_continuous_at_the_bound(sign, exponent):
-    law, overlap = MindlinLaw(2e5, 6e4, 0.8, exponent), 1e-3
-    limit = sign * float(law.slip_limit(overlap))
-    at, inside = derivatives(law, overlap, limit), derivatives(law, overlap, limit * (1 - 1e-4))
-    assert at.tangential_force == pytest.approx(-sign * law.mu * at.normal_force, rel=1e-15)
-    assert at.slip_derivative == 0
-    # The clamped branch is f_t = -sign mu kn delta^p.
-    clamped = -sign * exponent * law.mu * law.kn * overlap ** (exponent - 1)
-    assert at.overlap_derivative == pytest.approx(clamped, rel=1e-15)
-    # C1 and not C2: just inside, f' has grown by 4 (1 - x) kt delta^(p-1), to first order in 1 - x.
-    assert inside.slip_derivative == pytest.approx(-4e-4 * law.kt * overlap ** (exponent - 1), rel=1e-4)
-
-
-finite = st.floats(1e-6, 1e6)
-share = st.integers(-3000, 3000).map(lambda thousandths: thousandths / 1000)
-
-
-exponents = st.sampled_from([1.5, 1.0])
-
-
-@given(kn=finite, kt=finite, mu=st.floats(1e-3, 10), p=exponents, overlap=st.floats(1e-8, 1.0), x=share, y=share)
-def test_properties(kn, kt, mu, p, overlap, x, y):
-    law = MindlinLaw(kn, kt, mu, p)
-    limit = float(law.slip_limit(overlap))
-    force = float(law.tangential_force(overlap, x * limit))
-    assert law.tangential_force(overlap, -x * limit) == -force
-    # mu f_n to a few roundings of the product.
-    assert abs(force) <= mu * law.normal_force(overlap) * (1 + 1e-14)
-    clamped = law.clamped(overlap, x * limit)
-    assert law.clamped(overlap, clamped) == clamped
-    assert law.tangential_force(overlap, clamped) == force
-    assert derivatives(law, overlap, x * limit).slip_derivative <= 0
-    # More slip, more force against it (up to rounding where the curve is flat).
-    low, high = sorted((x, y))
-    assert (
-        law.tangential_force(overlap, high * limit)
-        <= law.tangential_force(overlap, low * limit) + abs(mu * float(law.normal_force(overlap))) * 1e-14
-    )
-    twice = MindlinLaw(2 * kn, 2 * kt, mu, p)
-    assert twice.tangential_force(overlap, x * limit) == 2 * force
-
-
-ROOTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
-"""Exact for polynomials of the fifth degree; the force is one of the third in the slip of one sign."""
-
-
-def work_of_slipping(law, overlap, slip, end):
-    """Work that it takes to slip at constant overlap, and the slip that is remembered."""
-    kept, total = float(law.clamped(overlap, end)), 0.0
-    marks = sorted({slip, kept, *([0.0] if slip * kept < 0 else [])}, reverse=kept < slip)
-    for low, high in pairwise(marks):
-        at = 0.5 * (low + high) + 0.5 * (high - low) * ROOTS
-        total -= 0.5 * (high - low) * float(WEIGHTS @ law.tangential_force(overlap, at))
-    return total - (end - kept) * float(law.tangential_force(overlap, kept)), kept
+def stored(law, overlap, slip):
+    """Work that it takes to slip as far at constant overlap: the integral of the force."""
+    x = abs(slip) / float(law.slip_limit(overlap))
+    return law.kt * overlap ** (law.exponent - 1) * slip**2 * (1 / 2 + x / 3 - x**2 / 4)
 
 
 def work_along(law, path):
     """Work of a path of (overlap, slip increment), from no slip: the tangential force does none while nothing slips."""
     total, slip, before = 0.0, 0.0, path[0][0]
     for overlap, increment in path:
-        slip = float(law.remembered(slip, before, overlap))
-        work, slip = work_of_slipping(law, overlap, slip, slip + increment)
-        total, before = total + work, overlap
+        start = float(law.remembered(slip, before, overlap))
+        slip = float(law.clamped(overlap, start + increment))
+        total += stored(law, overlap, slip) - stored(law, overlap, start)
+        total -= (start + increment - slip) * float(law.tangential_force(overlap, slip))
+        before = overlap
     return total
 
 
@@ -147,17 +101,6 @@ def test_rescaled_slips_create_no_energy(mu, path):
     law = MindlinLaw(2e5, 6e4, mu, rescaled=True)
     most = sum(abs(increment) for _, increment in path) * mu * float(law.normal_force(1e-2))
     assert work_along(law, path) >= -1e-14 * most
-
-
-@pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
-def test_a_cycle_of_the_total_slip_creates_energy(share):
-    """Slip out, press, slip back, release: the same path dissipates with rescaled slips."""
-    law = MindlinLaw(2e5, 6e4, 0.8)
-    slip = share * float(law.slip_limit(1e-3))
-    path = [(1e-3, slip), (3e-3, -slip), (1e-3, 0.0)]
-    stored = work_of_slipping(law, 1e-3, 0.0, slip)[0]
-    assert work_along(law, path) < -0.5 * stored
-    assert work_along(replace(law, rescaled=True), path) > 0.1 * stored
 
 
 def test_what_is_rescaled():
@@ -183,20 +126,14 @@ def test_curvature_and_inverse(exponent):
 
 
 @both_exponents
-def test_dashpots(exponent):
+def test_contacts_that_slide_or_are_open_have_no_dashpots(exponent):
+    """test_operators.py has those of others."""
     law = MindlinLaw(2e5, 6e4, 0.8, exponent, cn=3.0, ct=5.0)
-    overlap = np.array([1e-3, 1e-3, 1e-3, 0.0, -1e-3])
-    slip = law.slip_limit(1e-3) * np.array([0.5, 1.0, -1.0, 0.0, 0.0])
-    normal, tangential = law.dashpots(overlap, slip)
-    grown = 1e-3 ** (exponent - 1)
-    np.testing.assert_allclose(normal, 3.0 * grown * np.array([1, 1, 1, 0, 0]), rtol=1e-15)
-    np.testing.assert_allclose(tangential, 5.0 * grown * np.array([1, 0, 0, 0, 0]), rtol=1e-15)
     # the overlap of a contact that slides, computed again from coordinates up to 10
     clamped = law.slip_limit(1e-3 + 1e-15 * np.arange(-2, 3))
-    assert not law.dashpots(np.full(5, 1e-3), clamped)[1].any()
-    assert law.damped
-    assert not MindlinLaw(2e5, 6e4, 0.8, exponent).damped
-    assert not MindlinLaw(2e5, 6e4, 0.0, exponent, ct=5.0).damped
+    for slip in (clamped, -clamped):
+        assert not law.dashpots(np.full(5, 1e-3), slip)[1].any()
+    assert not np.any(law.dashpots(np.array([0.0, -1e-3]), np.zeros(2)))
 
 
 @pytest.mark.parametrize(
@@ -208,14 +145,11 @@ def test_dashpots(exponent):
         ("exponent", (2.0, 0.0, np.nan)),
         ("cn", (-1.0,)),
         ("ct", (np.inf,)),
+        ("rescaled", (True,)),
     ],
 )
 def test_impossible_parameters(field, values):
+    """Harmonic disks have no rescaled history."""
     for value in values:
-        with pytest.raises(ValueError, match=rf"^{field} = "):
-            MindlinLaw(**({"kn": 1.0, "kt": 1.0, "mu": 1.0} | {field: value}))
-
-
-def test_harmonic_disks_have_no_rescaled_history():
-    with pytest.raises(ValueError, match="needs exponent"):
-        MindlinLaw(2e5, 6e4, 0.8, exponent=1.0, rescaled=True)
+        with pytest.raises(ValueError, match=rf"^{field} = |^a {field} history needs exponent"):
+            MindlinLaw(**({"kn": 1.0, "kt": 1.0, "mu": 1.0, "exponent": 1.0} | {field: value}))

@@ -57,9 +57,9 @@ def test_what_was_written_is_what_is_read(tmp_path, states):
 @pytest.mark.parametrize(
     ("law", "changes", "stored"),
     [
-        ({}, {}, set()),
-        ({"cn": 0.1, "ct": 0.2}, {"drag_time": 0.3}, {"cn", "ct", "drag_time"}),
-        ({"exponent": 1.5, "rescaled": True}, {}, {"rescaled"}),
+        ({"exponent": 1.5}, {}, {"box_length"}),
+        ({"exponent": 1.5, "cn": 0.1, "ct": 0.2}, {"drag_time": 0.3}, {"box_length", "cn", "ct", "drag_time"}),
+        ({"exponent": 1.5, "rescaled": True}, {}, {"box_length", "rescaled"}),
         ({"exponent": 1.0, "kt": 0.0}, {"box_length": None}, {"exponent"}),
     ],
     ids=["undamped", "damped", "rescaled", "open sides, harmonic, without friction"],
@@ -72,9 +72,8 @@ def test_what_is_not_there_is_not_in_the_file(tmp_path, cluster, law, changes, s
         run.append(state)
         assert [run.packing(k) for k in (0, 1)] == [state, state]
     always = {"radius", "mass", "top", "kn", "kt", "mu", "inertia_factor"}
-    optional = ({"box_length"} if state.box_length else set()) | ({"exponent"} if state.law.exponent == 1 else set())
     with h5py.File(tmp_path / "run.h5") as file:
-        assert set(file["parameters"]) == always | optional | stored
+        assert set(file["parameters"]) == always | stored
 
 
 def write_and_die(path, states):
@@ -82,7 +81,7 @@ def write_and_die(path, states):
     run = RunFile.create(path, states[0])
     for state in states[:2]:
         run.append(state)
-    run.append_series("msd", time=[0.0, 1.0], value=[1e-20, 2e-20])
+    run.append_series("msd", time=[0.0, 1.0], value=[[1e-20, 1.0], [2e-20, 2.0]])
     run.save()
     run.append(states[2])
     os._exit(9)
@@ -99,32 +98,14 @@ def test_a_killed_run_keeps_its_frames(tmp_path, states):
         assert not run.complete
         for state in states[len(run) : 3]:
             run.append(state)
-        run.append_series("msd", time=[2.0], value=[3e-20])
+        run.append_series("msd", time=[2.0], value=[[3e-20, 3.0]])
         run.complete = True
     with RunFile(path) as run:
         assert run.complete
         for k in range(3):
             assert run.packing(k) == states[k]
-        np.testing.assert_array_equal(run.series("msd")["value"], [1e-20, 2e-20, 3e-20])
-
-
-def test_what_an_error_leaves_half_done_is_not_saved(tmp_path, states):
-    path = tmp_path / "run.h5"
-    run = RunFile.create(path, states[0])
-    run.append(states[0])
-    run.save()
-
-    def cut_short():
-        with run.change():
-            run.append(states[1])
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        cut_short()
-    run.close()
-    with RunFile(path) as run:
-        assert len(run) == 1
-    assert [each.name for each in tmp_path.iterdir()] == ["run.h5"]
+        np.testing.assert_array_equal(run.series("msd")["time"], [0, 1, 2])
+        np.testing.assert_array_equal(run.series("msd")["value"], [[1e-20, 1], [2e-20, 2], [3e-20, 3]])
 
 
 @pytest.fixture
@@ -135,6 +116,19 @@ def sound(tmp_path, states):
             run.append(state, floor=2.0)
         run.append_series("undamped", time=np.arange(50.0), msd=np.linspace(0, 1, 50))
     return path
+
+
+def test_what_an_error_leaves_half_done_is_not_saved(sound, states):
+    def cut_short():
+        with RunFile(sound, "a") as run, run.change():
+            run.append(states[1], floor=2.0)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        cut_short()
+    with RunFile(sound) as run:
+        assert len(run) == 4
+    assert [each.name for each in sound.parent.iterdir()] == ["run.h5"]
 
 
 def test_every_flipped_byte_is_noticed(sound):
@@ -164,17 +158,15 @@ def test_a_file_without_a_checksum_is_read_and_not_continued(sound, states):
         RunFile(sound, "a")
 
 
-def replaced(name, value):
+def put(name, value, place=None):
+    """Another dataset in place of one, or another number in it."""
+
     def edit(file):
-        del file[name]
-        file[name] = value
-
-    return edit
-
-
-def changed(name, place, value):
-    def edit(file):
-        file[name][place] = value
+        if place is None:
+            del file[name]
+            file[name] = value
+        else:
+            file[name][place] = value
 
     return edit
 
@@ -189,23 +181,23 @@ def changed(name, place, value):
         lambda file: file["particles/disks/box"].attrs.__delitem__("boundary"),
         lambda file: file["particles/disks/box"].attrs.__setitem__("boundary", 3.0),
         lambda file: file["particles/disks/position/step"].resize(7, axis=0),
-        replaced("parameters/mass", np.ones(5)),
-        replaced("parameters/kn", np.inf),
-        replaced("parameters/kn", "2e5"),
-        replaced("parameters/kn", -1.0),
-        replaced("parameters/top", np.ones(6)),
-        replaced("observables/fx/value", np.zeros((4, 2))),
-        replaced("observables/angle", 1.0),
-        replaced("observables/contacts/value", np.zeros((4, 3))),
-        replaced("particles/disks/position/value", np.zeros((4, 6, 2))),
-        replaced("particles/disks/position/value", np.zeros((4, 6, 3), np.float32)),
-        replaced("particles/disks/position/step", np.array([0, 1, 1, 3])),
-        changed("particles/disks/position/value", (2, 3, 1), np.nan),
-        changed("particles/disks/position/value", (2, 3, 2), 1.0),
-        changed("observables/contacts/value", (0, 0, 1), 1e300),
-        changed("observables/contacts/value", (0, 0, 0), 1.5),
-        changed("observables/contacts/value", (0, 0, 2), np.nan),
-        changed("faultgouge/undamped/msd", 3, np.inf),
+        put("parameters/mass", np.ones(5)),
+        put("parameters/kn", np.inf),
+        put("parameters/kn", "2e5"),
+        put("parameters/kn", -1.0),
+        put("parameters/top", np.ones(6)),
+        put("observables/fx/value", np.zeros((4, 2))),
+        put("observables/angle", 1.0),
+        put("observables/contacts/value", np.zeros((4, 3))),
+        put("particles/disks/position/value", np.zeros((4, 6, 2))),
+        put("particles/disks/position/value", np.zeros((4, 6, 3), np.float32)),
+        put("particles/disks/position/step", np.array([0, 1, 1, 3])),
+        put("particles/disks/position/value", np.nan, (2, 3, 1)),
+        put("particles/disks/position/value", 1.0, (2, 3, 2)),
+        put("observables/contacts/value", 1e300, (0, 0, 1)),
+        put("observables/contacts/value", 1.5, (0, 0, 0)),
+        put("observables/contacts/value", np.nan, (0, 0, 2)),
+        put("faultgouge/undamped/msd", np.inf, 3),
         lambda file: file.create_dataset("faultgouge/undamped/huge", (10**13,), "f8", chunks=(1000,)),
         lambda file: file.create_dataset("faultgouge/undamped/empty", (5000,), "f8", chunks=(1000,)),
     ],
@@ -219,23 +211,8 @@ def test_what_is_not_as_it_should_be_is_refused(sound, edit):
         RunFile(sound)
 
 
-def test_series(tmp_path, states):
-    with RunFile.create(tmp_path / "run.h5", states[0]) as run:
-        run.append_series("growth", time=[0.0, 0.1], velocity=[[1.0, 2.0], [3.0, 4.0]])
-        run.append_series("growth", time=[0.2], velocity=[[5.0, 6.0]])
-        series = run.series("growth")
-        np.testing.assert_array_equal(series["time"], [0, 0.1, 0.2])
-        np.testing.assert_array_equal(series["velocity"], [[1, 2], [3, 4], [5, 6]])
-        for columns in ({"time": [1.0]}, {"time": [1.0], "velocity": []}, {"time": 1.0, "velocity": 1.0}):
-            with pytest.raises(ValueError, match="growth"):
-                run.append_series("growth", **columns)
-        with pytest.raises(PackingFileError, match="no series msd"):
-            run.series("msd")
-
-
-def test_a_file_holds_one_set_of_disks(tmp_path, states):
-    with RunFile.create(tmp_path / "run.h5", states[0]) as run:
-        run.append(states[0], floor=1.0)
+def test_a_file_holds_one_set_of_disks_and_of_names(sound, states):
+    with RunFile(sound, "a") as run:
         for change in ({"law": MindlinLaw(1, 1, 1)}, {"box_length": None}, {"mass": np.full(6, 3.0)}):
             with pytest.raises(ValueError, match="another"):
                 run.append(replace(states[1], **change), floor=1.0)
@@ -243,26 +220,29 @@ def test_a_file_holds_one_set_of_disks(tmp_path, states):
             run.append(states[1])
         with pytest.raises(ValueError, match="residual is taken"):
             run.append(states[1], residual=0.0)
-        assert len(run) == 1
+        for columns in ({"time": [1.0]}, {"time": [1.0], "msd": []}, {"time": 1.0, "msd": 1.0}):
+            with pytest.raises(ValueError, match="undamped"):
+                run.append_series("undamped", **columns)
+        with pytest.raises(PackingFileError, match="no series growth"):
+            run.series("growth")
+        assert len(run) == 4
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not HDF5", "truncated", "foreign", "other h5md"])
-def test_broken_missing_and_foreign_files(tmp_path, states, content):
-    path = tmp_path / "run.h5"
+def test_broken_missing_and_foreign_files(sound, content):
     if content == "truncated":
-        with RunFile.create(path, states[0]) as run:
-            run.append(states[0])
-        path.write_bytes(path.read_bytes()[:3000])
-    elif content in ("foreign", "other h5md"):
-        with h5py.File(path, "w") as file:
+        content = sound.read_bytes()[:3000]
+    sound.unlink()
+    if content in ("foreign", "other h5md"):
+        with h5py.File(sound, "w") as file:
             file["x"] = 1
             if content == "other h5md":
                 file.create_group("h5md/creator").attrs["name"] = "somebody"
     elif content is not None:
-        path.write_bytes(content)
+        sound.write_bytes(content)
     for mode in ("r", "a"):
         with pytest.raises(PackingFileError, match=r"run\.h5"):
-            RunFile(path, mode)
+            RunFile(sound, mode)
 
 
 def test_a_file_that_cannot_be_written(tmp_path, states):
