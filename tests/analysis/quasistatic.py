@@ -39,9 +39,9 @@ def moved(old: Packing, q: np.ndarray, fx: float) -> Packing:
         before, after = (branch(place, old.box_length, i, j) for place in (old.position, position))
         tangent = turned((before + after) / np.hypot(*(before + after)))
         disks = [i] if j == FLOOR else [i, j]
-        relative = shift[i] - (0 if j == FLOOR else shift[j])
+        relative, turning = (shift[i], 0.0) if j == FLOOR else (shift[i] - shift[j], du[j])
         start = remembered.get((i, j))
-        slip = 0.0 if start is None else start + tangent @ relative - du[disks].sum()
+        slip = 0.0 if start is None else start + (tangent @ relative - du[i] - turning)
         overlap = old.radius[disks].sum() - np.hypot(*after)
         limit = old.law.mu * old.law.kn / old.law.kt * overlap if old.law.frictional else 0.0
         slips.append(min(max(slip, -limit), limit))
