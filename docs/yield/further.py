@@ -46,7 +46,9 @@ def lasting(seed: int) -> Iterator[dict[str, Any]]:
     path = branch(settle(given))
     for share in (0.97, 0.9):
         here = path.borne(share * path.kept[-1].fx)
-        for history in HISTORIES if here is not None else ():
+        if here is None:
+            continue
+        for history in HISTORIES:
             start = with_history(here, history)
             known = {"seed": seed, "share": share, "fx_over_fy": here.fx / given.load.fy, "history": history}
             if history == "rescaled":  # those of total slips are in quartz_100.jsonl
