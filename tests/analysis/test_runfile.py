@@ -4,12 +4,14 @@ import json
 import multiprocessing
 import os
 from dataclasses import replace
+from errno import ENOSPC
 
 import h5py
 import numpy as np
 import pytest
 
 from faultgouge.analysis import Contacts, MindlinLaw, OutputError, PackingFileError, RunFile
+from faultgouge.analysis.files.wholefile import write_text
 
 
 @pytest.fixture
@@ -129,6 +131,20 @@ def test_what_an_error_leaves_half_done_is_not_saved(sound, states):
     with RunFile(sound) as run:
         assert len(run) == 4
     assert [each.name for each in sound.parent.iterdir()] == ["run.h5"]
+
+
+def test_a_write_that_fails_keeps_what_was_there_and_leaves_nothing_else(tmp_path, monkeypatch):
+    path = tmp_path / "table.csv"
+    write_text(path, "before")
+
+    def full(*_):
+        raise OSError(ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.replace", full)
+    with pytest.raises(OutputError, match=r"cannot be written: No space left on device; what it held before is kept\."):
+        write_text(path, "after")
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_every_flipped_byte_is_noticed(sound):
