@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...analysis import Packing, PackingFileError
+from ...analysis import PackingFileError
 from ..lammps.data_file import box_lines
 from . import quantities
 from .disks import Disks, of_columns, sphere_volume
@@ -82,7 +82,8 @@ def _header(path: Path, lines: list[str]) -> dict[str, list[float]]:
 def write_data(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
     """A data file that `read_data` takes back to the bit; what LAMMPS itself reads of it is returned in words."""
     (packing,) = (frame.packing for frame in frames)
-    density = densities(packing)
+    volume = sphere_volume(packing.radius)
+    density = packing.mass / volume  # no other double gives LAMMPS the mass to the bit where this one does not
     sides = "f" if packing.box_length is None else "p"
     lines = [
         f"{MARK} sides={sides} " + " ".join(f"{key}={value!r}" for key, value in quantities.scalars(packing).items())
@@ -99,16 +100,6 @@ def write_data(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) ->
     for n, (top, d, rho, x, y, *more) in enumerate(zip(*(each.tolist() for each in columns), strict=True), 1):
         lines.append(f"{n} {1 + top} {d!r} {rho!r} {x!r} {y!r} 0.0 # " + " ".join(map(repr, more)))
     path.write_text("\n".join(lines) + "\n")
-    exact = density * sphere_volume(packing.radius) == packing.mass
+    exact = density * volume == packing.mass
     odd = "" if exact.all() else f" ({np.sum(~exact)} masses with a last bit of their own)"
     return f"LAMMPS reads places, radii, masses{odd} and types, and skips angles, slips, law and load in comments"
-
-
-def densities(packing: Packing) -> np.ndarray:
-    """Densities of which LAMMPS makes the masses, to the bit where there is one."""
-    volume = sphere_volume(packing.radius)
-    density = packing.mass / volume
-    for candidate in (np.nextafter(density, 0), np.nextafter(density, np.inf)):
-        better = (density * volume != packing.mass) & (candidate * volume == packing.mass)
-        density = np.where(better, candidate, density)
-    return density

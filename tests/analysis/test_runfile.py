@@ -120,6 +120,15 @@ def sound(tmp_path, states):
     return path
 
 
+def test_frames_of_a_trajectory_carry_the_load_of_its_equilibrium(sound, states):
+    with RunFile(sound, "a") as run:
+        run.append_trajectory([0.5, 1.0], [states[-1].position] * 2)
+    with h5py.File(sound) as file:
+        np.testing.assert_array_equal(
+            file["observables/fx/value"], [*(each.fx for each in states), *[states[-1].fx] * 2]
+        )
+
+
 def test_what_an_error_leaves_half_done_is_not_saved(sound, states):
     def cut_short():
         with RunFile(sound, "a") as run, run.change():

@@ -204,6 +204,8 @@ def test_mdanalysis_and_gsd_read_it(tmp_path, sheared, suffix, mdanalysis):
             frame = file[0]
         assert frame.configuration.dimensions == 2
         np.testing.assert_array_equal(frame.particles.diameter, np.float32(2 * sheared.radius))
+        turned = 2 * np.arctan2(frame.particles.orientation[:, 3], frame.particles.orientation[:, 0])
+        np.testing.assert_allclose(np.sin(turned - sheared.angle), 0, atol=1e-6)  # float32
         np.testing.assert_array_equal(frame.log["particles/net_force"][:, :2], sheared.net_force.reshape(3, -1)[:2].T)
 
 
