@@ -5,10 +5,12 @@ A trajectory in run.h5 is H5MD: MDAnalysis steps through it, and its analyses ag
 
 import re
 import sys
+from base64 import b64decode
 from dataclasses import replace
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -207,6 +209,18 @@ def test_mdanalysis_and_gsd_read_it(tmp_path, sheared, suffix, mdanalysis):
         turned = 2 * np.arctan2(frame.particles.orientation[:, 3], frame.particles.orientation[:, 0])
         np.testing.assert_allclose(np.sin(turned - sheared.angle), 0, atol=1e-6)  # float32
         np.testing.assert_array_equal(frame.log["particles/net_force"][:, :2], sheared.net_force.reshape(3, -1)[:2].T)
+
+
+def test_lines_of_a_vtp_go_from_disk_to_disk_and_to_the_floor(tmp_path, sheared):
+    write_packing(tmp_path / "a.vtp", sheared)
+    text = ElementTree.parse(tmp_path / "a.vtp").find(".//Points/DataArray").text
+    points = np.frombuffer(b64decode(text)[8:]).reshape(-1, 3)[:, :2]
+    contacts, (first, second) = sheared.contacts, points[len(sheared) :].reshape(-1, 2, 2).swapaxes(0, 1)
+    np.testing.assert_array_equal(points[: len(sheared)], sheared.position)
+    np.testing.assert_array_equal(first, sheared.position[contacts.i])
+    foot = first * (1.0, 0.0)
+    expected = np.where(contacts.floor[:, None], foot, sheared.position[contacts.j])
+    np.testing.assert_allclose(nearest_image(second - expected, sheared.box_length), 0, atol=1e-14)
 
 
 @pytest.fixture(scope="module", params=["double", pytest.param("compensated", marks=pytest.mark.long)])
