@@ -21,7 +21,7 @@ SEEN = 0.01
 """Displacement, in radii of the disk, from which a disk counts as moved."""
 
 
-def at_rest(packing: Packing, watch: Watch = lambda says: None) -> tuple[Packing, str]:
+def at_rest(packing: Packing, watch: Watch = lambda says: None) -> tuple[Equilibrium, str]:
     """Bring a packing to rest under its law and load.
 
     Parameters
@@ -33,7 +33,7 @@ def at_rest(packing: Packing, watch: Watch = lambda says: None) -> tuple[Packing
 
     Returns
     -------
-    Packing
+    Equilibrium
         At rest.
     str
         What moved, and by how much.
@@ -60,7 +60,7 @@ def at_rest(packing: Packing, watch: Watch = lambda says: None) -> tuple[Packing
         )
     with Engine(resting) as engine:
         found = equilibrate(engine, Equilibrium.of(resting), resting.fx)
-    return found.packing, _what_moved(packing, found)
+    return found, _what_moved(packing, found)
 
 
 def _what_moved(before: Packing, found: Equilibrium) -> str:

@@ -256,7 +256,7 @@ def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
     with status("coming to rest") as show:
         found, words = at_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
     say(words)
-    return found
+    return found.packing
 
 
 def _store(output: Path, packing: Packing) -> None:
