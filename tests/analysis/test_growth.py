@@ -56,7 +56,11 @@ def test_rate_from_samples_at_uneven_times():
     time = 1e-3 * np.union1d(every, np.geomspace(1, every[-1], 200).astype(int))
     msd = 1e-24 * np.exp(0.4 * time) * (1 + 0.5 * np.cos(9 * time))
     # the stretches begin and end at other samples, by a spacing at the most
-    assert fit_growth(time, msd, 1e-22, 1e-10).rate == pytest.approx(0.4, rel=1e-3)
+    growth = fit_growth(time, msd, 1e-22, 1e-10)
+    assert growth.rate == pytest.approx(0.4, rel=1e-3)
+    used = msd[(time >= growth.start) & (time <= growth.end)]
+    assert used[0] >= 1e-22 > msd[time < growth.start].max()
+    assert used.max() < 1e-10 <= msd[time > growth.end][0]
 
 
 def test_mean_square_displacement_of_wrapped_positions():
