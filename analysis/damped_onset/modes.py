@@ -150,7 +150,7 @@ class DampedMode:
         return complex(-np.vdot(self.left, force) / self._slant)
 
     def at(self, pencil: Pencil, guess: complex | None = None) -> "DampedMode | None":
-        """The same mode in a neighbouring pencil, with the same shape rather than not; None if it is not found there.
+        """The same mode in a neighbouring pencil; None if no mode of about the same shape is found there.
 
         Parameters
         ----------

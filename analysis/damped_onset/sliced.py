@@ -80,20 +80,17 @@ def first_growing(
 
 
 class SlicedGrowing(Sliced[Pencil, DampedWindow]):
-    """The oracle of growing motion."""
+    """The oracle of growing motion.
 
+    Small differences of large couplings tell where weak dashpots begin to feed a mode. So clusters know that a mode is
+    about to grow, and not where: all that they announce is looked at, and the operator follows it to its onset.
+    """
+
+    locates = False
     _borne: Floats | None = None  # |A - A^T| up to which each mode of the spectrum is left out
     _borders: Sequence[Border] = ()  # of the slices that were searched last
     _lost: float | None = None  # frequency of the motion that is in doubt
     _passing = False  # whether bases are not kept
-
-    @property
-    def off(self) -> float:
-        """Any distance: small differences of large couplings tell where weak dashpots begin to feed a mode.
-
-        So clusters know that a mode is about to grow, and not where. The operator follows all modes to there.
-        """
-        return np.inf
 
     def ahead(self, done: int) -> int:
         """More and more of them, as dissipation may put off the onset by much; each costs a tenth of the bases."""

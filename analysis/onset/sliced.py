@@ -71,6 +71,9 @@ class Sliced(ABC, Generic[P, W]):
         As of :func:`~faultgouge.analysis.find_onset`.
     """
 
+    locates = True
+    """Whether clusters tell where a window begins, and not only that one does."""
+
     def __init__(
         self,
         at: Callable[[float], P],
@@ -107,11 +110,6 @@ class Sliced(ABC, Generic[P, W]):
     def ahead(self, done: int) -> int:
         """Increments that are looked at while bases that are not kept pass by, after so many others."""
         return self.limits.ahead
-
-    @property
-    def off(self) -> float:
-        """How far from where a cluster announces it a window may begin, in shares of the way or of the increment."""
-        return 2 * self.limits.reach
 
     def record(self, sure: W) -> None:
         """Take down a window; the one with the smaller onset is the first."""
@@ -194,11 +192,13 @@ class Sliced(ABC, Generic[P, W]):
         On the finest increments it goes on, and an error is raised if no window has been found beside it.
         """
         here = self._passed[-1]
+        off = 2 * self.limits.reach  # of what clusters locate, in shares of the way or of the increment
         first: W | None = None
         lost: Exception | None = None
         doubt = False
         for candidate in candidates:
-            if first is not None and candidate.onset - here.fx > (1 + self.off) * (first.fx_onset - here.fx):
+            beyond = first is not None and candidate.onset - here.fx > (1 + off) * (first.fx_onset - here.fx)
+            if self.locates and beyond:
                 break
             try:
                 window = self._confirmed(candidate, there, first)
@@ -206,7 +206,7 @@ class Sliced(ABC, Generic[P, W]):
                 window, doubt = None, True
                 lost = lost if isinstance(error, DoubtError) else error
             if window is not None:
-                elsewhere = abs(window.fx_onset - candidate.onset) > self.off * (there.fx - here.fx)
+                elsewhere = self.locates and abs(window.fx_onset - candidate.onset) > off * (there.fx - here.fx)
                 doubt = doubt or (elsewhere and window.fx_onset > here.fx)
                 if first is None or window.fx_onset < first.fx_onset:
                     first = window

@@ -8,9 +8,11 @@ from scipy.sparse import csr_array
 from test_found import PASSING, cut_off
 from test_slicing import FEW, on_ranks
 
+from faultgouge.analysis.damped_onset.edge import DampedWindow
 from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, growing_near, nearest_mode
-from faultgouge.analysis.damped_onset.sliced import first_growing
+from faultgouge.analysis.damped_onset.sliced import SlicedGrowing, first_growing
 from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating
+from faultgouge.analysis.onset.found import Candidate
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.onset.damped import ramped
 
@@ -129,3 +131,17 @@ def test_packings_against_all_eigenvalues(disks, seed, kind, grows):
         else:
             assert window is None
             assert max(map(fastest, [0.0, 0.01, 0.02, 0.03, 0.04])) < 0
+
+
+def test_all_announced_modes_are_looked_at_also_beside_one_that_grew_before():
+    """Clusters do not tell where modes begin to grow: the second may have begun in an earlier increment still."""
+    begun = {0.5: DampedWindow(-1.0, None, 1.0, 0.0, "hopf"), 0.9: DampedWindow(-2.0, None, 1.0, 0.0, "hopf")}
+
+    class Told(SlicedGrowing):
+        def _confirmed(self, candidate, there, first):
+            return begun[candidate.onset]
+
+    empty = csr_array((2, 2))
+    oracle, here, there = Told(lambda fx: Pencil(fx, empty, empty)), *(Pencil(fx, empty, empty) for fx in (0.0, 1.0))
+    announced = [Candidate(onset, onset, np.zeros((2, 2)), np.zeros((2, 2))) for onset in begun]
+    assert oracle.confirm(announced, here, there, 0) == (begun[0.9], [])
