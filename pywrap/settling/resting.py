@@ -64,6 +64,7 @@ def at_rest(packing: Packing, watch: Watch = lambda says: None) -> tuple[Equilib
 
 
 def _what_moved(before: Packing, found: Equilibrium) -> str:
+    """What coming to rest has done to a packing, in words."""
     after = found.packing
     moved = np.hypot(*nearest_image(after.position - before.position, after.box_length).T)
     far = int(np.sum(moved > SEEN * after.radius))

@@ -31,12 +31,13 @@ def large():
 
 
 @pytest.mark.parametrize(
-    "keys", [{"seed": 9}, *(pytest.param(LARGE | {"seed": seed}, marks=pytest.mark.slow) for seed in (2, 3))]
+    ("keys", "most"),
+    [({"seed": 9}, 2e-10), *(pytest.param(LARGE | {"seed": n}, 3e-10, marks=pytest.mark.slow) for n in (2, 3))],
 )
-def test_settled_packing_is_in_balance_and_ready_for_friction(keys):
+def test_settled_packing_is_in_balance_and_ready_for_friction(keys, most):
     settled = settle(scene(**keys))
     packing = settled.packing
-    assert settled.residual < 1.5 * settled.floor < 3e-10
+    assert settled.residual < 1.5 * settled.floor < most
     assert np.all(packing.contacts.slip == 0)
     matrix = stiffness_matrix(packing).toarray()
     # zero slips: no term that is not symmetric, but for the rounding of products

@@ -271,7 +271,7 @@ def test_error_follows_the_noise_of_the_equilibria(noise):
         assert window.kind == "coalescence"
         errors.append(window.error)
         misses.append(abs(window.fx_onset - d) / window.error)
-    assert len(errors) >= 6  # fewer in one of ten thousand; what is drawn depends on the processor's last digits
+    assert len(errors) >= 5  # fewer in 7 of 100,000; what is drawn depends on the processor's last digits
     # Entries of 50 in a basis of condition 10: noise in D some 1e3 times that of an entry, slope 2.4.
     assert noise < np.median(errors) < 1e4 * noise
     # Two degrees of freedom make a single error uncertain by a factor of two or three: a median of 60 is 0.3.
