@@ -11,11 +11,13 @@ from faultgouge.analysis import (
     Contacts,
     MindlinLaw,
     Packing,
+    closest_to_meeting,
     discrete_frequency,
     dynamical_matrix,
     eigenpairs,
     eigenvalues,
     growth_rate,
+    normal_modes,
     spectrum,
     stable_timestep,
 )
@@ -148,3 +150,10 @@ def test_imaginary_part_grows_as_the_root_of_the_distance(path):
     near, nearer = (spectrum(path(onset + distance)).pairs[0].eigenvalue.imag for distance in (1e-5, 1e-7))
     # The next order is the distance over the width of the window, 1e-2.
     assert near / nearer == pytest.approx(10, rel=1e-2)
+
+
+def test_modes_of_a_symmetric_operator_are_not_close_to_meeting(path):
+    """Without slips, at F_x = 0."""
+    first, second, cosine = closest_to_meeting(normal_modes(path(0.0)))
+    assert first < second
+    assert cosine < 1e-9

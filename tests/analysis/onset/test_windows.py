@@ -278,6 +278,13 @@ def test_error_follows_the_noise_of_the_equilibria(noise):
     assert np.median(misses) < 1
 
 
+def test_what_is_out_of_balance_is_part_of_the_error(path):
+    """A load that is off by 1e-4 on each of ten disks shifts the onset by as much, less what their mean averages."""
+    found = find_onset(lambda fx: replace(path(fx), fy=path(fx).fy + 1e-4), path.grid[20:])
+    assert found.fx_c == pytest.approx(0.021833056408, rel=1e-9)
+    assert found.error > 0.99e-4 / np.sqrt(10)
+
+
 def test_contacts_without_force_are_left_out(reference_packing):
     """A rattler brought to touch by 1e-12 of a length: a stiffness of 0.3 that no force stands for."""
     packing = reference_packing(1.0)
