@@ -76,6 +76,42 @@ def test_a_load_that_is_not_reached_from_below_is_reached_from_above(reference_p
     assert found.residual < 10 * found.floor
 
 
+def sideways(packing):
+    """All disks by more than a radius."""
+    return np.full_like(packing.position, [0.55, 0.0])
+
+
+def inside(packing):
+    """The centres of two disks that touch into the other one."""
+    moved = np.zeros_like(packing.position)
+    moved[packing.contacts.i[0]] = 0.45 * packing.geometry.normal[0]
+    moved[packing.contacts.j[0]] = -0.45 * packing.geometry.normal[0]
+    return moved
+
+
+@pytest.mark.parametrize("away", [sideways, inside])
+def test_a_guess_that_lammps_would_refuse_is_passed_over(away):
+    """A second equilibrium whose displacement, in proportion to the increment, is too long."""
+    *_, beside, last = ramp(Scene.from_mapping(SCENE))
+    position = last.packing.position + away(last.packing)
+    odd = replace(beside, packing=replace(last.packing, position=position, fx=beside.fx))
+    with Engine(last.packing) as engine:
+        found, plain = (equilibrate(engine, last, 0.022, beside=each) for each in (odd, beside))
+    # two roundings of coordinates up to 12
+    np.testing.assert_allclose(found.packing.position, plain.packing.position, rtol=0, atol=4 * np.spacing(12))
+
+
+def test_a_long_increment_stays_on_the_branch_of_short_ones():
+    """Where Newton's step is no small displacement the increment is halved."""
+    mapping = {"packing": {"disks": 20, "width": 3.6, "seed": 10}, "law": {"kn": 2e3, "mu": 0.5}, "load": {"fy": 3.0}}
+    long, short = (
+        list(ramp(Scene.from_mapping(mapping | {"ramp": {"step": step, "until": 0.8}})))[-1] for step in (0.2, 0.01)
+    )
+    forces = [np.sort(each.packing.normal_force) for each in (long, short)]
+    # 0.02 by the error of the path, which falls with the increment; 0.16 on the other branch
+    assert np.abs(forces[0] - forces[1]).max() < 0.05
+
+
 SETTLED = SCENE | {"packing": {"disks": 20, "width": 3.6, "seed": 2}, "ramp": {"step": 1e-3, "until": 2e-3}}
 DAMPING = {"damping": {"cn": 30.0, "ct": 20.0, "tau": 0.2}}
 
