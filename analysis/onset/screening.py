@@ -19,7 +19,7 @@ the signs, by
     R_{ij} = \sum_{k \ne i, j} \frac{|H_{ik}|}{|H_{ii} - H_{kk}|} S_{kj} , \qquad
     S_{kj} = \sum_l \frac{|H_{kl}|}{|H_{kk} - H_{ll}|} |H_{lj}| .
 
-So the discriminant is positive, and the two modes do not meet, if
+So the discriminant is positive up to this order, and the two modes do not meet, if
 
 .. math::
 

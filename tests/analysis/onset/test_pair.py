@@ -137,6 +137,20 @@ def test_no_complex_pair_escapes_the_may_meet(seed, antisymmetric):
         assert set(np.argsort(np.abs(right[:, k]))[-2:]) in [set(pair) for pair in named.tolist()]
 
 
+def test_couplings_of_third_order_hide_no_complex_pair():
+    """Four to seven levels of spacing 1 that are coupled strongly; without the third order 85 of 1072 escape."""
+    rng = np.random.default_rng(1)
+    escaped = 0
+    for _ in range(1500):
+        size = int(rng.integers(4, 8))
+        diagonal = np.diag(np.sort(rng.uniform(0, size, size)))
+        symmetric, turning = rng.normal(size=(2, size, size))
+        matrix = diagonal + 0.2 * (symmetric + symmetric.T + turning - turning.T)
+        levels = Basis.of(csr_array(diagonal)).levels(csr_array(matrix))
+        escaped += np.iscomplexobj(np.linalg.eigvals(matrix)) and len(may_meet(levels, levels, SLACK)) == 0
+    assert escaped == 0
+
+
 def test_meetings_of_crossing_levels_between_two_loads():
     """Levels that exchange their order meet, coupled as weakly as may be; those that only come close do not."""
     basis = Basis.of(csr_array(np.diag([1.0, 2.0, 5.0])))
