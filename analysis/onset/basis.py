@@ -142,8 +142,10 @@ class Basis(Slice):
         return self.vectors.astype(np.float32)
 
     def mixing(self, levels: Levels) -> list[float]:
-        """The typical coupling over the spacing in each cluster."""
-        return [width_and_mixing(levels.block(each), self.values[each.modes])[1] for each in self.clusters]
+        """The typical coupling over the spacing in each cluster, of the symmetric part: a new basis has none."""
+        symmetric = 0.5 * (levels.coupling + levels.coupling.T)
+        blocks = ((symmetric[each.modes, each.modes], self.values[each.modes]) for each in self.clusters)
+        return [width_and_mixing(block, values)[1] for block, values in blocks]
 
     def lifted(self, modes: slice | Indices, vectors: Floats | None = None) -> Floats:
         """Modes of the basis, or combinations of them in columns, as vectors in the coordinates of the operator."""

@@ -85,8 +85,8 @@ class Limits:
     """Modes of a slice on either side beyond those of its clusters, in second order. What is farther away changes
     levels by less than (coupling / spacing)^2 / 30 of their spacing."""
     mixing: float = 0.1
-    """Typical coupling within clusters, in level spacings, up to which a basis is used: with other modes `margin`
-    spacings away, the second order leaves out (mixing / margin)^2 = 2.5e-5 of the coupling."""
+    """Typical symmetric coupling within clusters, in level spacings, up to which a basis is used: with other modes
+    `margin` spacings away, the second order leaves out (mixing / margin)^2 = 2.5e-5 of the coupling."""
 
     # Slices of the spectrum
 
@@ -98,10 +98,9 @@ class Limits:
     """Vectors that are solved for at a time: 0.7 ms each at 30,000 coordinates, against 2.6 ms one by one. Larger
     blocks need more vectors for the same eigenvalues: 288 for a slice, with blocks of eight 304."""
     first_look: int = 48
-    """Blocks of a Krylov space before its eigenvalues are looked at: enough for most slices, as a look costs two
-    blocks."""
-    looks: int = 2
-    """Blocks between two looks."""
+    """Blocks of a Krylov space before its eigenvalues are looked at: enough for most slices."""
+    looks: int = 6
+    """Blocks between two looks. A look costs as much as two blocks of 30,000 coordinates, or as twenty of 3,000."""
     last_look: int = 200
     """Blocks at the most."""
     together: int = 2
