@@ -262,15 +262,15 @@ def nearest_mode(pencil: Pencil, frequency: float) -> DampedMode | None:
     return solved_mode(pencil, x, y, shift)
 
 
-def growing_near(pencil: Pencil, frequency: float, count: int) -> list[DampedMode]:
-    """Those of the modes nearest to a point of the imaginary axis that grow, by shift and invert with ARPACK.
+def growing_near(pencil: Pencil, point: complex, count: int) -> list[DampedMode]:
+    """Those of the modes nearest to a point of the complex plane that grow, by shift and invert with ARPACK.
 
     Parameters
     ----------
     pencil : Pencil
         Of any size.
-    frequency : float
-        The point, 1 / time.
+    point : complex
+        On the imaginary axis or beyond, 1 / time; not zero, where the disks that touch nothing have theirs.
     count : int
         How many of the nearest modes are looked at.
 
@@ -279,7 +279,7 @@ def growing_near(pencil: Pencil, frequency: float, count: int) -> list[DampedMod
     ArpackError
         If they do not converge.
     """
-    size, shift = pencil.stiffness.shape[0], 1j * frequency * (1 + 1e-9)  # no eigenvalue to the last digit
+    size, shift = pencil.stiffness.shape[0], point * (1 + 1e-9)  # no eigenvalue to the last digit
     factors = _factors(csc_array(pencil.stiffness + shift * pencil.damping + shift**2 * eye_array(size)))
 
     def inverse(state: Complexes) -> Complexes:
@@ -298,6 +298,19 @@ def growing_near(pencil: Pencil, frequency: float, count: int) -> list[DampedMod
             if mode is not None and mode.growing and mode.rate.imag >= 0:
                 found.append(mode)
     return found
+
+
+def fastest_growing(pencil: Pencil) -> DampedMode | None:
+    """The motion that grows fastest at a load, by all eigenvalues; None if none grows.
+
+    LAPACK takes a minute for 1,000 disks, ARPACK finds the vectors. An ArpackError says that it does not.
+    """
+    values = np.linalg.eigvals(pencil.system.matrix)
+    for s in sorted(values[(values.real > 1e-6 * abs(values)) & (values.imag >= 0)], key=lambda each: -each.real):
+        found = growing_near(pencil, complex(s), 1)
+        if found:
+            return found[0]
+    return None
 
 
 def solved_mode(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> DampedMode | None:

@@ -11,12 +11,13 @@ looked at again.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
 from scipy.sparse.linalg import ArpackError
 
+from ..errors import NoEquilibriumError
 from ..onset.basis import Basis, Levels
 from ..onset.edge import DoubtError, LostPairError, LostTrackError, track
 from ..onset.found import Border, Candidate, Found
@@ -27,8 +28,8 @@ from ..packing.packing import Floats
 from ..spectrum.spectrum import active_coordinates
 from .edge import Crossing, DampedWindow, solved, window_of
 from .growing import nearly_growing, searched
-from .modes import DampedMode, Pencil, growing_near
-from .screening import Cluster, Reduced, changed, clusters, cores_of, may_grow, reduced
+from .modes import DampedMode, Pencil, fastest_growing, growing_near
+from .screening import LARGEST, Cluster, changed, clusters, cores_of, may_grow, reduced
 
 TRUSTED = 0.5
 """Share of what a slice bears up to which it is left out: its modes change on the way."""
@@ -76,7 +77,9 @@ def first_growing(
     tuple of (float, float)
         Increments on which clusters announce a growing mode that the operator was not seen to have.
     """
-    return first_along(SlicedGrowing(pencil, None, watch, ranks, folder, limits), loads)
+    oracle = SlicedGrowing(pencil, None, watch, ranks, folder, limits)
+    first, doubtful = first_along(oracle, loads)
+    return oracle.looked_over(first, doubtful) if oracle.crowded else (first, doubtful)
 
 
 class SlicedGrowing(Sliced[Pencil, DampedWindow]):
@@ -87,6 +90,9 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
     """
 
     locates = False
+    crowded = False
+    """Whether dashpots have coupled more modes than a cluster can have, so that clusters may have missed a motion."""
+
     _borne: Floats | None = None  # |A - A^T| up to which each mode of the spectrum is left out
     _borders: Sequence[Border] = ()  # of the slices that were searched last
     _lost: float | None = None  # frequency of the motion that is in doubt
@@ -127,30 +133,47 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
     def _found_by_all(self, places: Sequence[Pencil]) -> list[Found]:
         found = super()._found_by_all(places)
         self._borders = [each.border for each in found]
+        self.crowded = self.crowded or any(each.crowded for each in found)
         if self._borne is not None:
             for each in found:
                 self._borne[slice(*each.border.modes)] = TRUSTED * each.bears
         return found
 
     def _seen(self, basis: Basis, levels: Levels, places: Sequence[Pencil]) -> Found:
-        here, found = reduced(basis, levels, places[0]), []
+        here, found, crowded = reduced(basis, levels, places[0]), [], False
         for before, after in pairwise(places):
             there = changed(basis, before, here, after)
-            found.append(list(self._announced(basis, (before, here), (after, there))))
+            named = may_grow(here, there)
+            cores = cores_of(named[(named >= basis.own.start) & (named < basis.own.stop)])
+            loud = [each for each in clusters(basis, (before, here), (after, there), cores) if not each.quiet]
+            found.append(list(chain.from_iterable(map(grown, loud))))
+            crowded = crowded or any(each.right.shape[1] > LARGEST[0] for each in loud)
             here = there
-        return Found(basis.border, found, here.bears * antisymmetric(places[-1]))
-
-    def _announced(
-        self, basis: Basis, here: tuple[Pencil, Reduced], there: tuple[Pencil, Reduced]
-    ) -> Iterator[Candidate]:
-        """The modes of a basis that grow in their clusters, or nearly do so."""
-        named = may_grow(here[1], there[1])
-        cores = cores_of(named[(named >= basis.own.start) & (named < basis.own.stop)])
-        for cluster in clusters(basis, here, there, cores):
-            if not cluster.quiet:
-                yield from grown(cluster)
+        return Found(basis.border, found, here.bears * antisymmetric(places[-1]), crowded)
 
     # What the operator has
+
+    def looked_over(self, first: DampedWindow | None, doubtful: Increments) -> tuple[DampedWindow | None, Increments]:
+        """The first window after a look at all modes at the last load that was passed before it, and what is in doubt.
+
+        A motion that grows there is followed back to its onset, before which all modes are looked at again.
+        """
+        while True:
+            below = [each for each in self._passed if first is None or each.fx < first.fx_onset]
+            if not below:
+                return first, doubtful
+            last = below.pop()
+            unsure = (*doubtful, (self._passed[0].fx, last.fx))
+            if last.stiffness.shape[0] > self.limits.lapack:
+                return first, unsure
+            self.watch(f"all modes at F_x = {last.fx:.6g}, as the dashpots couple many")
+            try:
+                mode = fastest_growing(last)
+                if mode is None:
+                    return first, doubtful
+                first = self._begun(mode, below, None)
+            except (ArpackError, LostPairError, NoEquilibriumError):
+                return first, unsure
 
     def _confirmed(self, candidate: Candidate, there: Pencil, first: DampedWindow | None) -> DampedWindow | None:
         self.watch(f"a motion that grows from about F_x = {candidate.onset:.6g}: its onset")
@@ -167,8 +190,12 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
             return None
         above = followed(mode, there)
         end = None if above.growing else self._edge(above, mode)
-        for passed in reversed(self._passed):
-            below = followed(mode, passed)
+        return self._begun(mode, self._passed, end)
+
+    def _begun(self, mode: DampedMode, passed: Sequence[Pencil], end: Crossing | None) -> DampedWindow:
+        """The window of a mode that grows, followed back along the loads that were passed."""
+        for place in reversed(passed):
+            below = followed(mode, place)
             if not below.growing:
                 return window_of(self._edge(below, mode), end)
             mode = below
@@ -210,7 +237,7 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
         """
         try:
             for place in places:
-                growing = growing_near(place, guess.rate.imag, NEAREST)
+                growing = growing_near(place, guess.rate if guess.rate.imag == 0 else 1j * guess.rate.imag, NEAREST)
                 if growing:
                     return min(growing, key=lambda each: abs(each.rate - guess.rate))
         except ArpackError as error:
@@ -275,10 +302,11 @@ def candidate_of(onset: float, mode: DampedMode) -> Candidate:
 
 
 def announced_by(candidate: Candidate, pencil: Pencil) -> DampedMode:
-    """The mode of a cluster as one of the operator: its s is the root of y^H T(s) x above the axis of real s."""
+    """The mode of a cluster as one of the operator: its s is the root of y^H T(s) x above the axis of real s, or
+    the upper one of two on the axis."""
     x, y = (np.asarray(each @ np.array([1.0, 1.0j])) for each in (candidate.right, candidate.left))
     products = [complex(np.vdot(y, each)) for each in (x, pencil.damping @ x, pencil.stiffness @ x)]
-    return DampedMode(pencil, complex(max(np.roots(products), key=lambda s: s.imag)), x, y)
+    return DampedMode(pencil, complex(max(np.roots(products), key=lambda s: (s.imag, s.real))), x, y)
 
 
 def followed(mode: DampedMode, pencil: Pencil) -> DampedMode:

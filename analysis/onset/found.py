@@ -151,11 +151,14 @@ class Found:
         The pairs that turn complex in its clusters, or the modes that begin to grow, increment by increment.
     bears : float
         |A - A^T| of the operator up to which dissipation surely holds all modes of the slice, 1 / time^2.
+    crowded : bool
+        Whether dashpots couple more of its modes than a cluster can have.
     """
 
     border: Border
     candidates: Sequence[Sequence[Candidate]]
     bears: float = 0.0
+    crowded: bool = False
 
 
 @dataclass(frozen=True)
@@ -219,6 +222,7 @@ class Pass:
             modes=found.border.modes,
             border=found.border[1:],
             bears=found.bears,
+            crowded=found.crowded,
             increments=len(found.candidates),
             increment=[k for k, _ in flat],
             loads=[(each.onset, each.inside) for _, each in flat],
@@ -266,7 +270,7 @@ def _found(path: Path) -> Found:
         for k, loads, planes in zip(data["increment"], data["loads"], data["planes"], strict=True):
             candidates[int(k)].append(Candidate(float(loads[0]), float(loads[1]), *planes))
         border = Border((first, stop), *(float(each) for each in data["border"]))
-        return Found(border, candidates, float(data["bears"]))
+        return Found(border, candidates, float(data["bears"]), bool(data["crowded"]))
 
 
 def _shifts(path: Path) -> list[Shift]:

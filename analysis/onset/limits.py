@@ -92,7 +92,7 @@ class Limits:
 
     own: int = 120
     """Eigenvalues of a slice. Fewer cost more factorisations, more cost more orthogonalisation."""
-    coarse: int = 960
+    coarse: int = 240
     """Eigenvalues between two places at which they are counted; shifts are interpolated in between."""
     block: int = 6
     """Vectors that are solved for at a time: 0.7 ms each at 30,000 coordinates, against 2.6 ms one by one. Larger
@@ -135,6 +135,8 @@ class Limits:
     """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision."""
     ahead: int = 2
     """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
+    lapack: int = 5000
+    """Coordinates up to which all eigenvalues with dissipation are asked for: a minute for 3,000, five for 5,000."""
     wait: float = 2.0
     """Seconds between two looks at what other searches have found, where these have taken all that is left."""
     chunk: int = 1024

@@ -99,9 +99,9 @@ def test_modes_near_a_frequency_are_those_of_all(path):
         assert found.rate == pytest.approx(rate, rel=1e-9)
     assert len(modes.growing)
     for rate in modes.rates[modes.growing]:
-        found = [mode.rate for mode in growing_near(modes.pencil, 1.001 * float(rate.imag), 12)]
+        found = [mode.rate for mode in growing_near(modes.pencil, 1.001j * rate.imag, 12)]
         assert min(abs(each - rate) for each in found) < 1e-9 * abs(rate)
-        assert growing_near(Pencil.of(damped(0.02)), float(rate.imag), 12) == []
+        assert growing_near(Pencil.of(damped(0.02)), 1j * rate.imag, 12) == []
 
 
 @pytest.mark.long
