@@ -301,9 +301,12 @@ def growing_near(pencil: Pencil, point: complex, count: int) -> list[DampedMode]
 
 
 def fastest_growing(pencil: Pencil) -> DampedMode | None:
-    """The motion that grows fastest at a load, by all eigenvalues; None if none grows.
+    """The motion that grows fastest at a load, by all eigenvalues from LAPACK; None if none grows.
 
-    LAPACK takes a minute for 1,000 disks, ARPACK finds the vectors. An ArpackError says that it does not.
+    Raises
+    ------
+    ArpackError
+        If its vectors are not found.
     """
     values = np.linalg.eigvals(pencil.system.matrix)
     for s in sorted(values[(values.real > 1e-6 * abs(values)) & (values.imag >= 0)], key=lambda each: -each.real):

@@ -8,6 +8,10 @@ named, clusters about them announce where one begins to, and the operator confir
 **Slices that are left out.** In each slice the antisymmetric part may be so many times larger before it can feed any
 motion as much as the motion loses (`Reduced.bears`). As long as it has not grown by `TRUSTED` of that, a slice is not
 looked at again.
+
+**Strong dashpots** couple more modes than a cluster can have, and clusters may miss a motion. Then all eigenvalues are
+looked at, at the last load that was passed before the first window; what grows there is followed back to its onset. A
+window that ends before that load is not excluded.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -75,10 +79,17 @@ def first_growing(
     DampedWindow or None
         Its end is None where the mode grows at the next load.
     tuple of (float, float)
-        Increments on which clusters announce a growing mode that the operator was not seen to have.
+        Increments on which clusters announce a growing mode that the operator was not seen to have; and all loads
+        before the window, where clusters may have missed one and all modes are too many to be looked at.
     """
     oracle = SlicedGrowing(pencil, None, watch, ranks, folder, limits)
-    first, doubtful = first_along(oracle, loads)
+    try:
+        first, doubtful = first_along(oracle, loads)
+    except NoEquilibriumError:
+        first, doubtful = oracle.looked_over(None, ()) if oracle.crowded else (None, ())
+        if first is None:
+            raise
+        return first, doubtful
     return oracle.looked_over(first, doubtful) if oracle.crowded else (first, doubtful)
 
 

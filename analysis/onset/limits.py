@@ -136,7 +136,7 @@ class Limits:
     ahead: int = 2
     """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
     lapack: int = 5000
-    """Coordinates up to which all eigenvalues with dissipation are asked for: a minute for 3,000, five for 5,000."""
+    """Coordinates up to which all eigenvalues with dissipation are asked for: a minute for 3,000, and as their cube."""
     wait: float = 2.0
     """Seconds between two looks at what other searches have found, where these have taken all that is left."""
     chunk: int = 1024

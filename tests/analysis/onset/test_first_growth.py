@@ -9,7 +9,7 @@ from test_found import PASSING, cut_off
 from test_slicing import FEW, on_ranks
 
 from faultgouge.analysis.damped_onset.edge import DampedWindow
-from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, growing_near, nearest_mode
+from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, fastest_growing, growing_near, nearest_mode
 from faultgouge.analysis.damped_onset.sliced import SlicedGrowing, first_growing
 from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating
 from faultgouge.analysis.onset.found import Candidate
@@ -102,6 +102,8 @@ def test_modes_near_a_frequency_are_those_of_all(path):
         found = [mode.rate for mode in growing_near(modes.pencil, 1.001j * rate.imag, 12)]
         assert min(abs(each - rate) for each in found) < 1e-9 * abs(rate)
         assert growing_near(Pencil.of(damped(0.02)), 1j * rate.imag, 12) == []
+    assert fastest_growing(modes.pencil).rate == pytest.approx(max(modes.rates, key=lambda s: s.real), rel=1e-9)
+    assert fastest_growing(Pencil.of(damped(0.02))) is None
 
 
 @pytest.mark.long
