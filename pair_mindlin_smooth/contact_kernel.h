@@ -110,7 +110,7 @@ struct Features {
   bool friction;
   bool advance;             // slips advance by v dt and omega dt
   bool damped;              // dashpots
-  bool rescaled = false;    // slips, while overlaps grow
+  History history = History::TOTAL;
   bool energy = false;      // of contacts that sliding and dashpots take
 };
 

@@ -10,9 +10,8 @@ to one disk. Pairs that do not overlap, which LAMMPS lists up to its cutoff, are
 there are neither slips nor angles, and their columns may be missing.
 
 Law, load and inertia are no part of a dump. They are given by the caller or by a sidecar file of the same
-name with the suffix ".params", which has one ``key value`` a line out of kn, kt, mu, exponent, rescaled, cn, ct, tau,
-fx, fy, inertia_factor;
-what the caller gives wins.
+name with the suffix ".params", which has one ``key value`` a line out of kn, kt, mu, exponent, rescaled, coulomb,
+cn, ct, tau, fx, fy, inertia_factor; what the caller gives wins.
 """
 
 from collections import deque
@@ -158,7 +157,8 @@ def _law(given: Mapping[str, float], disks: Path) -> MindlinLaw:
     try:
         kn, kt, mu = (given[name] for name in ("kn", "kt", "mu"))
         more = {name: given[name] for name in ("exponent", "cn", "ct") if name in given}
-        return MindlinLaw(kn, kt, mu, rescaled=bool(given.get("rescaled")), **more)
+        history = {name: bool(given.get(name)) for name in ("rescaled", "coulomb")}
+        return MindlinLaw(kn, kt, mu, **history, **more)
     except KeyError as error:
         sidecar = disks.with_suffix(".params")
         raise PackingFileError(f"The law of {disks} is not given: {sidecar} does not name {error}.") from None

@@ -14,7 +14,6 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..operators.stiffness import stiffness_matrix
-from ..packing.law import AT_THE_BOUND
 from ..packing.packing import Floats, Indices, Packing
 from ..spectrum.spectrum import Complexes, all_modes, believable, mass_weighted, unit_rounding
 from .limits import LIMITS, Limits
@@ -45,8 +44,7 @@ def contact_states(packing: Packing, limits: Limits = LIMITS) -> bytes:
     """Which contacts bear a force, and which of them slide to which side; equal for equal states."""
     packing = force_bearing(packing, limits)
     contacts, law = packing.contacts, packing.law
-    bound = AT_THE_BOUND * law.slip_limit(packing.geometry.overlap) if law.frictional else np.inf
-    slides = np.sign(contacts.slip) * (np.abs(contacts.slip) >= bound)
+    slides = np.sign(contacts.slip) * law.at_bound(packing.geometry.overlap, contacts.slip)
     return np.array([contacts.i, contacts.j, slides], dtype=np.int64).tobytes()
 
 

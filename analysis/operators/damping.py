@@ -21,6 +21,7 @@ first of the two, as the stability operator does where the slip of such a contac
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
@@ -29,13 +30,15 @@ from ..packing.packing import Floats, Packing
 from .stiffness import assembled, contact_terms
 
 
-def damping_matrix(packing: Packing) -> csr_array:
+def damping_matrix(packing: Packing, sliding: ArrayLike = False) -> csr_array:
     """Assemble C = -dF/d(dq/dt).
 
     Parameters
     ----------
     packing : Packing
         The configuration, with dashpots ``law.cn`` and ``law.ct`` and with ``drag_time``; any of them may be absent.
+    sliding : array_like of bool, shape () or (C,)
+        As of `stiffness_matrix`: contacts that slide on have no tangential dashpot.
 
     Returns
     -------
@@ -46,7 +49,7 @@ def damping_matrix(packing: Packing) -> csr_array:
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry
-    along, across = packing.law.dashpots(overlap, contacts.slip)
+    along, across = packing.law.dashpots(overlap, contacts.slip, sliding)
     zero = np.zeros_like(along)
     # N N^T and T T^T are what the normal and the tangential stiffness multiply in K
     terms = contact_terms(Derivatives(zero, zero, along, -across, zero), normal.T, distance, pairs)

@@ -62,6 +62,7 @@ def stiffness_matrix(
     form: Form = "consistent",
     coupled: NDArray[np.bool_] | None = None,
     parting: ArrayLike = 0.5,
+    sliding: ArrayLike = False,
 ) -> csr_array:
     """Assemble K = -dF/dq.
 
@@ -75,9 +76,12 @@ def stiffness_matrix(
         Contacts whose tangential force depends on their overlap; all by default. Of the others b = d f_t / d overlap
         counts as zero. That is no derivative of this law: it tells what comes of b.
     parting : array_like, shape () or (C,)
-        Share of the derivative while a contact parts, for a law whose history is rescaled: 0 that of contacts which
+        Share of the derivative while a contact parts, for a law that rescales slips: 0 that of contacts which
         close, 1 that of contacts which part, and by default 1/2, the first harmonic of a small vibration
         (:mod:`~faultgouge.analysis.packing.law`).
+    sliding : array_like of bool, shape () or (C,)
+        Which contacts slide on if they are at Coulomb's bound, for Coulomb's slider, which has two derivatives there.
+        By default they stick, as contacts do that a small vibration has shaken.
 
     Returns
     -------
@@ -95,7 +99,7 @@ def stiffness_matrix(
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry
-    law = packing.law.derivatives(overlap, contacts.slip, parting)
+    law = packing.law.derivatives(overlap, contacts.slip, parting, sliding)
     if coupled is not None:
         law = law._replace(overlap_derivative=np.where(coupled, law.overlap_derivative, 0.0))
     return assembled(contact_terms(law, normal.T, distance, pairs, form), contacts.i, contacts.j[:pairs], len(packing))

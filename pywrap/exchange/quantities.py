@@ -19,7 +19,7 @@ from ...analysis.files.runfile_header import unusual
 from ...analysis.packing.arrays import Floats
 from .disks import Slips
 
-KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
+KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "coulomb", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
 """Names of law, load and inertia in files."""
 
 

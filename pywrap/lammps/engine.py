@@ -294,7 +294,7 @@ class Engine:
                 kt=law.kt,
                 mu=law.mu,
                 exponent=law.exponent,
-                history="rescaled" if law.rescaled else "total",
+                history=law.history,
                 fx=packing.fx,
                 fy=packing.fy,
                 inertia=packing.inertia_factor,

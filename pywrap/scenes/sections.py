@@ -32,9 +32,10 @@ class Law(Section):
         `reproduce` take every one and all else the first.
     exponent : float
         p of the repulsion kn overlap^p: 1.5 (Hertz, the paper's) or 1 (harmonic disks).
-    history : {"total", "rescaled"}
+    history : {"total", "rescaled", "coulomb"}
         What contacts remember: the whole slip, as in the paper, or the slip rescaled while overlaps grow, which creates
-        no energy (:mod:`~faultgouge.analysis.packing.law`).
+        no energy, or the force of a spring behind Coulomb's slider: the law of Cundall and Strack, without the paper's
+        smoothing, which creates no energy either (:mod:`~faultgouge.analysis.packing.law`).
     """
 
     kn: Positive
@@ -42,7 +43,7 @@ class Law(Section):
     kt: NotNegative = Field("2/7 kn")  # type: ignore[assignment]
     mu: float | tuple[float, ...] = 1.0
     exponent: float = 1.5
-    history: Literal["total", "rescaled"] = "total"
+    history: Literal["total", "rescaled", "coulomb"] = "total"
 
     @model_validator(mode="before")
     @classmethod

@@ -104,8 +104,9 @@ def settled_bed(
 
 def law_of(scene: Scene, mu: float) -> MindlinLaw:
     cn, ct = (scene.damping.cn, scene.damping.ct) if scene.damping else (0.0, 0.0)
-    rescaled = scene.law.history == "rescaled"
-    return MindlinLaw(scene.law.kn, scene.law.kt, mu, scene.law.exponent, cn, ct, rescaled)
+    law, history = scene.law, scene.law.history
+    memory = {"rescaled": history == "rescaled", "coulomb": history == "coulomb"}
+    return MindlinLaw(law.kn, law.kt, mu, law.exponent, cn, ct, **memory)
 
 
 def load_of(scene: Scene) -> dict[str, Any]:

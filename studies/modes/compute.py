@@ -241,7 +241,7 @@ def _load(packing: Packing) -> dict[str, Any]:
         row |= {"participation": float(pair.participation[0]), "rotation": float(pair.rotation[0])}
     if len(packing) <= SMALL:
         row["b_of"] = switched(packing)
-        if packing.law.rescaled:
+        if packing.law.rescales:
             row["while"] = parting(packing)
     digits = [[float(f"{w.real:.{DIGITS}g}"), float(f"{w.imag:.{DIGITS}g}")] for w in found.omega.tolist()]
     return row | {"frequencies": digits}
