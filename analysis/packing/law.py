@@ -78,7 +78,7 @@ default) is the first harmonic of a small vibration: the rate of the force is
 :math:`a \dot s + \tfrac12 (b_+ + b_-) \dot\delta + \tfrac12 (b_+ - b_-) |\dot\delta|`, and the last term has no
 component at the frequency of :math:`\dot\delta`. The last term makes the force fall a little with each period, so
 that no operator says all: D(t) grows in LAMMPS more slowly than the mean of both says, by 5 % in the median of ten
-packings, at most by 35 % (4.60 for 4.74 in one with 5.57 and 3.77 to either side, tests/plugin/test_rescaled.py). As no
+packings, at most by 35 % (4.60 for 4.74 in one with 5.57 and 3.77 to either side, tests/plugin/test_history.py). As no
 contact creates energy, what grows is taken from what contacts and load have stored. A contact of elastic bodies
 (Mindlin and Deresiewicz) that is loaded a little and unloaded again follows :math:`b_+` both ways, since the annulus
 that parts carries no shear yet.

@@ -55,7 +55,9 @@ def back(disks):
     return packing_of(disks, MindlinLaw(**law), upper_layer(disks, None), **given, drag_time=drag_time)
 
 
-@pytest.mark.parametrize("kind", ["as it is", "open sides", "compensated", "rescaled", "no contacts", "far image"])
+@pytest.mark.parametrize(
+    "kind", ["as it is", "open sides", "compensated", "rescaled", "coulomb", "no contacts", "far image"]
+)
 def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
     packing, c = sheared, sheared.contacts
     if kind == "open sides":
@@ -65,8 +67,8 @@ def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
     elif kind == "compensated":
         low = 1e-18 * np.arange(len(c))
         packing = replace(packing, position_low=packing.position * 1e-17, contacts=c.slipped(c.slip, low))
-    elif kind == "rescaled":
-        packing = replace(packing, law=replace(packing.law, rescaled=True))
+    elif kind in ("rescaled", "coulomb"):
+        packing = replace(packing, law=replace(packing.law, **{kind: True}))
     elif kind == "no contacts":
         packing = replace(packing, contacts=Contacts([], [], []))
     elif kind == "far image":
