@@ -70,6 +70,7 @@ def test_a_wrong_page_is_found_out(tmp_path):
         pytest.param("docs/decks.md", 4, 0, marks=pytest.mark.ranks),
         ("docs/tutorial.md", None, 5),
         ("docs/api.md", None, 1),
+        ("docs/howto_sweep.md", 2, 0),
     ],
 )
 def test_a_page_shows_what_its_commands_print(tmp_path, page, count, pictures):

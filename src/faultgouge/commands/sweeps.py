@@ -29,7 +29,8 @@ def sweep(
 ) -> None:
     """One task for every scene of a product of keys: results.jsonl, the table results.csv, and a picture.
 
-    A sweep names a task (onset, triggering, ...); below [sweep] lists of values
+    A sweep names a task (onset, triggering, ..., or a function of your own as
+    "file.py:function"); below [sweep] lists of values
     or ranges for any keys of a scene, as in "packing.seed" = "1:200"; and below
     [scene.SECTION] what all scenes share. Every result is written as it ends,
     and the same command goes on where it was cut off. A scene that fails
@@ -47,7 +48,7 @@ def sweep(
         if is_root():
             known = stored(output / LINES)
             missing = [point for point in part_of(wanted.points, part) if point.key not in known]
-            for line in estimate(wanted.task, missing):
+            for line in estimate(wanted.task, missing, known.values()):
                 say(line)
         return
     keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there")
