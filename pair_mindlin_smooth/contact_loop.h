@@ -84,7 +84,8 @@ FAULTGOUGE_INLINE int with_friction(Features features, ContactPairs &pairs, cons
                             : all_forces<Variant<Number, P, Friction::SLIDER_LOOKED_AT, DAMPED>>(pairs, rest...);
   if (!features.advance) return all_forces<Variant<Number, P, Friction::LOOKED_AT, DAMPED>>(pairs, rest...);
   if constexpr (P == Exponent::HERTZ)
-    if (features.history == History::RESCALED) return all_forces<Variant<Number, P, Friction::RESCALED, DAMPED>>(pairs, rest...);
+    if (features.history == History::RESCALED)
+      return all_forces<Variant<Number, P, Friction::RESCALED, DAMPED>>(pairs, rest...);
   return all_forces<Variant<Number, P, Friction::ADVANCED, DAMPED>>(pairs, rest...);
 }
 

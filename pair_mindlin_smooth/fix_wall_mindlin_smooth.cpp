@@ -273,8 +273,8 @@ template <class NUMBER, bool FRICTION, bool DAMPED> void FixWallMindlinSmooth::c
     rates = {felt[1], -(felt[0] + radius * felt[2])};
   }
   const bool counted = dissipating && advance && FRICTION;
-  const auto [normal, tangential, kept, limit, slid, dashpot_power] =
-      faultgouge::floor_contact(law, overlap, slip, increment, rates, {FRICTION, advance, DAMPED, law.history, counted});
+  const auto [normal, tangential, kept, limit, slid, dashpot_power] = faultgouge::floor_contact(
+      law, overlap, slip, increment, rates, {FRICTION, advance, DAMPED, law.history, counted});
   if (counted) contact[size_peratom_cols - 1] += slid + dashpot_power * update->dt;
   if constexpr (FRICTION) {
     contact[TANGENTIAL] = value(tangential);

@@ -63,14 +63,14 @@ contact slips out, is pressed, and slips back (Elata and Berryman, Mech. Mater. 
 
 .. math:: f_t = -k_t \delta^{p-1} s, \qquad |s| \le t^*,
 
-the contact is a spring behind a slider that gives way at :math:`\mu f_n` and sticks as soon as the motion turns back: the
-standard law of granular simulations (Cundall and Strack, Geotechnique 29, 47 (1979)). The history *coulomb* is this
-force with rescaled slips: the force is what the contact remembers, :math:`s = -f_t/(k_t \delta^{p-1})` is the stretch of
-the spring, :math:`W = k_t \delta^{p-1} s^2/2`, and no path creates energy, for p = 1 and without rescaling, either.
-With p = 3/2 the law is LAMMPS's mindlin_rescale/force (Thornton, Cummins and Cleary, Powder Technol. 233, 30 (2013)),
-whose stiffnesses have the root of an effective radius besides. LAMMPS keeps the force and reduces it by the ratio of
-contact radii, :math:`\sim \sqrt\delta`, while they fall; that is the slip kept. It leaves the force alone while they
-grow; that is the slip rescaled. LAMMPS's mindlin/force, without the rescaling, creates energy where a contact is
+the contact is a spring behind a slider that gives way at :math:`\mu f_n` and sticks as soon as the motion turns back:
+the standard law of granular simulations (Cundall and Strack, Geotechnique 29, 47 (1979)). The history *coulomb* is
+this force with rescaled slips. The force is what the contact remembers, :math:`s = -f_t/(k_t \delta^{p-1})` is the
+stretch of the spring, :math:`W = k_t \delta^{p-1} s^2/2`, and no path creates energy. (Nor does one for p = 1, where
+there is nothing to rescale.) With p = 3/2 the law is LAMMPS's mindlin_rescale/force (Thornton, Cummins and Cleary,
+Powder Technol. 233, 30 (2013)), whose stiffnesses have the root of an effective radius besides. LAMMPS keeps the
+force and reduces it by the ratio of contact radii, :math:`\sim \sqrt\delta`, while they fall; that is the slip kept. It
+leaves the force alone while they grow; that is the slip rescaled. LAMMPS's mindlin/force, without the rescaling, creates energy where a contact is
 unloaded; its mindlin_rescale, which rescales a slip and not the force, creates energy where a contact is loaded.
 Harmonic disks have one stiffness, which nothing rescales, and the smoothing alone makes their forces depend on the
 overlap.
@@ -87,17 +87,19 @@ default) is the first harmonic of a small vibration: the rate of the force is
 component at the frequency of :math:`\dot\delta`. The last term makes the force fall a little with each period, so
 that no operator says all: D(t) grows in LAMMPS more slowly than the mean of both says, by 5 % in the median of ten
 packings, at most by 35 % (4.60 for 4.74 in one with 5.57 and 3.77 to either side, tests/plugin/test_history.py). As no
-contact creates energy, what grows is taken from what contacts and load have stored. Coulomb's slider has
-
-.. math:: a = -k_t \delta^{p-1}, \qquad b_+ = 0, \qquad b_- = (p - 1) f_t/\delta
-
-while it sticks, and a = 0, :math:`b = p f_t/\delta` while it slides on. At the bound it does either, as the motion has
-it. The operator of small vibrations takes all contacts as sticking, with the mean :math:`b = f_t/(4\delta)` for p = 3/2:
-a contact at the bound gives way in the first periods, until the vibration no longer reaches the bound (it is *shaken
-down*). The share of :math:`b_-`, and which contacts at the bound slide on, may be given. Newton's method takes each
-contact as its displacement has it: those that arrive at the bound slide. A contact of elastic bodies
+contact creates energy, what grows is taken from what contacts and load have stored. A contact of elastic bodies
 (Mindlin and Deresiewicz) that is loaded a little and unloaded again follows :math:`b_+` both ways, since the annulus
 that parts carries no shear yet.
+
+Coulomb's slider has, while it sticks,
+
+.. math:: a = -k_t \delta^{p-1}, \qquad b_+ = 0, \qquad b_- = (p - 1) f_t/\delta,
+
+and a = 0, :math:`b = p f_t/\delta` while it slides on. At the bound it does either, as the motion has it. The operator
+of small vibrations takes all contacts as sticking, with the mean :math:`b = f_t/(4\delta)` for p = 3/2: a contact at the
+bound gives way in the first periods, until the vibration no longer reaches the bound (it is *shaken down*). The share
+of :math:`b_-`, and which contacts at the bound slide on, may be given. Newton's method takes each contact as its
+displacement has it: those that arrive at the bound slide.
 
 :math:`k_n, k_t, C_N` and :math:`C_T` are constants per length\ :sup:`p-1`; no effective radius enters. :math:`\mu = 0`
 or :math:`k_t = 0` means no tangential force at all, and no memory of the slip.
@@ -166,8 +168,8 @@ class MindlinLaw:
     Raises
     ------
     ValueError
-        If a parameter is not finite or has the wrong sign, the exponent is another one, nothing can be rescaled, or there
-        are two histories.
+        If a parameter is not finite or has the wrong sign, the exponent is another one, nothing can be rescaled, or
+        there are two histories.
     """
 
     kn: float
@@ -351,9 +353,7 @@ class MindlinLaw:
             self._overlap_factor(x, parting) * (-self.kt * steep),
         )
 
-    def dashpots(
-        self, overlap: ArrayLike, slip: ArrayLike, sliding: ArrayLike = False
-    ) -> tuple[Floats, Floats]:
+    def dashpots(self, overlap: ArrayLike, slip: ArrayLike, sliding: ArrayLike = False) -> tuple[Floats, Floats]:
         """Coefficients of the dashpots of small velocities, force time / length.
 
         Parameters

@@ -233,7 +233,7 @@ def _scene(scene: Path | None, values: dict[str, Any]) -> Scene:
         return Scene.from_toml(scene, packing={})
     damping = {key: values[key] for key in ("cn", "ct", "tau") if key in values}
     law: dict[str, Any] = {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values}
-    law |= {"history": name for name in ("rescaled", "coulomb") if values.get(name)}
+    law["history"] = next((name for name in ("rescaled", "coulomb") if values.get(name)), "total")
     sections = {"packing": {}, "law": law, "load": {"fy": values["fy"]}}
     return Scene.from_mapping(sections | ({"damping": damping} if damping else {}))
 
