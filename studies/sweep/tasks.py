@@ -16,8 +16,6 @@ from typing import Any
 from ...pywrap import Scene
 from ...pywrap.scenes.study_sections import Modes
 from ..eruptions.study import eruptions_of
-from ..genericity.levels import growth, levels
-from ..genericity.surrogates import surrogates
 from ..modes.compute import modes
 from ..modes.loss import loss
 from ..modes.lossy_runs import lossy_runs
@@ -102,10 +100,6 @@ TASKS: Mapping[str, Task] = {
     "random matrices": Task(random_matrices, lambda scene: 3 * _modes(scene)),
     # the path to static yield, fifteen runs from equilibria and four with a load that rises
     "yield": Task(yielding, lambda scene: 60.0 * _disks(scene)),
-    # dense decompositions
-    "levels": Task(levels, lambda scene: 0.1 * _disks(scene) ** 3),
-    "growth": Task(growth, lambda scene: 0.1 * _increments(scene) * _disks(scene) ** 3),
-    "surrogates": Task(surrogates, lambda scene: 3 * _onset(scene)),
 }
 
 

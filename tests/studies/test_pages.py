@@ -7,13 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from reference_layer import parted
 from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import RunFile
 from faultgouge.figures.pages import WIDTH, filled
 from faultgouge.figures.style import spared
-from faultgouge.studies.genericity.page import write_page
 from faultgouge.studies.packings import distance
 from faultgouge.studies.sweep.draw import draw_sweep
 from faultgouge.studies.yielding.compute import CONTROLLED
@@ -58,20 +56,6 @@ def test_an_interrupt_is_no_failed_picture(said):
     with pytest.raises(KeyboardInterrupt), spared("x.png", said.append):
         raise KeyboardInterrupt
     assert said == []
-
-
-def test_genericity_keeps_its_numbers_and_its_page_which_are_those_of_the_docs(tmp_path, no_pictures, said):
-    docs = DOCS / "genericity"
-    for table in (*docs.glob("*/results.csv"), docs / "made.json"):
-        (tmp_path / table.relative_to(docs)).parent.mkdir(exist_ok=True)
-        shutil.copy(table, tmp_path / table.relative_to(docs))
-    write_page(tmp_path, said.append)
-    assert (tmp_path / "genericity.md").read_text() == (docs / "genericity.md").read_text()
-    (words, found), (stored, expected) = (parted(each / "genericity.json") for each in (tmp_path, docs))
-    assert words == stored
-    assert found == pytest.approx(expected, rel=1e-12)
-    assert len(said) == 4
-    assert all("was not drawn (RuntimeError: no font at all)" in sentence for sentence in said)
 
 
 def test_a_spectrum_keeps_its_eigenvalues_and_draw_its_words(
