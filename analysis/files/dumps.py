@@ -157,8 +157,8 @@ def _law(given: Mapping[str, float], disks: Path) -> MindlinLaw:
     try:
         kn, kt, mu = (given[name] for name in ("kn", "kt", "mu"))
         more = {name: given[name] for name in ("exponent", "cn", "ct") if name in given}
-        history = {name: bool(given.get(name)) for name in ("rescaled", "coulomb")}
-        return MindlinLaw(kn, kt, mu, **history, **more)
+        rescaled, coulomb = bool(given.get("rescaled")), bool(given.get("coulomb"))
+        return MindlinLaw(kn, kt, mu, rescaled=rescaled, coulomb=coulomb, **more)
     except KeyError as error:
         sidecar = disks.with_suffix(".params")
         raise PackingFileError(f"The law of {disks} is not given: {sidecar} does not name {error}.") from None

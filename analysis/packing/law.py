@@ -70,10 +70,10 @@ stretch of the spring, :math:`W = k_t \delta^{p-1} s^2/2`, and no path creates e
 there is nothing to rescale.) With p = 3/2 the law is LAMMPS's mindlin_rescale/force (Thornton, Cummins and Cleary,
 Powder Technol. 233, 30 (2013)), whose stiffnesses have the root of an effective radius besides. LAMMPS keeps the
 force and reduces it by the ratio of contact radii, :math:`\sim \sqrt\delta`, while they fall; that is the slip kept. It
-leaves the force alone while they grow; that is the slip rescaled. LAMMPS's mindlin/force, without the rescaling, creates energy where a contact is
-unloaded; its mindlin_rescale, which rescales a slip and not the force, creates energy where a contact is loaded.
-Harmonic disks have one stiffness, which nothing rescales, and the smoothing alone makes their forces depend on the
-overlap.
+leaves the force alone while they grow; that is the slip rescaled. LAMMPS's mindlin/force, without the rescaling,
+creates energy where a contact is unloaded; its mindlin_rescale, which rescales a slip and not the force, creates
+energy where a contact is loaded. Harmonic disks have one stiffness, which nothing rescales, and the smoothing alone
+makes their forces depend on the overlap.
 
 **Two derivatives.** A rescaled force has another b where the overlap grows than where the overlap falls,
 
@@ -96,9 +96,9 @@ Coulomb's slider has, while it sticks,
 .. math:: a = -k_t \delta^{p-1}, \qquad b_+ = 0, \qquad b_- = (p - 1) f_t/\delta,
 
 and a = 0, :math:`b = p f_t/\delta` while it slides on. At the bound it does either, as the motion has it. The operator
-of small vibrations takes all contacts as sticking, with the mean :math:`b = f_t/(4\delta)` for p = 3/2: a contact at the
-bound gives way in the first periods, until the vibration no longer reaches the bound (it is *shaken down*). The share
-of :math:`b_-`, and which contacts at the bound slide on, may be given. Newton's method takes each contact as its
+of small vibrations takes all contacts as sticking, with the mean :math:`b = f_t/(4\delta)` for p = 3/2: a contact at
+the bound gives way in the first periods, until the vibration no longer reaches the bound (it is *shaken down*). The
+share of :math:`b_-`, and which contacts at the bound slide on, may be given. Newton's method takes each contact as its
 displacement has it: those that arrive at the bound slide.
 
 :math:`k_n, k_t, C_N` and :math:`C_T` are constants per length\ :sup:`p-1`; no effective radius enters. :math:`\mu = 0`
