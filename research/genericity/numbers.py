@@ -186,6 +186,7 @@ def levels(table: Table) -> dict[str, Any]:
         means = {name: _mean(values[mine]) for name, values in columns.items()}
         rows.append({"disks": int(number), "packings": int(mine.sum())} | means)
     exponents = {name: _slope(disks, values) for name, values in columns.items() if name != "ratio"}
+    exponents["coupling over spacing"] = _slope(disks, columns["coupling"] / columns["spacing"])
     return {
         "rows": rows,
         "exponents": exponents,

@@ -15,7 +15,7 @@ from faultgouge.figures.style import spared
 from faultgouge.studies.packings import distance
 from faultgouge.studies.sweep.draw import draw_sweep
 from faultgouge.studies.yielding.compute import CONTROLLED
-from faultgouge.studies.yielding.page import numbers, rows_of, text, write_lasting
+from faultgouge.studies.yielding.page import numbers, rows_of, text, worst_ends, write_lasting
 
 DOCS = Path(__file__).parents[2] / "docs"
 ROWS, FAILED = rows_of(DOCS / "yield" / "tables" / "quartz_100.jsonl")
@@ -85,12 +85,20 @@ def test_the_page_of_yield_is_that_of_its_table():
     assert (DOCS / "yield" / "yield.md").read_text() == text(numbers(ROWS), len(ROWS), FAILED)
 
 
-def test_layers_without_loss_flow_below_their_static_yield_and_lossy_ones_do_not():
+def test_flow_is_told_from_a_layer_that_finds_no_rest_under_drag():
+    worst = worst_ends(ROWS, 1.0)
+    runs = [[run for run in row["dynamic"] if run["restitution"] == 1.0] for row in ROWS]
+    flowing = sum(any(run["ends"] == "flows" for run in each) for each in runs)
+    assert worst["counts"]["flows"]["count"] == flowing == 9
+    assert sum(each["count"] for each in worst["counts"].values()) == numbers(ROWS)["yields"][0]["unrest"]
+
+
+def test_layers_without_loss_do_not_rest_below_their_static_yield_and_lossy_ones_do():
     assert all(row["static"] >= row["newton"] for row in ROWS)
     undamped, *lossy = numbers(ROWS)["yields"]
-    assert undamped["flow"] > len(ROWS) / 2
+    assert undamped["unrest"] > len(ROWS) / 2
     assert undamped["share"][2] < 1
-    assert all(each["flow"] == 0 and each["share"] == [1, 1, 1] for each in lossy)
+    assert all(each["unrest"] == 0 and each["share"] == [1, 1, 1] for each in lossy)
     # with more loss the same layers flow as the load rises, and all of them beyond the end of Newton's branch
     flowing = {0.9: [], 0.5: [], 0.1: []}
     for k, row in enumerate(ROWS):
@@ -113,6 +121,6 @@ def test_the_page_of_layers_left_to_themselves_is_that_of_its_tables_and_other_p
     written = write_lasting(tmp_path).read_text()
     assert (DOCS / "yield" / "further.md").read_text() == written
     referee = " ".join((DOCS / "modes" / "referee.md").read_text().split())
-    assert "restitution 0.9, 5 of 20 (11 to 47 %) layers vibrate" in " ".join(written.split())
-    assert "[lossy layers](../yield/further.md), 5 of 20, vibrate" in referee
-    assert "5 of 20 vibrate on" in referee
+    assert "one draw of noise for each layer, 5 of 20 (11 to 47 %) layers vibrate" in " ".join(written.split())
+    assert "5 of 20 with one draw of noise each, vibrate" in referee
+    assert "5 of 20 vibrate on with the noise that they were given" in referee
