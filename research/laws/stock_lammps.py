@@ -1,13 +1,14 @@
-r"""Does a layer with loss begin to move at a fifth of its overburden? Stock LAMMPS, and the smoothed law beside it.
+r"""Does motion grow with loss at a fifth of the overburden? Stock LAMMPS, and this program's laws beside it.
 
-    python research/laws/stock_lammps.py [--seeds 1 2 3] [--laws granular smooth] [-o FILE.jsonl]
+    python research/laws/stock_lammps.py [--seeds 1 2 3] [--laws granular coulomb smooth] [-o FILE.jsonl]
 
-A packing of 100 disks that has settled without friction is given to LAMMPS as a data file. From there on the deck below
-is the only code: pair_style granular and fix wall/gran with hertz and mindlin_rescale/force, fix nve/sphere disc, or the
-same deck with mindlin/smooth. F_x rises to 0.2 F_y while fix viscous damps, stays until the disks rest, and then
-nothing damps but the dashpots of the contacts (a restitution of about 0.9). Small random velocities are added, and the
-kinetic energy says whether motion grows. LAMMPS's stiffnesses have the root of the effective radius, R_i R_j/(R_i + R_j)
-or R_i at the wall, and its viscoelastic dashpots the effective mass besides: both are divided out, type by type.
+A packing of 100 disks that has settled without friction is given to LAMMPS as a data file. From there on the deck
+below is the only code: pair_style granular and fix wall/gran with hertz and mindlin_rescale/force, fix nve/sphere
+disc, or the same deck with mindlin/smooth. F_x rises to 0.2 F_y while fix viscous damps, stays until the disks rest,
+and then nothing damps but the dashpots of the contacts (a restitution of about 0.9). Small random velocities are
+added, and the kinetic energy says whether motion grows. LAMMPS's stiffnesses have the root of the effective radius,
+R_i R_j/(R_i + R_j) or R_i at the wall, and its viscoelastic dashpots the effective mass besides: both are divided out,
+type by type.
 """
 
 import argparse
@@ -25,7 +26,7 @@ from faultgouge.pywrap.lammps.data_file import box_lines
 
 KN, KT, MU, FY = 2e5, 2e5 * 2 / 7, 1.0, 3.0
 DASHPOT = 171.0
-"""C_N = C_T of grains of quartz with a restitution of 0.9 at 1 m/s, in these units (docs/units.md)."""
+"""C_N = C_T; the C_N of quartz with a restitution of 0.9 at 1 m/s, in these units (docs/units.md)."""
 
 DECK = """
 units           lj
