@@ -57,8 +57,6 @@ check: $(VENV)/.check
 	$(BIN)/ruff check .
 	$(BIN)/clang-format --dry-run --Werror pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp analysis/factors/*.cpp
 	MYPYPATH=src $(BIN)/mypy -p faultgouge
-	MYPYPATH=src:docs/modes $(BIN)/mypy docs/modes/*.py
-	MYPYPATH=src $(BIN)/mypy docs/yield/*.py
 	MYPYPATH=src:. $(BIN)/mypy -p research
 
 format: $(VENV)/.check

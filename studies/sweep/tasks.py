@@ -17,13 +17,9 @@ from ...pywrap import Scene
 from ...pywrap.scenes.study_sections import Modes
 from ..eruptions.study import eruptions_of
 from ..modes.compute import modes
-from ..modes.loss import loss
-from ..modes.lossy_runs import lossy_runs
-from ..modes.random_matrices import random_matrices
 from ..packings import Start
 from ..trigger.compute import settings
 from ..trigger.study import trigger
-from ..yielding.compute import yielding
 from .onset import onset
 from .points import Point
 from .table import Row
@@ -84,22 +80,12 @@ def _modes(scene: Scene) -> float:
     return 0.02 * _loads(scene) * _disks(scene) ** 2.7 + 3e-3 * _increments(scene) * _disks(scene)
 
 
-def _loss(scene: Scene) -> float:
-    """Pencils along a ramp: 8 s for 100 disks and 5 loads."""
-    return 1.6 * _loads(scene) * _disks(scene) ** 2.3
-
-
 TASKS: Mapping[str, Task] = {
     "onset": Task(onset, _onset),
     "triggering": Task(triggering, _triggering),
     "trigger": Task(trigger, _trigger),
     "eruptions": Task(eruptions_of, _eruptions),
     "modes": Task(modes, _modes),
-    "loss": Task(loss, _loss),
-    "lossy runs": Task(lossy_runs, _loss),
-    "random matrices": Task(random_matrices, lambda scene: 3 * _modes(scene)),
-    # the path to static yield, fifteen runs from equilibria and four with a load that rises
-    "yield": Task(yielding, lambda scene: 60.0 * _disks(scene)),
 }
 
 
