@@ -29,8 +29,10 @@ def box_lines(packing: Packing) -> list[str]:
     left, right = (0.0, period) if period is not None else (x.min() - margin, x.max() + margin)
     # open above: a layer that erupts has room for its own height twice more
     top = 3 * (y.max() + margin)
+    # LAMMPS makes bins along z, too: the disks lie in the plane z = 0, in a box as thick as one of them
+    thickness = float(packing.radius.min())
     return [
         f"{float(left)!r} {float(right)!r} xlo xhi",
         f"{-float(margin)!r} {float(top)!r} ylo yhi",
-        "-0.5 0.5 zlo zhi",
+        f"{-thickness!r} {thickness!r} zlo zhi",
     ]

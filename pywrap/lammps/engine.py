@@ -298,6 +298,8 @@ class Engine:
                 fx=packing.fx,
                 fy=packing.fy,
                 inertia=packing.inertia_factor,
+                mass=float(packing.mass.min()),
+                diameter=2 * float(packing.radius.min()),
                 precision="compensated" if packing.compensated else "double",
             )
             if law.damped:

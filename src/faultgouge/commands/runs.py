@@ -54,16 +54,16 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     """Raise F_x from equilibrium to equilibrium, each stored as it is reached."""
     from faultgouge.pywrap import Record
     from faultgouge.pywrap import ramp as ramp_up
-    from faultgouge.pywrap.runs.path import loads
+    from faultgouge.pywrap.runs.path import all_loads, count_behind
     from faultgouge.pywrap.scenes.refusals import needed
 
     wanted = read_scene(scene, "ramp")
     settings = needed(wanted.ramp, "ramp")
     with Record(output, wanted, saved=keeps) as record:
         start = _settled(wanted, record)
-        total, done = len(loads(settings)), round(start.fx / settings.step) + 1
+        total, done = len(all_loads(settings)), count_behind(settings, record.forces)
         dumps = output.with_suffix("") if wanted.output is not None and wanted.output.dumps else None
-        for equilibrium in progress(ramp_up(wanted, start, dumps=dumps), "equilibria", total, done):
+        for equilibrium in progress(ramp_up(wanted, start, dumps=dumps, behind=done), "equilibria", total, done):
             say_way(equilibrium)
             record.append(equilibrium)
         record.finish()
@@ -78,14 +78,14 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t)."""
     from faultgouge.analysis import RunFile
     from faultgouge.pywrap import Record, reach
+    from faultgouge.pywrap.runs.path import step_of
     from faultgouge.pywrap.scenes.refusals import needed
 
     wanted = read_scene(scene, "perturb")
     settings = needed(wanted.perturb, "perturb")
     with Record(output, wanted, task="perturb", saved=keeps) as record:
         if record.last is None:
-            step = wanted.ramp.step if wanted.ramp else 1e-3  # as in `reach`
-            total = ceil(settings.fx / step * (1 - 1e-9)) + 1
+            total = ceil(settings.fx / step_of(wanted) * (1 - 1e-9)) + 1
             for start in progress(reach(wanted, settings.fx), "equilibria", total):
                 say_way(start)
             _lines(wanted, start)  # refuses what the packing does not allow, before anything is written
