@@ -69,9 +69,8 @@ def ramp(
         for k, fx in enumerate(wanted[behind:].tolist(), behind):
             start = next_equilibrium(engine, start, fx, scene)
             if dumps is not None:
-                # in LAMMPS started anew, where contacts stand in an order that no earlier increment has a part in
-                with Engine(start.packing, communicator) as fresh:
-                    fresh.dump(Path(f"{dumps}.{k}"))
+                engine.restore(start.packing)  # what was found, and not what was tried last
+                engine.dump(Path(f"{dumps}.{k}"))
             yield start
 
 
