@@ -54,7 +54,7 @@ def test_a_run_goes_on_where_it_was_on_the_way():
     assert [count_behind(settings, whole[:k]) for k in range(len(whole) + 1)] == list(range(len(whole) + 1))
     assert count_behind(settings, all_loads(Ramp(step=0.1, until=0.15))) == 2  # goes on to 0.2
     assert count_behind(Ramp(step=0.1, until=0.15), whole[:4]) == 3  # has been there
-    with pytest.raises(SceneError, match="has gone to F_x = 0.1 where ramp.until leads to F_x = 0.3"):
+    with pytest.raises(SceneError, match=r"has gone to F_x = 0\.1 where ramp\.until leads to F_x = 0\.3"):
         count_behind(Ramp(step=0.1, until=0.5), whole[:4])
 
 
