@@ -14,6 +14,7 @@ name with the suffix ".params", which has one ``key value`` a line out of kn, kt
 cn, ct, tau, fx, fy, inertia_factor; what the caller gives wins.
 """
 
+import zlib
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ from ..packing.geometry import nearest_image
 from ..packing.law import MindlinLaw
 from ..packing.packing import Floats, Indices, Packing
 from .by_hand import PackingFileError
+from .text_files import open_text
 
 DISK = {
     "id": ("id",),
@@ -221,15 +223,15 @@ def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
         If the file is missing, or breaks off or is malformed before the snapshot asked for is complete.
     """
     try:
-        with open(path, encoding="utf-8") as file:
+        with open_text(path) as file:
             while True:
                 frame = _next_frame(file)
                 if frame is None:
                     return
                 yield frame
     except OSError as error:
-        raise PackingFileError(f"{path} cannot be read: {error.strerror}.") from error
-    except (ValueError, IndexError, StopIteration) as error:
+        raise PackingFileError(f"{path} cannot be read: {error.strerror or error}.") from error
+    except (ValueError, IndexError, StopIteration, EOFError, zlib.error) as error:
         raise PackingFileError(f"{path} is not a complete LAMMPS text dump: {error or 'it breaks off'}.") from error
 
 

@@ -8,10 +8,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+import numpy as np
 from mpi4py import MPI
 
 from ...analysis import RunFile
 from ...analysis.files.wholefile import check_folder
+from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Motion, Weakening
 from ..scenes.refusals import SceneError
@@ -86,6 +88,11 @@ class Record:
         row = {name: file.observable(name)[-1] for name in ("residual", "floor", "evaluations")}
         way = ways_of(file).get(len(file) - 1)
         return Equilibrium(file.packing(), float(row["residual"]), float(row["floor"]), int(row["evaluations"]), way)
+
+    @property
+    def forces(self) -> Floats:
+        """F_x of the equilibria in the file, force; the same on all ranks."""
+        return from_root(self.communicator, lambda: np.zeros(0) if self._file is None else self._file.fx)
 
     @property
     def complete(self) -> bool:

@@ -7,8 +7,8 @@ core of 2020, within a factor of three or so, and say whether to wait or to come
 
 A contact that carries the force f has :math:`\delta = (f/k_n)^{1/p}` and the stiffness
 :math:`k = p\, k_n \delta^{p-1}`, with p = 3/2 for Hertz. A time step is a share of :math:`(m/k)^{1/2}`, a disk falls
-under :math:`F_y` through the medium at the speed :math:`F_y^{1/2}`: their ratio, :math:`(k_n/F_y)^{1/3}` for Hertz,
-is what the steps of a settling grow with.
+under :math:`F_y` through the medium at the speed :math:`(F_y d/m)^{1/2}`, d its diameter: their ratio,
+:math:`(k_n d^{3/2}/F_y)^{1/3}` for Hertz, is what the steps of a settling grow with.
 """
 
 from __future__ import annotations
@@ -149,9 +149,12 @@ def estimated(scene: Keys, task: Task) -> Estimate:
     seconds = 0.0
     if task in ("ramp", "onset", "reproduce") and ramp is not None:
         # the layer slides on whatever bears it once F_x exceeds mu F_y
-        increments = min(ramp.until, max(scene.law.mus) * scene.load.fy + ramp.step) / ramp.step
+        way = ramp.length if task == "ramp" else abs(ramp.first)
+        if len(ramp.turning_points) == 1 or task != "ramp":
+            way = min(way, max(scene.law.mus) * scene.load.fy + ramp.step)
+        increments = way / ramp.step
     if task == "perturb" and perturb is not None:
-        increments = perturb.fx / (ramp.step if ramp is not None else 1e-3)
+        increments = perturb.fx / (ramp.step if ramp is not None else scene.load.fy / 3000)
     if ramp is not None and ramp.method == "overdamped":
         steps += increments * _overdamped_steps(scene)
     else:
@@ -281,10 +284,11 @@ def _law(scene: Keys) -> MindlinLaw:
 
 
 def _settling_steps(scene: Keys) -> float:
-    stiff = _stiffness(scene, FORCE_CHAINS * scene.load.fy)
-    if scene.packing.settle_friction if isinstance(scene.packing, GeneratedPacking) else False:
-        return SETTLING_WITH_FRICTION * 4 * stiff / scene.load.fy  # overdamped, with damping 1
-    return SETTLING * math.sqrt(8 * stiff / scene.load.fy) / 0.8
+    assert isinstance(scene.packing, GeneratedPacking)
+    stiff = _stiffness(scene, FORCE_CHAINS * scene.load.fy) * 2 * min(scene.packing.radii) / scene.load.fy
+    if scene.packing.settle_friction:
+        return SETTLING_WITH_FRICTION * 4 * stiff  # overdamped
+    return SETTLING * math.sqrt(8 * stiff) / 0.8
 
 
 def _overdamped_step(scene: Keys) -> float:
@@ -297,7 +301,8 @@ def _overdamped_steps(scene: Keys) -> float:
 
 
 def _undamped_step(scene: Keys) -> float:
-    lightest = min(1.0, scene.inertia_factor)
+    packing = scene.packing
+    lightest = min(1.0, scene.inertia_factor) * ((isinstance(packing, GeneratedPacking) and packing.mass) or 1.0)
     return 0.1 * math.sqrt(lightest / (6 * _stiffness(scene, scene.load.fy)))
 
 

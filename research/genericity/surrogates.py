@@ -47,7 +47,7 @@ def surrogates(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
     assert scene.ramp is not None
     seed = int(getattr(scene.packing, "seed", 0))
     drawn = randomized(pencil, np.random.default_rng(seed))
-    steps, narrowest = loads(scene.ramp), 1e-7 * scene.ramp.until
+    steps, narrowest = loads(scene.ramp), 1e-7 * scene.ramp.first
     row = {
         "linear": _first(lambda fx: csr_array(pencil.at(fx)), steps, narrowest),
         "random": _first(lambda fx: csr_array(drawn.at(fx)), steps, narrowest),

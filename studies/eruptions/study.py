@@ -97,7 +97,7 @@ def eruptions_of(scene: Scene, _: object) -> Result:
 
 def _checked(scene: Scene) -> Eruptions:
     """The section [eruptions] of a scene whose ramp reaches its loads."""
-    until = needed(scene.ramp, "ramp").until
+    until = needed(scene.ramp, "ramp").first
     if scene.eruptions is None:
         raise SceneError("the scene has no section [eruptions]: add it, with load, a list of F_x")
     last = max(scene.eruptions.load)

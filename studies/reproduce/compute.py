@@ -97,7 +97,7 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
 def recorded_ramp(scene: Scene, mu: float, path: Path) -> OnsetRun:
     """Ramp and onset for one friction coefficient; every equilibrium goes to the file."""
     one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
-    near = NEARBY * needed(scene.ramp, "ramp").until
+    near = NEARBY * needed(scene.ramp, "ramp").first
     path.unlink(missing_ok=True)
     with Record(path, one) as record:
         run = onset_run(one, mu, reached=record.append, near_onset=near)

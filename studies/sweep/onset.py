@@ -71,7 +71,7 @@ def first_window(path: EquilibriumPath, scene: Scene) -> tuple[Ends, float, Onse
     """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one."""
     assert scene.ramp is not None
     steps = loads(scene.ramp)
-    narrowest = 1e-7 * scene.ramp.until  # as find_onset takes it on the whole ramp
+    narrowest = 1e-7 * scene.ramp.first  # as find_onset takes it on the whole ramp
     # increment by increment where a search looks at the whole of what it is given
     parts = list(pairwise(steps)) if seeks_all(path.kept[0].packing) else [steps]
     for part in parts:

@@ -41,7 +41,7 @@ def _disks(scene: Scene) -> float:
 
 
 def _increments(scene: Scene) -> float:
-    return 1.0 if scene.ramp is None else scene.ramp.until / scene.ramp.step
+    return 1.0 if scene.ramp is None else abs(scene.ramp.first) / scene.ramp.step
 
 
 def _onset(scene: Scene) -> float:

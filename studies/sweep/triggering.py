@@ -40,8 +40,8 @@ from .onset import first_window
 
 Row = dict[str, Any]
 
-FINEST_STEP = 1e-3
-"""Increment of F_x below which a ramp only costs: onsets are solved for, and come out the same."""
+FINEST_STEP = 1 / 3000
+"""Increment of F_x, in units of F_y, below which a ramp only costs: onsets are solved for, and come out the same."""
 
 LONGEST_TIME = 200.0
 """Length of the undamped runs, time, at the most: with 100 disks, four of them take some 30 s."""
@@ -131,7 +131,7 @@ def economical(scene: Scene) -> Scene:
     """The scene with increments and undamped runs that take seconds a packing, see `FINEST_STEP` and `LONGEST_TIME`."""
     changes: dict[str, Any] = {}
     if scene.ramp is not None:
-        step = min(max(scene.ramp.step, FINEST_STEP), scene.ramp.until)
+        step = min(max(scene.ramp.step, FINEST_STEP * scene.load.fy), scene.ramp.first)
         changes["ramp"] = scene.ramp.model_copy(update={"step": step})
     if scene.perturb is not None:
         changes["perturb"] = scene.perturb.model_copy(update={"time": min(scene.perturb.time, LONGEST_TIME)})

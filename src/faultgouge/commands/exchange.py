@@ -200,7 +200,7 @@ def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[st
     values = options if scene else {**disks.given, **options}
     _refuse_gaps(disks, top, scene, values)
     layer = upper_layer(disks, top)
-    wanted = _scene(scene, values)
+    wanted = _scene(scene, values, float(disks.radius.min()))
     load = load_of(wanted) | {"fx": 0.0} | {key: values[key] for key in ("fx", "inertia_factor") if key in values}
     return packing_of(disks, law_of(wanted, wanted.law.mus[0]), layer, **load)
 
@@ -225,16 +225,17 @@ def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict
     raise BadInputError(f"{disks.source} does not say {missing}: add {options}, as in `{example}`{ways}")
 
 
-def _scene(scene: Path | None, values: dict[str, Any]) -> Scene:
-    """The scene, or one that says what options and file say."""
+def _scene(scene: Path | None, values: dict[str, Any], smallest: float) -> Scene:
+    """The scene, or one that says what options and file say; with disks of the smallest radius in place of its own."""
     from faultgouge.pywrap.scenes.scene import Scene
 
+    packing = {"radii": [smallest], "width": 20 * smallest}
     if scene is not None:
-        return Scene.from_toml(scene, packing={})
+        return Scene.from_toml(scene, packing=packing)
     damping = {key: values[key] for key in ("cn", "ct", "tau") if key in values}
     law: dict[str, Any] = {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values}
     law["history"] = next((name for name in ("rescaled", "coulomb") if values.get(name)), "total")
-    sections = {"packing": {}, "law": law, "load": {"fy": values["fy"]}}
+    sections = {"packing": packing, "law": law, "load": {"fy": values["fy"]}}
     return Scene.from_mapping(sections | ({"damping": damping} if damping else {}))
 
 

@@ -45,30 +45,37 @@ WhichColour = Annotated[
 @app.command(epilog="Example: faultgouge draw run.h5 --mode pair -o mode.svg")
 def draw(
     file: PackingFile,
-    frame: Frame = -1,
+    frame: Annotated[
+        int | None, typer.Option(help="Which equilibrium; negative ones count from the last.", show_default=False)
+    ] = None,
     mode: WhichMode = None,
     color: WhichColour = Colour.MOBILISED,
     output: Annotated[
         Path, typer.Option("-o", "--output", help="The picture: .png, .svg or .pdf.", show_default=True)
     ] = Path("picture.png"),
 ) -> None:
-    """Draw a stored packing, with its force chains or with one of its modes.
+    """Draw a stored packing, with its force chains or with one of its modes; or a cycle of loads.
 
     Disks are to scale: the upper layer is yellow, rattlers are hollow. Bars are
     contacts: their width is the normal force. Of a mode, arrows are displacements
     and colours rotations; participation ratio and share of rotation stand above.
+    A ramp with turning points is drawn as F_x over the displacement of the upper
+    layer, unless --frame or --mode asks for a packing.
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
-    packing = stored_packing(file, frame)
+    packing = stored_packing(file, -1 if frame is None else frame)
     if not is_root():
         return
-    from faultgouge.figures import draw_packing
+    from faultgouge.figures import draw_cycle, draw_packing
     from faultgouge.figures.mode import draw_modes
     from faultgouge.figures.packing import in_words
     from faultgouge.figures.style import save_as
 
-    if mode is None:
+    cycle = _cycle(file) if mode is None and frame is None else []
+    if cycle:
+        figure = draw_cycle(cycle)
+    elif mode is None:
         say(in_words(packing))
         figure = draw_packing(packing, color=color.value, caption=True)
     else:
@@ -164,6 +171,17 @@ def view(
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
     write_view(packings, output, title, series, lambda them: progress(them, "loads"))
     say(f"{len(packings)} loads, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
+
+
+def _cycle(file: Path) -> list[Packing]:
+    """The equilibria of a ramp with turning points; none of another file."""
+    from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.hysteresis import turning_points
+
+    if file.suffix == ".disks":
+        return []
+    with RunFile(file) as run:
+        return [run.packing(k) for k in range(len(run))] if turning_points(run.fx) else []
 
 
 def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int) -> Film:

@@ -1,7 +1,7 @@
 """What the commands share: their common options, and how they speak.
 
-Results go to files and, with --json, to standard output; progress and messages go to standard error. Rank 0 alone
-speaks.
+Results go to files and to standard output, as JSON or in words; progress and messages go to standard error. Rank 0
+alone speaks.
 """
 
 from __future__ import annotations
@@ -79,6 +79,12 @@ def say(message: str) -> None:
     """A line on standard error."""
     if is_root():
         print(message, file=sys.stderr)
+
+
+def tell(result: str) -> None:
+    """A line of the result on standard output, for people; `print_json` is for programs, and goes instead of it."""
+    if is_root():
+        print(result)
 
 
 def say_way(equilibrium: Equilibrium) -> None:
