@@ -21,6 +21,7 @@ from .packing.contacts import FLOOR, Contacts
 from .packing.geometry import ContactGeometry, nearest_image, touching
 from .packing.law import MindlinLaw
 from .packing.packing import Packing
+from .packing.solid_fraction import solid_fraction
 from .spectrum.buckling import negative_eigenvalues
 from .spectrum.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
 from .spectrum.spectrum import (
@@ -79,6 +80,7 @@ __all__ = [
     "normal_modes",
     "read_dump",
     "read_packing",
+    "solid_fraction",
     "spectrum",
     "stable_timestep",
     "stiffness_matrix",

@@ -142,8 +142,8 @@ class Spectrum(Tabled):
         real = self.eigenvalues.real
         span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
         return (
-            f"<Spectrum: {len(real)} eigenvalues{span}, {len(self.negative)} negative, {len(self.pairs)} complex pairs, "
-            f"{len(self.rattlers)} rattlers>"
+            f"<Spectrum: {len(real)} eigenvalues{span}, {len(self.pairs)} complex pairs, {len(self.negative)} negative "
+            f"eigenvalues, {len(self.rattlers)} rattlers>"
         )
 
     def _rows(self) -> dict[str, str]:
@@ -161,6 +161,11 @@ class Spectrum(Tabled):
     def is_stable(self) -> bool:
         """Whether no motion grows: no believable complex pair, and no negative eigenvalue beyond noise."""
         return not self.pairs and not len(self.negative)
+
+    @property
+    def free(self) -> int:
+        """Number of eigenvalues that are zero within rounding: such a motion meets no force, and drifts."""
+        return int(np.count_nonzero(np.abs(self.eigenvalues) <= SAFETY * self.rounding))
 
     @property
     def least_q(self) -> float:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import Growth, RunFile, Spectrum, discrete_frequency, fit_growth, spectrum
+from ...analysis import Growth, RunFile, Spectrum, discrete_frequency, fit_growth, solid_fraction, spectrum
 from ...analysis.onset.pair_form import pair_eigenvalues
 from ...analysis.packing.packing import Floats
 from ...figures.pair import PairCurve
@@ -169,6 +169,7 @@ def summary_of(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> dict[st
                 "floor": run.equilibria[-1].floor,
                 "contacts": len(run.equilibria[0].packing.contacts),
                 "rattlers": run.equilibria[0].packing.rattlers.tolist(),
+                "solid_fraction": solid_fraction(run.equilibria[0].packing),
                 "flows_beyond": run.flows_beyond,
                 "onset": run.onset.as_dict(),
             }

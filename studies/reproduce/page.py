@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis.packing.solid_fraction import solid_fraction, solid_fraction_below_top
 from ...figures.pages import render
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
@@ -28,12 +29,14 @@ def report(
     `found` is a sentence where there is nothing to trigger, and None if no scene asks for it; `another` has the ramps
     of the packing that is triggered, if it is another one.
     """
+    settled = runs[0].equilibria[0].packing
     order = sorted(runs, key=lambda run: run.mu)
     triggering = found if isinstance(found, Triggering) else None
     return render(
         __package__ or "",
         "report.md.j2",
-        packing=runs[0].equilibria[0].packing,
+        packing=settled,
+        solid_fraction=(solid_fraction(settled), solid_fraction_below_top(settled)),
         ramp=scene.ramp,
         runs=runs,
         last=runs[0].equilibria[-1],
