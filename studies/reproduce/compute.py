@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import Growth, RunFile, Spectrum, discrete_frequency, fit_growth, solid_fraction, spectrum
+from ...analysis import Growth, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
 from ...analysis.onset.pair_form import pair_eigenvalues
 from ...analysis.packing.packing import Floats
 from ...figures.pair import PairCurve
@@ -86,9 +86,11 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
             f"F_x = {fx:g} is below the onset {weakened[0].onset.fx_c:g} of the weakened friction, too: no "
             "window between the two, and nothing to erupt."
         )
-    if fx >= run.onset.fx_c:
-        return f"F_x = {fx:g} is above the onset {run.onset.fx_c:g}: nothing is stable there to be triggered."
     *_, start = reach(scene, fx)  # to the bit the one of `perturb`, and so is v_0
+    modes = spectrum(start.packing)
+    if not modes.is_stable:
+        what = f"{len(modes.pairs)} complex pairs and {len(modes.negative)} negative eigenvalues"
+        return f"At F_x = {fx:g} the packing has {what} already: nothing is stable there to be triggered."
     lower = max(0.0, 2 * weakened[0].onset.fx_c - fx) if weakened else None
     control = None if lower is None else equilibrium_at(scene, run.equilibria, lower)
     return trigger(scene, start, control, run, path)
@@ -111,15 +113,14 @@ def growth_run(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
     spectra = [spectrum(each.packing) for each in candidates]
     best = int(np.argmax([_dominance(each) for each in spectra]))
     start, modes = candidates[best], spectra[best]
-    if not modes.pairs:
+    if not _dominance(modes):
         first = run.onset.windows[0]
         raise SceneError(
             f"no load of the ramp lies in a window of complex eigenvalues, of which the first begins at "
             f"F_x = {first.fx_onset:.6g}: take a smaller ramp.step, so that a run above the onset has where to start"
         )
     dt = time_step(start.packing)
-    fastest = max(modes.pairs, key=lambda pair: pair.growth_rate)
-    predicted = float(2 * np.abs(discrete_frequency(fastest.eigenvalue, dt).imag))
+    predicted = modes.growth_rate(dt)
     settings = Perturb(fx=start.fx, time=min(EFOLDS / predicted, LONGEST_RUN * dt), inertia_factor=scene.inertia_factor)
     # disks that have moved by a tenth of the smallest overlap certainly move otherwise than the spectrum says
     ceiling = (0.1 * start.packing.loaded(start.residual).geometry.overlap.min()) ** 2
@@ -151,7 +152,9 @@ def _growing(msd: Floats, ceiling: float) -> tuple[float, float]:
 
 
 def _dominance(modes: Spectrum) -> float:
-    """Growth rate of the fastest pair, less that of the second: how fast it gets ahead."""
+    """Growth rate of the fastest pair, less that of the second: how fast it gets ahead; 0 of a packing that buckles."""
+    if len(modes.negative):
+        return 0.0
     rates = sorted((pair.growth_rate for pair in modes.pairs), reverse=True)
     return rates[0] - (rates[1] if len(rates) > 1 else 0.0) if rates else 0.0
 

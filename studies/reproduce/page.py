@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis import Onset
 from ...analysis.packing.solid_fraction import solid_fraction, solid_fraction_below_top
 from ...figures.pages import render
 from ...pywrap import Scene
@@ -41,7 +42,7 @@ def report(
         runs=runs,
         last=runs[0].equilibria[-1],
         residual=max(each.residual for run in runs for each in run.equilibria),
-        mus_rise=all(a.onset.fx_c < b.onset.fx_c for a, b in pairwise(order)),
+        earlier=[_is_earlier(a.onset, b.onset) for a, b in pairwise(order)],
         growth=growth,
         triggering=triggering,
         says=found,
@@ -52,14 +53,21 @@ def report(
     )
 
 
+def _is_earlier(one: Onset, other: Onset) -> bool | None:
+    """Whether an onset comes before another one; None where their errors do not tell."""
+    apart = other.fx_c - one.fx_c
+    return None if abs(apart) <= one.error + other.error else apart > 0
+
+
 def _triggered(found: Triggering) -> dict[str, Any]:
     """What the section on triggering needs beside the runs."""
     numbers = summary(found)
+    jump = numbers["jump"]
     return {
         "numbers": numbers,
         "calibrated": isinstance(needed(found.scene.friction, "friction").v0, str),
         "highest_speed": float(np.abs(found.runs["erupting"]["layer_velocity"]).max()),
-        "jumped": float(np.log10(numbers["jump"] / numbers["largest_D"]["perturbed"])),
+        "jumped": None if jump is None else float(np.log10(jump / numbers["largest_D"]["perturbed"])),
         "above_noise": ABOVE_NOISE,
     }
 
