@@ -11,7 +11,7 @@ from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputEr
 from .files.by_hand import read_packing
 from .files.dumps import read_dump
 from .files.runfile import RunFile
-from .motion.growth import Growth, fit_growth, mean_square_displacement
+from .motion.growth import Growth, fit_growth, growth_of_run, mean_square_displacement
 from .motion.response import layer_force, linear_response
 from .motion.transient import NoGainError, TransientGain, transient_gain
 from .onset import Onset, OnsetError, Window, complex_windows, find_onset
@@ -69,6 +69,7 @@ __all__ = [
     "eigenvalues",
     "find_onset",
     "fit_growth",
+    "growth_of_run",
     "growth_rate",
     "largest_damping_rate",
     "largest_frequency",

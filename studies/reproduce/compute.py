@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import Growth, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
+from ...analysis import Growth, Packing, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
+from ...analysis.motion.growth import BELOW_TOP, growing_range
 from ...analysis.onset.pair_form import pair_eigenvalues
 from ...analysis.packing.packing import Floats
 from ...figures.pair import PairCurve
@@ -96,13 +97,13 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
     return trigger(scene, start, control, run, path)
 
 
-def recorded_ramp(scene: Scene, mu: float, path: Path) -> OnsetRun:
-    """Ramp and onset for one friction coefficient; every equilibrium goes to the file."""
+def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = None) -> OnsetRun:
+    """Ramp and onset for one friction coefficient, from a settled bed; every equilibrium goes to the file."""
     one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
     near = NEARBY * needed(scene.ramp, "ramp").until
     path.unlink(missing_ok=True)
     with Record(path, one) as record:
-        run = onset_run(one, mu, reached=record.append, near_onset=near)
+        run = onset_run(one, mu, reached=record.append, near_onset=near, bed=bed)
         record.finish()
     return run
 
@@ -134,21 +135,10 @@ def growth_run(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
         file.append_series("undamped", **series)
     time, msd = series["time"], series["msd"]
     try:
-        measured = fit_growth(time, msd, *_growing(msd, ceiling))
+        measured = fit_growth(time, msd, *growing_range(time, msd, min(ceiling, BELOW_TOP * float(msd.max()))))
     except ValueError:
         measured = None
     return GrowthRun(start, time, msd, modes, dt, predicted, measured)
-
-
-def _growing(msd: Floats, ceiling: float) -> tuple[float, float]:
-    """Bounds of D between which one pair grows alone: above the noise of all modes, below where D levels off.
-
-    The noise is what D shows in the first quarter of its way to the ceiling; three decades above it, the fastest pair
-    has left the others behind. Three decades below its largest value D has not levelled off.
-    """
-    upper = min(ceiling, 1e-3 * float(msd.max()))
-    way = int(np.argmax(msd >= upper))
-    return 1e3 * float(np.median(msd[: max(way // 4, 1)])), upper
 
 
 def _dominance(modes: Spectrum) -> float:
