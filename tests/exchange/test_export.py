@@ -278,6 +278,15 @@ def test_d_of_t_in_mdanalysis_is_that_of_the_run(run, mdanalysis, ours):
 
 
 @pytest.mark.slow
+def test_d_of_a_file_without_a_trajectory_is_refused(tmp_path, reference_packing, mdanalysis, ours):
+    with RunFile.create(tmp_path / "still.h5", reference_packing(1.0)) as file:
+        file.append(reference_packing(1.0))
+    universe = mdanalysis.Universe(str(tmp_path / "still.h5"))
+    with pytest.raises(PackingFileError, match="trajectory = true under"):
+        ours.MeanSquareDisplacement(universe.atoms)
+
+
+@pytest.mark.slow
 def test_no_equilibrium_follows_a_trajectory(run):
     path, packing, _ = run
     with RunFile(path, "a") as file, pytest.raises(ValueError, match="no equilibrium can follow"):

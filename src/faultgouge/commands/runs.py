@@ -120,7 +120,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         print(
             f"F_x = {packing.fx:g}, mu = {mus[0]:g}: D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}"
         )
-        print(growth.says)
+        print(growth.says, flush=True)  # before what follows on standard error
     say(f"written to {output}")
 
 
