@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from reference_layer import LAYER, toml
 
-from faultgouge.analysis import Contacts, MindlinLaw, RunFile, nearest_image, normal_modes
+from faultgouge.analysis import Contacts, MindlinLaw, PackingFileError, RunFile, nearest_image, normal_modes
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.exchange import (
     ModeVectors,

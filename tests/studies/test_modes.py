@@ -66,8 +66,9 @@ def test_a_packing_that_buckles_ends_its_branch_and_counts():
     found = counted(column).as_dict()
     assert (found["pairs"], found["negative"]) == (0, 1)
     assert found["growth_rate"] == pytest.approx(spectrum(column).growth_rate(), rel=1e-9)
-    scene = Scene.from_mapping(SCENE | {"modes": {"fx_over_fy": [0.0]}})
-    row = modes(scene, lambda mu: Equilibrium(column, column.residual, 1e-11, 1))
+    # the ramp has come to the first load of the scene, 0.02 F_y
+    there = Equilibrium(replace(column, fx=0.02 * 3.0), 0.0, 1e-11, 1)
+    row = modes(Scene.from_mapping(SCENE), lambda mu: there)
     assert (row["ends"], row["loads"]) == ("turning point", [])
 
 
