@@ -11,7 +11,7 @@ from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputEr
 from .files.by_hand import read_packing
 from .files.dumps import read_dump
 from .files.runfile import RunFile
-from .motion.growth import Growth, fit_growth, mean_square_displacement
+from .motion.growth import Growth, fit_growth, growth_of_run, mean_square_displacement
 from .motion.response import layer_force, linear_response
 from .motion.transient import NoGainError, TransientGain, transient_gain
 from .onset import Onset, OnsetError, Window, complex_windows, find_onset
@@ -21,6 +21,8 @@ from .packing.contacts import FLOOR, Contacts
 from .packing.geometry import ContactGeometry, nearest_image, touching
 from .packing.law import MindlinLaw
 from .packing.packing import Packing
+from .packing.solid_fraction import solid_fraction
+from .spectrum.buckling import negative_eigenvalues
 from .spectrum.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
 from .spectrum.spectrum import (
     ComplexPair,
@@ -67,6 +69,7 @@ __all__ = [
     "eigenvalues",
     "find_onset",
     "fit_growth",
+    "growth_of_run",
     "growth_rate",
     "largest_damping_rate",
     "largest_frequency",
@@ -74,9 +77,11 @@ __all__ = [
     "linear_response",
     "mean_square_displacement",
     "nearest_image",
+    "negative_eigenvalues",
     "normal_modes",
     "read_dump",
     "read_packing",
+    "solid_fraction",
     "spectrum",
     "stable_timestep",
     "stiffness_matrix",

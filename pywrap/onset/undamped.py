@@ -67,6 +67,7 @@ def onset_run(
     reached: Callable[[Equilibrium], None] | None = None,
     near_onset: Floats | None = None,
     modes: tuple[int, int] | None = None,
+    bed: Packing | None = None,
     watch: Watch = lambda says: None,
     folder: Path | None = None,
 ) -> OnsetRun:
@@ -88,6 +89,8 @@ def onset_run(
         Distances from F_x^c at which equilibria are wanted besides, force.
     modes : tuple of (int, int), optional
         Search these modes alone, see :func:`~faultgouge.analysis.find_onset`.
+    bed : Packing, optional
+        As of :func:`~faultgouge.pywrap.settle`.
     watch : callable, optional
         Told in words what is under way in a large packing.
     folder : Path, optional
@@ -104,7 +107,7 @@ def onset_run(
         If the packing flows from the first increment on, or before an onset.
     """
     wanted = loads(needed(scene.ramp, "ramp"))
-    start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"))
+    start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"), bed=bed)
     _check_modes(start.packing, modes)
     whole = reached is not None or seeks_all(start.packing, modes)
     reached = reached or (lambda _: None)

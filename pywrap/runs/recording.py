@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from ...analysis import RunFile
+from ...analysis import RunFile, solid_fraction
 from ...analysis.files.wholefile import check_folder
 from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
@@ -112,7 +112,8 @@ class Record:
         """Write one equilibrium."""
         if self.communicator.rank == 0:
             if self._file is None:
-                self._file = RunFile.create(self.path, equilibrium.packing, self._attributes())
+                attributes = self._attributes() | {"solid_fraction": solid_fraction(equilibrium.packing)}
+                self._file = RunFile.create(self.path, equilibrium.packing, attributes)
             file = self._file
             with file.change():
                 file.complete = False
@@ -214,7 +215,7 @@ class Record:
         count = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}{more}"
         self._said(f"{self.path} holds {count}; {goes_on}")
 
-    def _attributes(self) -> dict[str, str | int]:
+    def _attributes(self) -> dict[str, str | int | float]:
         return {
             "task": self.task,
             "scene": json.dumps(self.scene.resolved()),

@@ -33,6 +33,10 @@ STIFFNESS = 2e5
 DIGITS = 12
 """Decimal digits of the numbers that settle: more than anybody gives, and fewer than a change of units leaves right."""
 
+SLIPPERY = 1e-3
+"""Friction coefficient below which friction bears no packing: contacts are at their bound at slips of a thousandth of
+an overlap, and K has no tangential stiffness there."""
+
 STARTS = 5
 """Loose starts of a seed that settle one after the other, until a layer stays on top. Of 100 disks under the paper's
 load it sinks from one start in a hundred."""
@@ -90,9 +94,22 @@ def settle(
             return equilibrate(engine, Equilibrium.of(packing), packing.fx)
         except NoEquilibriumError as error:
             raise NoEquilibriumError(
-                f"the packing does not come to rest (a disk feels {packing.residual:.2g}): put more disks into the "
-                "upper layer (leave packing.top out for as many as it takes), or try another seed"
+                f"the packing does not come to rest (a disk feels {packing.residual:.2g}): {_cure(scene, packing)}"
             ) from error
+
+
+def _cure(scene: Scene, packing: Packing) -> str:
+    """What to do about a packing that has no equilibrium near where it is."""
+    if 0 < packing.law.mu < SLIPPERY:
+        return f"friction of mu = {packing.law.mu:g} holds next to nothing; take a larger law.mu, or 0 for no friction"
+    if isinstance(scene.packing, GeneratedPacking):
+        return (
+            "put more disks into the upper layer (leave packing.top out for as many as it takes), or try another seed"
+        )
+    return (
+        f"no equilibrium lies near where {scene.packing.file} has its disks: check law and load against those it was "
+        "settled with, or bring it to rest by `faultgouge import --relax`"
+    )
 
 
 def settled_bed(

@@ -3,8 +3,11 @@ r"""The static yield: a packing followed by Newton's method and, where that ends
 The load rises in increments of `STEP` of F_y. Newton's method gives the next equilibrium. Where Newton's method finds
 none, the disks move from the last equilibrium under the new load, with a drag of time `DRAG`, which is critical for
 modes of the frequency 1/(2 `DRAG`) and more than critical for slower ones. The motion is taken in segments; each one
-begins at rest, and the disks without a contact at its start are held still during it. Once the disks are slow, Newton's
-method is tried from where they are: its equilibrium is the proof that they rest.
+begins at rest, and the disks without a contact at its start are held still during it. Once the disks are slow,
+Newton's method is tried from where they are: its equilibrium is the proof that they rest.
+
+An equilibrium whose K has a negative eigenvalue is none on which disks rest: Newton's method has passed a turning
+point. It does not count, and dynamics goes on.
 
 **Fails** says: within one increment the upper layer moves by more than `FAR` diameters of a small disk, or the disks do
 not come to rest within `LONGEST`. The static yield F_s lies between the last load that is borne and the next one.
@@ -16,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from faultgouge.analysis import NoEquilibriumError, Packing, nearest_image
+from faultgouge.analysis import NoEquilibriumError, Packing, nearest_image, negative_eigenvalues
 from faultgouge.pywrap import Engine, Equilibrium
 from faultgouge.pywrap.equilibria.quasistatic import equilibrate
 from faultgouge.pywrap.runs.undamped import time_step
@@ -102,7 +105,7 @@ def following(last: Equilibrium, fx: float) -> tuple[Equilibrium, float | None]:
     """
     with Engine(last.packing) as engine:
         try:
-            return equilibrate(engine, last, fx), None
+            return _resting(equilibrate(engine, last, fx)), None
         except NoEquilibriumError:
             engine.restore(last.packing)
             engine.set_fx(fx)
@@ -129,13 +132,20 @@ def rest(engine: Engine) -> tuple[Equilibrium, float]:
             raise FailedError(f"at F_x = {fx:.6g} the layer has moved by {moved:.3g}")
         if np.abs(motion.velocity).max() < SLOW:
             try:
-                found = equilibrate(engine, Equilibrium.of(now), fx)
+                found = _resting(equilibrate(engine, Equilibrium.of(now), fx))
             except NoEquilibriumError:
                 engine.restore(now)
                 engine.set_fx(fx)
                 continue
             return found, moved + layer_slip(now, found.packing)
     raise FailedError(f"at F_x = {fx:.6g} the disks still move after {LONGEST:g}")
+
+
+def _resting(found: Equilibrium) -> Equilibrium:
+    """The equilibrium, unless it buckles."""
+    if len(negative_eigenvalues(found.packing)):
+        raise NoEquilibriumError(f"at F_x = {found.fx:.6g} the equilibrium lies beyond a turning point")
+    return found
 
 
 def layer_slip(before: Packing, after: Packing) -> float:

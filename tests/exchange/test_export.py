@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from reference_layer import LAYER, toml
 
-from faultgouge.analysis import Contacts, MindlinLaw, RunFile, nearest_image, normal_modes
+from faultgouge.analysis import Contacts, MindlinLaw, PackingFileError, RunFile, nearest_image, normal_modes
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.exchange import (
     ModeVectors,
@@ -277,6 +277,15 @@ def test_d_of_t_in_mdanalysis_is_that_of_the_run(run, mdanalysis, ours):
     share = packing.top.mean()
     weighted = share * layer.results.msd + (1 - share) * bed.results.msd
     np.testing.assert_allclose(weighted, everything.results.msd, rtol=1e-13)
+
+
+@pytest.mark.slow
+def test_d_of_a_file_without_a_trajectory_is_refused(tmp_path, reference_packing, mdanalysis, ours):
+    with RunFile.create(tmp_path / "still.h5", reference_packing(1.0)) as file:
+        file.append(reference_packing(1.0))
+    universe = mdanalysis.Universe(str(tmp_path / "still.h5"))
+    with pytest.raises(PackingFileError, match="trajectory = true under"):
+        ours.MeanSquareDisplacement(universe.atoms)
 
 
 @pytest.mark.slow

@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
+IN_BALANCE = 1e-4
+"""Force left on a disk, in units of the largest contact force, up to which a packing is in equilibrium. Dumps with few
+digits leave 1e-6; a packing before it is brought to rest, 1e-2 and more."""
+
 Slices = Annotated[
     Path | None,
     typer.Option(
@@ -53,6 +57,7 @@ def spectrum(
     as_json: AsJson = False,
 ) -> None:
     """Eigenvalues of a stored packing, its complex pairs and its rattlers."""
+    from faultgouge.analysis import solid_fraction
     from faultgouge.analysis import spectrum as eigenvalues_of
 
     packing = stored_packing(file, frame)
@@ -74,10 +79,13 @@ def spectrum(
             ],
             "pair_count": len(result.pairs),
             "least_q": result.least_q if result.pairs else None,
+            "negative": result.negative.tolist(),
+            "stable": result.is_stable if _in_balance(packing) else None,
             "largest_growth_rate": result.growth_rate(),
             "rattlers": result.rattlers.tolist(),
             "fx": packing.fx,
             "residual": packing.residual,
+            "solid_fraction": solid_fraction(packing),
             "noise_pairs": result.noise_pairs,
             "transient_gain": gain,
         }
@@ -97,22 +105,46 @@ def _values(packing: Packing, as_json: bool) -> None:
 
 
 def _print_spectrum(packing: Packing, result: Spectrum, gain: dict[str, Any] | None) -> None:
+    from faultgouge.analysis import growth_rate, solid_fraction
+
     real = result.eigenvalues.real
+    span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
     print(
-        f"F_x = {packing.fx:g}: {len(real)} eigenvalues from {real.min():.6g} to {real.max():.6g}, "
-        f"{len(result.rattlers)} rattlers left out"
+        f"F_x = {packing.fx:g}: {len(real)} eigenvalues{span}, {len(result.rattlers)} rattlers left out; volume "
+        f"fraction {solid_fraction(packing):.4f}"
     )
+    if not _in_balance(packing):
+        print(
+            f"not in equilibrium: a force of {packing.residual:.3g} is left on a disk, and of a packing that moves the "
+            "spectrum tells no stability"
+        )
+    for value in result.negative:
+        print(f"negative eigenvalue {value:.10g}: D grows as exp({growth_rate(value):.6g} t), without oscillation")
     for pair in result.pairs:
         print(
             f"complex pair {pair.eigenvalue.real:.10g} +- {pair.eigenvalue.imag:.10g} i: "
             f"D grows as exp({pair.growth_rate:.6g} t), |y^H x| = {pair.overlap:.2g}"
         )
+    if len(result.negative):
+        print(f"unstable as a column that buckles: negative eigenvalues: {len(result.negative)}")
     if result.pairs:
         print(
             f"{len(result.pairs)} complex pairs; least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}"
         )
-    else:
-        print("no complex pair: linearly stable")
+    if result.is_stable and _in_balance(packing):
+        free = result.free
+        but = (
+            f", but for {free} eigenvalues of zero: such a motion meets no force, and is not driven back"
+            if free
+            else ""
+        )
+        print(
+            f"no complex pair and no negative eigenvalue: linearly stable{but}"
+            if len(real)
+            else "no disk touches another or the floor: there is nothing to be stable"
+        )
+    if packing.law.damped or packing.drag_time is not None:
+        print("dashpots and drag are left out here: `faultgouge onset` of the scene counts them in")
     if gain is not None:
         print(
             f"a start at rest grows by up to {gain['displacement']:.6g} times in |q|^2, within t = {gain['time']:.6g} "
@@ -122,6 +154,11 @@ def _print_spectrum(packing: Packing, result: Spectrum, gain: dict[str, Any] | N
         )
     if result.noise_pairs:
         print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
+
+
+def _in_balance(packing: Packing) -> bool:
+    """Whether what is left of the forces on a disk is rounding, of a dump's digits at most."""
+    return packing.residual <= IN_BALANCE * float(packing.normal_force.max(initial=0.0))
 
 
 def _gain_of(packing: Packing) -> dict[str, Any] | None:

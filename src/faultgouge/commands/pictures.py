@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..ranks import is_root
-from .terminal import Frame, PackingFile, progress, say, stored_packing
+from .terminal import Frame, PackingFile, progress, say, stored_packing, stored_series
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -46,7 +46,8 @@ WhichColour = Annotated[
 def draw(
     file: PackingFile,
     frame: Annotated[
-        int | None, typer.Option(help="Which equilibrium; negative ones count from the last.", show_default=False)
+        int | None,
+        typer.Option(help="Which equilibrium, by default the last; negative ones count from it.", show_default=False),
     ] = None,
     mode: WhichMode = None,
     color: WhichColour = Colour.MOBILISED,
@@ -54,27 +55,35 @@ def draw(
         Path, typer.Option("-o", "--output", help="The picture: .png, .svg or .pdf.", show_default=True)
     ] = Path("picture.png"),
 ) -> None:
-    """Draw a stored packing, with its force chains or with one of its modes; or a cycle of loads.
+    """Draw a stored packing, with its force chains or with one of its modes; a cycle of loads; of perturb.h5 D(t).
 
     Disks are to scale: the upper layer is yellow, rattlers are hollow. Bars are
     contacts: their width is the normal force. Of a mode, arrows are displacements
     and colours rotations; participation ratio and share of rotation stand above.
     A ramp with turning points is drawn as F_x over the displacement of the upper
-    layer, unless --frame or --mode asks for a packing.
+    layer, and perturb.h5 as D(t) with the slope that the spectrum predicts; with
+    --frame or --mode their packing.
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
-    packing = stored_packing(file, -1 if frame is None else frame)
+    packing, series, cycle = stored_packing(file, -1 if frame is None else frame), None, []
+    if frame is None and mode is None:
+        series, cycle = stored_series(file), _cycle(file)
     if not is_root():
         return
+    from faultgouge.analysis.motion.growth import growth_of_run
     from faultgouge.figures import draw_cycle, draw_packing
     from faultgouge.figures.mode import draw_modes
     from faultgouge.figures.packing import in_words
+    from faultgouge.figures.series import draw_growth
     from faultgouge.figures.style import save_as
 
-    cycle = _cycle(file) if mode is None and frame is None else []
     if cycle:
         figure = draw_cycle(cycle)
+    elif series is not None:
+        growth = growth_of_run(packing, series["time"], series["msd"], series["friction"])
+        say(growth.says)
+        figure = draw_growth(series["time"], series["msd"], growth.predicted, growth.measured)
     elif mode is None:
         say(in_words(packing))
         figure = draw_packing(packing, color=color.value, caption=True)

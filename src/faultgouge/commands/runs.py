@@ -92,14 +92,24 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
 
 @app.command(epilog="Example: faultgouge perturb paper.toml -o run.h5")
 def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
-    """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t)."""
+    """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t).
+
+    It says whether D grew, at what rate, what the spectrum of the equilibrium
+    predicts, and whether the run was long enough. Of several friction coefficients
+    the first one is run.
+    """
     from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.growth import growth_of_run
     from faultgouge.pywrap import Record, reach
     from faultgouge.pywrap.runs.path import step_of
+    from faultgouge.pywrap.runs.undamped import sampling
     from faultgouge.pywrap.scenes.refusals import needed
 
     wanted = read_scene(scene, "perturb")
     settings = needed(wanted.perturb, "perturb")
+    mus = wanted.law.mus
+    if len(mus) > 1:
+        say(f"mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene, is run")
     with Record(output, wanted, task="perturb", saved=keeps) as record:
         if record.last is None:
             total = ceil(settings.fx / step_of(wanted) * (1 - 1e-9)) + 1
@@ -114,10 +124,21 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         for sample in progress(run, "samples", _lines(wanted, record.last)):
             last, largest = sample, max(largest, sample.msd)
         record.finish()
-    say(f"D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}; written to {output}")
+    if not is_root():
+        return
+    with RunFile(output) as file:
+        series, packing = file.series("undamped"), file.packing()
+    dt = sampling(settings, packing)[0]
+    growth = growth_of_run(packing, series["time"], series["msd"], series["friction"], dt)
     if as_json:
-        with RunFile(output) as file:
-            print_json({name: column.tolist() for name, column in file.series("undamped").items()})
+        columns = {name: column.tolist() for name, column in series.items()}
+        print_json({"mu": mus[0], "fx": packing.fx} | growth.as_dict() | columns)
+    else:
+        print(
+            f"F_x = {packing.fx:g}, mu = {mus[0]:g}: D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}"
+        )
+        print(growth.says, flush=True)  # before what follows on standard error
+    say(f"written to {output}")
 
 
 def _lines(scene: Scene, start: Equilibrium) -> int:

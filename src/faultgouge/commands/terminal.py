@@ -69,6 +69,18 @@ def stored_packing(file: Path, frame: int = -1) -> Packing:
         return run.packing(frame)
 
 
+def stored_series(file: Path) -> dict[str, Any] | None:
+    """The time series of the undamped run in a perturb.h5; None of another file, or where the run has not begun."""
+    from faultgouge.analysis import RunFile
+
+    if file.suffix == ".disks":
+        return None
+    with RunFile(file) as run:
+        series = run.series("undamped") if "undamped" in run.names_of_series else None
+        is_run = run.attributes.get("task") == "perturb"
+    return series if is_run and series is not None and len(series["time"]) > 1 else None
+
+
 def print_json(value: dict[str, Any]) -> None:
     """The result on standard output."""
     if is_root():
