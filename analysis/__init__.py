@@ -21,6 +21,7 @@ from .packing.contacts import FLOOR, Contacts
 from .packing.geometry import ContactGeometry, nearest_image, touching
 from .packing.law import MindlinLaw
 from .packing.packing import Packing
+from .packing.snapshot import LinearisedContacts, Snapshot
 from .spectrum.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
 from .spectrum.spectrum import (
     ComplexPair,
@@ -45,6 +46,7 @@ __all__ = [
     "Eigenpairs",
     "FaultgougeError",
     "Growth",
+    "LinearisedContacts",
     "MindlinLaw",
     "NoEquilibriumError",
     "NoGainError",
@@ -54,6 +56,7 @@ __all__ = [
     "Packing",
     "PackingFileError",
     "RunFile",
+    "Snapshot",
     "Spectrum",
     "TransientGain",
     "Window",

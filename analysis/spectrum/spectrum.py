@@ -37,12 +37,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, eigvals
-from scipy.sparse import csr_array
+from scipy.sparse import block_array, csr_array, eye_array
 from scipy.sparse.linalg import eigs
 
-from ..operators.damping import coordinate_mass
+from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
+from ..packing.snapshot import Snapshot
 from ..tabled import Tabled
 
 Complexes = NDArray[np.complex128]
@@ -181,7 +182,7 @@ class Spectrum(Tabled):
         return float(2 * np.abs(omega.imag).max(initial=0.0))
 
 
-def participation_ratio(right: Complexes | Floats) -> Floats:
+def participation_ratio(right: Complexes | Floats, axes: int = 3) -> Floats:
     r"""How many of the disks take part in a mode, as a share.
 
     With :math:`e_i` the kinetic energy of disk i, rotation included, the ratio is
@@ -190,24 +191,26 @@ def participation_ratio(right: Complexes | Floats) -> Floats:
 
     Parameters
     ----------
-    right : ndarray, shape (3N, k)
+    right : ndarray, shape (axes N, k)
         Right vectors in mass-weighted coordinates, in columns.
+    axes : int
+        Coordinates of a particle: 3 of disks, 6 of spheres.
 
     Returns
     -------
     ndarray, shape (k,)
     """
-    energy = (np.abs(right) ** 2).reshape(3, -1, right.shape[1]).sum(axis=0)
+    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=0)
     return energy.sum(axis=0) ** 2 / (len(energy) * (energy**2).sum(axis=0))
 
 
-def rotation_share(right: Complexes | Floats) -> Floats:
-    """Share of rotation in the kinetic energy of modes, shape (k,); `right` as of :func:`participation_ratio`."""
-    energy = (np.abs(right) ** 2).reshape(3, -1, right.shape[1]).sum(axis=1)
-    return energy[2] / energy.sum(axis=0)
+def rotation_share(right: Complexes | Floats, axes: int = 3) -> Floats:
+    """Share of rotation in the kinetic energy of modes, shape (k,); as of :func:`participation_ratio`."""
+    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=1)
+    return energy[axes // 2 + axes % 2 :].sum(axis=0) / energy.sum(axis=0)
 
 
-def dynamical_matrix(packing: Packing, form: Form = "consistent") -> tuple[csr_array, Indices]:
+def dynamical_matrix(packing: Packing | Snapshot, form: Form = "consistent") -> tuple[csr_array, Indices]:
     """A = M^(-1/2) K M^(-1/2) without its zero rows.
 
     Parameters
@@ -222,7 +225,7 @@ def dynamical_matrix(packing: Packing, form: Form = "consistent") -> tuple[csr_a
     matrix : scipy.sparse.csr_array, shape (E, E)
         1 / time^2.
     active : ndarray of int, shape (E,)
-        Which of the 3N coordinates (x.., y.., R theta..) its rows are. A coordinate whose row of K is zero
+        Which of the coordinates (x.., y.., R theta..) its rows are. A coordinate whose row of K is zero
         feels no force: its eigenvalue is zero and says nothing.
     """
     matrix = mass_weighted(stiffness_matrix(packing, form), packing)
@@ -251,8 +254,8 @@ def all_modes(matrix: csr_array) -> tuple[Complexes, Complexes, Complexes]:
     return values[order], right, left
 
 
-def mass_weighted(stiffness: csr_array, packing: Packing) -> csr_array:
-    """M^(-1/2) K M^(-1/2), zero rows and all, shape (3N, 3N); 1 / time^2."""
+def mass_weighted(stiffness: csr_array, packing: Packing | Snapshot) -> csr_array:
+    """M^(-1/2) K M^(-1/2), zero rows and all; 1 / time^2."""
     scale = 1.0 / np.sqrt(coordinate_mass(packing))
     rows = np.repeat(scale, np.diff(stiffness.indptr))
     return csr_array(
@@ -260,7 +263,7 @@ def mass_weighted(stiffness: csr_array, packing: Packing) -> csr_array:
     )
 
 
-def eigenvalues(packing: Packing, form: Form = "consistent") -> Complexes:
+def eigenvalues(packing: Packing | Snapshot, form: Form = "consistent") -> Complexes:
     """Every eigenvalue without vectors, by LAPACK's dense solver, in a third of the time of :func:`spectrum`.
 
     Which of the complex pairs exceed their rounding uncertainty is not known without vectors.
@@ -283,12 +286,12 @@ def _sorted(values: Complexes) -> Complexes:
     return np.asarray(values[np.lexsort((values.imag, values.real))], dtype=np.complex128)
 
 
-def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
+def spectrum(packing: Packing | Snapshot, form: Form = "consistent") -> Spectrum:
     """Every eigenvalue, by LAPACK's dense solver; left and right vectors only where complex pairs appear.
 
     Parameters
     ----------
-    packing : Packing
+    packing : Packing or Snapshot
         The configuration, in equilibrium if the result is to mean stability.
     form : {"consistent", "paper"}
         As in :func:`~faultgouge.analysis.stiffness_matrix`.
@@ -309,9 +312,9 @@ def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
         values, left, right = eig(matrix, left=True, right=True)
         overlap = np.abs(np.sum(left.conj() * right, axis=0))
         for k in np.flatnonzero(values.imag > 0):
-            vector = np.zeros((3 * len(packing), 1), dtype=np.complex128)
+            vector = np.zeros((packing.coordinates, 1), dtype=np.complex128)
             vector[active, 0] = right[:, k]
-            participation, rotation = float(participation_ratio(vector)[0]), float(rotation_share(vector)[0])
+            participation, rotation = float(participation_ratio(vector, packing.axes)[0]), float(rotation_share(vector, packing.axes)[0])
             pair = ComplexPair(complex(values[k]), float(overlap[k]), participation, rotation)
             if believable(pair.eigenvalue, pair.overlap, rounding):
                 pairs.append(pair)
@@ -352,7 +355,7 @@ def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
     return np.asarray(2.0 / dt * np.arcsin(0.5 * dt * root), dtype=np.complex128)
 
 
-def largest_frequency(packing: Packing) -> float:
+def largest_frequency(packing: Packing | Snapshot) -> float:
     """omega_max = max sqrt|lambda|; to `LIMIT`, by Arnoldi's iteration (ARPACK), beyond `DENSE` coordinates.
 
     Returns
@@ -375,9 +378,68 @@ def largest_frequency(packing: Packing) -> float:
     return float(np.sqrt(np.abs(largest).max()))
 
 
-def stable_timestep(omega_max: float) -> float:
-    """The limit dt < 2 / omega_max of velocity Verlet, time."""
-    return 2.0 / omega_max
+class StableTimestep(float):
+    """A time step that is the limit of stability, a float with its `error`, both times."""
+
+    error: float
+
+    def __new__(cls, value: float, error: float = 0.0) -> "StableTimestep":
+        """The limit and its error."""
+        made = super().__new__(cls, value)
+        made.error = error
+        return made
+
+
+def stable_timestep(of: float | Packing | Snapshot) -> StableTimestep:
+    r"""The largest stable time step of velocity Verlet.
+
+    Without dissipation it is :math:`2/\omega_{max}`. Dashpots take the velocity of the half step, as in all granular
+    styles of LAMMPS: a motion begins to alternate in sign and to grow where :math:`4 M - 2\,dt\, C - dt^2 K` becomes
+    singular, so that dt = 2/mu with the largest mu of :math:`\mu^2 M - \mu C - K`.
+
+    Parameters
+    ----------
+    of : float, Packing or Snapshot
+        omega_max, radian / time, or a configuration with its dashpots.
+
+    Returns
+    -------
+    StableTimestep
+        Time, infinite for a packing without contacts; `error` is what Arnoldi's iteration leaves, 0 of omega_max.
+
+    Raises
+    ------
+    scipy.sparse.linalg.ArpackError
+        If the iteration does not converge.
+    """
+    if not isinstance(of, Packing | Snapshot):
+        return StableTimestep(2.0 / of)
+    stiffness = mass_weighted(stiffness_matrix(of), of)
+    active = active_coordinates(stiffness)
+    a = stiffness[active][:, active]
+    if not len(active):
+        return StableTimestep(np.inf)
+    damping = mass_weighted(damping_matrix(of), of)[active][:, active] if of.damped else None
+    return _largest_step(a, damping)
+
+
+def _largest_step(a: csr_array, damping: csr_array | None) -> StableTimestep:
+    """2/mu of a stiffness and a damping, by LAPACK or by Arnoldi's iteration with the residual as its error."""
+    size = a.shape[0]
+    if damping is None:
+        operator, root = a, True
+    else:
+        operator, root = block_array([[damping, a], [eye_array(size), None]], format="csr"), False
+    if operator.shape[0] <= 60:  # ARPACK needs more coordinates than vectors
+        found = eigvals(operator.toarray())
+        largest = float(np.sqrt(np.abs(found).max()) if root else found.real.max())
+        return StableTimestep(2.0 / largest)
+    start = np.random.Generator(np.random.PCG64(0)).standard_normal(operator.shape[0])
+    which = "LM" if root else "LR"
+    value, vector = eigs(operator, 1, which=which, v0=start, tol=LIMIT)
+    off = float(np.linalg.norm(operator @ vector[:, 0] - value[0] * vector[:, 0]) / abs(value[0]))
+    size_of = float(np.sqrt(abs(value[0])) if root else value[0].real)
+    return StableTimestep(2.0 / size_of, 2.0 / size_of * (0.5 * off if root else off))
 
 
 def unit_rounding(matrix: Floats) -> float:
