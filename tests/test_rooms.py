@@ -40,7 +40,7 @@ FLOORS = {
     ),
     "faultgouge.pywrap": (
         ("lammps",),
-        ("equilibria", "exchange"),
+        ("equilibria", "exchange", "granular"),
         ("scenes",),
         ("settling",),
         ("runs",),

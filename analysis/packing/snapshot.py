@@ -391,6 +391,10 @@ class Snapshot:
         kept = self.contacts.normal_force > least
         return self if np.all(kept) else derived(self, contacts=self.contacts.chosen(kept))
 
+    def loaded_by(self, load: ArrayLike) -> "Snapshot":
+        """The snapshot with other forces and torques besides those of contacts, shape (N, 2, 3)."""
+        return derived(self, load=floats("load", load, self.load.shape))
+
     def with_sliding(self, sliding: ArrayLike | None = None) -> "Snapshot":
         """The snapshot with other contacts that slide, by a mask, shape (C,); those at Coulomb's bound by default."""
         c = self.contacts
