@@ -30,10 +30,10 @@ law in three dimensions.)
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array, csr_array
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
 
-from ..packing.arrays import Floats, derived
+from ..packing.arrays import Floats, Indices, derived
 from ..packing.snapshot import LinearisedContacts, Snapshot
 
 
@@ -82,45 +82,60 @@ def assembled_damping(snapshot: Snapshot) -> csr_array:
 
 def _assemble(snapshot: Snapshot, contacts: LinearisedContacts, parting: ArrayLike) -> csr_array:
     """-dF/dq: rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact."""
-    count, d, n = len(contacts), snapshot.dimension, len(snapshot)
-    moves, turns = (slice(0, 3), slice(0, 3)) if d == 3 else (slice(0, 2), slice(2, 3))
-    force, torque, growth = contact_derivatives(contacts, parting)
-    partners = np.stack([contacts.i, contacts.j])
-    radius = np.stack([snapshot.radius[contacts.i], snapshot.radius[np.maximum(contacts.j, 0)]])
-    rolling, lever = contacts.slip_arm.T / radius, contacts.lever_arm.T / radius
-    slope = contacts.lever_slope / radius
-    known = np.stack([snapshot.free[contacts.i], ~contacts.wall & snapshot.free[np.maximum(contacts.j, 0)]])
-    sign = (1.0, -1.0)
-    parts: list[tuple[NDArray, NDArray, Floats]] = []
-    for p in (0, 1):  # the partner whose force changes
-        # T/R = -(l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
-        turned = -lever[p][:, None, None, None] * torque
-        turned[:, 0] += slope[p][:, None, None] * growth
-        for q in (0, 1):  # the partner that moves
-            here = known[p] & known[q]
-            for block, rows, turning in ((sign[p] * force, moves, False), (turned, turns, True)):
-                row = _numbers(partners[p][here], rows, turning, d, n)
-                for values, columns, rolls in (
-                    (sign[q] * block[here, 0, rows, moves], moves, False),
-                    (rolling[q][here, None, None] * block[here, 1, rows, turns], turns, True),
-                ):
-                    column = _numbers(partners[q][here], columns, rolls, d, n)
-                    where = (np.broadcast_to(index, values.shape).ravel() for index in (row[:, :, None], column[:, None]))
-                    parts.append((*where, -values.ravel()))
-    size = snapshot.coordinates
-    if count == 0:
-        return csr_array((size, size))
-    row, column, value = (np.concatenate(each) for each in zip(*parts, strict=True))
-    matrix = coo_array((value, (row, column)), shape=(size, size)).tocsr()
+    count, c, pair = len(snapshot), contacts, ~contacts.wall
+    force, torque, growth = contact_derivatives(c, parting)
+    partners = np.stack([c.i, np.where(pair, c.j, 0)])
+    radius = snapshot.radius[partners]
+    rolling, lever = c.slip_arm.T / radius, c.lever_arm.T / radius
+    takes_part = snapshot.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
+    blocks = np.empty((2, 2, len(c), 6, 6))
+    for p, of in enumerate((-1.0, 1.0)):  # the partner whose force changes, and the sign of -F
+        for q, by in enumerate((1.0, -1.0)):  # the partner that moves
+            block = blocks[p, q]
+            block[:, :3, :3] = of * by * force[:, 0]
+            block[:, :3, 3:] = of * rolling[q][:, None, None] * force[:, 1]
+            # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
+            less = (c.lever_slope / radius[p])[:, None, None] * growth
+            block[:, 3:, :3] = by * (lever[p][:, None, None] * torque[:, 0] - less)
+            block[:, 3:, 3:] = (lever[p] * rolling[q])[:, None, None] * torque[:, 1]
+            block *= (takes_part[p] & takes_part[q])[:, None, None]
+    chosen = np.array([0, 1, 5] if snapshot.dimension == 2 else range(6))
+    blocks = blocks[..., chosen[:, None], chosen]
+    diagonal = np.zeros((count, len(chosen), len(chosen)))
+    for row in range(len(chosen)):
+        for column in range(len(chosen)):
+            for p in (0, 1):
+                diagonal[:, row, column] += np.bincount(partners[p], blocks[p, p, :, row, column], count)
+    first, second = partners[:, pair]
+    every = np.arange(count)
+    rows, columns = np.concatenate([every, first, second]), np.concatenate([every, second, first])
+    return _from_blocks(rows, columns, np.concatenate([diagonal, blocks[0, 1, pair], blocks[1, 0, pair]]), count)
+
+
+def _from_blocks(rows: Indices, columns: Indices, blocks: Floats, count: int) -> csr_array:
+    """A matrix in the order of axes, from blocks of particles; those of the same place, of two images, are added."""
+    key = rows * count + columns
+    order = np.argsort(key, kind="stable")
+    begins = np.flatnonzero(np.diff(key[order], prepend=-1))
+    rows, columns = rows[order][begins], columns[order][begins]
+    values = blocks[order] if len(begins) == len(order) else np.add.reduceat(blocks[order], begins, axis=0)
+    axes = blocks.shape[1]
+    # a row of an axis has its neighbours once for each axis of the columns
+    neighbours = np.bincount(rows, minlength=count)
+    starts = np.concatenate([[0], np.cumsum(neighbours)])
+    inside = np.arange(len(rows)) - starts[rows]
+    data = np.empty((axes, axes * len(rows)))
+    indices = np.empty(axes * len(rows), dtype=np.int32)
+    for axis in range(axes):
+        place = axes * starts[rows] + axis * neighbours[rows] + inside
+        indices[place] = axis * count + columns
+        data[:, place] = values[:, :, axis].T
+    pointers = (axes * starts[:-1] + np.arange(axes)[:, None] * axes * len(rows)).ravel()
+    pointers = np.append(pointers, axes * axes * len(rows))
+    size = axes * count
+    matrix = csr_array((data.ravel(), np.tile(indices, axes), pointers), shape=(size, size))
     matrix.eliminate_zeros()
     return matrix
-
-
-def _numbers(particles: NDArray, axes: slice, turning: bool, dimension: int, count: int) -> NDArray:
-    """Numbers of the coordinates of particles along some axes, shape (C, axes); 32 bits halve what is sorted."""
-    which = np.arange(3)[axes]
-    place = (dimension + (which - axes.start if dimension == 2 else which)) if turning else which
-    return np.asarray(place[None, :] * count + particles[:, None], dtype=np.int32)
 
 
 def _outer(a: Floats, b: Floats) -> Floats:
