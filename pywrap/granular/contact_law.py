@@ -192,9 +192,9 @@ def measure_law(bench: Bench, state: State, types: tuple[int, int], who: str) ->
     SnapshotError
         If it is no power law of the kind above.
     """
-    half = tuple(0.5 * r for r in state.radii)
+    state = state._replace(overlap=min(state.overlap, 0.1 * state.radii[0]))
     heavy = (3 * state.masses[0], state.masses[1] if bench.wall else 2 * state.masses[1])
-    small = State((half[0], 0.8 * state.radii[1]), state.masses, state.overlap)
+    small = State((0.5 * state.radii[0], 0.8 * state.radii[1]), state.masses, state.overlap)
     states = [state, state._replace(overlap=0.5 * state.overlap), state._replace(masses=heavy), small]
     found = [_measure(bench, each, types) for each in states]
     here, shallow, heavier, smaller = (values for _, values in found)

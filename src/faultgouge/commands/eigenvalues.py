@@ -24,10 +24,11 @@ from .terminal import (
     show_table,
     status,
     stored_packing,
+    stored_snapshot,
 )
 
 if TYPE_CHECKING:
-    from ..analysis import DampedWindow, Packing, Spectrum, Window
+    from ..analysis import DampedWindow, Packing, Snapshot, Spectrum, Window
     from ..pywrap import Equilibrium, Scene
     from ..pywrap.onset.damped import DampedOnset
 
@@ -55,7 +56,7 @@ def spectrum(
     """Eigenvalues of a stored packing, its complex pairs and its rattlers."""
     from faultgouge.analysis import spectrum as eigenvalues_of
 
-    packing = stored_packing(file, frame)
+    packing = stored_snapshot(file) or stored_packing(file, frame)
     if values:
         _values(packing, as_json)
         return
@@ -84,7 +85,7 @@ def spectrum(
     )
 
 
-def _values(packing: Packing, as_json: bool) -> None:
+def _values(packing: Packing | Snapshot, as_json: bool) -> None:
     """Eigenvalues without vectors: as JSON, or a line each."""
     from faultgouge.analysis import eigenvalues
 
@@ -96,10 +97,21 @@ def _values(packing: Packing, as_json: bool) -> None:
         print(f"{real:.17g} {imaginary:.17g}")
 
 
-def _print_spectrum(packing: Packing, result: Spectrum, gain: dict[str, Any] | None) -> None:
-    real = result.eigenvalues.real
+def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[str, Any] | None) -> None:
+    from faultgouge.analysis import Snapshot
+
+    real, what = result.eigenvalues.real, f"F_x = {packing.fx:g}"
+    if isinstance(packing, Snapshot):
+        what = f"{len(packing)} {'spheres' if packing.dimension == 3 else 'disks'} as LAMMPS left them"
+        bound = int(packing.contacts.at_bound.sum())
+        if bound:
+            acts = "slide" if packing.contacts.sliding.any() else "stick"
+            say(f"{bound} of {len(packing.contacts)} contacts are at Coulomb's bound; they {acts} here")
+    if not len(real):
+        print(f"{what}: no particle touches another, so that there are no eigenvalues")
+        return
     print(
-        f"F_x = {packing.fx:g}: {len(real)} eigenvalues from {real.min():.6g} to {real.max():.6g}, "
+        f"{what}: {len(real)} eigenvalues from {real.min():.6g} to {real.max():.6g}, "
         f"{len(result.rattlers)} rattlers left out"
     )
     for pair in result.pairs:
@@ -124,11 +136,11 @@ def _print_spectrum(packing: Packing, result: Spectrum, gain: dict[str, Any] | N
         print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
 
 
-def _gain_of(packing: Packing) -> dict[str, Any] | None:
+def _gain_of(packing: Packing | Snapshot) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None if unstable, too large, or where it fails."""
     from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
 
-    if len(packing) > MOST_DISKS:
+    if packing.coordinates > 3 * MOST_DISKS:
         return None
     try:
         displacement, energy = transient_gains(packing)
