@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from ...analysis import BadInputError, Snapshot
 from ..lammps.instance import lammps_instance
+from . import reading
 from .commands import SnapshotError
 from .from_lammps import BALANCE, from_lammps
 
@@ -41,7 +42,7 @@ def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE) -> S
             os.chdir(path.parent.resolve())
             lmp.file(path.name)
         except Exception as error:  # LAMMPS raises what its bindings choose
-            raise SnapshotError(f"{path}: LAMMPS stopped: {str(error).strip().rstrip('.')}.") from error
+            raise SnapshotError(f"{path}: {reading.stopped(error)}") from error
         finally:
             os.chdir(here)
         found = from_lammps(lmp, slides=slides, balance=balance)

@@ -10,6 +10,7 @@ and given back.
 import ctypes
 import os
 import pickle
+import re
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -65,7 +66,7 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
             try:
                 said = pickle.dumps((True, work()))
             except Exception as error:  # whatever it is, the parent says it
-                said = pickle.dumps((False, error if isinstance(error, SnapshotError) else str(error)))
+                said = pickle.dumps((False, error if isinstance(error, SnapshotError) else stopped(error)))
             with os.fdopen(sink, "wb") as stream:
                 stream.write(said)
             code = 0
@@ -80,7 +81,14 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
     good, found = pickle.loads(said)
     if good:
         return found
-    raise found if isinstance(found, SnapshotError) else SnapshotError(f"LAMMPS stopped: {found}.")
+    raise found if isinstance(found, SnapshotError) else SnapshotError(found)
+
+
+def stopped(error: Exception) -> str:
+    """A sentence of an error that LAMMPS has raised."""
+    lines = [line.strip().removeprefix("ERROR: ") for line in str(error).splitlines() if line.strip()]
+    reason = re.sub(r" \(\S+:\d+\)", "", "; ".join(lines) or type(error).__name__)
+    return f"LAMMPS stopped: {reason.rstrip('.')}."
 
 
 def quieten(lmp: Any, *, drag: bool = False) -> None:
