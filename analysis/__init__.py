@@ -1,6 +1,6 @@
 """A configuration of frictional disks in; its stability operator, spectrum, onset and growth out.
 
-Everything takes a :class:`Packing` and nothing else. The physics is in the docstrings of the modules: `law`
+Everything takes a :class:`Packing`, and the operators with what follows from them a :class:`Snapshot` as well. The physics is in the docstrings of the modules: `law`
 (the contact law), `contacts`, `geometry`, `packing` (forces), `stiffness` (the stability operator), `spectrum` (its
 eigenvalues), `damping` (the damping matrix), `onset` (where they become complex), `growth` (what a run shows of
 it). `runfile`, `dumps` and `files` read and write packings.

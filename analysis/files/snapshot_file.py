@@ -63,7 +63,9 @@ def write_snapshot(path: Path, snapshot: Snapshot, attributes: Mapping[str, str 
             group.create_dataset(name, data=getattr(snapshot, name))
         for name in PER_CONTACT:
             values = getattr(snapshot.contacts, name)
-            group.create_dataset(f"contacts/{name}", data=values, **(CHECKED if len(values) else {}), chunks=len(values) > 0 or None)
+            group.create_dataset(
+                f"contacts/{name}", data=values, **(CHECKED if len(values) else {}), chunks=len(values) > 0 or None
+            )
         for name, value in (attributes or {}).items():
             file.attrs[name] = value
         write(path, file)

@@ -88,28 +88,30 @@ def _assemble(snapshot: Snapshot, contacts: LinearisedContacts, parting: ArrayLi
     radius = snapshot.radius[partners]
     rolling, lever = c.slip_arm.T / radius, c.lever_arm.T / radius
     takes_part = snapshot.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
-    blocks = np.empty((2, 2, len(c), 6, 6))
+    # axes first: all that follows walks along contacts
+    force, torque, growth = (np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (force, torque, growth))
+    blocks = np.empty((2, 2, 6, 6, len(c)))
     for p, of in enumerate((-1.0, 1.0)):  # the partner whose force changes, and the sign of -F
         for q, by in enumerate((1.0, -1.0)):  # the partner that moves
-            block = blocks[p, q]
-            block[:, :3, :3] = of * by * force[:, 0]
-            block[:, :3, 3:] = of * rolling[q][:, None, None] * force[:, 1]
+            both = (takes_part[p] & takes_part[q]).astype(np.float64)
+            blocks[p, q, :3, :3] = (of * by * both) * force[0]
+            blocks[p, q, :3, 3:] = (of * both * rolling[q]) * force[1]
             # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
-            less = (c.lever_slope / radius[p])[:, None, None] * growth
-            block[:, 3:, :3] = by * (lever[p][:, None, None] * torque[:, 0] - less)
-            block[:, 3:, 3:] = (lever[p] * rolling[q])[:, None, None] * torque[:, 1]
-            block *= (takes_part[p] & takes_part[q])[:, None, None]
-    chosen = np.array([0, 1, 5] if snapshot.dimension == 2 else range(6))
-    blocks = blocks[..., chosen[:, None], chosen]
-    diagonal = np.zeros((count, len(chosen), len(chosen)))
-    for row in range(len(chosen)):
-        for column in range(len(chosen)):
-            for p in (0, 1):
-                diagonal[:, row, column] += np.bincount(partners[p], blocks[p, p, :, row, column], count)
+            blocks[p, q, 3:, :3] = (by * both * lever[p]) * torque[0] - (by * both * c.lever_slope / radius[p]) * growth
+            blocks[p, q, 3:, 3:] = (both * lever[p] * rolling[q]) * torque[1]
+    if snapshot.dimension == 2:
+        in_plane = np.array([0, 1, 5])
+        blocks = blocks[:, :, in_plane[:, None], in_plane]
+    diagonal = np.zeros((*blocks.shape[2:4], count))
+    for row, column in np.ndindex(*diagonal.shape[:2]):
+        for p in (0, 1):
+            diagonal[row, column] += np.bincount(partners[p], blocks[p, p, row, column], count)
     first, second = partners[:, pair]
     every = np.arange(count)
     rows, columns = np.concatenate([every, first, second]), np.concatenate([every, second, first])
-    return _from_blocks(rows, columns, np.concatenate([diagonal, blocks[0, 1, pair], blocks[1, 0, pair]]), count)
+    return _from_blocks(
+        rows, columns, np.concatenate([diagonal, blocks[0, 1][..., pair], blocks[1, 0][..., pair]], axis=2), count
+    )
 
 
 def _from_blocks(rows: Indices, columns: Indices, blocks: Floats, count: int) -> csr_array:
@@ -118,8 +120,10 @@ def _from_blocks(rows: Indices, columns: Indices, blocks: Floats, count: int) ->
     order = np.argsort(key, kind="stable")
     begins = np.flatnonzero(np.diff(key[order], prepend=-1))
     rows, columns = rows[order][begins], columns[order][begins]
-    values = blocks[order] if len(begins) == len(order) else np.add.reduceat(blocks[order], begins, axis=0)
-    axes = blocks.shape[1]
+    values = blocks[..., order]
+    if len(begins) < len(order):
+        values = np.add.reduceat(values, begins, axis=2)
+    axes = len(blocks)
     # a row of an axis has its neighbours once for each axis of the columns
     neighbours = np.bincount(rows, minlength=count)
     starts = np.concatenate([[0], np.cumsum(neighbours)])
@@ -129,7 +133,7 @@ def _from_blocks(rows: Indices, columns: Indices, blocks: Floats, count: int) ->
     for axis in range(axes):
         place = axes * starts[rows] + axis * neighbours[rows] + inside
         indices[place] = axis * count + columns
-        data[:, place] = values[:, :, axis].T
+        data[:, place] = values[:, axis]
     pointers = (axes * starts[:-1] + np.arange(axes)[:, None] * axes * len(rows)).ravel()
     pointers = np.append(pointers, axes * axes * len(rows))
     size = axes * count

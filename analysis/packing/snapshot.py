@@ -21,7 +21,19 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Floats, Indices, booleans, derived, floats, frozen, integers, number, positive_each, same_bits, settle
+from .arrays import (
+    Floats,
+    Indices,
+    booleans,
+    derived,
+    floats,
+    frozen,
+    integers,
+    number,
+    positive_each,
+    same_bits,
+    settle,
+)
 from .law import MindlinLaw
 from .packing import Packing
 

@@ -325,7 +325,10 @@ def spectrum(packing: Packing | Snapshot, form: Form = "consistent") -> Spectrum
         for k in np.flatnonzero(values.imag > 0):
             vector = np.zeros((packing.coordinates, 1), dtype=np.complex128)
             vector[active, 0] = right[:, k]
-            participation, rotation = float(participation_ratio(vector, packing.axes)[0]), float(rotation_share(vector, packing.axes)[0])
+            participation, rotation = (
+                float(participation_ratio(vector, packing.axes)[0]),
+                float(rotation_share(vector, packing.axes)[0]),
+            )
             pair = ComplexPair(complex(values[k]), float(overlap[k]), participation, rotation)
             if believable(pair.eigenvalue, pair.overlap, rounding):
                 pairs.append(pair)
@@ -452,7 +455,9 @@ def _largest_step(a: csr_array, damping: csr_array | None) -> StableTimestep:
         if damping is None and loose:
             continue
         (value,), vectors = eigs(operator, 1, which="LM", v0=vector, tol=0.1 if loose else tolerance, ncv=12)
-        vector = np.ascontiguousarray(vectors[:, 0].real if abs(value.imag) < abs(value) * 1e-3 else vectors.sum(axis=1).real)
+        vector = np.ascontiguousarray(
+            vectors[:, 0].real if abs(value.imag) < abs(value) * 1e-3 else vectors.sum(axis=1).real
+        )
         off = float(np.linalg.norm(operator @ vectors[:, 0] - value * vectors[:, 0]) / abs(value))
         if damping is None:
             mu = float(np.sqrt(abs(value)))

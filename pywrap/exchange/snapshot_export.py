@@ -113,7 +113,9 @@ def _write_vtp(path: Path, snapshot: Snapshot, modes: Sequence[SnapshotMode]) ->
     reach = np.where(c.wall, snapshot.radius[c.i] - c.overlap, c.distance)
     numbers = {f"{mode.name}_eigenvalue": mode.eigenvalue.real for mode in modes}
     numbers |= {f"{mode.name}_eigenvalue_imag": mode.eigenvalue.imag for mode in modes}
-    share = np.divide(np.linalg.norm(c.tangential_force, axis=1), c.friction, out=np.zeros(len(c)), where=c.friction > 0)
+    share = np.divide(
+        np.linalg.norm(c.tangential_force, axis=1), c.friction, out=np.zeros(len(c)), where=c.friction > 0
+    )
     on_contacts = {
         "contact_i": snapshot.ids[c.i].astype(np.float64),
         "contact_j": np.where(c.wall, 0, snapshot.ids[np.maximum(c.j, 0)]).astype(np.float64),

@@ -207,7 +207,9 @@ def measure_law(bench: Bench, state: State, types: tuple[int, int], who: str) ->
         if values[0] == 0 and not any(values):
             return PowerLaw(0.0)
         if min(values) <= 0:
-            raise SnapshotError(f"{who} has a {name.replace('_', ' ')} that changes its sign, which no contact law does.")
+            raise SnapshotError(
+                f"{who} has a {name.replace('_', ' ')} that changes its sign, which no contact law does."
+            )
         by_depth, by_mass, by_size = (
             quarter(np.log(value / values[0]) / scale, f"{name.replace('_', ' ')} of {who}")
             for value, scale in zip(values[1:], (depth, weight, size), strict=True)
@@ -215,7 +217,9 @@ def measure_law(bench: Bench, state: State, types: tuple[int, int], who: str) ->
         if by_depth != by_size:
             raise SnapshotError(f"The {name.replace('_', ' ')} of {who} is no power of its contact radius.")
         first = found[0][0]
-        return PowerLaw(values[0] / (first.mass**by_mass * (first.radius * first.overlap) ** by_depth), by_depth, by_mass)
+        return PowerLaw(
+            values[0] / (first.mass**by_mass * (first.radius * first.overlap) ** by_depth), by_depth, by_mass
+        )
 
     stiffness = power("stiffness")
     exponents = here.closing, here.parting
@@ -311,7 +315,9 @@ def _dashpot(bench: Bench, direction: tuple[float, float], scale: float, speed: 
     bench.move((0.0, 0.0))
     bench.run("run 0 post no")
     rest, found = bench.force()[tangential], 0.0
-    for _ in range(6):  # each time far nearer; a speed whose force is lost in rounding, or is cut at the bound, comes near
+    for _ in range(
+        6
+    ):  # each time far nearer; a speed whose force is lost in rounding, or is cut at the bound, comes near
         bench.move((speed * direction[0], speed * direction[1]))
         bench.run("run 0 post no")
         force = bench.force()[tangential] - rest

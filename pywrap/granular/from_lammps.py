@@ -116,7 +116,9 @@ def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Styles, Co
     if copied:
         reading.quieten(lmp)
     groups = _groups(styles[1], given)
-    walls = tuple(name for name, style in styles[1].items() if without_suffix(style) in ("wall/gran", "wall/mindlin/smooth"))
+    walls = tuple(
+        name for name, style in styles[1].items() if without_suffix(style) in ("wall/gran", "wall/mindlin/smooth")
+    )
     own = given.style == OWN
     columns = "dx dy dz force p1 p2 p3" if not own else "dx dy dz force p1 p3"
 
@@ -223,9 +225,7 @@ def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: reading.Array
 class _Contacts:
     """The contacts of a look, with the laws that LAMMPS has for them."""
 
-    def __init__(
-        self, found: reading.Arrays, commands: Commands, styles: Styles, types: int, frozen: Indices
-    ) -> None:
+    def __init__(self, found: reading.Arrays, commands: Commands, styles: Styles, types: int, frozen: Indices) -> None:
         self.found, self.commands, self.types, self.units = found, commands, types, styles[2]
         self.radius, self.mass = found["radius"], np.where(frozen, np.inf, found["rmass"])
         self.kind = found["type"].astype(np.int64)
@@ -282,7 +282,9 @@ class _Contacts:
         for name, (touching, _, depth, _) in walls.items():
             if len(touching):
                 k = np.argsort(depth)[len(depth) // 2]
-                at_walls.append((name, State((self.radius[touching[k]], 0.0), (self.found["rmass"][touching[k]], np.inf), depth[k])))
+                at_walls.append(
+                    (name, State((self.radius[touching[k]], 0.0), (self.found["rmass"][touching[k]], np.inf), depth[k]))
+                )
         laws = measure_laws(self.commands, self.units, self.types, states, at_walls)
         parts = []
         for key, chosen in which.items():
@@ -294,8 +296,17 @@ class _Contacts:
             effective = np.where(np.isfinite(effective), effective, 0.0)
             parts.append(
                 _by_law(
-                    laws[key], p, q, normal[chosen], distance[chosen], overlap[chosen], rows[chosen, 0],
-                    rows[chosen, 1:4], np.column_stack([self.radius[p], self.radius[q]]), reduced, effective,
+                    laws[key],
+                    p,
+                    q,
+                    normal[chosen],
+                    distance[chosen],
+                    overlap[chosen],
+                    rows[chosen, 0],
+                    rows[chosen, 1:4],
+                    np.column_stack([self.radius[p], self.radius[q]]),
+                    reduced,
+                    effective,
                     f"contacts of types {key[0]} and {key[1]}",
                 )  # fmt: skip
             )
@@ -305,8 +316,18 @@ class _Contacts:
             none = np.zeros(len(p))
             parts.append(
                 _by_law(
-                    laws[name], p, np.full(len(p), WALL), n, np.full(len(p), np.inf), depth, fn, force - fn[:, None] * n,
-                    np.column_stack([self.radius[p], none]), self.radius[p], self.found["rmass"][p], f"fix {name}",
+                    laws[name],
+                    p,
+                    np.full(len(p), WALL),
+                    n,
+                    np.full(len(p), np.inf),
+                    depth,
+                    fn,
+                    force - fn[:, None] * n,
+                    np.column_stack([self.radius[p], none]),
+                    self.radius[p],
+                    self.found["rmass"][p],
+                    f"fix {name}",
                 )  # fmt: skip
             )
         return parts or [_none()]
@@ -325,7 +346,9 @@ class _Contacts:
         i, j, normal, distance, overlap, rows = self._pairs()
         arms = np.column_stack([self.radius[i], self.radius[j]])
         law = self._own_law(self.commands.pair[0].split()[2:])
-        return _smooth(law, overlap, rows[:, 2], normal, rows[:, 0], i=i, j=j, distance=distance, slip_arm=arms, lever_arm=arms)
+        return _smooth(
+            law, overlap, rows[:, 2], normal, rows[:, 0], i=i, j=j, distance=distance, slip_arm=arms, lever_arm=arms
+        )
 
     def _own_floor(self, name: str, rows: Floats) -> LinearisedContacts:
         words = self.commands.fixes[name].split()

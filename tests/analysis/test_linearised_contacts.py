@@ -1,4 +1,4 @@
-"""K and C of linearised contacts: a force law of ten lines in extended precision, symmetries, and the operators of disks."""
+"""K and C of linearised contacts: a force law in extended precision, symmetries, and the operators of disks."""
 
 import numpy as np
 import pytest
@@ -209,7 +209,10 @@ def test_held_particles_take_part_in_contacts_alone(bed):
     held = Snapshot(**{name: getattr(bed, name) for name in bed.__dataclass_fields__} | {"free": free})
     coordinates = np.tile(free, bed.axes)
     k, less = stiffness_matrix(bed).toarray(), stiffness_matrix(held).toarray()
-    assert np.abs(less[np.ix_(coordinates, coordinates)] - k[np.ix_(coordinates, coordinates)]).max() < 1e-14 * np.abs(k).max()
+    assert (
+        np.abs(less[np.ix_(coordinates, coordinates)] - k[np.ix_(coordinates, coordinates)]).max()
+        < 1e-14 * np.abs(k).max()
+    )
     assert not less[~coordinates].any()
     assert not less[:, ~coordinates].any()
 

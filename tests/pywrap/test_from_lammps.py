@@ -1,4 +1,4 @@
-"""Snapshots of LAMMPS's own packings: LAMMPS's motion beside exp(t G), b of two spheres, what is refused, what changes."""
+"""Snapshots of LAMMPS's own packings: LAMMPS's motion beside exp(t G), b of two spheres, refusals, what changes."""
 
 import numpy as np
 import pytest
@@ -36,8 +36,8 @@ LAWS = {
 }  # fmt: skip
 """Pair style, coefficients and wall, with dashpots g and w, or a restitution e.
 
-The coefficient of friction is 3, so that no contact comes to rest at Coulomb's bound. They are soft: overlaps are a hundredth of a radius, so that velocities of 1e-5 are small beside them and large beside
-rounding."""
+The coefficient of friction is 3, so that no contact comes to rest at Coulomb's bound. They are soft: overlaps are a
+hundredth of a radius, so that velocities of 1e-5 are small beside them and large beside rounding."""
 
 RESCALED = ("mindlin_rescale", "mindlin_rescale/force")
 OWN = "mindlin/smooth 2e5 6e4 0.5"
@@ -161,7 +161,7 @@ def test_motion_of_lammps(beds, law, damped, d):
     contacts = snapshot.contacts
     assert len(contacts) > len(snapshot)
     assert snapshot.damped
-    steps = [8e-4 / 2**k for k in range(4)]
+    steps = [2e-4 / 2**k for k in range(4)]
     runs = [compare_motion(lmp, snapshot, 0.2, 1e-5, timestep=step) for step in steps]
     error = [run.difference for run in runs]
     assert not contacts.at_bound.any()
@@ -359,8 +359,14 @@ def test_our_own_style():
     lmp = instance()
     start(lmp, 2, 8)
     told = ["pair_style mindlin/smooth 2e5 6e4 0.5 damping 10 5", "pair_coeff * *",
-            "fix floor all wall/mindlin/smooth 2e5 6e4 0.5 ylo 0.0 damping 10 5", "fix move all nve/disc 0.5"]  # fmt: skip
-    command(lmp, "\n".join([*told, "fix load all gravity 1 vector 0.2 -1 0", "fix drag all viscous 1", "timestep 0.001", "run 9000"]))
+            "fix floor all wall/mindlin/smooth 2e5 6e4 0.5 ylo 0.0 damping 10 5",
+            "fix move all nve/disc 0.5"]  # fmt: skip
+    command(
+        lmp,
+        "\n".join(
+            [*told, "fix load all gravity 1 vector 0.2 -1 0", "fix drag all viscous 1", "timestep 0.001", "run 9000"]
+        ),
+    )
     found = from_lammps(lmp, told, balance=np.inf)
     c = found.contacts
     assert c.wall.any()
@@ -392,3 +398,49 @@ def test_pairs_at_rest_on_a_slope(beds):
     found = from_lammps(beds("mindlin/force", 3, True))
     if not found.contacts.at_bound.any():
         assert len(spectrum(found).pairs) == 0
+
+
+RANKS = """
+import sys
+import numpy as np
+from mpi4py import MPI
+sys.path[:0] = sys.argv[1:]
+from test_from_lammps import command, instance, start, state, with_law
+from faultgouge.pywrap import from_lammps
+from pathlib import Path
+ends = []
+for looks in (0, 1):
+    lmp = instance(Path(f"log{looks}"))
+    start(lmp, 3, 20)
+    with_law(lmp, "mindlin", 3, "40", "40", ("", ""))
+    command(lmp, "fix load all gravity 1.0 vector 0.1 0 -1\\nfix move all nve/sphere\\nfix drag all viscous 1.5\\n"
+                 "timestep 0.002\\nthermo 10000\\nrun 3000")
+    if looks:
+        found = from_lammps(lmp, balance=np.inf)
+        assert len(found.contacts) > 20 and found.contacts.wall.any()
+        # what is left of the forces without those of all contacts is the weight
+        slope = np.array([0.1, 0, -1]) / np.hypot(0.1, 1)
+        assert np.abs(found.load[:, 0] - found.mass[:, None] * slope).max() < 1e-9
+        assert np.abs(found.load[:, 1]).max() < 1e-9
+    lmp.command("run 300")
+    ends.append(state(lmp))
+    lmp.close()
+assert np.array_equal(*ends), "the run that follows is another one"
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.ranks
+def test_on_two_ranks(tmp_path):
+    """All contacts are in the snapshot, whichever rank has them, and the next run is the same as without the look."""
+    import subprocess
+    import sys
+    from pathlib import Path
+
+    from reference_layer import BIN
+
+    (tmp_path / "look.py").write_text(RANKS)
+    paths = [Path(__file__).parent, Path(__file__).parents[1]]
+    words = [BIN / "mpiexec", "-n", "2", sys.executable, "look.py", *paths]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr

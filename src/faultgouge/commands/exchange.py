@@ -88,7 +88,9 @@ def import_(
     if file.suffix == ".in" or file.name.startswith("in."):
         given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame, relax or None]
         if floor or any(each is not None for each in given):
-            raise typer.BadParameter(f"{file} is a deck, which says all by itself: leave all options but -o and --slides")
+            raise typer.BadParameter(
+                f"{file} is a deck, which says all by itself: leave all options but -o and --slides"
+            )
         _import_deck(file, output, slides)
         return
     if slides:
