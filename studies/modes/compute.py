@@ -51,7 +51,7 @@ from ...analysis.spectrum.spectrum import (
     mass_weighted,
     unit_rounding,
 )
-from ...pywrap import Scene
+from ...pywrap import Equilibrium, Scene
 from ...pywrap.runs.path import EquilibriumPath
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.study_sections import Modes
@@ -185,10 +185,10 @@ def modes(scene: Scene, start: Start) -> dict[str, Any]:
     NoEquilibriumError
         If the packing does not settle.
     """
-    return along_ramp(scene, start, _load)
+    return along_ramp(scene, start(scene.law.mus[0]), _load)
 
 
-def along_ramp(scene: Scene, start: Start, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
+def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
     """What there is to see of the packing at each load of [modes] that it bears.
 
     Parameters
@@ -201,7 +201,6 @@ def along_ramp(scene: Scene, start: Start, look: Callable[[Packing], dict[str, A
         Packing -> the numbers of one load.
     """
     step, wanted = needed(scene.ramp, "ramp").step, (scene.modes or Modes()).fx_over_fy
-    rest = start(scene.law.mus[0])
     row: dict[str, Any] = {"ends": "until", "loads": []}
     with path_from(rest, scene) as path:
         for share in sorted(wanted):

@@ -10,7 +10,6 @@ from faultgouge.analysis.motion.power_law import PowerLaw
 from faultgouge.analysis.onset.pair_form import PairForm
 from faultgouge.analysis.spectrum.normal_form import NormalForm
 from faultgouge.pywrap.lammps.dynamics import Weakening
-from faultgouge.studies.dissipation.draw import dissipation_figure
 from faultgouge.studies.reproduce.draw import growth_figure
 from faultgouge.studies.triggering.compute import Sensitivity
 from faultgouge.studies.triggering.draw import (
@@ -24,6 +23,7 @@ from faultgouge.studies.triggering.draw import (
     share,
     weakening_figure,
 )
+from research.dissipation.draw import dissipation_figure
 
 PAPERS = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=0.0, v_ss=1.0)
 

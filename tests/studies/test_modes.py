@@ -12,9 +12,9 @@ from faultgouge.analysis import spectrum, stiffness_matrix
 from faultgouge.analysis.onset import LIMITS
 from faultgouge.pywrap import Engine, Scene, equilibrate, settle
 from faultgouge.studies.modes.compute import antisymmetric_norm, counted, modes, switched
-from faultgouge.studies.modes.sets import sets
 from faultgouge.studies.modes.sliced import sliced
 from faultgouge.studies.packings import sliding
+from research.modes.sets import sets
 
 SCENE = SMALL | {
     "packing": {"disks": 60, "width": 9.2, "seed": 77},
