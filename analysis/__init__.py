@@ -1,9 +1,10 @@
 """A configuration of frictional disks in; its stability operator, spectrum, onset and growth out.
 
-Everything takes a :class:`Packing`, and the operators with what follows from them a :class:`Snapshot` as well. The physics is in the docstrings of the modules: `law`
-(the contact law), `contacts`, `geometry`, `packing` (forces), `stiffness` (the stability operator), `spectrum` (its
-eigenvalues), `damping` (the damping matrix), `onset` (where they become complex), `growth` (what a run shows of
-it). `runfile`, `dumps` and `files` read and write packings.
+Everything takes a :class:`Packing`; the operators, and what follows from them, take a :class:`Snapshot` as well. The
+physics is in the docstrings of the modules: `law` (the contact law), `contacts`, `geometry`, `packing` (forces),
+`stiffness` and `linearised_contacts` (the stability operator), `spectrum` (its eigenvalues), `damping` (the damping
+matrix), `onset` (where they become complex), `growth` (what a run shows of it). `runfile`, `dumps` and `files` read and
+write packings.
 """
 
 from .damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows

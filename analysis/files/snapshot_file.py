@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import PackingFileError
 from ..packing.snapshot import PER_CONTACT, LinearisedContacts, Snapshot
 from .runfile_header import CHECKED, CREATOR, program_version
-from .sealedfile import opened, new_file, write
+from .sealedfile import new_file, opened, write
 from .wholefile import is_sealed
 
 SCALARS = ("dimension", "fx", "load_error")

@@ -169,7 +169,7 @@ class Packing:
 
     @property
     def load_error(self) -> float:
-        """r / n^(1/2) of a residual r with n top disks, force per disk: what is out of balance is exact at another load.
+        """r / n^(1/2) of a residual r and n top disks, force per disk: what is out of balance is exact at another load.
 
         Rounding leaves forces of r or less at random on the disks, and their mean over n disks is that of a load.
         """

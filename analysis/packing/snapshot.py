@@ -302,11 +302,11 @@ class Snapshot:
 
     def __repr__(self) -> str:
         what = "disks" if self.dimension == 2 else "spheres"
-        walls = int(self.contacts.wall.sum())
+        count, walls = len(self.contacts), int(self.contacts.wall.sum())
         bound = int(self.contacts.at_bound.sum())
         slide = ", which slide" if self.contacts.sliding.any() else ", which stick" if bound else ""
         return (
-            f"<Snapshot: {len(self)} {what}, {len(self.contacts) - walls} contacts between them and {walls} with walls, "
+            f"<Snapshot: {len(self)} {what}, {count - walls} contacts between them and {walls} with walls, "
             f"{bound} at Coulomb's bound{slide}, {len(self.rattlers)} rattlers, residual {self.residual:.3g}>"
         )
 

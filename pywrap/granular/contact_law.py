@@ -1,7 +1,7 @@
 r"""The laws of LAMMPS's granular styles, measured in a second LAMMPS with two particles or one and a wall.
 
-What a wall's tangential stiffness is, where the lever arm of a torque ends, how coefficients of two types mix, and which
-damping a model's name stands for differ between versions of LAMMPS. None of it is looked up. At the overlap
+What a wall's tangential stiffness is, where the lever arm of a torque ends, how coefficients of two types mix, and
+which damping a model's name stands for differ between versions of LAMMPS. None of it is looked up. At the overlap
 :math:`\delta`, with the effective radius R and the effective mass m of a contact, every law of these styles is a
 power law,
 
@@ -310,14 +310,12 @@ def _pushed(bench: Bench, state: State, types: tuple[int, int], speed: float) ->
 
 
 def _dashpot(bench: Bench, direction: tuple[float, float], scale: float, speed: float) -> float:
-    """Force per velocity of a contact without slip: first at some speed, then at one whose force is a tenth of scale."""
+    """Force per velocity of a contact without slip: first at some speed, then where the force is a tenth of scale."""
     tangential = int(direction[1])
     bench.move((0.0, 0.0))
     bench.run("run 0 post no")
     rest, found = bench.force()[tangential], 0.0
-    for _ in range(
-        6
-    ):  # each time far nearer; a speed whose force is lost in rounding, or is cut at the bound, comes near
+    for _ in range(6):  # a speed whose force is lost in rounding, or is cut at the bound, comes nearer
         bench.move((speed * direction[0], speed * direction[1]))
         bench.run("run 0 post no")
         force = bench.force()[tangential] - rest

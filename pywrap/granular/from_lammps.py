@@ -308,7 +308,7 @@ class _Contacts:
                     reduced,
                     effective,
                     f"contacts of types {key[0]} and {key[1]}",
-                )  # fmt: skip
+                )
             )
         for name, _ in at_walls:
             p, n, depth, force = walls[name]
@@ -328,7 +328,7 @@ class _Contacts:
                     self.radius[p],
                     self.found["rmass"][p],
                     f"fix {name}",
-                )  # fmt: skip
+                )
             )
         return parts or [_none()]
 
@@ -358,9 +358,17 @@ class _Contacts:
         normal = np.tile([0.0, 1.0, 0.0], (len(i), 1))
         arms = np.column_stack([self.radius[i], np.zeros(len(i))])
         return _smooth(
-            law, overlap[i], rows[i, 2], normal, rows[i, 0], i=i, j=np.full(len(i), WALL),
-            distance=np.full(len(i), np.inf), slip_arm=arms, lever_arm=arms,
-        )  # fmt: skip
+            law,
+            overlap[i],
+            rows[i, 2],
+            normal,
+            rows[i, 0],
+            i=i,
+            j=np.full(len(i), WALL),
+            distance=np.full(len(i), np.inf),
+            slip_arm=arms,
+            lever_arm=arms,
+        )
 
 
 def _none() -> LinearisedContacts:
@@ -389,9 +397,19 @@ def _agree(computed: Floats, said: Floats, who: str) -> None:
 
 
 def _by_law(
-    law: MeasuredLaw, i: Indices, j: Indices, normal: Floats, distance: Floats, overlap: Floats, normal_force: Floats,
-    tangential_force: Floats, arms: Floats, reduced: Floats, effective: Floats, who: str,
-) -> LinearisedContacts:  # fmt: skip
+    law: MeasuredLaw,
+    i: Indices,
+    j: Indices,
+    normal: Floats,
+    distance: Floats,
+    overlap: Floats,
+    normal_force: Floats,
+    tangential_force: Floats,
+    arms: Floats,
+    reduced: Floats,
+    effective: Floats,
+    who: str,
+) -> LinearisedContacts:
     """Contacts of a law that has been measured."""
     _agree(law.stiffness.at(reduced, overlap) * overlap, normal_force, who)
     per_overlap = tangential_force / overlap[:, None]

@@ -3,8 +3,8 @@
 LAMMPS hands out contacts in a run alone, and a run of zero steps sorts particles, may cut a history once more at
 Coulomb's bound, and scales a rescaled one. So the look is taken in a copy of the process (`fork`), at rest and
 with dumps, averages and log closed, and the instance stays as it is. A copy of one of several ranks could not speak
-with the others: there, and where LAMMPS has threads, the instance itself runs zero steps, with its velocities taken away
-and given back.
+with the others: there, and where LAMMPS has threads, the instance itself runs zero steps, with its velocities taken
+away and given back.
 """
 
 import ctypes

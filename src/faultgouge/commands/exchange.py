@@ -24,8 +24,8 @@ Source = Annotated[
     Path,
     typer.Argument(
         metavar="FILE",
-        help="A LAMMPS deck (.in); or LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, packing.json, "
-        "or what MDAnalysis reads with radii.",
+        help="A LAMMPS deck (.in); or LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended "
+        "XYZ, GSD, packing.json, or what MDAnalysis reads with radii.",
         show_default=False,
     ),
 ]
