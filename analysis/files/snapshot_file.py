@@ -66,8 +66,8 @@ def write_snapshot(path: Path, snapshot: Snapshot, attributes: Mapping[str, str 
             group.create_dataset(
                 f"contacts/{name}", data=values, **(CHECKED if len(values) else {}), chunks=len(values) > 0 or None
             )
-        for name, value in (attributes or {}).items():
-            file.attrs[name] = value
+        for name, said in (attributes or {}).items():
+            file.attrs[name] = said
         write(path, file)
 
 

@@ -414,4 +414,4 @@ class Snapshot:
         return derived(self, contacts=derived(c, sliding=which))
 
 
-Configuration = TypeVar("Configuration", Packing, Snapshot)
+Configuration = TypeVar("Configuration", bound=Packing | Snapshot)
