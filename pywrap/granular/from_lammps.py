@@ -55,7 +55,7 @@ def from_lammps(
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
     The instance does not change: its next run is the same to the bit as without the look. (On several ranks, or with
-    threads, the same but for rounding.)
+    threads, LAMMPS itself runs zero steps, which may change the next run of a packing that still moves.)
 
     Parameters
     ----------
