@@ -1,9 +1,10 @@
 """A configuration of frictional disks in; its stability operator, spectrum, onset and growth out.
 
-Everything takes a :class:`Packing` and nothing else. The physics is in the docstrings of the modules: `law`
-(the contact law), `contacts`, `geometry`, `packing` (forces), `stiffness` (the stability operator), `spectrum` (its
-eigenvalues), `damping` (the damping matrix), `onset` (where they become complex), `growth` (what a run shows of
-it). `runfile`, `dumps` and `files` read and write packings.
+Everything takes a :class:`Packing`; the operators, and what follows from them, take a :class:`Snapshot` as well. The
+physics is in the docstrings of the modules: `law` (the contact law), `contacts`, `geometry`, `packing` (forces),
+`stiffness` and `linearised_contacts` (the stability operator), `spectrum` (its eigenvalues), `damping` (the damping
+matrix), `onset` (where they become complex), `growth` (what a run shows of it). `runfile`, `dumps` and `files` read and
+write packings.
 """
 
 from .damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows
@@ -21,6 +22,7 @@ from .packing.contacts import FLOOR, Contacts
 from .packing.geometry import ContactGeometry, nearest_image, touching
 from .packing.law import MindlinLaw
 from .packing.packing import Packing
+from .packing.snapshot import LinearisedContacts, Snapshot
 from .packing.solid_fraction import solid_fraction
 from .spectrum.buckling import negative_eigenvalues
 from .spectrum.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
@@ -47,6 +49,7 @@ __all__ = [
     "Eigenpairs",
     "FaultgougeError",
     "Growth",
+    "LinearisedContacts",
     "MindlinLaw",
     "NoEquilibriumError",
     "NoGainError",
@@ -56,6 +59,7 @@ __all__ = [
     "Packing",
     "PackingFileError",
     "RunFile",
+    "Snapshot",
     "Spectrum",
     "TransientGain",
     "Window",

@@ -42,7 +42,7 @@ FLOORS = {
     ),
     "faultgouge.pywrap": (
         ("lammps",),
-        ("equilibria", "exchange"),
+        ("equilibria", "exchange", "granular"),
         ("scenes",),
         ("settling",),
         ("runs",),

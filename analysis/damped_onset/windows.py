@@ -83,7 +83,7 @@ def damped_windows(
     """
     loads = increasing(forces)
     start = equilibrium(float(loads[0]))
-    if not start.law.damped and start.drag_time is None:
+    if not start.damped:
         raise ValueError("The packing has no dissipation: find_onset is what it needs.")
     return growing_windows(lambda fx: Pencil.of(equilibrium(fx)), loads, look, first, watch, known)
 

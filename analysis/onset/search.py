@@ -99,7 +99,7 @@ class Onset(Tabled):
 
 def seeks_all(packing: Packing, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
     """Whether `find_onset` seeks all windows, at all loads; else it asks for loads up to the first window."""
-    return modes is None and len(packing) <= limits.all_windows
+    return modes is None and packing.coordinates <= 3 * limits.all_windows
 
 
 def complex_windows(

@@ -49,6 +49,8 @@ from scipy.sparse import coo_array, csr_array
 
 from ..packing.law import Derivatives
 from ..packing.packing import Floats, Indices, Packing
+from ..packing.snapshot import Snapshot
+from .linearised_contacts import assembled_stiffness
 
 Form = Literal["consistent", "paper"]
 
@@ -58,7 +60,7 @@ SIGNS = np.einsum("pa,qb->pqab", SIDES, SIDES)
 
 
 def stiffness_matrix(
-    packing: Packing,
+    packing: Packing | Snapshot,
     form: Form = "consistent",
     coupled: NDArray[np.bool_] | None = None,
     parting: ArrayLike = 0.5,
@@ -68,7 +70,7 @@ def stiffness_matrix(
 
     Parameters
     ----------
-    packing : Packing
+    packing : Packing or Snapshot
         The configuration; it need not be in balance.
     form : {"consistent", "paper"}
         The exact derivative, or the one without the turning of the tangent.
@@ -85,17 +87,22 @@ def stiffness_matrix(
 
     Returns
     -------
-    scipy.sparse.csr_array, shape (3N, 3N)
-        Force / length, in the order (x.., y.., R theta..). Rows of rattlers are empty, and so are all rows and columns
+    scipy.sparse.csr_array, shape (3N, 3N), or (6N, 6N) of spheres
+        Force / length, in the order (x.., y.., R theta..), or as of
+        :mod:`~faultgouge.analysis.packing.snapshot`. Rows of rattlers are empty, and so are all rows and columns
         of rotations without friction.
 
     Raises
     ------
     ValueError
-        If the form is neither of the two.
+        If the form is neither of the two, or a Snapshot is asked for another operator than its own.
     """
     if form not in ("consistent", "paper"):
         raise ValueError(f'form = "{form}" must be "consistent" or "paper".')
+    if isinstance(packing, Snapshot):
+        if form == "paper" or coupled is not None:
+            raise ValueError("The operator of a Snapshot is the consistent one, of all of its contacts.")
+        return assembled_stiffness(packing, parting)
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry

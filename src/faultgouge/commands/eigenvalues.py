@@ -24,10 +24,11 @@ from .terminal import (
     show_table,
     status,
     stored_packing,
+    stored_snapshot,
 )
 
 if TYPE_CHECKING:
-    from ..analysis import DampedWindow, Packing, Spectrum, Window
+    from ..analysis import DampedWindow, Packing, Snapshot, Spectrum, Window
     from ..pywrap import Equilibrium, Scene
     from ..pywrap.onset.damped import DampedOnset
 
@@ -57,10 +58,10 @@ def spectrum(
     as_json: AsJson = False,
 ) -> None:
     """Eigenvalues of a stored packing, its complex pairs and its rattlers."""
-    from faultgouge.analysis import solid_fraction
+    from faultgouge.analysis import Snapshot, solid_fraction
     from faultgouge.analysis import spectrum as eigenvalues_of
 
-    packing = stored_packing(file, frame)
+    packing = stored_snapshot(file) or stored_packing(file, frame)
     if values:
         _values(packing, as_json)
         return
@@ -85,14 +86,14 @@ def spectrum(
             "rattlers": result.rattlers.tolist(),
             "fx": packing.fx,
             "residual": packing.residual,
-            "solid_fraction": solid_fraction(packing),
+            "solid_fraction": None if isinstance(packing, Snapshot) else solid_fraction(packing),
             "noise_pairs": result.noise_pairs,
             "transient_gain": gain,
         }
     )
 
 
-def _values(packing: Packing, as_json: bool) -> None:
+def _values(packing: Packing | Snapshot, as_json: bool) -> None:
     """Eigenvalues without vectors: as JSON, or a line each."""
     from faultgouge.analysis import eigenvalues
 
@@ -104,15 +105,21 @@ def _values(packing: Packing, as_json: bool) -> None:
         print(f"{real:.17g} {imaginary:.17g}")
 
 
-def _print_spectrum(packing: Packing, result: Spectrum, gain: dict[str, Any] | None) -> None:
-    from faultgouge.analysis import growth_rate, solid_fraction
+def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[str, Any] | None) -> None:
+    from faultgouge.analysis import Snapshot, growth_rate, solid_fraction
 
     real = result.eigenvalues.real
-    span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
-    print(
-        f"F_x = {packing.fx:g}: {len(real)} eigenvalues{span}, {len(result.rattlers)} rattlers left out; volume "
-        f"fraction {solid_fraction(packing):.4f}"
-    )
+    what, fraction = f"F_x = {packing.fx:g}", ""
+    if isinstance(packing, Snapshot):
+        what = f"{len(packing)} {'spheres' if packing.dimension == 3 else 'disks'} as LAMMPS left them"
+        bound = int(packing.contacts.at_bound.sum())
+        if bound:
+            acts = "slide" if packing.contacts.sliding.any() else "stick"
+            say(f"{bound} of {len(packing.contacts)} contacts are at Coulomb's bound; they {acts} here")
+    else:
+        fraction = f"; volume fraction {solid_fraction(packing):.4f}"
+    span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ", as no particle touches another"
+    print(f"{what}: {len(real)} eigenvalues{span}, {len(result.rattlers)} rattlers left out{fraction}")
     if not _in_balance(packing):
         print(
             f"not in equilibrium: a force of {packing.residual:.3g} is left on a disk, and of a packing that moves the "
@@ -143,7 +150,7 @@ def _print_spectrum(packing: Packing, result: Spectrum, gain: dict[str, Any] | N
             if len(real)
             else "no disk touches another or the floor: there is nothing to be stable"
         )
-    if packing.law.damped or packing.drag_time is not None:
+    if not isinstance(packing, Snapshot) and (packing.law.damped or packing.drag_time is not None):
         print("dashpots and drag are left out here: `faultgouge onset` of the scene counts them in")
     if gain is not None:
         print(
@@ -156,16 +163,16 @@ def _print_spectrum(packing: Packing, result: Spectrum, gain: dict[str, Any] | N
         print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
 
 
-def _in_balance(packing: Packing) -> bool:
+def _in_balance(packing: Packing | Snapshot) -> bool:
     """Whether what is left of the forces on a disk is rounding, of a dump's digits at most."""
     return packing.residual <= IN_BALANCE * float(packing.normal_force.max(initial=0.0))
 
 
-def _gain_of(packing: Packing) -> dict[str, Any] | None:
+def _gain_of(packing: Packing | Snapshot) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None if unstable, too large, or where it fails."""
     from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
 
-    if len(packing) > MOST_DISKS:
+    if packing.coordinates > 3 * MOST_DISKS:
         return None
     try:
         displacement, energy = transient_gains(packing)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..ranks import is_root
-from .terminal import Frame, PackingFile, progress, say, stored_packing, stored_series
+from .terminal import Frame, PackingFile, progress, refuse_snapshot, say, stored_packing, stored_series
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -66,6 +66,7 @@ def draw(
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
+    refuse_snapshot(file)
     packing, series, cycle = stored_packing(file, -1 if frame is None else frame), None, []
     if frame is None and mode is None:
         series, cycle = stored_series(file), _cycle(file)
@@ -121,6 +122,7 @@ def movie(
     from faultgouge.figures.writers import check_name, write_film
 
     check_name(output)
+    refuse_snapshot(file)
     count = max(2, round(seconds * rate))
     if not is_root():
         return
@@ -167,6 +169,7 @@ def view(
 
     check_library()
     check_folder(output)
+    refuse_snapshot(file)
     if not is_root():
         return
     with RunFile(file) as run:

@@ -21,7 +21,7 @@ import typer
 from ..ranks import is_root
 
 if TYPE_CHECKING:
-    from faultgouge.analysis import Packing
+    from faultgouge.analysis import Packing, Snapshot
     from faultgouge.pywrap import Equilibrium, Scene
     from faultgouge.pywrap.scenes.estimate import Task
 
@@ -55,6 +55,26 @@ def read_scene(path: Path, task: Task | None = None, packings: int = 1) -> Scene
     if ahead:
         say(ahead)
     return scene
+
+
+def stored_snapshot(file: Path) -> Snapshot | None:
+    """The snapshot of a run.h5 that holds one; None of all other files."""
+    from faultgouge.analysis.files.snapshot_file import holds_snapshot, read_snapshot
+
+    return read_snapshot(file) if holds_snapshot(file) else None
+
+
+def refuse_snapshot(file: Path) -> None:
+    """Say of a run.h5 that holds a snapshot what shows it."""
+    from faultgouge.analysis import BadInputError
+
+    snapshot = stored_snapshot(file)
+    if snapshot is not None:
+        what = "spheres" if snapshot.dimension == 3 else "disks of another law"
+        raise BadInputError(
+            f"{file} holds {what} as LAMMPS left them: `faultgouge export {file} --mode 0 -o packing.vtp` shows them "
+            "in ParaView, and -o packing.xyz in OVITO."
+        )
 
 
 def stored_packing(file: Path, frame: int = -1) -> Packing:
