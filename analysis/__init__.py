@@ -21,6 +21,7 @@ from .packing.contacts import FLOOR, Contacts
 from .packing.geometry import ContactGeometry, nearest_image, touching
 from .packing.law import MindlinLaw
 from .packing.packing import Packing
+from .spectrum.buckling import negative_eigenvalues
 from .spectrum.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
 from .spectrum.spectrum import (
     ComplexPair,
@@ -74,6 +75,7 @@ __all__ = [
     "linear_response",
     "mean_square_displacement",
     "nearest_image",
+    "negative_eigenvalues",
     "normal_modes",
     "read_dump",
     "read_packing",

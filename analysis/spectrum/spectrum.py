@@ -14,6 +14,11 @@ K is not symmetric, and real eigenvalues may coalesce and leave the axis as a pa
 each pair grows as :math:`e^{|\omega_I| t}`, and the mean square displacement as :math:`e^{2 |\omega_I| t}`.
 "Growth rate" means :math:`2 |\mathrm{Im}\,\omega|` throughout, the rate of the square.
 
+**Negative eigenvalues.** A real :math:`\lambda < 0` is the classical instability (buckling): :math:`\omega` is
+imaginary, and the motion leaves the equilibrium without oscillation. A branch of equilibria passes through
+:math:`\lambda = 0` at a turning point; Newton's method can land beyond it, on equilibria that no packing reaches by
+itself. A packing is linearly stable only if it has neither complex pairs nor negative eigenvalues.
+
 **Noise.** A backward stable solver returns the eigenvalues of :math:`A + E` with :math:`|E| \sim u |A|`, u
 the unit roundoff, and a simple eigenvalue with unit right and left vectors x, y moves by :math:`\kappa |E|`,
 :math:`\kappa = 1/|y^H x|`. Close to a coalescence :math:`\kappa \to \infty` as one over the distance of the
@@ -116,8 +121,10 @@ class Spectrum(Tabled):
         force at all are left out.
     pairs : tuple of ComplexPair
         The complex pairs that exceed their own rounding uncertainty, fastest growing first.
+    negative : ndarray, shape (B,)
+        The real negative eigenvalues beyond their own rounding uncertainty, the most negative first, 1 / time^2.
     noise_pairs : int
-        Number of computed complex pairs that do not.
+        Number of computed complex pairs that do not exceed their rounding uncertainty.
     rattlers : ndarray of int
         Disks that touch nothing.
     rounding : float
@@ -126,6 +133,7 @@ class Spectrum(Tabled):
 
     eigenvalues: Complexes
     pairs: tuple[ComplexPair, ...]
+    negative: Floats
     noise_pairs: int
     rattlers: Indices
     rounding: float
@@ -134,7 +142,8 @@ class Spectrum(Tabled):
         real = self.eigenvalues.real
         span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
         return (
-            f"<Spectrum: {len(real)} eigenvalues{span}, {len(self.pairs)} complex pairs, {len(self.rattlers)} rattlers>"
+            f"<Spectrum: {len(real)} eigenvalues{span}, {len(self.negative)} negative, {len(self.pairs)} complex pairs, "
+            f"{len(self.rattlers)} rattlers>"
         )
 
     def _rows(self) -> dict[str, str]:
@@ -145,7 +154,13 @@ class Spectrum(Tabled):
             )
             for pair in self.pairs
         }
-        return rows or {"no complex pair": "linearly stable"}
+        rows |= {f"{value:.10g}": f"2 |Im \u03c9| = {growth_rate(value):.6g}, negative" for value in self.negative}
+        return rows or {"no complex pair and no negative eigenvalue": "linearly stable"}
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether no motion grows: no believable complex pair, and no negative eigenvalue beyond noise."""
+        return not self.pairs and not len(self.negative)
 
     @property
     def least_q(self) -> float:
@@ -159,9 +174,8 @@ class Spectrum(Tabled):
 
     @property
     def unstable(self) -> Complexes:
-        """Eigenvalues whose motion grows: one of each believable pair, and negative ones beyond noise."""
-        falling = self.eigenvalues[(self.eigenvalues.imag == 0) & (self.eigenvalues.real < -SAFETY * self.rounding)]
-        return np.concatenate([[pair.eigenvalue for pair in self.pairs], falling]).astype(np.complex128)
+        """Eigenvalues whose motion grows: one of each believable pair, and the negative ones."""
+        return np.concatenate([[pair.eigenvalue for pair in self.pairs], self.negative]).astype(np.complex128)
 
     def growth_rate(self, dt: float | None = None) -> float:
         """Rate at which D of an undamped run will grow, 1 / time.
@@ -304,10 +318,11 @@ def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
     alone = len(matrix) <= DENSE or (sparse != sparse.T).nnz == 0
     values = eigvals(matrix) if len(matrix) and alone else np.zeros(0, complex)
     pairs: list[ComplexPair] = []
-    noise = 0
-    if not alone or np.any(values.imag != 0):
+    noise, negative = 0, np.zeros(0)
+    if not alone or np.any(values.imag != 0) or values.real.min(initial=0.0) < -SAFETY * rounding:
         values, left, right = eig(matrix, left=True, right=True)
         overlap = np.abs(np.sum(left.conj() * right, axis=0))
+        negative = np.sort(values[is_negative(values, overlap, rounding)].real)
         for k in np.flatnonzero(values.imag > 0):
             vector = np.zeros((3 * len(packing), 1), dtype=np.complex128)
             vector[active, 0] = right[:, k]
@@ -321,6 +336,7 @@ def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
     return Spectrum(
         eigenvalues=_sorted(values),
         pairs=tuple(pairs),
+        negative=negative,
         noise_pairs=noise,
         rattlers=packing.rattlers,
         rounding=rounding,
@@ -383,6 +399,11 @@ def stable_timestep(omega_max: float) -> float:
 def unit_rounding(matrix: Floats) -> float:
     """u |A|_F with the unit roundoff u = 2^-53: the backward error scale of an eigenvalue solver."""
     return float(0.5 * np.finfo(np.float64).eps * np.linalg.norm(matrix))
+
+
+def is_negative(values: Complexes, overlap: Floats, rounding: float) -> NDArray[np.bool_]:
+    """Which eigenvalues are real and below zero by more than SAFETY kappa u |A|, their own rounding uncertainty."""
+    return (values.imag == 0) & (-values.real * overlap > SAFETY * rounding)
 
 
 def believable(eigenvalue: complex, overlap: float | np.floating, rounding: float) -> bool:
