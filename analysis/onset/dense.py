@@ -402,8 +402,8 @@ def windows_along(
     for way in ways:
         try:
             for load, windows in _walked(Dense(family, way, first), loads):
-                if load > reached:
-                    reached = load
+                if load > reached or (first and windows):  # the second walk may find what the first one missed
+                    reached = max(reached, load)
                     yield load, windows
             return
         except LostTrackError:
