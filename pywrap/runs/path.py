@@ -218,22 +218,22 @@ class EquilibriumPath:
     ) -> None:
         self.engine, self.scene, self._onward = engine, scene, onward
         self.kept = [start, *further]
-        # an equilibrium, and another one near it
-        self._beside = (self.kept[-1], self.kept[-2]) if further else None
+        self._beside: tuple[Equilibrium, Equilibrium] | None = None  # a kept one, and the last one found above it
 
     def __call__(self, fx: float) -> Packing:
         """The packing in equilibrium at fx."""
         below = next((each for each in reversed(self.kept) if each.fx <= fx), self.kept[0])
         if below.fx == fx:
             return below.packing
-        beside = self._beside[1] if self._beside and self._beside[0] is below else None
-        onward = self._onward and fx > self.kept[-1].fx
-        found = next_equilibrium(self.engine, below, fx, self.scene, beside, onward)
         if fx > self.kept[-1].fx:
+            # from the ramp alone, so that it does not depend on what is asked for in between
+            beside = self.kept[-2] if len(self.kept) > 1 else None
+            found = next_equilibrium(self.engine, below, fx, self.scene, beside, self._onward)
             self.kept.append(found)
-            self._beside = found, below
-        else:
-            self._beside = below, found
+            return found.packing
+        beside = self._beside[1] if self._beside and self._beside[0] is below else None
+        found = next_equilibrium(self.engine, below, fx, self.scene, beside, onward=False)
+        self._beside = below, found
         return found.packing
 
     def climb(self, forces: Floats) -> Iterator[Equilibrium]:

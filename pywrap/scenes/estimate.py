@@ -23,7 +23,7 @@ from .keys import Keys
 from .packing_section import GeneratedPacking
 from .refusals import SceneError
 
-Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "reproduce"]
+Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "onset --all", "reproduce"]
 
 EPSILON = 2.3e-16
 
@@ -138,8 +138,9 @@ def estimated(scene: Keys, task: Task) -> Estimate:
     ----------
     scene : Scene
         What is wanted.
-    task : {"settle", "ramp", "perturb", "onset", "reproduce"}
-        Each includes the settling; perturb the ramp up to its equilibrium, onset that up to its end, reproduce the
+    task : {"settle", "ramp", "perturb", "onset", "onset --all", "reproduce"}
+        Each includes the settling; perturb the ramp up to its equilibrium, onset that
+        up to the first window, with --all up to its end, reproduce the
         onset, a run whose growth is measured and, where the scene has [friction], the runs of [perturb].
     """
     disks = scene.packing.disks
@@ -147,12 +148,15 @@ def estimated(scene: Keys, task: Task) -> Estimate:
     increments, kept = 0.0, 1.0
     ramp, perturb = scene.ramp, scene.perturb
     seconds = 0.0
-    if task in ("ramp", "onset", "reproduce") and ramp is not None:
+    if task in ("ramp", "onset", "onset --all", "reproduce") and ramp is not None:
         # the layer slides on whatever bears it once F_x exceeds mu F_y
         way = ramp.length if task == "ramp" else abs(ramp.first)
         if len(ramp.turning_points) == 1 or task != "ramp":
             way = min(way, max(scene.law.mus) * scene.load.fy + ramp.step)
         increments = way / ramp.step
+        if task == "onset":
+            first = FIRST[scene.damping is not None] * scene.load.fy / disks
+            increments = min(increments, math.ceil(first / ramp.step))
     if task == "perturb" and perturb is not None:
         increments = perturb.fx / (ramp.step if ramp is not None else scene.load.fy / 3000)
     if ramp is not None and ramp.method == "overdamped":
@@ -166,16 +170,16 @@ def estimated(scene: Keys, task: Task) -> Estimate:
         steps += GROWTH
         if perturb is not None and scene.friction is not None:
             steps += TRIGGERING_RUNS * perturb.time / (perturb.time_step or _undamped_step(scene))
-    if task in ("onset", "reproduce"):
-        search = _search_seconds(scene, increments, task == "onset" and scene.damping is not None)
+    if task in ("onset", "onset --all", "reproduce"):
+        search = _search_seconds(scene, increments, task != "reproduce" and scene.damping is not None)
         seconds = len(scene.law.mus) * (seconds + search)
         kept = increments + 1
     seconds += steps * (SECONDS_A_STEP[0] + SECONDS_A_STEP[1] * disks)
     memory = disks * (BYTES_AT_ALL + kept * BYTES_KEPT)
-    if task in ("onset", "reproduce") and disks > DENSE:
+    if task in ("onset", "onset --all", "reproduce") and disks > DENSE:
         # the ramp ends at the first onset, and few equilibria are kept
         memory = max(memory, disks * BYTES_AT_ALL + _searched_bytes(disks))
-    written = 0.0 if task == "onset" else disks * BYTES_WRITTEN * (increments + 1)
+    written = 0.0 if task.startswith("onset") else disks * BYTES_WRITTEN * (increments + 1)
     return Estimate(disks, steps, increments, memory, written, seconds)
 
 
@@ -186,7 +190,7 @@ def foreseen(scene: Keys, task: Task, packings: int = 1) -> str:
     ----------
     scene : Scene
         What is wanted.
-    task : {"settle", "ramp", "perturb", "onset", "reproduce"}
+    task : {"settle", "ramp", "perturb", "onset", "onset --all", "reproduce"}
         As in `estimated`.
     packings : int
         How many packings of the scene, one after the other.
@@ -309,7 +313,11 @@ def _undamped_step(scene: Keys) -> float:
 def _remedy(scene: Keys, task: Task) -> str:
     if task == "perturb":
         return "lower perturb.time, or raise perturb.time_step"
-    return "take a larger ramp.step, or fewer disks" if task in ("ramp", "onset", "reproduce") else "take fewer disks"
+    return (
+        "take a larger ramp.step, or fewer disks"
+        if task in ("ramp", "onset", "onset --all", "reproduce")
+        else "take fewer disks"
+    )
 
 
 def _installed_memory() -> float:

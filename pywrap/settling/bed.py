@@ -127,6 +127,13 @@ def settled_bed(
     return _settled(scene, law, communicator, watch) if generated else _stored(scene, law)
 
 
+def shared_bed(scene: Scene, watch: Watch = lambda says: None) -> Packing | None:
+    """The bed that all friction coefficients of a scene begin from; None if each has its own, or there is one alone."""
+    alone = len(scene.law.mus) == 1
+    own = isinstance(scene.packing, GeneratedPacking) and scene.packing.settle_friction
+    return None if alone or own else settled_bed(scene, watch=watch)
+
+
 def law_of(scene: Scene, mu: float) -> MindlinLaw:
     cn, ct = (scene.damping.cn, scene.damping.ct) if scene.damping else (0.0, 0.0)
     law, history = scene.law, scene.law.history

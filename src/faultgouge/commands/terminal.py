@@ -107,6 +107,12 @@ def print_json(value: dict[str, Any]) -> None:
         print(json.dumps(value, indent=1))
 
 
+def print_line(message: str) -> None:
+    """A result on standard output."""
+    if is_root():
+        print(message, flush=True)
+
+
 def say(message: str) -> None:
     """A line on standard error."""
     if is_root():
@@ -192,15 +198,13 @@ def progress(items: Iterable[T], what: str, total: int | None = None, done: int 
             yield item
 
 
+def table_of(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table as lines of text, whose columns are as wide as what is in them."""
+    lines = [list(headings), *map(list, rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join("   ".join(map(str.ljust, line, widths)).rstrip() for line in lines)
+
+
 def show_table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
     """A table on standard error."""
-    if not is_root():
-        return
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(*headings, box=box.SIMPLE_HEAD)
-    for row in rows:
-        table.add_row(*row)
-    Console(stderr=True, highlight=False).print(table)
+    say(table_of(headings, rows))
