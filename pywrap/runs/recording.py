@@ -14,6 +14,7 @@ from ...analysis import RunFile
 from ...analysis.files.wholefile import check_folder
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Motion, Weakening
+from ..scenes.commands import COMMANDS
 from ..scenes.refusals import SceneError
 from ..scenes.scene import SECTIONS, Scene
 from .undamped import Checkpoint, Sample, perturb, sampling
@@ -71,7 +72,7 @@ class Record:
             return None
         file = RunFile(self.path, "a")
         stored = json.loads(file.attributes.get("scene", "{}"))
-        difference = _difference(stored, self.scene.resolved())
+        difference = _difference(stored, self.scene.resolved(), self.task)
         if difference:
             raise SceneError(
                 f"{self.path} holds a run of another scene ({difference}): give another name with -o, or delete it"
@@ -109,6 +110,9 @@ class Record:
             file = self._file
             with file.change():
                 file.complete = False
+                scene = json.dumps(json.loads(file.attributes.get("scene", "{}")) | self.scene.resolved())
+                if scene != file.attributes.get("scene"):  # a ramp goes on from a file of `settle`, or further
+                    file.put_attribute("scene", scene)
                 file.append(equilibrium.packing, floor=equilibrium.floor, evaluations=equilibrium.evaluations)
                 if equilibrium.way is not None:
                     file.put_attribute("ways", json.dumps(ways_of(file) | {len(file) - 1: equilibrium.way}))
@@ -245,9 +249,17 @@ def from_root(communicator: MPI.Comm, work: Callable[[], T]) -> T:
     return value
 
 
-def _difference(stored: dict[str, Any], wanted: dict[str, Any]) -> str:
-    """The first key in which two resolved scenes differ, ramp.until left aside: a ramp may be prolonged."""
+def _difference(stored: dict[str, Any], wanted: dict[str, Any], task: Task) -> str:
+    """The first key in which two resolved scenes differ, ramp.until left aside: a ramp may be prolonged.
+
+    Sections that the command of the file does not read are left aside, too, and those that a settled packing does not
+    need and one of the two does not have, since a ramp goes on from a file of `settle`.
+    """
+    stored, wanted = COMMANDS[task].part(stored), COMMANDS[task].part(wanted)
+    may_lack = set() if task == "perturb" else {"relax", "ramp", "output"}
     for section in sorted(stored.keys() | wanted.keys()):
+        if section in may_lack - (stored.keys() & wanted.keys()):
+            continue
         here, there = stored.get(section), wanted.get(section)
         if isinstance(here, dict) and isinstance(there, dict):
             for key in sorted(here.keys() | there.keys()):

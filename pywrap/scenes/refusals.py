@@ -36,7 +36,13 @@ NotNegative: TypeAlias = Annotated[float, Field(ge=0, allow_inf_nan=False), Afte
 
 T = TypeVar("T")
 
-KEYS = {"ramp": "step and until", "perturb": "fx and time", "damping": "cn, ct or tau"}
+KEYS = {
+    "ramp": "step and until",
+    "perturb": "fx and time",
+    "damping": "cn, ct or tau",
+    "friction": "v0, the velocity at which friction weakens",
+    "eruptions": "load, a list of F_x",
+}
 """What a section needs at least."""
 
 

@@ -170,7 +170,7 @@ def onset(
     """
     from faultgouge.analysis.files.wholefile import check_folder
 
-    wanted, part = read_scene(scene, "onset"), None if modes is None else _modes(modes)
+    wanted, part = read_scene(scene, "onset", "onset"), None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if output:

@@ -230,7 +230,7 @@ def _scene(scene: Path | None, values: dict[str, Any]) -> Scene:
     from faultgouge.pywrap.scenes.scene import Scene
 
     if scene is not None:
-        return Scene.from_toml(scene, packing={})
+        return Scene.from_toml(scene, packing={}, command="settle")
     damping = {key: values[key] for key in ("cn", "ct", "tau") if key in values}
     law: dict[str, Any] = {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values}
     if values.get("rescaled"):

@@ -37,7 +37,7 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
 
-    wanted = read_scene(scene, "settle")
+    wanted = read_scene(scene, "settle", "settle")
     with Record(output, wanted, saved=keeps) as record:
         last = _settled(wanted, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
@@ -57,7 +57,7 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     from faultgouge.pywrap.runs.path import loads
     from faultgouge.pywrap.scenes.refusals import needed
 
-    wanted = read_scene(scene, "ramp")
+    wanted = read_scene(scene, "ramp", "ramp")
     settings = needed(wanted.ramp, "ramp")
     with Record(output, wanted, saved=keeps) as record:
         start = _settled(wanted, record)
@@ -80,7 +80,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     from faultgouge.pywrap import Record, reach
     from faultgouge.pywrap.scenes.refusals import needed
 
-    wanted = read_scene(scene, "perturb")
+    wanted = read_scene(scene, "perturb", "perturb")
     settings = needed(wanted.perturb, "perturb")
     with Record(output, wanted, task="perturb", saved=keeps) as record:
         if record.last is None:

@@ -27,7 +27,7 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     """
     from faultgouge.assessment.left_out.explain import explain as explain_scene
 
-    wanted = read_scene(scene, "settle")
+    wanted = read_scene(scene, "explain", "settle")
     with status("switching features off and on"):
         explanation = explain_scene(wanted)
     if as_json:
@@ -65,7 +65,7 @@ def reproduce(
     from importlib.resources import files
 
     shipped = Path(str(files("faultgouge") / "scenes"))
-    wanted = read_scene(scene or shipped / "paper.toml", "reproduce", max(ensemble, 1))
+    wanted = read_scene(scene or shipped / "paper.toml", "reproduce", "reproduce", max(ensemble, 1))
     if ensemble:
         from faultgouge.studies.reproduce.ensemble import ensemble as examine_packings
 
@@ -83,7 +83,7 @@ def reproduce(
     from faultgouge.studies.reproduce import reproduce as run_protocol
 
     keeps(f"what is in {output} so far is kept; the same command begins anew and replaces it")
-    triggered = read_scene(shipped / "triggered.toml") if scene is None else None
+    triggered = read_scene(shipped / "triggered.toml", "reproduce") if scene is None else None
     run_protocol(wanted, output, say, triggered)
     say(f"written: {output}/report.md")
 
@@ -147,7 +147,7 @@ def _into_folder(
     study: Callable[..., dict[str, Any]], scene: Path, output: Path, name: str, what: str, kept: str, as_json: bool
 ) -> None:
     """Run a study of a scene that goes on in its folder; `what` is counted, and `kept` is what an interrupt leaves."""
-    wanted = read_scene(scene)
+    wanted = read_scene(scene, name)
     keeps(f"{output}/{name}.jsonl has {kept}; the same command goes on from there")
     result = study(wanted, output, say, lambda results, count: progress(results, what, count))
     say(f"written: {output}/{name}.md")

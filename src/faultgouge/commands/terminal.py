@@ -44,12 +44,12 @@ Frame = Annotated[int, typer.Option(help="Which equilibrium; negative ones count
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
-def read_scene(path: Path, task: Task | None = None, packings: int = 1) -> Scene:
-    """The scene of a TOML file; if its task is long, what is to be done and how long it takes is said."""
+def read_scene(path: Path, command: str, task: Task | None = None, packings: int = 1) -> Scene:
+    """What a command reads of a scene, a TOML file; if its task is long, what is to be done and how long is said."""
     from faultgouge.pywrap.scenes.estimate import foreseen
     from faultgouge.pywrap.scenes.scene import Scene
 
-    scene = Scene.from_toml(path)
+    scene = Scene.from_toml(path, command=command)
     ahead = foreseen(scene, task, packings) if task is not None else ""
     if ahead:
         say(ahead)
