@@ -10,6 +10,7 @@ from ..errors import PackingFileError
 from ..packing.geometry import touching
 from ..packing.law import MindlinLaw
 from ..packing.packing import Packing
+from .plain_file import read_plain_text
 
 
 def read_packing(
@@ -42,7 +43,7 @@ def read_packing(
     """
     path = Path(path)
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_plain_text(path))
         position = np.column_stack([data["x"], data["y"]])
         radius = np.asarray(data["radius"], dtype=np.float64)
         top = np.zeros(len(radius), dtype=np.bool_)

@@ -18,6 +18,7 @@ what the caller gives wins.
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from io import TextIOWrapper
 from itertools import islice
 from os import PathLike
 from pathlib import Path
@@ -31,6 +32,7 @@ from ..packing.geometry import nearest_image
 from ..packing.law import MindlinLaw
 from ..packing.packing import Floats, Indices, Packing
 from .by_hand import PackingFileError
+from .plain_file import open_plain, read_plain_text
 
 DISK = {
     "id": ("id",),
@@ -221,7 +223,7 @@ def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
         If the file is missing, or breaks off or is malformed before the snapshot asked for is complete.
     """
     try:
-        with open(path, encoding="utf-8") as file:
+        with TextIOWrapper(open_plain(path), encoding="utf-8") as file:
             while True:
                 frame = _next_frame(file)
                 if frame is None:
@@ -297,7 +299,8 @@ def _sidecar(path: Path) -> dict[str, float]:
         return {}
     try:
         return {
-            key: float(value) for key, value in (line.split() for line in path.read_text().splitlines() if line.strip())
+            key: float(value)
+            for key, value in (line.split() for line in read_plain_text(path).splitlines() if line.strip())
         }
     except ValueError as error:
         raise PackingFileError(f"{path} must have one key and one number a line.") from error

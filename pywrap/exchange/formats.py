@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...analysis import BadInputError, OutputError, Packing, PackingFileError
+from ...analysis.files.plain_file import open_plain
 from ...analysis.files.wholefile import BEGINNINGS
 from .disks import Disks
 from .quantities import Frame, ModeVectors
@@ -90,7 +91,7 @@ def known_formats() -> str:
 
 def is_hdf5(path: Path) -> bool:
     """Whether a file begins as HDF5 does, or as a run.h5."""
-    with path.open("rb") as stream:
+    with open_plain(path) as stream:
         return stream.read(64).startswith(BEGINNINGS)
 
 
@@ -127,7 +128,7 @@ def format_of(path: Path) -> Format:
 def _by_beginning(path: Path) -> Format | None:
     """YADE and MercuryDPM, which the first line tells."""
     try:
-        with path.open("rb") as stream:
+        with open_plain(path) as stream:
             words = stream.readline(400).split()
     except OSError:
         return None

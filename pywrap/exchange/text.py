@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis import PackingFileError
+from ...analysis.files.plain_file import read_plain_text
 from ...analysis.packing.arrays import Floats
 
 WORDS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0}
@@ -17,7 +18,7 @@ WORDS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0}
 def lines_of(path: Path) -> list[str]:
     """The lines of a text file."""
     try:
-        return path.read_text(encoding="utf-8").splitlines()
+        return read_plain_text(path).splitlines()
     except OSError as error:
         raise PackingFileError(f"{path} cannot be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:

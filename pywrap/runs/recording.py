@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -11,7 +12,7 @@ from typing import Any, Literal, TypeVar
 from mpi4py import MPI
 
 from ...analysis import RunFile
-from ...analysis.files.wholefile import check_folder
+from ...analysis.files.wholefile import alone_with, check_output
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Motion, Weakening
 from ..scenes.commands import COMMANDS
@@ -37,7 +38,7 @@ class Record:
     task : {"ramp", "perturb"}
         What the file is for: a settled packing and its ramp, or an undamped run. A file for the other is refused.
     saved : callable, optional
-        Told in words what the file holds, whenever it has been saved.
+        Told in words what the file holds, and its path, whenever it has been saved.
 
     Attributes
     ----------
@@ -49,7 +50,7 @@ class Record:
     SceneError
         If the file holds another scene, or is for another task.
     OutputError
-        If the file cannot be written.
+        If the file cannot be written, or another run is writing it.
     """
 
     def __init__(
@@ -58,17 +59,23 @@ class Record:
         scene: Scene,
         communicator: MPI.Comm | None = None,
         task: Task = "ramp",
-        saved: Callable[[str], None] = lambda words: None,
+        saved: Callable[[str, Path], object] = lambda words, path: None,
     ) -> None:
         self.path, self.scene, self.task = path, scene, task
         self.communicator = communicator or MPI.COMM_WORLD
         self._file: RunFile | None = None
         self._said = saved
-        self.last: Equilibrium | None = from_root(self.communicator, self._resume)
+        self._alone = ExitStack()
+        try:
+            self.last: Equilibrium | None = from_root(self.communicator, self._resume)
+        except BaseException:
+            self._alone.close()
+            raise
 
     def _resume(self) -> Equilibrium | None:
+        check_output(self.path)
+        self._alone.enter_context(alone_with(self.path))
         if not self.path.exists():
-            check_folder(self.path)
             return None
         file = RunFile(self.path, "a")
         stored = json.loads(file.attributes.get("scene", "{}"))
@@ -209,7 +216,7 @@ class Record:
             return
         goes_on = "is complete" if file.complete else "the same command goes on from there"
         count = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}{more}"
-        self._said(f"{self.path} holds {count}; {goes_on}")
+        self._said(f"{self.path} holds {count}; {goes_on}", self.path)
 
     def _attributes(self) -> dict[str, str | int]:
         return {
@@ -228,6 +235,7 @@ class Record:
             self._file.save()
             self._say_saved()
             self._file.close()
+        self._alone.close()
 
 
 def ways_of(file: RunFile) -> dict[int, str]:

@@ -17,12 +17,14 @@ from .terminal import (
     Frame,
     PackingFile,
     ScenePath,
+    check_output,
     print_json,
     read_scene,
     say,
     say_way,
     show_table,
     status,
+    stored_files,
     stored_packing,
 )
 
@@ -168,13 +170,11 @@ def onset(
     With a section [damping]: the windows in which some motion grows in spite of
     the dissipation, or because of it, and beside them the undamped onset.
     """
-    from faultgouge.analysis.files.wholefile import check_folder
-
     wanted, part = read_scene(scene, "onset", "onset"), None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if output:
-        check_folder(output)
+        check_output(output, scene, *stored_files(wanted))
     folder = _search_folder(slices, output)
     found: list[dict[str, Any]] = []
     for mu in wanted.law.mus:
@@ -240,7 +240,10 @@ def _damped_onset(
     def known(so_far: DampedOnset, fx: float) -> None:
         if output is not None:
             _written(output, [*before, {"mu": mu, "searched_to": fx} | so_far.as_dict()])
-            keeps(f"{output} has the windows with dissipation up to F_x = {fx:.6g}, without the errors of the path")
+            keeps(
+                f"{output} has the windows with dissipation up to F_x = {fx:.6g}, without the errors of the path",
+                output,
+            )
 
     with status(f"mu = {mu:g}") as show:
         watch = partial(_under_way, show, f"mu = {mu:g}", folder=folder, tells=output is None)
@@ -316,7 +319,7 @@ def _under_way(
     """Say what is under way; at an interrupt, what a folder has, or how far the search had come if it `tells`."""
     show(f"{what}: {now}")
     if folder is not None and folder.is_dir():
-        keeps(f"{folder} has what was found so far; the same command goes on from there")
+        keeps(f"{folder} has what was found so far; the same command goes on from there", folder)
     if tells:
         keeps(f"no file was written. {what}: {now}")
 

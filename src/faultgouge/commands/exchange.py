@@ -10,7 +10,7 @@ import typer
 from ..guard import keeps
 from ..ranks import is_root
 from .pictures import modes_of
-from .terminal import Frame, PackingFile, progress, say, status, stored_packing
+from .terminal import Frame, PackingFile, check_output, progress, say, status, stored_packing
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -74,11 +74,9 @@ def import_(
     comes to rest under law and load: without friction, which then begins with zero
     slips; with friction if the file has slips. What moved is said.
     """
-    from faultgouge.analysis.files.wholefile import check_folder
-
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
-    check_folder(output)
+    check_output(output)
     disks = _placed(file, frame, floor, width, contacts)
     laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
     packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
@@ -126,6 +124,7 @@ def export(
     from faultgouge.pywrap.exchange import ModeVectors
     from faultgouge.pywrap.exchange.formats import check_writer, write_packing
 
+    check_output(output, file)
     if frames is not None:
         if mode is not None or frame != -1:
             raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..ranks import is_root
-from .terminal import Frame, PackingFile, progress, say, stored_packing
+from .terminal import Frame, PackingFile, check_output, progress, say, stored_packing
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -60,6 +60,7 @@ def draw(
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
+    check_output(output, file)
     packing = stored_packing(file, frame)
     if not is_root():
         return
@@ -105,6 +106,7 @@ def movie(
     from faultgouge.figures.writers import check_name, write_film
 
     check_name(output)
+    check_output(output, file)
     count = max(2, round(seconds * rate))
     if not is_root():
         return
@@ -145,12 +147,11 @@ def view(
     if output.suffix.lower() != ".html":
         raise typer.BadParameter(f"-o {output}: a page is an .html")
     from faultgouge.analysis import RunFile
-    from faultgouge.analysis.files.wholefile import check_folder
     from faultgouge.figures.view import check_library, equally_spaced, loads_shown, write_view
     from faultgouge.figures.view_pair import seconds
 
     check_library()
-    check_folder(output)
+    check_output(output, file)
     if not is_root():
         return
     with RunFile(file) as run:

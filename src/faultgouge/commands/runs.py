@@ -11,7 +11,19 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import AsJson, Out, ScenePath, print_json, progress, read_scene, say, say_way, status
+from .terminal import (
+    AsJson,
+    Out,
+    ScenePath,
+    check_output,
+    print_json,
+    progress,
+    read_scene,
+    say,
+    say_way,
+    status,
+    stored_files,
+)
 
 if TYPE_CHECKING:
     from faultgouge.pywrap import Equilibrium, Record, Scene
@@ -38,6 +50,7 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
     from faultgouge.pywrap import Record
 
     wanted = read_scene(scene, "settle", "settle")
+    check_output(output, scene, *stored_files(wanted))
     with Record(output, wanted, saved=keeps) as record:
         last = _settled(wanted, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
@@ -58,6 +71,7 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     from faultgouge.pywrap.scenes.refusals import needed
 
     wanted = read_scene(scene, "ramp", "ramp")
+    check_output(output, scene, *stored_files(wanted))
     settings = needed(wanted.ramp, "ramp")
     with Record(output, wanted, saved=keeps) as record:
         start = _settled(wanted, record)
@@ -81,6 +95,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     from faultgouge.pywrap.scenes.refusals import needed
 
     wanted = read_scene(scene, "perturb", "perturb")
+    check_output(output, scene, *stored_files(wanted))
     settings = needed(wanted.perturb, "perturb")
     with Record(output, wanted, task="perturb", saved=keeps) as record:
         if record.last is None:

@@ -50,7 +50,7 @@ def sweep(
             for line in estimate(wanted.task, missing):
                 say(line)
         return
-    keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there")
+    keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there", output)
     rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count), workers)
     if is_root():
         failed = sum(row["says"] is not None for row in rows)
@@ -102,7 +102,7 @@ def genericity(
     from faultgouge.studies.genericity.page import write_page
 
     if not page:
-        keeps(f"{output} has the scenes that have ended; the same command goes on from there")
+        keeps(f"{output} has the scenes that have ended; the same command goes on from there", output)
         compute(output, say, lambda ended, count: progress(ended, "scenes", count), share, workers)
     if is_root():
         say(f"written: {write_page(output, say)}")
@@ -138,7 +138,7 @@ def modes(
             say(line)
     if dry_run:
         return
-    keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there")
+    keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there", output)
     result = count_modes(wanted, output, part, say, lambda rows, count: progress(rows, "scenes", count), workers)
     if is_root():
         _show_modes(result["rows"])

@@ -56,6 +56,12 @@ def read_scene(path: Path, command: str, task: Task | None = None, packings: int
     return scene
 
 
+def stored_files(scene: Scene) -> list[Path]:
+    """The files that a scene names: of its packing, and of the signal that forces it."""
+    file, signal = getattr(scene.packing, "file", None), scene.perturb.signal if scene.perturb else None
+    return [Path(each) for each in (file, signal) if each is not None]
+
+
 def stored_packing(file: Path, frame: int = -1) -> Packing:
     """A packing of a run.h5, or of the dumps that decks write."""
     from faultgouge.analysis import RunFile, read_dump
@@ -66,6 +72,26 @@ def stored_packing(file: Path, frame: int = -1) -> Packing:
         if not run.complete:
             say(f"{file} is of a run that is not finished: {len(run)} equilibria, up to F_x = {run.fx[-1]:g}")
         return run.packing(frame)
+
+
+def check_output(output: Path, *inputs: Path) -> None:
+    """Refuse a file that cannot be written, or is one of the inputs, before any work."""
+    from faultgouge.analysis.files.wholefile import check_output as check
+
+    check(output, *inputs)
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Make a folder for results, and keep other runs out of it, on rank 0."""
+    from faultgouge.analysis.files.wholefile import alone_with, make_folder
+
+    if not is_root():
+        yield
+        return
+    make_folder(folder)
+    with alone_with(folder):
+        yield
 
 
 def print_json(value: dict[str, Any]) -> None:
