@@ -86,7 +86,7 @@ FILMS = {each.suffixes[0]: each for each in FORMATS if each.film}
 def known_formats() -> str:
     """All formats that are read, in words."""
     listed = [f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS if each.reader]
-    return ", ".join([*listed, "run.h5", f"and {OTHER.words} (pip install 'faultgouge[export]')"])
+    return ", ".join([*listed, "run.h5", f"and {OTHER.words}"])
 
 
 def is_hdf5(path: Path) -> bool:

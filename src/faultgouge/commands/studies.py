@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -128,7 +129,11 @@ def stability(
     keeps(f"{output} has the cases that were finished; the same command begins anew and replaces them", output)
     with alone_in(output):
         result = try_cases(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
-    say(f"{len(result['cases'])} cases tried; written: {output}/stability.md")
+    counts = Counter(case["status"] for case in result.get("cases", ()))
+    say(
+        f"{counts.total()} cases: {counts['holds']} hold, {counts['refused']} are refused in a sentence, "
+        f"{counts['fails']} fail; written: {output}/stability.md"
+    )
     if as_json:
         print_json(result)
     check(result)
