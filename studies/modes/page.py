@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,9 @@ from .loss import EVERY, RESTITUTIONS
 from .numbers import COMPARED, QUALITIES, numbers
 from .sets import SIZES
 from .tables import read_tables
+
+GENERICITY = Path(__file__).resolve().parents[2] / "research" / "genericity" / "genericity.json"
+"""The exponents of spacings and couplings."""
 
 LOSSES = ("least_q", "critical_restitution")
 """Quantities of the picture of loss."""
@@ -44,7 +48,14 @@ def write_page(tables: Path, folder: Path) -> Path:
         "collapse": lambda: collapse(found["sizes"], power[0], found["random"]),
         "loss": lambda: over_load({str(disks): course for disks, course in found["loss"].items()}, LOSSES),
     }
-    names = {"planned": SIZES, "compared": COMPARED, "qualities": QUALITIES, **told(found)}
+    ratio = json.loads(GENERICITY.read_text())["levels"]["exponents"]["coupling over spacing"]
+    names = {
+        "ratio": [ratio["low"], ratio["high"]],
+        "planned": SIZES,
+        "compared": COMPARED,
+        "qualities": QUALITIES,
+        **told(found),
+    }
     formats = {"middle": interval, "exponent": partial(interval, digits=".2f"), "plain": plain, "part": part}
     page = found | names | formats | {"critical": critical}
     write_text(folder / "tables.md", render(package, "tables.md.j2", **page))

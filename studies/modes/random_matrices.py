@@ -3,7 +3,7 @@ r"""Complex modes of random matrices with the levels and couplings of a packing:
 At a load the operator is :math:`K = S + A` in mass-weighted coordinates, S symmetric and A antisymmetric. In the
 eigenbasis of S, with the levels :math:`e_k`, A couples the levels k and l by :math:`A_{kl}`. Spacings are permuted
 among neighbouring levels, and elements of A within blocks of levels, with random signs
-(:func:`~faultgouge.studies.genericity.surrogates.randomized`): the band of A stays as measured.
+(:func:`~research.genericity.surrogates.randomized`): the band of A stays as measured.
 
 **Weak non-symmetry.** To a large real symmetric random matrix with the local spacing :math:`\Delta` an antisymmetric
 one is added whose elements have the standard deviation :math:`\sigma`. The share of its eigenvalues that are real is
@@ -23,11 +23,12 @@ import numpy as np
 from scipy.linalg import eigh, eigvals
 from scipy.special import erf
 
+from research.genericity.levels import Pencil, local_mean
+from research.genericity.surrogates import randomized
+
 from ...analysis import Packing, dynamical_matrix
 from ...analysis.packing.packing import Floats
 from ...pywrap import Scene
-from ..genericity.levels import Pencil, local_mean
-from ..genericity.surrogates import randomized
 from ..packings import Start
 from .compute import Counted, along_ramp
 

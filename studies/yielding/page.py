@@ -20,8 +20,10 @@ from ..rows import columns, read_rows
 from ..statistics import interval, median, share
 from .compute import CONTROLLED, LOADINGS, LOSSES, SHARES
 
-FLOWING = ("flows", "bursts", "fails at rest")
-"""How a run ends after which the layer does not rest."""
+UNREST = ("flows", "bursts", "fails at rest")
+"""How a run ends after which the layer does not rest: it flows in the run; it throws a disk out of the box; or it finds
+no equilibrium once drag is switched on, after it may have moved by a hundredth of a diameter alone. The first alone is
+flow."""
 
 ELSEWHERE = 1e-8
 """D beyond which the layer rests in another equilibrium: a ten-thousandth of a small disk's diameter, squared."""
@@ -45,27 +47,49 @@ def numbers(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "static": median([row["static"] for row in rows]),
         "dynamic": [of_runs(rows, load, loss) for load in SHARES for loss in LOSSES],
         "yields": [yields(rows, loss) for loss in LOSSES],
+        "worst": worst_ends(rows, 1.0),
         "spread": median([np.ptp([row["static"], *(each[1] for each in row["static_by_increment"])]) for row in rows]),
         "loading": [_rising(rows, *each) for each in LOADINGS],
     }
 
 
 def yields(rows: list[dict[str, Any]], loss: float) -> dict[str, Any]:
-    """The dynamic yield with a loss, medians with intervals: the least load of `SHARES` at which a packing flows.
+    """The dynamic yield with a loss, medians with intervals: the least load of `SHARES` from which a packing
+    does not come to rest.
 
-    A packing that does not flow at any of them has its static yield. "least" is F_x/F_y, "share" over the static yield.
+    A packing that rests from all of them has its static yield. "least" is F_x/F_y, "share" over the static yield.
     """
     shares = []
     for row in rows:
-        flows = [run["share"] for run in row["dynamic"] if run["restitution"] == loss and run["ends"] in FLOWING]
-        shares.append(min(flows, default=1.0))
+        restless = [run["share"] for run in row["dynamic"] if run["restitution"] == loss and run["ends"] in UNREST]
+        shares.append(min(restless, default=1.0))
     static = np.array([row["static"] for row in rows])
     return {
         "restitution": loss,
         "least": median(shares * static),
         "share": median(shares),
-        "flow": int(np.sum(np.less(shares, 1))),
+        "unrest": int(np.sum(np.less(shares, 1))),
     }
+
+
+def worst_ends(rows: list[dict[str, Any]], loss: float) -> dict[str, Any]:
+    """How many packings flow at some load of `SHARES`; of the others burst; of the others fail at rest.
+
+    With the least and the largest slip of the layer, in diameters, of runs that fail at rest, and how many packings
+    have a static yield by other increments that is below the largest of these loads.
+    """
+    ends = [[run["ends"] for run in row["dynamic"] if run["restitution"] == loss] for row in rows]
+    worst = [next((kind for kind in UNREST if kind in each), "rests") for each in ends]
+    slips = [
+        abs(run["slip"])
+        for row in rows
+        for run in row["dynamic"]
+        if run["restitution"] == loss and run["ends"] == "fails at rest"
+    ]
+    yields = [(row["static"], [each[1] for each in row.get("static_by_increment", ())]) for row in rows]
+    exceeded = [max(SHARES) * static > min(others, default=static) for static, others in yields]
+    counts = {kind: share(worst.count(kind), len(rows)) for kind in UNREST}
+    return {"counts": counts, "slips": [min(slips), max(slips)] if slips else None, "exceeded": sum(exceeded)}
 
 
 def static_and_dynamic(rows: list[dict[str, Any]]) -> tuple[list[float], Floats]:
@@ -76,11 +100,12 @@ def static_and_dynamic(rows: list[dict[str, Any]]) -> tuple[list[float], Floats]
 def of_runs(rows: list[dict[str, Any]], load: float, loss: float) -> dict[str, Any]:
     """How the dynamic runs at a share of the static yield end with a restitution."""
     runs = [run for row in rows for run in row["dynamic"] if (run["share"], run["restitution"]) == (load, loss)]
-    rest = [run for run in runs if run["ends"] not in FLOWING]
+    rest = [run for run in runs if run["ends"] not in UNREST]
     return {
         "share": load,
         "restitution": loss,
-        "flow": share(len(runs) - len(rest), len(runs)),
+        "unrest": share(len(runs) - len(rest), len(runs)),
+        "ends": {kind: sum(run["ends"] == kind for run in runs) for kind in UNREST},
         "elsewhere": share(sum(run["D"] > ELSEWHERE for run in rest), len(runs)),
         "slip": float(np.median([abs(run["slip"]) for run in rest])) if rest else None,
     }
@@ -109,8 +134,8 @@ def _rising(rows: list[dict[str, Any]], rate: float, loss: float) -> dict[str, A
 
 def text(found: dict[str, Any], packings: int, failed: int) -> str:
     """The page."""
-    flow = [share(each["flow"], packings) for each in found["yields"]]
-    names = {"packings": packings, "failed": failed, "flow": flow, "interval": interval, "percent": percent}
+    unrest = [share(each["unrest"], packings) for each in found["yields"]]
+    names = {"packings": packings, "failed": failed, "unrest": unrest, "interval": interval, "percent": percent}
     names["slow"] = [row for row in found["loading"] if row["rate"] == CONTROLLED]
     return render(__package__ or "", "yield.md.j2", **found, **names)
 
@@ -124,7 +149,7 @@ def percent(part: dict[str, Any]) -> str:
 
 @styled
 def figure(found: dict[str, Any]) -> Figure:
-    """Static and dynamic yield over loss, of either size; share of layers of 100 disks that flow over the load."""
+    """Static and dynamic yield over loss, of either size; share of layers of 100 disks without rest over the load."""
     drawn = Figure(figsize=(7, 3), layout="constrained")
     left, axes = drawn.subplots(1, 2)
     for k, (disks, (static, least)) in enumerate(found["sizes"].items()):
@@ -140,13 +165,13 @@ def figure(found: dict[str, Any]) -> Figure:
     left.set_xticks(range(len(LOSSES)), ["1 (undamped)", *map(str, LOSSES[1:])])
     left.legend(loc="lower right")
     for k, loss in enumerate(LOSSES):
-        rows = [row for row in found["dynamic"] if row["restitution"] == loss and row["flow"]["of"]]
-        middle, low, high = columns([row["flow"] for row in rows], "share", "low", "high")
+        rows = [row for row in found["dynamic"] if row["restitution"] == loss and row["unrest"]["of"]]
+        middle, low, high = columns([row["unrest"] for row in rows], "share", "low", "high")
         bars = np.clip([middle - low, high - middle], 0, 1)
         label = "undamped" if loss == 1 else f"restitution {loss}"
         axes.errorbar(columns(rows, "share")[0] + 0.01 * (k - 1), middle, yerr=bars, fmt="o-", capsize=3, label=label)
     axes.axvline(1.0, color="black", linestyle="--", label="static yield")
-    axes.set(xlabel="$F_x$ over static yield", ylabel="share of packings that flow", ylim=(-0.02, 1.02))
+    axes.set(xlabel="$F_x$ over static yield", ylabel="share of packings that do not rest", ylim=(-0.02, 1.02))
     axes.legend(loc="upper left")
     return drawn
 
@@ -176,7 +201,8 @@ def write_lasting(folder: Path) -> Path:
         **_lasting(lossy),
         free=_without_loss(rows, tables / "quartz_100.jsonl"),
         large=[of_runs(large, load, loss) for load in SHARES for loss in LOSSES],
-        large_flow=[_flowing(large, loss) for loss in LOSSES],
+        large_unrest=[_restless(large, loss) for loss in LOSSES],
+        large_worst={kind: each["count"] for kind, each in worst_ends(large, 1.0)["counts"].items()},
         large_static=interval(median([row["static"] for row in large])),
     )
     (folder / "further.md").write_text(page)
@@ -208,7 +234,7 @@ def _lasting(lossy: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _without_loss(rows: list[dict[str, Any]], table: Path) -> dict[str, Any]:
-    """Runs without loss, those with total slips and with rescaled ones from the same states, and how many flow."""
+    """Runs without loss, those with total slips and with rescaled ones from the same states, and how they end."""
     total = {
         (row["values"]["packing.seed"], run["share"]): run
         for row in read_rows(table)
@@ -217,17 +243,17 @@ def _without_loss(rows: list[dict[str, Any]], table: Path) -> dict[str, Any]:
         if run["restitution"] == 1
     }
     runs = [row | {"total": total[row["seed"], row["share"]]} for row in rows if row["restitution"] == 1]
-    flow = {}
+    ends = {}
     for load in (0.97, 0.9):
         here = [row for row in runs if row["share"] == load]
-        flow[load] = [
-            share(sum(each["ends"] in FLOWING for each in ends), len(ends))
-            for ends in ([row["total"] for row in here], here)
+        ends[load] = [
+            {kind: share(sum(each["ends"] == kind for each in group), len(group)) for kind in UNREST}
+            for group in ([row["total"] for row in here], here)
         ]
-    return {"runs": runs, "flow": flow}
+    return {"runs": runs, "ends": ends}
 
 
-def _flowing(large: list[dict[str, Any]], restitution: float) -> dict[str, Any]:
-    """Packings that flow at a load below their static yield."""
-    flow = [any(run["ends"] in FLOWING for run in row["dynamic"] if run["restitution"] == restitution) for row in large]
-    return share(sum(flow), len(flow))
+def _restless(large: list[dict[str, Any]], loss: float) -> dict[str, Any]:
+    """Packings that do not come to rest from a load below their static yield."""
+    ends = [any(run["ends"] in UNREST for run in row["dynamic"] if run["restitution"] == loss) for row in large]
+    return share(sum(ends), len(ends))

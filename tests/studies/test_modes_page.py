@@ -46,7 +46,9 @@ def claims_of_sizes():
         yield f"growth is not known to rise at fixed {kind}", low < 0 < high
 
     page = (DOCS / "modes.md").read_text()
-    exponents = json.loads((DOCS.parent / "genericity" / "genericity.json").read_text())["levels"]["exponents"]
+    exponents = json.loads((DOCS.parents[1] / "research" / "genericity" / "genericity.json").read_text())["levels"][
+        "exponents"
+    ]
     spacing, coupling = (exponents[name]["value"] for name in ("spacing", "coupling"))
     for power in (spacing, coupling, coupling - spacing):
         yield "spacings and couplings have the powers of the page", f"$N^{{{power:.2f}}}$" in page

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
@@ -147,7 +148,7 @@ def status(what: str) -> Iterator[Callable[[str], None]]:
 
 
 def progress(items: Iterable[T], what: str, total: int | None = None, done: int = 0) -> Iterator[T]:
-    """The items, with a progress bar on a terminal; off a terminal with a line a minute."""
+    """The items, with a progress bar on a terminal; off a terminal with a line a minute. Both say how long is left."""
     from rich.console import Console
 
     console = Console(stderr=True)
@@ -155,14 +156,23 @@ def progress(items: Iterable[T], what: str, total: int | None = None, done: int 
         total = len(items)
     if not console.is_terminal or not is_root():
         among = "" if total is None else f" of {total}"
+        begin = time.monotonic()
         with status(f"{what}: {done}{among}") as show:
             for number, item in enumerate(items, done + 1):
-                show(f"{what}: {number}{among}")
+                left = 0.0 if total is None else (time.monotonic() - begin) / (number - done) * (total - number)
+                show(f"{what}: {number}{among}" + (f", about {left / 60:.0f} min left" if left > 60 else ""))
                 yield item
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(what, total=total, completed=done)
         for item in items:

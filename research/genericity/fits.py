@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.packing.packing import Floats
-from ..statistics import Bools, between, resampled
+from faultgouge.analysis.packing.packing import Floats
+from faultgouge.studies.statistics import Bools, between, resampled
 
 DRAWS = 300
 """Fits to resampled packings: the ends of an interval are then known to a tenth of its width."""

@@ -3,7 +3,7 @@ others.
 
 linear
     The packing's own operator as a straight line about rest, :math:`\mathrm{diag}(e) + F (V + C)` (see
-    :mod:`~faultgouge.studies.genericity.levels`). What the onset owes to bending is missing.
+    :mod:`~research.genericity.levels`). What the onset owes to bending is missing.
 random
     The same with everything else than its statistics taken away. Spacings are permuted among `BLOCK` neighbouring
     levels; the elements of V and of C are permuted within blocks of `BLOCK` by `BLOCK` levels and get random signs.
@@ -27,23 +27,23 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from ...analysis import NoEquilibriumError, Packing
-from ...analysis.onset import complex_windows, force_bearing
-from ...analysis.operators.stiffness import stiffness_matrix
-from ...analysis.packing.packing import Floats
-from ...analysis.spectrum.spectrum import mass_weighted
-from ...pywrap import Scene
-from ...pywrap.runs.path import loads
-from ..packings import Start, path_from
-from .levels import Pencil, pencil_of
+from faultgouge.analysis import NoEquilibriumError, Packing
+from faultgouge.analysis.onset import complex_windows, force_bearing
+from faultgouge.analysis.operators.stiffness import stiffness_matrix
+from faultgouge.analysis.packing.packing import Floats
+from faultgouge.analysis.spectrum.spectrum import mass_weighted
+from faultgouge.pywrap import Equilibrium, Scene
+from faultgouge.pywrap.runs.path import loads
+from faultgouge.studies.packings import path_from
+from research.genericity.levels import Pencil, pencil_of
 
 BLOCK = 20
 """Levels among which spacings and couplings are permuted: their means change little over so many."""
 
 
-def surrogates(scene: Scene, start: Start) -> dict[str, Any]:
+def surrogates(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
     """The task "surrogates": how the ramps of all surrogates of a scene end, as the task "onset" has it."""
-    pencil = pencil_of(scene, start)
+    pencil = pencil_of(scene, rest)
     assert scene.ramp is not None
     seed = int(getattr(scene.packing, "seed", 0))
     drawn = randomized(pencil, np.random.default_rng(seed))
@@ -52,7 +52,6 @@ def surrogates(scene: Scene, start: Start) -> dict[str, Any]:
         "linear": _first(lambda fx: csr_array(pencil.at(fx)), steps, narrowest),
         "random": _first(lambda fx: csr_array(drawn.at(fx)), steps, narrowest),
     }
-    rest = start(scene.law.mus[0])
     names = _names(force_bearing(rest.packing))
     order = np.random.default_rng(seed).permutation(len(names)).tolist()
     instead = {name: names[k] for name, k in zip(names, order, strict=True)}

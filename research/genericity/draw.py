@@ -9,14 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from ...analysis.packing.packing import Floats
-from ...figures.style import INK, styled
-from ..rows import columns
-from ..statistics import course
-from ..sweep.draw import draw_pairs
-from .numbers import STEPS
-from .sets import FRICTION
-from .tables import Table
+from faultgouge.analysis.packing.packing import Floats
+from faultgouge.figures.style import INK, styled
+from faultgouge.studies.rows import columns
+from faultgouge.studies.statistics import course
+from faultgouge.studies.sweep.draw import draw_pairs
+from research.genericity.numbers import STEPS
+from research.genericity.sets import FRICTION
+from research.genericity.table import Table
 
 
 @styled

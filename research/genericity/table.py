@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.packing.packing import Floats
-from ..statistics import Bools
+from faultgouge.analysis.packing.packing import Floats
+from faultgouge.studies.statistics import Bools
 
 
 @dataclass(frozen=True, eq=False)

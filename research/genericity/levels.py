@@ -43,14 +43,14 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
-from ...analysis import spectrum
-from ...analysis.onset import force_bearing, full_operator
-from ...analysis.packing.packing import Floats, Indices
-from ...analysis.spectrum.spectrum import active_coordinates
-from ...pywrap import Scene
-from ...pywrap.runs.path import loads
-from ...pywrap.scenes.refusals import needed
-from ..packings import Start, path_from
+from faultgouge.analysis import spectrum
+from faultgouge.analysis.onset import force_bearing, full_operator
+from faultgouge.analysis.packing.packing import Floats, Indices
+from faultgouge.analysis.spectrum.spectrum import active_coordinates
+from faultgouge.pywrap import Equilibrium, Scene
+from faultgouge.pywrap.runs.path import loads
+from faultgouge.pywrap.scenes.refusals import needed
+from faultgouge.studies.packings import path_from
 
 AVERAGED = 21
 """Levels over which local densities and couplings are averaged: some 5 % of the level's statistics in error, and few
@@ -97,16 +97,15 @@ class Pencil:
         return np.diag(self.values) + fx * (self.symmetric + self.antisymmetric)
 
 
-def pencil_of(scene: Scene, start: Start) -> Pencil:
+def pencil_of(scene: Scene, rest: Equilibrium) -> Pencil:
     """The operator of a scene's packing about rest, from a small load."""
     settings = needed(scene.ramp, "ramp")
-    rest = start(scene.law.mus[0])
     with path_from(rest, scene) as path:
         there = path(SMALL * settings.step)
     return Pencil.between(full_operator(rest.packing), full_operator(there), there.fx)
 
 
-def levels(scene: Scene, start: Start) -> dict[str, Any]:
+def levels(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
     """The task "levels": spacing, couplings and the predicted scale F_0 of a packing's onset.
 
     Returns
@@ -118,7 +117,7 @@ def levels(scene: Scene, start: Start) -> dict[str, Any]:
         local spacings per force; participation : median number of disks in a mode; f0 : F_0, force per disk of the
         layer.
     """
-    pencil = pencil_of(scene, start)
+    pencil = pencil_of(scene, rest)
     gaps = np.diff(pencil.values)
     spacing = local_mean(gaps)
     neighbours = np.arange(len(gaps)), np.arange(1, len(gaps) + 1)
@@ -158,7 +157,7 @@ def local_mean(values: Floats) -> Floats:
     return uniform_filter1d(values, AVERAGED, mode="reflect")
 
 
-def growth(scene: Scene, start: Start) -> dict[str, Any]:
+def growth(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
     """The task "growth": complex pairs and the largest growth rate of D at every increment of a ramp.
 
     Returns
@@ -168,7 +167,6 @@ def growth(scene: Scene, start: Start) -> dict[str, Any]:
         where the packing flows.
     """
     settings = needed(scene.ramp, "ramp")
-    rest = start(scene.law.mus[0])
     row: dict[str, Any] = {"fx": [], "pairs": [], "rate": []}
     with path_from(rest, scene) as path:
         for equilibrium in path.climb(loads(settings)[1:]):

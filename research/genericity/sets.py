@@ -13,11 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import ceil
-from pathlib import Path
 from typing import Any
 
-from ..sweep.points import Sweep
-from ..sweep.tasks import TASKS
+from faultgouge.studies.sweep.points import Sweep
+from faultgouge.studies.sweep.tasks import TASKS
 
 FRICTION = [0.2, 0.4, 0.6, 0.8, 1.0]
 FEW = [0.2, 0.6, 1.0]
@@ -34,6 +33,8 @@ closes or slides."""
 HARMONIC_STIFFNESS = 7e3
 """k_n of the law with exponent 1, force / length: the stiffness 3/2 k_n delta^(1/2) that a contact of the law with
 3/2 has under the force F_y."""
+
+SURROGATES = "research.genericity.surrogates:surrogates"
 
 SHARES = (0.1, 0.3, 0.6, 1.0)
 
@@ -62,11 +63,11 @@ def sets(share: float) -> dict[str, Sweep]:
     law = {"kn": HARMONIC_STIFFNESS, "exponent": 1.0}
     return {
         "onsets": _onsets("onsets", share, {}),
-        "surrogates": _onsets("surrogates", share, {}, "surrogates", [1.0]),
+        "surrogates": _onsets("surrogates", share, {}, SURROGATES, [1.0]),
         "fixed force": _sizes(SIZES, share, "onset", fixed_pressure=False),
         "fixed pressure": _sizes(SIZES, share, "onset", fixed_pressure=True),
-        "levels": _sizes(LEVELS, share, "levels", increments=30),
-        "growth": _sizes(GROWTH, share, "growth", increments=20, reach=3.0),
+        "levels": _sizes(LEVELS, share, "research.genericity.levels:levels", increments=30),
+        "growth": _sizes(GROWTH, share, "research.genericity.levels:growth", increments=20, reach=3.0),
         "harmonic": _onsets("harmonic", share, {"law": law}, friction=FEW),
         "halved increments": _onsets("halved increments", share, {"ramp": {"step": 1e-3}}),
         "settled with friction": _onsets(
@@ -81,7 +82,7 @@ def _onsets(
     scene = {section: {**values, **changes.get(section, {})} for section, values in STANDARD.items()}
     seeds = f"1:{ceil(share * PACKINGS[name])}"
     axes = {"packing.seed": seeds, "law.mu": friction}
-    return Sweep.from_mapping({"task": task, "sweep": axes, "scene": scene}, TASKS, Path())
+    return Sweep.from_mapping({"task": task, "sweep": axes, "scene": scene}, TASKS)
 
 
 def _sizes(
@@ -107,4 +108,4 @@ def _sizes(
         rows += [[disks, width, top, fy, step, until, seed] for seed in range(1, ceil(share * count) + 1)]
     keys = "packing.disks, packing.width, packing.top, load.fy, ramp.step, ramp.until, packing.seed"
     scene = {"packing": {}, "law": {"kn": 2e5, "mu": 1.0}, "load": {}, "ramp": {}}
-    return Sweep.from_mapping({"task": task, "sweep": {keys: rows}, "scene": scene}, TASKS, Path())
+    return Sweep.from_mapping({"task": task, "sweep": {keys: rows}, "scene": scene}, TASKS)

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.packing.packing import Floats
-from ..statistics import exponent, lowers, median_interval, quartiles, share
-from .fits import shape, size_law
-from .sets import FRICTION
-from .tables import Table
+from faultgouge.analysis.packing.packing import Floats
+from faultgouge.studies.statistics import exponent, lowers, median_interval, quartiles, share
+from research.genericity.fits import shape, size_law
+from research.genericity.sets import FRICTION
+from research.genericity.table import Table
 
 LOADS = (0.005, 0.01, 0.02, 0.03)
 """F_x below which shares of packings with an onset are given."""
@@ -186,6 +186,7 @@ def levels(table: Table) -> dict[str, Any]:
         means = {name: _mean(values[mine]) for name, values in columns.items()}
         rows.append({"disks": int(number), "packings": int(mine.sum())} | means)
     exponents = {name: _slope(disks, values) for name, values in columns.items() if name != "ratio"}
+    exponents["coupling over spacing"] = _slope(disks, columns["coupling"] / columns["spacing"])
     return {
         "rows": rows,
         "exponents": exponents,
