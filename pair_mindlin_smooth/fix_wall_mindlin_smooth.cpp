@@ -6,6 +6,7 @@
 #include "error.h"
 #include "fix_dashpot_velocities.h"
 #include "fix_low_parts.h"
+#include "fix_weaken_friction.h"
 #include "force.h"
 #include "input.h"
 #include "modify.h"
@@ -114,8 +115,8 @@ void FixWallMindlinSmooth::init()
       error->all(FLERR, "fix wall/mindlin/smooth: MU is v_{}, but there is no equal-style variable of that name",
                  mu_variable);
   }
-  // a variable may be zero now and not later
-  has_friction = mu_variable.empty() ? law.frictional() : law.kt > 0.0;
+  // friction that changes may be zero now and not later
+  has_friction = mu_variable.empty() && !friction_weakens(*modify) ? law.frictional() : law.kt > 0.0;
   if (has_friction && update->whichflag == 2)
     error->all(FLERR, "fix wall/mindlin/smooth with friction cannot be minimized, since its forces depend on the path: "
                       "relax with fix overdamped/disc, or minimize with mu = 0");
@@ -171,6 +172,15 @@ int FixWallMindlinSmooth::modify_param(int narg, char **arg)
   set_mu(arg[1]);
   if (!law.valid()) error->all(FLERR, "fix_modify {} mu: must not be negative, but is {}", id, arg[1]);
   return 2;
+}
+
+void FixWallMindlinSmooth::change_mu(double mu)
+{
+  if (!mu_variable.empty())
+    error->all(FLERR,
+               "fix wall/mindlin/smooth: MU is v_{}, and fix weaken/friction sets it too: leave one of the two out",
+               mu_variable);
+  law.mu = mu;
 }
 
 void FixWallMindlinSmooth::update_mu()

@@ -8,6 +8,7 @@
 #include "domain.h"
 #include "error.h"
 #include "fix_disc_integrators.h"
+#include "fix_weaken_friction.h"
 #include "force.h"
 #include "memory.h"
 #include "modify.h"
@@ -133,7 +134,8 @@ void PairMindlinSmooth::coeff(int narg, char **arg)
 void PairMindlinSmooth::init_style()
 {
   check_disks();
-  has_friction = law.frictional();
+  // friction that weakens may be zero now and not later
+  has_friction = law.frictional() || (law.kt > 0.0 && friction_weakens(*modify));
   if (energy && !has_friction)
     error->all(FLERR, "pair mindlin/smooth: without friction there is no history to keep the energy of contacts in: "
                       "use energy no, or MU and KT above 0");
