@@ -10,6 +10,7 @@
 #include "force.h"
 #include "input.h"
 #include "modify.h"
+#include "run_styles.h"
 #include "update.h"
 #include "variable.h"
 
@@ -98,6 +99,7 @@ int FixWallMindlinSmooth::setmask()
 
 void FixWallMindlinSmooth::init()
 {
+  refuse_respa(*this, *update, *error);
   if (domain->dimension != 2) error->all(FLERR, "fix wall/mindlin/smooth is for disks in the plane: use dimension 2");
   if (domain->periodicity[1])
     error->all(FLERR, "fix wall/mindlin/smooth needs a box that is not periodic in y: use boundary p f p");
@@ -117,6 +119,9 @@ void FixWallMindlinSmooth::init()
   }
   // friction that changes may be zero now and not later
   has_friction = mu_variable.empty() && !friction_weakens(*modify) ? law.frictional() : law.kt > 0.0;
+  if (has_friction && reruns(*update))
+    error->all(FLERR, "fix wall/mindlin/smooth with friction cannot serve rerun, since snapshots have no slips: rerun "
+                      "with MU = 0");
   if (has_friction && update->whichflag == 2)
     error->all(FLERR, "fix wall/mindlin/smooth with friction cannot be minimized, since its forces depend on the path: "
                       "relax with fix overdamped/disc, or minimize with mu = 0");

@@ -13,6 +13,7 @@
 #include "memory.h"
 #include "modify.h"
 #include "neighbor.h"
+#include "run_styles.h"
 #include "update.h"
 
 #include <algorithm>
@@ -170,6 +171,19 @@ void PairMindlinSmooth::check_run() const
 {
   if (has_friction && !comm->ghost_velocity)
     error->all(FLERR, "pair mindlin/smooth needs the velocities of ghost disks: use comm_modify vel yes");
+  if (update->whichflag == 1 && runs_respa(*update))
+    error->all(FLERR,
+               "pair mindlin/smooth does not work under run_style respa, since slips advance by whole steps: use "
+               "run_style verlet");
+  if (has_friction && reruns(*update))
+    error->all(FLERR, "pair mindlin/smooth with friction cannot serve rerun, since snapshots have no slips: rerun with "
+                      "MU = 0");
+  for (const auto &fix : modify->get_fix_list())
+    if (fix->diam_flag)
+      error->all(FLERR,
+                 "pair mindlin/smooth: fix {} of style {} changes radii within a run, but contacts are sought by the "
+                 "radii at its begin: use the command set between runs",
+                 fix->id, fix->style);
   if (compensated && update->whichflag == 2)
     error->all(FLERR, "pair mindlin/smooth: a minimizer does not carry the low parts of coordinates: minimize without "
                       "the keyword compensated");

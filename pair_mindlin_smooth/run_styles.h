@@ -19,7 +19,7 @@ inline bool runs_respa(const Update &update)
 inline void refuse_respa(const Fix &fix, const Update &update, Error &error)
 {
   if (update.whichflag == 1 && runs_respa(update))
-    error.all(FLERR, "fix {} does nothing under run_style respa: use run_style verlet", fix.style);
+    error.all(FLERR, "fix {} does not work under run_style respa: use run_style verlet", fix.style);
 }
 
 // rerun alone sets its last step, by default the largest there is, without a number of steps.
