@@ -1,6 +1,6 @@
 # make reproduce   sets everything up and runs the paper's protocol into results/
 # make test        sets everything up and runs the tests (four minutes on two cores)
-# make long        runs the tests that take longest: kills, odd scenes, genericity, reproduce (eight minutes)
+# make long        runs the tests that take longest: kills, odd scenes, research tables, reproduce (eight minutes)
 # make readers     reads exports by OVITO and VTK, in tests
 # make fuzz        a thousand odd scenes, 300 damaged files, 60 kills; says what went wrong (an hour)
 # make plugin      builds the C++ plugin anew, after an edit of it
@@ -57,8 +57,7 @@ check: $(VENV)/.check
 	$(BIN)/ruff check .
 	$(BIN)/clang-format --dry-run --Werror pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp analysis/factors/*.cpp
 	MYPYPATH=src $(BIN)/mypy -p faultgouge
-	MYPYPATH=src:docs/modes $(BIN)/mypy docs/modes/*.py
-	MYPYPATH=src $(BIN)/mypy docs/yield/*.py
+	MYPYPATH=src:. $(BIN)/mypy -p research
 
 format: $(VENV)/.check
 	$(BIN)/ruff format .

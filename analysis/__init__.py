@@ -1,9 +1,10 @@
 """A configuration of frictional disks in; its stability operator, spectrum, onset and growth out.
 
-Everything takes a :class:`Packing` and nothing else. The physics is in the docstrings of the modules: `law`
-(the contact law), `contacts`, `geometry`, `packing` (forces), `stiffness` (the stability operator), `spectrum` (its
-eigenvalues), `damping` (the damping matrix), `onset` (where they become complex), `growth` (what a run shows of
-it). `runfile`, `dumps` and `files` read and write packings.
+Everything takes a :class:`Packing`; the operators, and what follows from them, take a :class:`Snapshot` as well. The
+physics is in the docstrings of the modules: `law` (the contact law), `contacts`, `geometry`, `packing` (forces),
+`stiffness` and `linearised_contacts` (the stability operator), `spectrum` (its eigenvalues), `damping` (the damping
+matrix), `onset` (where they become complex), `growth` (what a run shows of it). `runfile`, `dumps` and `files` read and
+write packings.
 """
 
 from .damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows
@@ -11,7 +12,7 @@ from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputEr
 from .files.by_hand import read_packing
 from .files.dumps import read_dump
 from .files.runfile import RunFile
-from .motion.growth import Growth, fit_growth, mean_square_displacement
+from .motion.growth import Growth, fit_growth, growth_of_run, mean_square_displacement
 from .motion.response import layer_force, linear_response
 from .motion.transient import NoGainError, TransientGain, transient_gain
 from .onset import Onset, OnsetError, Window, complex_windows, find_onset
@@ -21,6 +22,9 @@ from .packing.contacts import FLOOR, Contacts
 from .packing.geometry import ContactGeometry, nearest_image, touching
 from .packing.law import MindlinLaw
 from .packing.packing import Packing
+from .packing.snapshot import LinearisedContacts, Snapshot
+from .packing.solid_fraction import solid_fraction
+from .spectrum.buckling import negative_eigenvalues
 from .spectrum.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
 from .spectrum.spectrum import (
     ComplexPair,
@@ -45,6 +49,7 @@ __all__ = [
     "Eigenpairs",
     "FaultgougeError",
     "Growth",
+    "LinearisedContacts",
     "MindlinLaw",
     "NoEquilibriumError",
     "NoGainError",
@@ -54,6 +59,7 @@ __all__ = [
     "Packing",
     "PackingFileError",
     "RunFile",
+    "Snapshot",
     "Spectrum",
     "TransientGain",
     "Window",
@@ -67,6 +73,7 @@ __all__ = [
     "eigenvalues",
     "find_onset",
     "fit_growth",
+    "growth_of_run",
     "growth_rate",
     "largest_damping_rate",
     "largest_frequency",
@@ -74,9 +81,11 @@ __all__ = [
     "linear_response",
     "mean_square_displacement",
     "nearest_image",
+    "negative_eigenvalues",
     "normal_modes",
     "read_dump",
     "read_packing",
+    "solid_fraction",
     "spectrum",
     "stable_timestep",
     "stiffness_matrix",

@@ -51,3 +51,7 @@ class NoEquilibriumError(FaultgougeError):
     def __init__(self, says: str, beyond: float | None = None) -> None:
         super().__init__(says)
         self.beyond = beyond
+
+
+class TurningPointError(NoEquilibriumError):
+    """The branch of stable equilibria ends before this load: an eigenvalue of the equilibrium found is negative."""

@@ -31,6 +31,7 @@ STYLES = {
     "mindlin/smooth": (f"mindlin/smooth {KN} {KT} 1.0", "", "nve/disc 0.5"),
     "mindlin/smooth, compensated": (f"mindlin/smooth {KN} {KT} 1.0 compensated", "", "nve/disc 0.5 compensated"),
     "mindlin/smooth, rescaled": (f"mindlin/smooth {KN} {KT} 1.0 history rescaled", "", "nve/disc 0.5"),
+    "mindlin/smooth, coulomb": (f"mindlin/smooth {KN} {KT} 1.0 history coulomb", "", "nve/disc 0.5"),
     "mindlin/smooth, energy": (f"mindlin/smooth {KN} {KT} 1.0 energy yes", "", "nve/disc 0.5"),
     "mindlin/smooth, mu = 0": (f"mindlin/smooth {KN} {KT} 0.0", "", "nve/disc 0.5"),
     "gran/hertz/history": (f"gran/hertz/history {2 * KN} {2 * KT} 0.0 0.0 1.0 1", "", "nve/sphere disc"),

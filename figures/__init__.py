@@ -5,9 +5,10 @@ window is opened, and no setting of matplotlib is changed. Lengths, forces and t
 a scene is free to choose them.
 """
 
+from .cycle import draw_cycle
 from .packing import draw_packing
 from .pair import PairCurve, draw_pair
 from .series import draw_series
 from .style import save
 
-__all__ = ["PairCurve", "draw_packing", "draw_pair", "draw_series", "save"]
+__all__ = ["PairCurve", "draw_cycle", "draw_packing", "draw_pair", "draw_series", "save"]

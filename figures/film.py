@@ -22,8 +22,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from faultgouge.analysis import Packing, PackingFileError, RunFile, nearest_image
+from faultgouge.analysis.motion.hysteresis import layer_displacement
 from faultgouge.analysis.packing.arrays import Floats
 
+from .cycle import in_powers_of_ten
 from .mode import Mode, ModeArtist, finish, side_by_side
 from .packing import COLOURS, PackingArtist, View
 from .series import few_decades
@@ -283,16 +285,12 @@ class RampFilm(Film):
         factor = rf"$\times\,10^{{{round(np.log10(self._factor))}}}$" if self._factor > 1 else "to scale"
         self._words = f"displacements {factor}"
         self._says = axes.text(0.5, 1.01, "", transform=axes.transAxes, ha="center", va="bottom", fontsize=8)
-        upper = first.top if first.top.any() else np.ones(len(first), dtype=bool)
-        moved = shifts[:, upper, 0].mean(axis=1)
-        power = int(np.floor(np.log10(np.abs(moved).max() or 1.0)))
-        unit = rf" $/\,10^{{{power}}}$" if power else ""
-        self._moved = moved / 10.0**power
+        self._moved, label = in_powers_of_ten(layer_displacement(packings)[:, 0])
         self._fx = np.array([each.fx for each in packings])
         beside.plot(self._moved, self._fx, color=BULK, linewidth=1.2)
         (self._line,) = beside.plot([], [], color="C1", linewidth=1.0)
         (self._dot,) = beside.plot([], [], "o", color="C0", markersize=4)
-        beside.set(xlabel=f"displacement of the upper layer{unit}", ylabel="$F_x$")
+        beside.set(xlabel=label, ylabel="$F_x$")
         moving = [*self._artist.moving, self._says, self._line, self._dot]
         super().__init__(figure, moving, frames, dots)
 

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike
 
+from faultgouge.analysis import Growth
 from faultgouge.analysis.packing.arrays import Floats
 
 from .style import figure_of, styled
@@ -14,6 +15,9 @@ from .style import figure_of, styled
 BELOW_NOISE = 1e-2
 """Lower end of a picture of growth, in units of the median of the first quarter: the very first steps, which are many
 decades lower, would flatten the rest."""
+
+SHIFT = 1.5
+"""Decades by which a predicted slope lies above D."""
 
 
 @styled
@@ -53,6 +57,59 @@ def draw_series(
     if alone:
         begin_at_noise(axes, time, values)
     return figure_of(axes)
+
+
+@styled
+def draw_growth(time: Floats, msd: Floats, rate: float | None, fitted: Growth | None) -> Figure:
+    """The mean square displacement of an undamped run, with the slope that the spectrum predicts.
+
+    Parameters
+    ----------
+    time, msd : ndarray, shape (n,)
+        D(t), length^2; drawn where it is positive.
+    rate : float or None
+        Growth rate of D from the spectrum, 1 / time: 0 of a stable packing, None if it is not known.
+    fitted : Growth or None
+        The growth measured. Its slope lies beside D, a decade and a half above; without it the slope begins at the
+        noise, over the whole run.
+
+    Returns
+    -------
+    Figure
+        As the paper's figure 4.
+    """
+    figure = Figure(figsize=(3.4, 2.7), layout="constrained")
+    axes = figure.add_subplot()
+    label = "undamped run"
+    if fitted is not None:
+        label = rf"$\mathrm{{d}}\ln D/\mathrm{{d}}t = {fitted.rate:.5g}$, measured"
+        if rate:
+            label += rf" (${100 * (fitted.rate / rate - 1):+.2g}\,\%$)"
+    draw_series(time, msd, axes, label=label)
+    if rate:
+        ends, slope = _slope(time, msd, rate, fitted)
+        predicted = rf"$2\,|\mathrm{{Im}}\,\omega| = {rate:.5g}$, from the spectrum"
+        axes.plot(ends, slope, color="C0", linestyle="--", label=predicted)
+    begin_at_noise(axes, time, msd)
+    few_decades(axes)
+    title = "linearly stable: nothing grows" if rate == 0 else None
+    figure.legend(loc="outside upper left", title=title, alignment="left")
+    return figure
+
+
+def _slope(time: Floats, msd: Floats, rate: float, fitted: Growth | None) -> tuple[Floats, Floats]:
+    """Times and values of the two ends of the predicted slope."""
+    above = msd > 0
+    if fitted is not None:
+        ends = np.array([fitted.start, fitted.end])
+        inside = above & (time >= ends[0]) & (time <= ends[1])
+        intercept = np.mean(np.log(msd[inside]) - rate * time[inside])
+    else:
+        noise = np.median(msd[above & (time <= time[0] + 0.25 * (time[-1] - time[0]))])
+        room = np.log(10**SHIFT * msd.max() / noise) / rate  # to where the picture would end without the slope
+        ends = np.array([time[0], min(time[-1], time[0] + room)])
+        intercept = np.log(noise) - rate * time[0]
+    return ends, 10**SHIFT * np.exp(intercept + rate * ends)
 
 
 def begin_at_noise(axes: Axes, time: ArrayLike, values: ArrayLike) -> None:

@@ -31,6 +31,7 @@ function show() {
   others.data = {re: frame.re, im: frame.im}
   members.data = {re, im, colour: two}
   now.data = {fx: [frame.fx, frame.fx], real: re, imaginary: im, colour: two}
+  here.data = {moved: [frame.moved], fx: [frame.fx]}
   const digits = (x) => Number(x.toPrecision(5))
   at("fx").textContent = digits(frame.fx)
   at("says").textContent = !frame.known ? "The pair is not recognised at this load."

@@ -13,6 +13,8 @@ import numpy as np
 from matplotlib.colors import to_hex
 
 from faultgouge.analysis import BadInputError, Packing
+from faultgouge.analysis.motion.hysteresis import layer_displacement
+from faultgouge.analysis.packing.arrays import Floats
 
 from .packing import LEAST_SHARE, PackingArtist, View
 from .style import EDGE, FLOOR, INK, MOBILIZATION
@@ -31,6 +33,7 @@ MOVED = {
     "others": "re im",
     "members": "re im colour",
     "now": "fx real imaginary colour",
+    "here": "moved fx",
 }
 """What `view.js` fills anew at each load: sources of data and their columns."""
 
@@ -88,13 +91,15 @@ def write_view(
     from bokeh.resources import INLINE
 
     course = followed(packings, progress)
-    frames = [_frame(packing, course, k) for k, packing in enumerate(packings)]
+    moved = layer_displacement(packings)[:, 0]
+    frames = [_frame(packing, course, k) | {"moved": moved[k]} for k, packing in enumerate(packings)]
     sources = {
         name: ColumnDataSource({column: [] for column in columns.split()}, name=name) for name, columns in MOVED.items()
     }
     plots = [_packing_plot(packings, sources), _plane(course, sources)]
     if len(packings) > 1:
         plots += _curves(packings, course, sources)
+        plots.append(_cycle(packings, moved, sources))
     if series is not None:
         plots.append(_growth(series))
     document = Document()
@@ -166,7 +171,8 @@ def _packing_plot(packings: Sequence[Packing], sources: dict[str, Any]) -> "figu
     views = [View.of(packing) for packing in packings]
     left, right = min(view.left for view in views), max(view.right for view in views)
     bottom = min(view.bottom for view in views)
-    top = max(float((packing.position[:, 1] + packing.radius).max()) for packing in packings) + 0.3
+    top = max(float((packing.position[:, 1] + packing.radius).max()) for packing in packings)
+    top += 0.6 * float(packings[0].radius.min())
     more = {"x_range": (left, right), "y_range": (bottom, top), "tools": "", "toolbar_location": None}
     plot = _plot("packing", "", "", **more)
     plot.axis.visible = False
@@ -213,6 +219,14 @@ def _curves(packings: Sequence[Packing], course: Followed, sources: dict[str, An
         plot.scatter("fx", name, source=sources["now"], size=11, fill_color="colour", line_color=None)
         plots.append(plot)
     return plots
+
+
+def _cycle(packings: Sequence[Packing], moved: Floats, sources: dict[str, Any]) -> "figure":
+    """F_x over the displacement of the upper layer."""
+    plot = _plot("cycle", "displacement of the upper layer", "Fₓ")
+    plot.line(moved, [packing.fx for packing in packings], line_color=OTHERS, line_width=2)
+    plot.scatter("moved", "fx", source=sources["here"], size=11, fill_color=FIRST, line_color=None)
+    return plot
 
 
 def _growth(series: dict[str, Any]) -> "figure":

@@ -32,15 +32,17 @@ struct alignas(64) CompensatedColumn {
 };
 
 // Whether there is friction, and what becomes of slips
-enum class Friction { NONE, LOOKED_AT, ADVANCED, RESCALED };
+enum class Friction { NONE, LOOKED_AT, ADVANCED, RESCALED, SLIDER_LOOKED_AT, SLIDER };
 
 // What is known at compile time
 template <class NUMBER, Exponent P, Friction SLIPS, bool HAS_DASHPOTS> struct Variant {
   using Number = NUMBER;
   static constexpr bool COMPENSATED = std::is_same_v<Number, Compensated>;
   static constexpr Exponent EXPONENT = P;
-  static constexpr bool FRICTION = SLIPS != Friction::NONE, RESCALE = SLIPS == Friction::RESCALED;
-  static constexpr bool ADVANCE = SLIPS == Friction::ADVANCED || RESCALE, DAMPED = HAS_DASHPOTS;
+  static constexpr bool FRICTION = SLIPS != Friction::NONE, DAMPED = HAS_DASHPOTS;
+  static constexpr bool SLIDER = SLIPS == Friction::SLIDER || SLIPS == Friction::SLIDER_LOOKED_AT;
+  static constexpr bool ADVANCE = FRICTION && SLIPS != Friction::LOOKED_AT && SLIPS != Friction::SLIDER_LOOKED_AT;
+  static constexpr bool RESCALE = P == Exponent::HERTZ && ADVANCE && SLIPS != Friction::ADVANCED;
 };
 
 struct alignas(64) DashpotColumns {
@@ -181,7 +183,7 @@ template <class V> FAULTGOUGE_INLINE void tangential_forces(Batch<V> &batch, con
     Number slip = batch.slip.load(k);
     if constexpr (V::ADVANCE) slip = advanced_slip(slip, APART ? increment[k] : slip_increment(batch, k), limit);
     batch.slip.store(k, slip);
-    batch.tangential.store(k, law.tangential_force(batch.normal.load(k), slip, limit));
+    batch.tangential.store(k, law.tangential_force<V::SLIDER>(batch.normal.load(k), slip, limit));
   }
 }
 

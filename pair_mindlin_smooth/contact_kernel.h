@@ -108,10 +108,10 @@ struct Grids {
 // What is compiled into a run
 struct Features {
   bool friction;
-  bool advance;             // slips advance by v dt and omega dt
-  bool damped;              // dashpots
-  bool rescaled = false;    // slips, while overlaps grow
-  bool energy = false;      // of contacts that sliding and dashpots take
+  bool advance;    // slips advance by v dt and omega dt
+  bool damped;     // dashpots
+  History history = History::TOTAL;
+  bool energy = false;    // of contacts that sliding and dashpots take
 };
 
 // All pairs: their forces, slips and whether they touch. Returns a pair with one centre inside of the other disk, where

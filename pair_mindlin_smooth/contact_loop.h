@@ -79,9 +79,13 @@ template <class Number, Exponent P, bool DAMPED, class... Rest>
 FAULTGOUGE_INLINE int with_friction(Features features, ContactPairs &pairs, const Rest &...rest)
 {
   if (!features.friction) return all_forces<Variant<Number, P, Friction::NONE, DAMPED>>(pairs, rest...);
+  if (features.history == History::COULOMB)
+    return features.advance ? all_forces<Variant<Number, P, Friction::SLIDER, DAMPED>>(pairs, rest...)
+                            : all_forces<Variant<Number, P, Friction::SLIDER_LOOKED_AT, DAMPED>>(pairs, rest...);
   if (!features.advance) return all_forces<Variant<Number, P, Friction::LOOKED_AT, DAMPED>>(pairs, rest...);
   if constexpr (P == Exponent::HERTZ)
-    if (features.rescaled) return all_forces<Variant<Number, P, Friction::RESCALED, DAMPED>>(pairs, rest...);
+    if (features.history == History::RESCALED)
+      return all_forces<Variant<Number, P, Friction::RESCALED, DAMPED>>(pairs, rest...);
   return all_forces<Variant<Number, P, Friction::ADVANCED, DAMPED>>(pairs, rest...);
 }
 

@@ -62,7 +62,7 @@ void FixWallMindlinSmooth::read_keywords(int narg, char **arg)
         error->all(FLERR, "fix wall/mindlin/smooth: exponent must be 1.5 or 1, not {}", k < narg ? arg[k] : "left out");
     } else if (strcmp(arg[k], "history") == 0) {
       if (++k >= narg || !law.set_history(arg[k]))
-        error->all(FLERR, "fix wall/mindlin/smooth: history must be total or rescaled, not {}",
+        error->all(FLERR, "fix wall/mindlin/smooth: history must be total, rescaled or coulomb, not {}",
                    k < narg ? arg[k] : "left out");
     } else if (strcmp(arg[k], "damping") == 0) {
       if (k + 2 >= narg) error->all(FLERR, "fix wall/mindlin/smooth: damping takes two numbers, CN CT");
@@ -280,7 +280,7 @@ template <class NUMBER, bool FRICTION, bool DAMPED> void FixWallMindlinSmooth::c
   NUMBER slip = known && FRICTION ? contact[SLIP] : 0.0;
   if constexpr (COMPENSATED && FRICTION) slip.low = known ? contact[SLIP_LOW] : 0.0;
   double increment = known && FRICTION ? -(atom->v[i][0] + radius * atom->omega[i][2]) * update->dt : 0.0;
-  if (known && FRICTION && law.rescaled)
+  if (known && FRICTION && law.rescales())
     increment = faultgouge::rescaled_increment(value(slip), increment, -atom->v[i][1] * update->dt, value(overlap));
   faultgouge::FloorRates rates{};
   if constexpr (DAMPED) {
@@ -288,8 +288,8 @@ template <class NUMBER, bool FRICTION, bool DAMPED> void FixWallMindlinSmooth::c
     rates = {felt[1], -(felt[0] + radius * felt[2])};
   }
   const bool counted = dissipating && advance && FRICTION;
-  const auto [normal, tangential, kept, limit, slid, dashpot_power] =
-      faultgouge::floor_contact(law, overlap, slip, increment, rates, {FRICTION, advance, DAMPED, false, counted});
+  const auto [normal, tangential, kept, limit, slid, dashpot_power] = faultgouge::floor_contact(
+      law, overlap, slip, increment, rates, {FRICTION, advance, DAMPED, law.history, counted});
   if (counted) contact[size_peratom_cols - 1] += slid + dashpot_power * update->dt;
   if constexpr (FRICTION) {
     contact[TANGENTIAL] = value(tangential);

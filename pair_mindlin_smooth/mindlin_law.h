@@ -13,6 +13,9 @@
 // Rescaled, the slip becomes s (delta_old/delta_new)^(p-1) while the overlap grows, and stays while it falls. Growth of
 // a contact then adds no tangential force to what the contact carries.
 //
+// Coulomb's slider behind a spring (Cundall and Strack) has f_t = -k_t delta^(p-1) s up to the bound, with rescaled
+// slips. Its slip is -f_t/(k_t delta^(p-1)), the elastic part of the displacement.
+//
 // analysis/packing/law.py says the same in Python. See docs/howto_law.md for how to add another.
 
 #ifndef FAULTGOUGE_MINDLIN_LAW_H
@@ -31,6 +34,10 @@ struct Vector {
   double x, y;
 };
 
+// what a contact remembers: the whole slip, the slip rescaled while the overlap grows, or the stretch of a spring that
+// pulls Coulomb's slider
+enum class History { TOTAL, RESCALED, COULOMB };
+
 // of the repulsion: 3/2 (Hertz) and 1 (harmonic disks)
 enum class Exponent { HERTZ, HARMONIC };
 
@@ -38,7 +45,7 @@ struct MindlinLaw {
   double kn = 0.0, kt = 0.0, mu = 0.0;
   double cn = 0.0, ct = 0.0;
   Exponent exponent = Exponent::HERTZ;
-  bool rescaled = false;    // slips, while overlaps grow
+  History history = History::TOTAL;
 
   bool frictional() const { return mu > 0.0 && kt > 0.0; }
   bool valid() const
@@ -46,7 +53,8 @@ struct MindlinLaw {
     return std::isfinite(kn) && std::isfinite(kt) && std::isfinite(mu) && kn > 0.0 && kt >= 0.0 && mu >= 0.0;
   }
   // the stiffness of harmonic disks does not depend on the overlap
-  bool valid_history() const { return !rescaled || exponent == Exponent::HERTZ; }
+  bool valid_history() const { return history != History::RESCALED || exponent == Exponent::HERTZ; }
+  bool rescales() const { return history != History::TOTAL && exponent == Exponent::HERTZ; }
   bool valid_dashpots() const { return std::isfinite(cn) && std::isfinite(ct) && cn >= 0.0 && ct >= 0.0; }
 
   // false: there is no such exponent
@@ -59,8 +67,9 @@ struct MindlinLaw {
   // false: there is no such history
   bool set_history(const char *name)
   {
-    rescaled = std::strcmp(name, "rescaled") == 0;
-    return rescaled || std::strcmp(name, "total") == 0;
+    const bool rescaled = std::strcmp(name, "rescaled") == 0, coulomb = std::strcmp(name, "coulomb") == 0;
+    history = rescaled ? History::RESCALED : coulomb ? History::COULOMB : History::TOTAL;
+    return rescaled || coulomb || std::strcmp(name, "total") == 0;
   }
 
   // slip at which the tangential force reaches the Coulomb limit, per unit overlap
@@ -93,13 +102,19 @@ struct MindlinLaw {
   }
 
   // Where friction has weakened to nothing slip_limit is zero, and so is the bound.
-  template <class Number> FAULTGOUGE_INLINE Number tangential_force(Number normal, Number slip, Number slip_limit) const
+  template <bool SLIDER, class Number>
+  FAULTGOUGE_INLINE Number tangential_force(Number normal, Number slip, Number slip_limit) const
   {
     using std::fabs;
     const Number size = fabs(slip), one = 1.0;
     const Number x = select(size < slip_limit, size / slip_limit, one);
-    const Number smooth = x * ordered_sum(1.0, x * ordered_sum(1.0, -x));
-    return times_sign(mu * normal * smooth, -std::copysign(1.0, leading(slip)));
+    const Number share = SLIDER ? x : x * ordered_sum(1.0, x * ordered_sum(1.0, -x));
+    return times_sign(mu * normal * share, -std::copysign(1.0, leading(slip)));
+  }
+  template <class Number> FAULTGOUGE_INLINE Number tangential_force(Number normal, Number slip, Number slip_limit) const
+  {
+    if (history == History::COULOMB) return tangential_force<true>(normal, slip, slip_limit);
+    return tangential_force<false>(normal, slip, slip_limit);
   }
 
   // f_n with the dashpot's force while n . v_ij is so large

@@ -140,7 +140,7 @@ Period PairMindlinSmooth::period() const
 int PairMindlinSmooth::contact_forces(bool advance)
 {
   const double dt = update->dt;
-  const Features features{has_friction, advance, damped, law.rescaled, energy};
+  const Features features{has_friction, advance, damped, law.history, energy};
   if (!compensated) return faultgouge::contact_forces(pairs, disks(), period(), law, dt, features);
   return faultgouge::compensated_contact_forces(pairs, disks(), period(), law, dt, features,
                                                 {low_parts->grid(), force_grid, tangential_grid});

@@ -5,7 +5,8 @@
 // MU = 0 or KT = 0 there is no tangential force, no history and no fix.
 //
 //   exponent      3/2 by default, or 1
-//   history       total by default, or rescaled: slips are rescaled while overlaps grow (exponent 3/2 alone)
+//   history       total by default, or rescaled: slips are rescaled while overlaps grow (exponent 3/2 alone), or
+//                 coulomb: a spring behind Coulomb's slider
 //   damping       dashpots at the contacts, which feel the velocities of fix dashpot/velocities; none by default, and
 //                 none while fix displace/disc moves the disks
 //   energy        each contact adds up what sliding and dashpots take; not by default

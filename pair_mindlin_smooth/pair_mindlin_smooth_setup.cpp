@@ -98,7 +98,7 @@ void PairMindlinSmooth::read_keywords(int narg, char **arg)
                    k < narg ? arg[k] : "left out");
     } else if (strcmp(arg[k], "history") == 0) {
       if (++k >= narg || !law.set_history(arg[k]))
-        error->all(FLERR, "pair_style mindlin/smooth: history must be total or rescaled, not {}",
+        error->all(FLERR, "pair_style mindlin/smooth: history must be total, rescaled or coulomb, not {}",
                    k < narg ? arg[k] : "left out");
     } else if (strcmp(arg[k], "damping") == 0) {
       if (k + 2 >= narg) error->all(FLERR, "pair_style mindlin/smooth: damping takes two numbers, CN CT");

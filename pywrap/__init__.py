@@ -13,6 +13,9 @@ prepare()  # before mpi4py.MPI is imported
 # ruff: noqa: E402 - the imports below need it
 from ..analysis import NoEquilibriumError
 from .equilibria.quasistatic import Equilibrium, equilibrate
+from .granular.commands import SnapshotError
+from .granular.compare_motion import MotionComparison, compare_motion
+from .granular.from_lammps import from_lammps
 from .lammps.engine import Engine
 from .lammps.instance import EngineError
 from .runs.path import ramp, reach
@@ -26,12 +29,16 @@ __all__ = [
     "Engine",
     "EngineError",
     "Equilibrium",
+    "MotionComparison",
     "NoEquilibriumError",
     "Record",
     "Sample",
     "Scene",
     "SceneError",
+    "SnapshotError",
+    "compare_motion",
     "equilibrate",
+    "from_lammps",
     "perturb",
     "ramp",
     "reach",

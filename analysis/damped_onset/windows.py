@@ -22,6 +22,7 @@ hide. Undamped windows are looked into besides: between their edges the growth w
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +39,9 @@ from .screening import Screen
 
 Known = Callable[[tuple[DampedWindow, ...], float], None]
 """Takes the windows so far, and the load up to which they are all."""
+
+Look = Callable[[float, float], Iterable[float]]
+"""Two neighbouring loads of a ramp -> further loads between them that are to be looked at."""
 
 
 class DampedOnsetError(FaultgougeError):
@@ -83,15 +87,23 @@ def damped_windows(
     """
     loads = increasing(forces)
     start = equilibrium(float(loads[0]))
-    if not start.law.damped and start.drag_time is None:
+    if not start.damped:
         raise ValueError("The packing has no dissipation: find_onset is what it needs.")
-    return growing_windows(lambda fx: Pencil.of(equilibrium(fx)), loads, look, first, watch, known)
+    further = [float(fx) for fx in look]
+    return growing_windows(
+        lambda fx: Pencil.of(equilibrium(fx)),
+        loads,
+        lambda below, above: [fx for fx in further if below < fx < above],
+        first,
+        watch,
+        known,
+    )
 
 
 def growing_windows(
     pencil: Callable[[float], Pencil],
     forces: ArrayLike,
-    look: Iterable[float] = (),
+    look: Look = lambda below, above: (),
     first: bool = False,
     watch: Callable[[str], None] = lambda says: None,
     known: Known = lambda windows, fx: None,
@@ -102,22 +114,23 @@ def growing_windows(
     ----------
     pencil : callable
         fx -> Pencil.
-    forces, look, first, watch, known
+    forces, first, watch, known
         As of `damped_windows`.
+    look : callable, optional
+        Two neighbouring loads -> further loads between them that are to be looked at.
     """
     loads = increasing(forces)
-    looked = [float(fx) for fx in look if loads[0] < fx < loads[-1]]
     narrowest = LIMITS.narrowest * float(np.abs(loads).max())
     try:
-        return walked(Growing(pencil, narrowest, Screen()), loads, looked, first, watch, known)
+        return walked(Growing(pencil, narrowest, Screen()), loads, look, first, watch, known)
     except LostTrackError:
-        return walked(Growing(pencil, narrowest, None), loads, looked, first, watch, known)
+        return walked(Growing(pencil, narrowest, None), loads, look, first, watch, known)
 
 
 def walked(
     oracle: Growing,
     loads: Floats,
-    look: Iterable[float] = (),
+    look: Look = lambda below, above: (),
     first: bool = False,
     watch: Callable[[str], None] = lambda says: None,
     known: Known = lambda windows, fx: None,
@@ -125,20 +138,21 @@ def walked(
     """The windows that an oracle finds along a ramp; a load to be looked at besides may have no equilibrium."""
     here = oracle.at(float(loads[0]))
     windows: tuple[DampedWindow, ...] = ()
-    for load in np.unique([*loads[1:], *look]):
-        so_far = f"; {len(windows)} windows so far, the first from {windows[0].fx_onset:.8g}" if windows else ""
-        watch(f"motion that grows up to F_x = {load:.6g} of {loads[-1]:.6g}{so_far}")
-        try:
-            there = oracle.at(float(load))
-        except NoEquilibriumError:
-            if load in loads:
-                raise
-            continue
-        walk(oracle, [here, there])
-        here, windows = there, oracle.windows()
-        known(windows, here.fx)
-        if first and windows:
-            break
+    for below, above in pairwise(loads.tolist()):
+        for load in [*sorted(look(below, above)), above]:
+            so_far = f"; {len(windows)} windows so far, the first from {windows[0].fx_onset:.8g}" if windows else ""
+            watch(f"motion that grows up to F_x = {load:.6g} of {loads[-1]:.6g}{so_far}")
+            try:
+                there = oracle.at(load)
+            except NoEquilibriumError:
+                if load == above:
+                    raise
+                continue
+            walk(oracle, [here, there])
+            here, windows = there, oracle.windows()
+            known(windows, here.fx)
+            if first and windows:
+                return windows
     return windows
 
 

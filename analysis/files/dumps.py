@@ -10,11 +10,11 @@ to one disk. Pairs that do not overlap, which LAMMPS lists up to its cutoff, are
 there are neither slips nor angles, and their columns may be missing.
 
 Law, load and inertia are no part of a dump. They are given by the caller or by a sidecar file of the same
-name with the suffix ".params", which has one ``key value`` a line out of kn, kt, mu, exponent, rescaled, cn, ct, tau,
-fx, fy, inertia_factor;
-what the caller gives wins.
+name with the suffix ".params", which has one ``key value`` a line out of kn, kt, mu, exponent, rescaled, coulomb,
+cn, ct, tau, fx, fy, inertia_factor; what the caller gives wins.
 """
 
+import zlib
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -31,6 +31,7 @@ from ..packing.geometry import nearest_image
 from ..packing.law import MindlinLaw
 from ..packing.packing import Floats, Indices, Packing
 from .by_hand import PackingFileError
+from .text_files import open_text
 
 DISK = {
     "id": ("id",),
@@ -158,7 +159,8 @@ def _law(given: Mapping[str, float], disks: Path) -> MindlinLaw:
     try:
         kn, kt, mu = (given[name] for name in ("kn", "kt", "mu"))
         more = {name: given[name] for name in ("exponent", "cn", "ct") if name in given}
-        return MindlinLaw(kn, kt, mu, rescaled=bool(given.get("rescaled")), **more)
+        rescaled, coulomb = bool(given.get("rescaled")), bool(given.get("coulomb"))
+        return MindlinLaw(kn, kt, mu, rescaled=rescaled, coulomb=coulomb, **more)
     except KeyError as error:
         sidecar = disks.with_suffix(".params")
         raise PackingFileError(f"The law of {disks} is not given: {sidecar} does not name {error}.") from None
@@ -221,15 +223,15 @@ def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
         If the file is missing, or breaks off or is malformed before the snapshot asked for is complete.
     """
     try:
-        with open(path, encoding="utf-8") as file:
+        with open_text(path) as file:
             while True:
                 frame = _next_frame(file)
                 if frame is None:
                     return
                 yield frame
     except OSError as error:
-        raise PackingFileError(f"{path} cannot be read: {error.strerror}.") from error
-    except (ValueError, IndexError, StopIteration) as error:
+        raise PackingFileError(f"{path} cannot be read: {error.strerror or error}.") from error
+    except (ValueError, IndexError, StopIteration, EOFError, zlib.error) as error:
         raise PackingFileError(f"{path} is not a complete LAMMPS text dump: {error or 'it breaks off'}.") from error
 
 

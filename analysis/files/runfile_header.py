@@ -51,7 +51,7 @@ def parameters_of(packing: Packing) -> dict[str, Any]:
     return values
 
 
-def _version() -> str:
+def program_version() -> str:
     """The program's version; empty where the analysis runs without being installed."""
     try:
         return version(CREATOR)
@@ -65,7 +65,7 @@ def write_header(file: h5py.File, packing: Packing) -> None:
     h5md.attrs["version"] = np.array([1, 1])
     h5md.create_group("author").attrs["name"] = CREATOR
     creator = h5md.create_group("creator")
-    creator.attrs["name"], creator.attrs["version"] = CREATOR, _version()
+    creator.attrs["name"], creator.attrs["version"] = CREATOR, program_version()
     disks = file.create_group("particles/disks")
     box = disks.create_group("box")
     box.attrs["dimension"] = 3

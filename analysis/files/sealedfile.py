@@ -53,7 +53,7 @@ class SealedFile:
         if not self.path.is_file():
             raise PackingFileError(f"{self.path} {'is no file' if self.path.exists() else 'does not exist'}.")
         sealed, self._writable = is_sealed(self.path), mode == "a"
-        self._file = _image(self.path) if sealed and self._writable else _opened(self.path)
+        self._file = _image(self.path) if sealed and self._writable else opened(self.path)
         try:
             check(self._file, self.path, self.path.stat().st_size)
             if self._writable and not sealed:
@@ -152,7 +152,7 @@ def write(path: Path, file: h5py.File) -> None:
     write_whole(path, seal(image), image)
 
 
-def _opened(path: Path) -> h5py.File:
+def opened(path: Path) -> h5py.File:
     """The file for reading."""
     try:
         return h5py.File(path, "r", locking=False)

@@ -9,6 +9,7 @@ from scipy.sparse.linalg import svds
 
 from ..errors import FaultgougeError
 from ..packing.packing import Floats, Indices, Packing
+from ..packing.snapshot import Snapshot
 from ..spectrum.spectrum import Complexes
 from .matrix_functions import WELL_CONDITIONED, Function, Modes, second_order
 from .oscillator import Oscillator
@@ -61,7 +62,7 @@ class NoGainError(FaultgougeError):
     """A packing without a transient gain: it is unstable, or has no energy."""
 
 
-def stable_motion(packing: Packing) -> LinearMotion:
+def stable_motion(packing: Packing | Snapshot) -> LinearMotion:
     """The motion of a packing; NoGainError if the packing is unstable."""
     motion = LinearMotion.of(packing)
     values, dissipative = motion.modes.values, motion.dissipative

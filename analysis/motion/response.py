@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..packing.packing import Floats, Packing
+from ..packing.snapshot import Snapshot
 from .matrix_functions import Modes, first_order
 from .oscillator import Oscillator
 from .state_space import StateSpace, driven, released
@@ -44,18 +45,21 @@ class Response:
     velocity : ndarray, shape (T, 3N)
         Its time derivative, length / time.
     top : ndarray of bool, shape (N,)
-        The disks of the upper layer.
+        The disks of the upper layer; none of a Snapshot.
+    dimension : int
+        2 of disks, 3 of spheres.
     """
 
     time: Floats
     displacement: Floats
     velocity: Floats
     top: NDArray[np.bool_]
+    dimension: int = 2
 
     @property
     def msd(self) -> Floats:
-        """D, mean over disks of dx^2 + dy^2, length^2, shape (T,)."""
-        return np.sum(self.displacement[:, : 2 * len(self.top)] ** 2, axis=1) / len(self.top)
+        """D, mean over disks of dx^2 + dy^2 (+ dz^2), length^2, shape (T,)."""
+        return np.sum(self.displacement[:, : self.dimension * len(self.top)] ** 2, axis=1) / len(self.top)
 
     @property
     def layer_velocity(self) -> Floats:
@@ -77,15 +81,15 @@ class LinearMotion:
         Of A without dissipation, of the first-order system with it.
     """
 
-    packing: Packing
+    packing: Packing | Snapshot
     system: StateSpace
     modes: Modes
 
     @classmethod
-    def of(cls, packing: Packing) -> "LinearMotion":
+    def of(cls, packing: Packing | Snapshot) -> "LinearMotion":
         """Decompose a packing; errors as of `linear_response`."""
         system = StateSpace.of(packing)
-        if packing.law.damped or packing.drag_time is not None:
+        if packing.damped:
             return cls(packing, system, Modes.of(system.matrix, first_order))
         return cls(packing, system, Modes.of(system.stiffness))
 
@@ -107,7 +111,7 @@ class LinearMotion:
         if dt is not None and self.dissipative:
             raise ValueError("The dispersion of velocity Verlet is that of undamped runs: give dt without dissipation.")
         oscillator, time = Oscillator(float(omega), dt), _times(times, dt)
-        active, root, count = self.system.active, self.system.root_mass, 3 * len(self.packing)
+        active, root, count = self.system.active, self.system.root_mass, self.packing.coordinates
         displacement, velocity = np.zeros((2, len(time), count))
         for given, name, scale in ((force, "force", 1 / root), (initial, "initial", root)):
             if given is None:
@@ -116,7 +120,7 @@ class LinearMotion:
             x, v = self._motion(oscillator, name == "force", vector[active] * scale, time, np.diag(1 / root))
             displacement[:, active] += x
             velocity[:, active] += v
-        return Response(time, displacement, velocity, self.packing.top)
+        return Response(time, displacement, velocity, self.packing.top, self.packing.dimension)
 
     def _motion(
         self, oscillator: Oscillator, forced: bool, vector: Floats, time: Floats, observed: Floats
@@ -135,7 +139,7 @@ class LinearMotion:
 
 
 def linear_response(
-    packing: Packing,
+    packing: Packing | Snapshot,
     times: ArrayLike,
     *,
     force: ArrayLike | None = None,
@@ -153,7 +157,7 @@ def linear_response(
         The equilibrium.
     times : array_like, shape (T,)
         Times, in any order, not negative.
-    force : array_like, shape (3N,), optional
+    force : array_like, shape (3N,), or (6N,) of spheres, optional
         f of the force f cos(omega t) on (x.., y.., R theta..), force, as of `layer_force`; none by default.
     omega : float
         Angular frequency of the force, radian / time.
@@ -192,16 +196,16 @@ def layer_force(packing: Packing, amplitude: float) -> Floats:
     ndarray, shape (3N,)
         On (x.., y.., R theta..).
     """
-    force = np.zeros(3 * len(packing))
+    force = np.zeros(packing.coordinates)
     force[: len(packing)] = amplitude * packing.top
     return force
 
 
-def coordinates(packing: Packing, name: str, values: ArrayLike) -> Floats:
+def coordinates(packing: Packing | Snapshot, name: str, values: ArrayLike) -> Floats:
     """Numbers of all coordinates as an array of shape (3N,); a ValueError if they have another shape."""
     vector = np.asarray(values, dtype=np.float64)
-    if vector.shape != (3 * len(packing),):
-        raise ValueError(f"{name} has shape {vector.shape}; {(3 * len(packing),)} is needed.")
+    if vector.shape != (packing.coordinates,):
+        raise ValueError(f"{name} has shape {vector.shape}; {(packing.coordinates,)} is needed.")
     return vector
 
 

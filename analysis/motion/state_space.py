@@ -27,6 +27,7 @@ from scipy.sparse import csr_array
 from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
+from ..packing.snapshot import Snapshot
 from ..spectrum.spectrum import Complexes, active_coordinates, mass_weighted
 
 SOFTEST = 1e-6
@@ -61,7 +62,7 @@ class StateSpace:
     positive: bool
 
     @classmethod
-    def of(cls, packing: Packing) -> "StateSpace":
+    def of(cls, packing: Packing | Snapshot) -> "StateSpace":
         """Set up the system of a packing.
 
         Parameters

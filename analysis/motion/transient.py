@@ -39,6 +39,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..packing.packing import Floats, Packing
+from ..packing.snapshot import Snapshot
 from .propagator import ACCURACY, NoGainError, Norm, Propagator, stable_motion
 from .response import LinearMotion
 
@@ -84,6 +85,8 @@ class TransientGain:
         The times from 0 to this were searched.
     bound : float
         No later time has a larger gain; inf where no bound is known.
+    dimension : int
+        2 of disks, 3 of spheres.
     """
 
     gain: float
@@ -93,20 +96,25 @@ class TransientGain:
     norm: Norm
     window: float
     bound: float
+    dimension: int = 2
+
+    @property
+    def _translations(self) -> Floats:
+        return self.start.reshape(3 if self.dimension == 2 else 6, -1)[: self.dimension]
 
     @property
     def disk(self) -> int:
         """The worst disk to push: that which the start displaces farthest."""
-        return int(np.argmax(np.linalg.norm(self.start.reshape(3, -1)[:2], axis=0)))
+        return int(np.argmax(np.linalg.norm(self._translations, axis=0)))
 
     @property
     def direction(self) -> Floats:
-        """In which direction, a unit vector (x, y)."""
-        push = self.start.reshape(3, -1)[:2, self.disk]
+        """In which direction, a unit vector (x, y) or (x, y, z)."""
+        push = self._translations[:, self.disk]
         return np.asarray(push / np.linalg.norm(push))
 
 
-def transient_gain(packing: Packing, norm: Norm = "displacement") -> TransientGain:
+def transient_gain(packing: Packing | Snapshot, norm: Norm = "displacement") -> TransientGain:
     """The largest transient gain of a stable packing, with its dashpots and drag.
 
     Parameters
@@ -130,39 +138,39 @@ def transient_gain(packing: Packing, norm: Norm = "displacement") -> TransientGa
     return _gain(stable_motion(packing), norm)
 
 
-def transient_gains(packing: Packing) -> tuple[TransientGain, TransientGain]:
+def transient_gains(packing: Packing | Snapshot) -> tuple[TransientGain, TransientGain]:
     """The gains in displacement and in energy, with the modes computed once; as of :func:`transient_gain`."""
     motion = stable_motion(packing)
     return _gain(motion, "displacement"), _gain(motion, "energy")
 
 
 def _gain(motion: LinearMotion, norm: Norm) -> TransientGain:
-    system, disks = motion.system, len(motion.packing)
+    system, packing = motion.system, motion.packing
     if norm == "energy" and not system.positive:
         raise NoGainError("the symmetric part of K is not positive: displacements have no energy to compare with")
     propagator = Propagator.of(motion, norm)
     bound, columns = propagator.bound(), propagator.kept()
     if bound < 1 + SYMMETRIC:
-        return _nothing(disks, norm, 0.0, bound)
+        return _nothing(packing, norm, 0.0, bound)
     length = min(propagator.window(columns), propagator.end(bound))
     time, size, start = _refined(propagator, propagator.candidates(columns, length))
     if size <= 1:
-        return _nothing(disks, norm, length, bound)
-    displacement, velocity = np.zeros((2, 3 * disks))
+        return _nothing(packing, norm, length, bound)
+    displacement, velocity = np.zeros((2, packing.coordinates))
     root, count = system.root_mass, len(system.active)
     if norm == "displacement":
         displacement[system.active] = start
     else:
         displacement[system.active] = system.unweight @ start[:count] / root
         velocity[system.active] = start[count:] / root
-    return TransientGain(size**2, time, displacement, velocity, norm, length, bound)
+    return TransientGain(size**2, time, displacement, velocity, norm, length, bound, packing.dimension)
 
 
-def _nothing(disks: int, norm: Norm, window: float, bound: float) -> TransientGain:
+def _nothing(packing: Packing | Snapshot, norm: Norm, window: float, bound: float) -> TransientGain:
     """No start grows: K is symmetric, or what it feeds is less than the dissipation takes."""
-    rest, start = np.zeros((2, 3 * disks))
+    rest, start = np.zeros((2, packing.coordinates))
     start[0] = 1.0
-    return TransientGain(1.0, 0.0, start, rest, norm, window, bound)
+    return TransientGain(1.0, 0.0, start, rest, norm, window, bound, packing.dimension)
 
 
 def _refined(propagator: Propagator, brackets: list[tuple[float, float]]) -> tuple[float, float, Floats]:

@@ -14,7 +14,7 @@ from .limits import LIMITS, Limits
 from .modes import Modes, force_bearing, full_operator
 from .pair import Pair
 from .ranks import Ranks
-from .search import Onset, OnsetError, complex_windows, find_onset, seeks_all
+from .search import Onset, OnsetError, complex_windows, find_onset, takes_all_modes
 from .sliced import Increments
 
 __all__ = [
@@ -33,5 +33,5 @@ __all__ = [
     "find_onset",
     "force_bearing",
     "full_operator",
-    "seeks_all",
+    "takes_all_modes",
 ]

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ..errors import NoEquilibriumError
+from ..errors import NoEquilibriumError, TurningPointError
 from ..packing.packing import Floats, Indices
 from ..spectrum.spectrum import Complexes
 from .edge import DoubtError, Edge, Family, LostPairError, LostTrackError, Window, locate, other_sign
@@ -45,14 +45,17 @@ Fate = tuple[Pair | None, Pair | None, Ends | None]
 class Dense:
     """The oracle; what it is sure of are the courses of all pairs that are complex at either end of an increment."""
 
-    finished = False
-
-    def __init__(self, family: Family, screening: Screening) -> None:
-        self.family, self.screening = family, screening
+    def __init__(self, family: Family, screening: Screening, first: bool = False) -> None:
+        self.family, self.screening, self._first = family, screening, first
         self._open: dict[Pair, Edge] | None = None  # the onsets of the windows that are open at the load reached so far
         self._closed: list[Window] = []
         self._reached: tuple[Place, Place] | None = None  # the last step that was looked at
         self._known: list[Pair] = []  # the few pairs at the load reached so far
+
+    @property
+    def finished(self) -> bool:
+        """Whether the first window has been found, and is all that is sought."""
+        return self._first and bool(self._open or self._closed)
 
     def candidates(self, places: Sequence[Place], depth: int) -> Iterator[list[Ends] | None]:
         """The pairs that may meet; None where these are not few, or the increment has been divided."""
@@ -374,23 +377,59 @@ def _sensitivity(modes: Modes, change: csr_array) -> Complexes:
         return np.sum(y * (change @ modes.right), axis=0) / np.sum(y * modes.right, axis=0)
 
 
-def all_windows(family: Family, loads: Floats, screening: Screening | None = None) -> tuple[Window, ...]:
+def all_windows(
+    family: Family, loads: Floats, screening: Screening | None = None, first: bool = False
+) -> tuple[Window, ...]:
     """All windows of a family of matrices between the first and the last of increasing loads.
 
     `screening` names the pairs that may meet, a `Screen` by default. It is of finite order: should all modes contradict
-    it, the ramp is walked again without it.
+    it, the ramp is walked again without it. If the `first` window alone is sought, the walk ends with it, and no load
+    beyond the increment in which it begins is asked for; the windows are then those that begin up to there.
     """
-    try:
-        return _walked(Dense(family, screening or Screen(family.limits)), loads)
-    except LostTrackError:
-        return _walked(Dense(family, lambda here, there, known: None), loads)
+    *_, (_, windows) = windows_along(family, loads, screening, first)
+    return windows
 
 
-def _walked(oracle: Dense, loads: Floats) -> tuple[Window, ...]:
-    """The windows that an oracle finds along a ramp."""
+def windows_along(
+    family: Family, loads: Floats, screening: Screening | None = None, first: bool = False
+) -> Iterator[tuple[float, tuple[Window, ...]]]:
+    """Each load but the smallest as it is reached, and all windows up to there; arguments are those of `all_windows`.
+
+    The walk ends where an eigenvalue is found to be negative: the branch of equilibria has ended before that load.
+    """
+    reached = float(loads[0])
+    ways = screening or Screen(family.limits), _without_screening
+    for way in ways:
+        try:
+            for load, windows in _walked(Dense(family, way, first), loads):
+                if load > reached or (first and windows):  # the second walk may find what the first one missed
+                    reached = max(reached, load)
+                    yield load, windows
+            return
+        except LostTrackError:
+            if way is _without_screening:
+                raise
+
+
+def _without_screening(here: csr_array, there: csr_array, known: int) -> None:
+    """No pairs are named: all modes tell."""
+
+
+def _walked(oracle: Dense, loads: Floats) -> Iterator[tuple[float, tuple[Window, ...]]]:
+    """The loads of a ramp as an oracle reaches them, and the windows up to there."""
     here = oracle.family.at(loads[0])
     for load in loads[1:]:
-        for there in oracle.family.steps(here, load):
+        try:
+            steps = oracle.family.steps(here, load)
+        except TurningPointError:
+            if not oracle.windows():
+                raise
+            return
+        for there in steps:
             walk(oracle, [here, there])
             here = there
-    return oracle.windows()
+            if oracle.finished:
+                break
+        yield float(load), oracle.windows()
+        if oracle.finished:
+            return

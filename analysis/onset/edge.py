@@ -17,6 +17,7 @@ from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError
 from ..packing.packing import Floats, Packing
+from ..packing.snapshot import Snapshot
 from .limits import LIMITS, Limits
 from .modes import Operator, Place
 from .pair import Pair, continued, dip_between
@@ -129,12 +130,9 @@ class Window:
         }
 
 
-def load_error(packing: Packing) -> float:
-    """r / n^(1/2) of a residual r with n top disks, force per disk: what is out of balance is exact at another load.
-
-    Rounding leaves forces of r or less at random on the disks, and their mean over n disks is that of a load.
-    """
-    return packing.residual / float(np.sqrt(max(1, packing.top.sum())))
+def load_error(packing: Packing | Snapshot) -> float:
+    """Error of the load that goes with what is out of balance."""
+    return packing.load_error
 
 
 Followed = TypeVar("Followed")

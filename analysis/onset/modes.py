@@ -14,8 +14,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..operators.stiffness import stiffness_matrix
-from ..packing.law import AT_THE_BOUND
 from ..packing.packing import Floats, Indices, Packing
+from ..packing.snapshot import Configuration, Snapshot
 from ..spectrum.spectrum import Complexes, all_modes, believable, mass_weighted, unit_rounding
 from .limits import LIMITS, Limits
 from .pair import Pair
@@ -24,13 +24,13 @@ Members = tuple[int, int]  # the numbers of the two modes of a pair
 Operator: TypeAlias = Floats | csr_array
 
 
-def full_operator(packing: Packing, limits: Limits = LIMITS) -> csr_array:
-    """A = M^(-1/2) K M^(-1/2) of the contacts that bear a force, shape (3N, 3N), with its zero rows; 1 / time^2."""
+def full_operator(packing: Packing | Snapshot, limits: Limits = LIMITS) -> csr_array:
+    """A = M^(-1/2) K M^(-1/2) of the contacts that bear a force, of all coordinates, with its zero rows; 1 / time^2."""
     packing = force_bearing(packing, limits)
     return mass_weighted(stiffness_matrix(packing), packing)
 
 
-def force_bearing(packing: Packing, limits: Limits = LIMITS) -> Packing:
+def force_bearing(packing: Configuration, limits: Limits = LIMITS) -> Configuration:
     """The packing without the contacts whose force is no more than the packing's own imbalance.
 
     A disk that only such contacts hold comes to rest just about touching. Its overlap is rounding noise, and with the
@@ -41,13 +41,9 @@ def force_bearing(packing: Packing, limits: Limits = LIMITS) -> Packing:
     return packing.loaded(min(limits.unknown_force * packing.residual, limits.small_force * largest))
 
 
-def contact_states(packing: Packing, limits: Limits = LIMITS) -> bytes:
+def contact_states(packing: Packing | Snapshot, limits: Limits = LIMITS) -> bytes:
     """Which contacts bear a force, and which of them slide to which side; equal for equal states."""
-    packing = force_bearing(packing, limits)
-    contacts, law = packing.contacts, packing.law
-    bound = AT_THE_BOUND * law.slip_limit(packing.geometry.overlap) if law.frictional else np.inf
-    slides = np.sign(contacts.slip) * (np.abs(contacts.slip) >= bound)
-    return np.array([contacts.i, contacts.j, slides], dtype=np.int64).tobytes()
+    return force_bearing(packing, limits).contact_states
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """What a user asks for: the onset along a ramp, and the windows of a family of matrices."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +10,15 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from ..digits import with_uncertainty
-from ..errors import FaultgougeError
+from ..errors import FaultgougeError, TurningPointError
 from ..packing.packing import Floats, Packing
+from ..spectrum.buckling import negative_eigenvalues
+from ..spectrum.spectrum import spectrum
 from ..tabled import Tabled
 from .dense import all_windows
 from .edge import Family, Window, load_error
 from .limits import LIMITS, Limits
-from .modes import Operator, contact_states, full_operator
+from .modes import Operator, contact_states, force_bearing, full_operator
 from .ranks import ALONE, Ranks
 from .sliced import Increments, Watch, first_window
 from .walk import increasing
@@ -49,6 +51,36 @@ def windows_rows(windows: Sequence[Window]) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
+class Unstable:
+    """What makes a packing unstable.
+
+    Attributes
+    ----------
+    pairs : int
+        Complex pairs.
+    negative : int
+        Negative eigenvalues.
+    growth_rate : float
+        Of D in the fastest motion, 1 / time.
+    """
+
+    pairs: int
+    negative: int
+    growth_rate: float
+
+    @classmethod
+    def of(cls, packing: Packing) -> "Unstable":
+        """Count what all eigenvalues of a packing show, without contacts whose force is unknown."""
+        found = spectrum(force_bearing(packing))
+        return cls(len(found.pairs), len(found.negative), found.growth_rate())
+
+    def __str__(self) -> str:
+        counts = [(self.pairs, "complex pair"), (self.negative, "negative eigenvalue")]
+        parts = [f"{count} {what}{'s' * (count > 1)}" for count, what in counts if count]
+        return f"{' and '.join(parts)}; in the fastest motion D grows as exp({self.growth_rate:.6g} t)"
+
+
+@dataclass(frozen=True)
 class Onset(Tabled):
     """The windows of complex eigenvalues along a ramp.
 
@@ -57,17 +89,25 @@ class Onset(Tabled):
     windows : tuple of Window
         By increasing onset; at least one.
     complete : bool
-        Whether these are all up to the largest load. Of a large packing only the first is sought.
+        Whether these are all up to the largest load, or to where the branch of equilibria ends; else it is the first.
     doubtful : tuple of (float, float)
         Of a large packing, increments before the onset in which a pair was expected and not found: take smaller ones.
     modes : tuple of (int, int) or None
         Modes among which the onset was sought; None for all.
+    at_start : Unstable or None
+        What makes the packing unstable at the smallest load already; None if it is stable there, or too large for all
+        of its eigenvalues to be counted.
+    ends : float or None
+        Load before which the branch of equilibria ends, as an eigenvalue is negative there; None if it does not, as far
+        as the search went.
     """
 
     windows: tuple[Window, ...]
     complete: bool = True
     doubtful: Increments = ()
     modes: tuple[int, int] | None = None
+    at_start: Unstable | None = None
+    ends: float | None = None
 
     def __repr__(self) -> str:
         return f"<Onset: F_x^c = {with_uncertainty(self.fx_c, self.error)}, {len(self.windows)} windows>"
@@ -86,7 +126,7 @@ class Onset(Tabled):
         return self.windows[0].error
 
     def as_dict(self) -> dict[str, Any]:
-        """{"fx_c", "error", "windows": [...], "doubtful": [[from, to], ...], "modes"} of plain numbers, for JSON."""
+        """fx_c, error, error_of_path, windows, doubtful, modes, unstable_at_start, branch_ends: numbers, for JSON."""
         return {
             "fx_c": self.fx_c,
             "error": self.error,
@@ -94,12 +134,14 @@ class Onset(Tabled):
             "windows": [window.as_dict() for window in self.windows],
             "doubtful": [list(increment) for increment in self.doubtful],
             "modes": None if self.modes is None else list(self.modes),
+            "unstable_at_start": None if self.at_start is None else asdict(self.at_start),
+            "branch_ends": self.ends,
         }
 
 
-def seeks_all(packing: Packing, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
-    """Whether `find_onset` seeks all windows, at all loads; else it asks for loads up to the first window."""
-    return modes is None and len(packing) <= limits.all_windows
+def takes_all_modes(packing: Packing, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
+    """Whether a packing is small enough for all of its modes to be searched, and for all windows to be found."""
+    return modes is None and packing.coordinates <= 3 * limits.all_windows
 
 
 def complex_windows(
@@ -128,6 +170,7 @@ def find_onset(
     *,
     narrowest: float | None = None,
     modes: tuple[int, int] | None = None,
+    first: bool = False,
     watch: Watch = lambda says: None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
@@ -135,7 +178,9 @@ def find_onset(
 ) -> Onset:
     """The windows of complex eigenvalues between the smallest and the largest load.
 
-    Of a packing of up to `Limits.all_windows` disks these are all; of a larger one it is the first.
+    Of a packing of up to `Limits.all_windows` disks these are all, unless the first alone is asked for; of a larger one
+    it is the first. They end where the branch of equilibria does: where an equilibrium at one of the given loads has a
+    negative eigenvalue, so that a static instability lies before it.
 
     Parameters
     ----------
@@ -151,6 +196,9 @@ def find_onset(
         Search these modes alone, and for their first window: numbers of the first one and of the first one beyond, by
         frequency, the lowest being 0, of the symmetric part at the load where the search stands. Parts that are
         searched apart, on machines of their own, have together the same first window as all.
+    first : bool
+        Seek the first window alone. No equilibrium beyond the increment in which it begins is then asked for, and its
+        end is None where it ends beyond that increment.
     watch : callable, optional
         Told in words what is being looked at in a large packing.
     ranks : Ranks, optional
@@ -164,6 +212,8 @@ def find_onset(
     ------
     OnsetError
         If all eigenvalues are real at every load.
+    TurningPointError
+        If one is negative before any is complex.
     LostPairError, SliceError
         Of a large packing, if a pair cannot be followed, or a part of the spectrum is not found.
     OutputError, DamagedSliceError
@@ -173,25 +223,42 @@ def find_onset(
     """
     loads = increasing(forces)
     start = equilibrium(float(loads[0]))
+    takes_all = takes_all_modes(start, modes, limits)
+    negative = negative_eigenvalues(force_bearing(start, limits))
+    if len(negative):
+        at_start = Unstable.of(start) if takes_all else None
+        window = Window(start.fx, None, float(negative[0]), load_error(start), None, 1.0, "start")
+        return Onset((window,), False, (), modes, at_start, start.fx)
     unbalanced: dict[float, float] = {}
     states: dict[float, bytes] = {}
+    given, ends = set(loads[1:].tolist()), np.inf
 
     def operator(fx: float) -> csr_array:
+        nonlocal ends
         packing = start if fx == loads[0] else equilibrium(fx)
+        if fx in given and len(negative_eigenvalues(force_bearing(packing, limits))):
+            ends = min(ends, fx)
+            raise TurningPointError(
+                f"no pair of eigenvalues becomes complex before F_x = {fx:.10g}, where one is negative: the branch of "
+                "stable equilibria ends before, at a turning point, and the packing leaves it without oscillation"
+            )
         unbalanced[fx], states[fx] = load_error(packing), contact_states(packing, limits)
         return full_operator(packing, limits)
 
-    doubtful: Increments
-    complete = seeks_all(start, modes, limits)
-    if complete:
+    doubtful: Increments = ()
+    if takes_all:
         narrowest = _narrowest(loads, limits) if narrowest is None else narrowest
-        windows, doubtful = all_windows(Family(operator, narrowest, limits, states.__getitem__), loads), ()
+        windows = all_windows(Family(operator, narrowest, limits, states.__getitem__), loads, first=first)
+        windows = windows[:1] if first else windows
     else:
-        first, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks, folder)
-        windows = (first,) if first else ()
+        one, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks, folder)
+        windows = (one,) if one else ()
     if not windows:
         raise OnsetError.among(modes, float(loads[-1]), doubtful)
-    return Onset(tuple(_with_imbalance(window, unbalanced) for window in windows), complete, doubtful, modes)
+    windows = tuple(_with_imbalance(window, unbalanced) for window in windows)
+    at_start = Unstable.of(start) if takes_all and windows[0].kind == "start" else None
+    complete = takes_all and not first
+    return Onset(windows, complete, doubtful, modes, at_start, float(ends) if ends < np.inf else None)
 
 
 def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:

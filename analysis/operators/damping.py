@@ -21,32 +21,40 @@ first of the two, as the stability operator does where the slip of such a contac
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
 from ..packing.law import Derivatives
 from ..packing.packing import Floats, Packing
+from ..packing.snapshot import Snapshot
+from .linearised_contacts import assembled_damping
 from .stiffness import assembled, contact_terms
 
 
-def damping_matrix(packing: Packing) -> csr_array:
+def damping_matrix(packing: Packing | Snapshot, sliding: ArrayLike = False) -> csr_array:
     """Assemble C = -dF/d(dq/dt).
 
     Parameters
     ----------
-    packing : Packing
+    packing : Packing or Snapshot
         The configuration, with dashpots ``law.cn`` and ``law.ct`` and with ``drag_time``; any of them may be absent.
+    sliding : array_like of bool, shape () or (C,)
+        As of `stiffness_matrix`: contacts that slide on have no tangential dashpot.
 
     Returns
     -------
-    scipy.sparse.csr_array, shape (3N, 3N)
-        Force time / length, symmetric and positive semidefinite, in the order (x.., y.., R theta..). Empty without
+    scipy.sparse.csr_array, shape (3N, 3N), or (6N, 6N) of spheres
+        Force time / length, in the order (x.., y.., R theta..), or as of
+        :mod:`~faultgouge.analysis.packing.snapshot`; of a Packing symmetric and positive semidefinite. Empty without
         dashpots and drag.
     """
+    if isinstance(packing, Snapshot):
+        return assembled_damping(packing)
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry
-    along, across = packing.law.dashpots(overlap, contacts.slip)
+    along, across = packing.law.dashpots(overlap, contacts.slip, sliding)
     zero = np.zeros_like(along)
     # N N^T and T T^T are what the normal and the tangential stiffness multiply in K
     terms = contact_terms(Derivatives(zero, zero, along, -across, zero), normal.T, distance, pairs)
@@ -73,6 +81,6 @@ def largest_damping_rate(packing: Packing) -> float:
     return float(found[0])
 
 
-def coordinate_mass(packing: Packing) -> Floats:
-    """Masses of the coordinates (x.., y.., R theta..), shape (3N,)."""
-    return np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
+def coordinate_mass(packing: Packing | Snapshot) -> Floats:
+    """Masses of all coordinates."""
+    return packing.coordinate_mass

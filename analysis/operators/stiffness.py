@@ -49,6 +49,8 @@ from scipy.sparse import coo_array, csr_array
 
 from ..packing.law import Derivatives
 from ..packing.packing import Floats, Indices, Packing
+from ..packing.snapshot import Snapshot
+from .linearised_contacts import assembled_stiffness
 
 Form = Literal["consistent", "paper"]
 
@@ -58,16 +60,17 @@ SIGNS = np.einsum("pa,qb->pqab", SIDES, SIDES)
 
 
 def stiffness_matrix(
-    packing: Packing,
+    packing: Packing | Snapshot,
     form: Form = "consistent",
     coupled: NDArray[np.bool_] | None = None,
     parting: ArrayLike = 0.5,
+    sliding: ArrayLike = False,
 ) -> csr_array:
     """Assemble K = -dF/dq.
 
     Parameters
     ----------
-    packing : Packing
+    packing : Packing or Snapshot
         The configuration; it need not be in balance.
     form : {"consistent", "paper"}
         The exact derivative, or the one without the turning of the tangent.
@@ -75,27 +78,35 @@ def stiffness_matrix(
         Contacts whose tangential force depends on their overlap; all by default. Of the others b = d f_t / d overlap
         counts as zero. That is no derivative of this law: it tells what comes of b.
     parting : array_like, shape () or (C,)
-        Share of the derivative while a contact parts, for a law whose history is rescaled: 0 that of contacts which
+        Share of the derivative while a contact parts, for a law that rescales slips: 0 that of contacts which
         close, 1 that of contacts which part, and by default 1/2, the first harmonic of a small vibration
         (:mod:`~faultgouge.analysis.packing.law`).
+    sliding : array_like of bool, shape () or (C,)
+        Which contacts slide on if they are at Coulomb's bound, for Coulomb's slider, which has two derivatives there.
+        By default they stick, as contacts do that a small vibration has shaken.
 
     Returns
     -------
-    scipy.sparse.csr_array, shape (3N, 3N)
-        Force / length, in the order (x.., y.., R theta..). Rows of rattlers are empty, and so are all rows and columns
+    scipy.sparse.csr_array, shape (3N, 3N), or (6N, 6N) of spheres
+        Force / length, in the order (x.., y.., R theta..), or as of
+        :mod:`~faultgouge.analysis.packing.snapshot`. Rows of rattlers are empty, and so are all rows and columns
         of rotations without friction.
 
     Raises
     ------
     ValueError
-        If the form is neither of the two.
+        If the form is neither of the two, or a Snapshot is asked for another operator than its own.
     """
     if form not in ("consistent", "paper"):
         raise ValueError(f'form = "{form}" must be "consistent" or "paper".')
+    if isinstance(packing, Snapshot):
+        if form == "paper" or coupled is not None:
+            raise ValueError("The operator of a Snapshot is the consistent one, of all of its contacts.")
+        return assembled_stiffness(packing, parting)
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry
-    law = packing.law.derivatives(overlap, contacts.slip, parting)
+    law = packing.law.derivatives(overlap, contacts.slip, parting, sliding)
     if coupled is not None:
         law = law._replace(overlap_derivative=np.where(coupled, law.overlap_derivative, 0.0))
     return assembled(contact_terms(law, normal.T, distance, pairs, form), contacts.i, contacts.j[:pairs], len(packing))

@@ -59,13 +59,21 @@ contact slips out, is pressed, and slips back (Elata and Berryman, Mech. Mater. 
 
   which creates none.
 
-Without the smoothing (:math:`f_t = -k_t \sqrt\delta\, s`) the rescaled law is LAMMPS's mindlin_rescale/force
-(Thornton, Cummins and Cleary, Powder Technol. 233, 30 (2013)). LAMMPS keeps the force and reduces it by the ratio of
-contact radii, :math:`a \sim \sqrt\delta`, while a falls; that is the slip kept. It leaves the force alone while a
-grows; that is the slip rescaled. LAMMPS's mindlin/force, without the rescaling, creates energy where a contact is
-unloaded; its mindlin_rescale, which rescales a slip and not the force, creates energy where a contact is loaded.
-Harmonic disks have one stiffness, which nothing rescales, and the smoothing alone makes their forces depend on the
-overlap.
+**Coulomb's slider.** Without the smoothing,
+
+.. math:: f_t = -k_t \delta^{p-1} s, \qquad |s| \le t^*,
+
+the contact is a spring behind a slider that gives way at :math:`\mu f_n` and sticks as soon as the motion turns back:
+the standard law of granular simulations (Cundall and Strack, Geotechnique 29, 47 (1979)). The history *coulomb* is
+this force with rescaled slips. The force is what the contact remembers, :math:`s = -f_t/(k_t \delta^{p-1})` is the
+stretch of the spring, :math:`W = k_t \delta^{p-1} s^2/2`, and no path creates energy. (Nor does one for p = 1, where
+there is nothing to rescale.) With p = 3/2 the law is LAMMPS's mindlin_rescale/force (Thornton, Cummins and Cleary,
+Powder Technol. 233, 30 (2013)), whose stiffnesses have the root of an effective radius besides. LAMMPS keeps the
+force and reduces it by the ratio of contact radii, :math:`\sim \sqrt\delta`, while they fall; that is the slip kept. It
+leaves the force alone while they grow; that is the slip rescaled. LAMMPS's mindlin/force, without the rescaling,
+creates energy where a contact is unloaded; its mindlin_rescale, which rescales a slip and not the force, creates
+energy where a contact is loaded. Harmonic disks have one stiffness, which nothing rescales, and the smoothing alone
+makes their forces depend on the overlap.
 
 **Two derivatives.** A rescaled force has another b where the overlap grows than where the overlap falls,
 
@@ -78,10 +86,20 @@ default) is the first harmonic of a small vibration: the rate of the force is
 :math:`a \dot s + \tfrac12 (b_+ + b_-) \dot\delta + \tfrac12 (b_+ - b_-) |\dot\delta|`, and the last term has no
 component at the frequency of :math:`\dot\delta`. The last term makes the force fall a little with each period, so
 that no operator says all: D(t) grows in LAMMPS more slowly than the mean of both says, by 5 % in the median of ten
-packings, at most by 35 % (4.60 for 4.74 in one with 5.57 and 3.77 to either side, tests/plugin/test_rescaled.py). As no
+packings, at most by 35 % (4.60 for 4.74 in one with 5.57 and 3.77 to either side, tests/plugin/test_history.py). As no
 contact creates energy, what grows is taken from what contacts and load have stored. A contact of elastic bodies
 (Mindlin and Deresiewicz) that is loaded a little and unloaded again follows :math:`b_+` both ways, since the annulus
 that parts carries no shear yet.
+
+Coulomb's slider has, while it sticks,
+
+.. math:: a = -k_t \delta^{p-1}, \qquad b_+ = 0, \qquad b_- = (p - 1) f_t/\delta,
+
+and a = 0, :math:`b = p f_t/\delta` while it slides on. At the bound it does either, as the motion has it. The operator
+of small vibrations takes all contacts as sticking, with the mean :math:`b = f_t/(4\delta)` for p = 3/2: a contact at
+the bound gives way in the first periods, until the vibration no longer reaches the bound (it is *shaken down*). The
+share of :math:`b_-`, and which contacts at the bound slide on, may be given. Newton's method takes each contact as its
+displacement has it: those that arrive at the bound slide.
 
 :math:`k_n, k_t, C_N` and :math:`C_T` are constants per length\ :sup:`p-1`; no effective radius enters. :math:`\mu = 0`
 or :math:`k_t = 0` means no tangential force at all, and no memory of the slip.
@@ -94,7 +112,7 @@ from math import isfinite, prod
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .arrays import Floats, settle
 
@@ -144,11 +162,14 @@ class MindlinLaw:
         Normal and tangential dashpots, force time / length^p, not negative; none by default.
     rescaled : bool
         Whether slips are rescaled while overlaps grow, which needs p = 3/2.
+    coulomb : bool
+        Whether the tangential force is that of a spring behind Coulomb's slider, not smoothed, with rescaled slips.
 
     Raises
     ------
     ValueError
-        If a parameter is not finite or has the wrong sign, the exponent is another one, or nothing can be rescaled.
+        If a parameter is not finite or has the wrong sign, the exponent is another one, nothing can be rescaled, or
+        there are two histories.
     """
 
     kn: float
@@ -158,6 +179,7 @@ class MindlinLaw:
     cn: float = 0.0
     ct: float = 0.0
     rescaled: bool = False
+    coulomb: bool = False
 
     def __post_init__(self) -> None:
         for name in ("kn", "kt", "mu", "exponent", "cn", "ct"):
@@ -168,7 +190,9 @@ class MindlinLaw:
                 raise ValueError(f"{name} = {value} must be finite and {sign}.")
         if self.exponent not in EXPONENTS:
             raise ValueError(f"exponent = {self.exponent:g} must be 1.5 (Hertz) or 1 (harmonic).")
-        settle(self, rescaled=bool(self.rescaled))
+        settle(self, rescaled=bool(self.rescaled), coulomb=bool(self.coulomb))
+        if self.rescaled and self.coulomb:
+            raise ValueError("rescaled and coulomb are two histories: a law has one of them.")
         if self.rescaled and self.exponent != 1.5:
             raise ValueError("a rescaled history needs exponent = 1.5: harmonic disks have one stiffness.")
 
@@ -176,6 +200,16 @@ class MindlinLaw:
     def frictional(self) -> bool:
         """Whether there is a tangential force at all."""
         return self.kt > 0 and self.mu > 0
+
+    @property
+    def history(self) -> str:
+        """What contacts remember: "total", "rescaled" or "coulomb"."""
+        return "coulomb" if self.coulomb else "rescaled" if self.rescaled else "total"
+
+    @property
+    def rescales(self) -> bool:
+        """Whether slips fall while overlaps grow, so that b depends on whether a contact closes or parts."""
+        return self.history != "total" and self.exponent == 1.5
 
     @property
     def damped(self) -> bool:
@@ -198,6 +232,11 @@ class MindlinLaw:
         overlap = _closed(overlap)
         return overlap * self.mu * self.kn / self.kt if self.frictional else np.zeros_like(overlap)
 
+    def at_bound(self, overlap: ArrayLike, slip: ArrayLike) -> NDArray[np.bool_]:
+        """Which contacts have reached Coulomb's bound, but for rounding; none without friction."""
+        limit = self.slip_limit(overlap)
+        return (np.abs(slip) >= AT_THE_BOUND * limit) & (limit > 0)
+
     def clamped(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
         """Slip brought back into [-t*, t*], length: what a contact remembers after an increment."""
         limit = self.slip_limit(overlap)
@@ -214,7 +253,7 @@ class MindlinLaw:
             Overlaps, length, positive.
         """
         kept = np.asarray(slip, dtype=np.result_type(slip, np.float64))
-        if self.rescaled:
+        if self.rescales:
             kept = kept * np.sqrt(np.minimum(np.divide(before, after), 1.0))
         return self.clamped(after, kept)
 
@@ -252,12 +291,16 @@ class MindlinLaw:
         Returns
         -------
         ndarray
-            f_t = -kt overlap^(p-1) (1 + x - x^2) slip: it opposes the slip.
+            f_t = -kt overlap^(p-1) (1 + x - x^2) slip, or without the bracket behind Coulomb's slider: it opposes the
+            slip.
         """
         overlap = _closed(overlap)
         slip = self.clamped(overlap, slip)
+        spring = -self.kt * self._powers(overlap)[0]
+        if self.coulomb:
+            return spring * slip
         x = _ratio(np.abs(slip), self.slip_limit(overlap))
-        return -self.kt * self._powers(overlap)[0] * (1 + x - x * x) * slip
+        return spring * (1 + x - x * x) * slip
 
     def _overlap_factor(self, x: Floats, parting: ArrayLike) -> Floats:
         """-b in units of kt s overlap^(p-2)."""
@@ -269,7 +312,9 @@ class MindlinLaw:
         growing = p * x * (2 * x - 1)
         return growing + np.asarray(parting, dtype=np.float64) * (falling - growing)
 
-    def derivatives(self, overlap: Floats, slip: Floats, parting: ArrayLike = 0.5) -> Derivatives:
+    def derivatives(
+        self, overlap: Floats, slip: Floats, parting: ArrayLike = 0.5, sliding: ArrayLike = False
+    ) -> Derivatives:
         """Forces and their derivatives; overlaps that are not positive give zeros.
 
         Parameters
@@ -277,8 +322,11 @@ class MindlinLaw:
         overlap, slip : ndarray
             Overlap and slip of each contact, length.
         parting : array_like
-            Share of the derivative while the overlap falls in b; only a rescaled history has another one while the
+            Share of the derivative while the overlap falls in b; only rescaled slips have another one while the
             overlap grows.
+        sliding : array_like of bool
+            Which contacts slide on if they are at Coulomb's bound. Only Coulomb's slider has two derivatives there, and
+            by default sticks.
         """
         overlap, p = np.maximum(overlap, 0.0), self.exponent
         root, rest_power = self._powers(overlap)
@@ -293,6 +341,10 @@ class MindlinLaw:
         else:  # an open contact has no slip either
             x, steep = _ratio(np.abs(slip), limit), _ratio(slip, rest_power)
         rest, triple, soft = 1 - x, 3 * x, -self.kt * root
+        if self.coulomb:
+            slides = np.logical_and(sliding, x >= AT_THE_BOUND)
+            b = np.where(slides, p, (p - 1) * np.asarray(parting, dtype=np.float64)) * (-self.kt * steep)
+            return Derivatives(normal_force, soft * slip, normal_stiffness, soft * ~slides, b)
         return Derivatives(
             normal_force,
             soft * (1 + x * rest) * slip,
@@ -301,23 +353,28 @@ class MindlinLaw:
             self._overlap_factor(x, parting) * (-self.kt * steep),
         )
 
-    def dashpots(self, overlap: ArrayLike, slip: ArrayLike) -> tuple[Floats, Floats]:
+    def dashpots(self, overlap: ArrayLike, slip: ArrayLike, sliding: ArrayLike = False) -> tuple[Floats, Floats]:
         """Coefficients of the dashpots of small velocities, force time / length.
 
         Parameters
         ----------
         overlap, slip : array_like
             Overlap and slip of each contact, length.
+        sliding : array_like of bool
+            As of `derivatives`.
 
         Returns
         -------
         normal, tangential : ndarray
-            cn overlap^(p-1) and ct overlap^(p-1); the tangential one is zero at Coulomb's bound and without friction.
+            cn overlap^(p-1) and ct overlap^(p-1); the tangential one is zero without friction, and where a contact is
+            at Coulomb's bound, unless Coulomb's slider sticks there.
         """
         overlap = _closed(overlap)
         power = self._powers(overlap)[0]
-        inside = np.abs(slip) < AT_THE_BOUND * self.slip_limit(overlap)
-        return self.cn * power, self.ct * power * inside
+        slides = self.at_bound(overlap, slip)
+        if self.coulomb:
+            slides &= np.asarray(sliding, dtype=np.bool_)
+        return self.cn * power, self.ct * power * (self.frictional & ~slides)
 
     def growth(self, overlap: Floats) -> Floats:
         """overlap^(p-1), with which stiffnesses and dashpots grow; of overlaps that are not negative, or complex."""

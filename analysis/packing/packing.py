@@ -140,6 +140,39 @@ class Packing:
             f"layer, {box}, mu = {self.law.mu:g}, {load}{digits}>"
         )
 
+    dimension = 2
+    axes = 3
+    """Coordinates of each disk: x, y and R theta."""
+
+    @property
+    def coordinates(self) -> int:
+        """Number of all coordinates, 3N."""
+        return 3 * len(self)
+
+    @property
+    def coordinate_mass(self) -> Floats:
+        """Masses of the coordinates (x.., y.., R theta..), shape (3N,)."""
+        return np.concatenate([self.mass, self.mass, self.inertia_factor * self.mass])
+
+    @property
+    def damped(self) -> bool:
+        """Whether there are dashpots or drag."""
+        return self.law.damped or self.drag_time is not None
+
+    @property
+    def contact_states(self) -> bytes:
+        """Which contacts there are, and which of them slide to which side; equal for equal states."""
+        slides = np.sign(self.contacts.slip) * self.law.at_bound(self.geometry.overlap, self.contacts.slip)
+        return np.array([self.contacts.i, self.contacts.j, slides], dtype=np.int64).tobytes()
+
+    @property
+    def load_error(self) -> float:
+        """r / n^(1/2) of a residual r and n top disks, force per disk: what is out of balance is exact at another load.
+
+        Rounding leaves forces of r or less at random on the disks, and their mean over n disks is that of a load.
+        """
+        return self.residual / float(np.sqrt(max(1, self.top.sum())))
+
     @property
     def scaled_angle(self) -> Floats:
         """u = R theta, length, shape (N,)."""

@@ -11,6 +11,7 @@ from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Packing
+from ..packing.snapshot import Snapshot
 from .spectrum import Complexes, all_modes, dynamical_matrix, mass_weighted, participation_ratio, rotation_share
 
 
@@ -27,22 +28,25 @@ class Eigenpairs:
         zero on coordinates that feel no force.
     solves : int
         Sparse solves that it took; 0 of a dense solver.
+    axes : int
+        Coordinates of a particle: 3 of disks, 6 of spheres.
     """
 
     values: Complexes
     right: Complexes
     left: Complexes
     solves: int
+    axes: int = 3
 
     @property
     def participation(self) -> Floats:
         """Participation ratio of each mode, shape (k,)."""
-        return participation_ratio(self.right)
+        return participation_ratio(self.right, self.axes)
 
     @property
     def rotation(self) -> Floats:
         """Share of rotation in the kinetic energy of each mode, shape (k,)."""
-        return rotation_share(self.right)
+        return rotation_share(self.right, self.axes)
 
     @property
     def overlap(self) -> Floats:
@@ -50,7 +54,7 @@ class Eigenpairs:
         return np.abs(np.sum(self.left.conj() * self.right, axis=0))
 
 
-def normal_modes(packing: Packing) -> Eigenpairs:
+def normal_modes(packing: Packing | Snapshot) -> Eigenpairs:
     """Every mode with its left and right vectors, by LAPACK's dense solver.
 
     Parameters
@@ -63,7 +67,7 @@ def normal_modes(packing: Packing) -> Eigenpairs:
     Eigenpairs
         Sorted by real part, then imaginary part, as of :func:`spectrum`.
     """
-    return Eigenpairs(*all_modes(mass_weighted(stiffness_matrix(packing), packing)), 0)
+    return Eigenpairs(*all_modes(mass_weighted(stiffness_matrix(packing), packing)), 0, packing.axes)
 
 
 def closest_to_meeting(modes: Eigenpairs) -> tuple[int, int, float]:
@@ -98,7 +102,7 @@ def closest_to_meeting(modes: Eigenpairs) -> tuple[int, int, float]:
     return int(real[first]), int(real[second]), float(cosine[first, second])
 
 
-def eigenpairs(packing: Packing, near: complex, count: int, tolerance: float = 0.0) -> Eigenpairs:
+def eigenpairs(packing: Packing | Snapshot, near: complex, count: int, tolerance: float = 0.0) -> Eigenpairs:
     """The eigenvalues nearest to a shift, with left and right vectors: shift-invert Arnoldi (ARPACK).
 
     One sparse LU factorisation of :math:`A - \\sigma` serves the right vectors and, transposed, the left
@@ -157,6 +161,6 @@ def eigenpairs(packing: Packing, near: complex, count: int, tolerance: float = 0
     values, right = values[order], right[:, order]
     # left vectors beside the right vectors of the same eigenvalue
     _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored.conj()[None, :]))
-    spread = np.zeros((2, 3 * len(packing), len(values)), dtype=np.complex128)
+    spread = np.zeros((2, packing.coordinates, len(values)), dtype=np.complex128)
     spread[0, active], spread[1, active] = right, left[:, partner]
-    return Eigenpairs(values, spread[0], spread[1], solves)
+    return Eigenpairs(values, spread[0], spread[1], solves, packing.axes)

@@ -14,6 +14,11 @@ K is not symmetric, and real eigenvalues may coalesce and leave the axis as a pa
 each pair grows as :math:`e^{|\omega_I| t}`, and the mean square displacement as :math:`e^{2 |\omega_I| t}`.
 "Growth rate" means :math:`2 |\mathrm{Im}\,\omega|` throughout, the rate of the square.
 
+**Negative eigenvalues.** A real :math:`\lambda < 0` is the classical instability (buckling): :math:`\omega` is
+imaginary, and the motion leaves the equilibrium without oscillation. A branch of equilibria passes through
+:math:`\lambda = 0` at a turning point; Newton's method can land beyond it, on equilibria that no packing reaches by
+itself. A packing is linearly stable only if it has neither complex pairs nor negative eigenvalues.
+
 **Noise.** A backward stable solver returns the eigenvalues of :math:`A + E` with :math:`|E| \sim u |A|`, u
 the unit roundoff, and a simple eigenvalue with unit right and left vectors x, y moves by :math:`\kappa |E|`,
 :math:`\kappa = 1/|y^H x|`. Close to a coalescence :math:`\kappa \to \infty` as one over the distance of the
@@ -40,9 +45,10 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
-from ..operators.damping import coordinate_mass
+from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
+from ..packing.snapshot import Snapshot
 from ..tabled import Tabled
 
 Complexes = NDArray[np.complex128]
@@ -61,6 +67,17 @@ DENSE = 900
 LIMIT = 1e-4
 """Relative error of the largest eigenvalue of more coordinates. It bounds time steps, that are far below the bound; to
 resolve the fastest modes of a crystal, which lie close together, takes ten times as long."""
+
+
+FEW, MANY = 40, 10_000
+"""Coordinates up to which a time step is that of all eigenvalues, and from which on it has fewer digits."""
+
+LIMIT_OF_FEW, LIMIT_OF_MANY = 1e-8, 1e-3
+"""Relative errors of mu^2 for a time step. Packings have many modes near the fastest one: among 200,000 coordinates a
+digit more takes twice the time, and nobody runs within a thousandth of the limit."""
+
+LOOKS = 6
+"""Steps of the iteration for mu: each squares its error."""
 
 
 @dataclass(frozen=True)
@@ -116,8 +133,10 @@ class Spectrum(Tabled):
         force at all are left out.
     pairs : tuple of ComplexPair
         The complex pairs that exceed their own rounding uncertainty, fastest growing first.
+    negative : ndarray, shape (B,)
+        The real negative eigenvalues beyond their own rounding uncertainty, the most negative first, 1 / time^2.
     noise_pairs : int
-        Number of computed complex pairs that do not.
+        Number of computed complex pairs that do not exceed their rounding uncertainty.
     rattlers : ndarray of int
         Disks that touch nothing.
     rounding : float
@@ -126,6 +145,7 @@ class Spectrum(Tabled):
 
     eigenvalues: Complexes
     pairs: tuple[ComplexPair, ...]
+    negative: Floats
     noise_pairs: int
     rattlers: Indices
     rounding: float
@@ -134,7 +154,8 @@ class Spectrum(Tabled):
         real = self.eigenvalues.real
         span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
         return (
-            f"<Spectrum: {len(real)} eigenvalues{span}, {len(self.pairs)} complex pairs, {len(self.rattlers)} rattlers>"
+            f"<Spectrum: {len(real)} eigenvalues{span}, {len(self.pairs)} complex pairs, {len(self.negative)} negative "
+            f"eigenvalues, {len(self.rattlers)} rattlers>"
         )
 
     def _rows(self) -> dict[str, str]:
@@ -145,7 +166,18 @@ class Spectrum(Tabled):
             )
             for pair in self.pairs
         }
-        return rows or {"no complex pair": "linearly stable"}
+        rows |= {f"{value:.10g}": f"2 |Im \u03c9| = {growth_rate(value):.6g}, negative" for value in self.negative}
+        return rows or {"no complex pair and no negative eigenvalue": "linearly stable"}
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether no motion grows: no believable complex pair, and no negative eigenvalue beyond noise."""
+        return not self.pairs and not len(self.negative)
+
+    @property
+    def free(self) -> int:
+        """Number of eigenvalues that are zero within rounding: such a motion meets no force, and drifts."""
+        return int(np.count_nonzero(np.abs(self.eigenvalues) <= SAFETY * self.rounding))
 
     @property
     def least_q(self) -> float:
@@ -159,9 +191,8 @@ class Spectrum(Tabled):
 
     @property
     def unstable(self) -> Complexes:
-        """Eigenvalues whose motion grows: one of each believable pair, and negative ones beyond noise."""
-        falling = self.eigenvalues[(self.eigenvalues.imag == 0) & (self.eigenvalues.real < -SAFETY * self.rounding)]
-        return np.concatenate([[pair.eigenvalue for pair in self.pairs], falling]).astype(np.complex128)
+        """Eigenvalues whose motion grows: one of each believable pair, and the negative ones."""
+        return np.concatenate([[pair.eigenvalue for pair in self.pairs], self.negative]).astype(np.complex128)
 
     def growth_rate(self, dt: float | None = None) -> float:
         """Rate at which D of an undamped run will grow, 1 / time.
@@ -181,7 +212,7 @@ class Spectrum(Tabled):
         return float(2 * np.abs(omega.imag).max(initial=0.0))
 
 
-def participation_ratio(right: Complexes | Floats) -> Floats:
+def participation_ratio(right: Complexes | Floats, axes: int = 3) -> Floats:
     r"""How many of the disks take part in a mode, as a share.
 
     With :math:`e_i` the kinetic energy of disk i, rotation included, the ratio is
@@ -190,24 +221,26 @@ def participation_ratio(right: Complexes | Floats) -> Floats:
 
     Parameters
     ----------
-    right : ndarray, shape (3N, k)
+    right : ndarray, shape (axes N, k)
         Right vectors in mass-weighted coordinates, in columns.
+    axes : int
+        Coordinates of a particle: 3 of disks, 6 of spheres.
 
     Returns
     -------
     ndarray, shape (k,)
     """
-    energy = (np.abs(right) ** 2).reshape(3, -1, right.shape[1]).sum(axis=0)
+    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=0)
     return energy.sum(axis=0) ** 2 / (len(energy) * (energy**2).sum(axis=0))
 
 
-def rotation_share(right: Complexes | Floats) -> Floats:
-    """Share of rotation in the kinetic energy of modes, shape (k,); `right` as of :func:`participation_ratio`."""
-    energy = (np.abs(right) ** 2).reshape(3, -1, right.shape[1]).sum(axis=1)
-    return energy[2] / energy.sum(axis=0)
+def rotation_share(right: Complexes | Floats, axes: int = 3) -> Floats:
+    """Share of rotation in the kinetic energy of modes, shape (k,); as of :func:`participation_ratio`."""
+    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=1)
+    return energy[axes // 2 + axes % 2 :].sum(axis=0) / energy.sum(axis=0)
 
 
-def dynamical_matrix(packing: Packing, form: Form = "consistent") -> tuple[csr_array, Indices]:
+def dynamical_matrix(packing: Packing | Snapshot, form: Form = "consistent") -> tuple[csr_array, Indices]:
     """A = M^(-1/2) K M^(-1/2) without its zero rows.
 
     Parameters
@@ -222,7 +255,7 @@ def dynamical_matrix(packing: Packing, form: Form = "consistent") -> tuple[csr_a
     matrix : scipy.sparse.csr_array, shape (E, E)
         1 / time^2.
     active : ndarray of int, shape (E,)
-        Which of the 3N coordinates (x.., y.., R theta..) its rows are. A coordinate whose row of K is zero
+        Which of the coordinates (x.., y.., R theta..) its rows are. A coordinate whose row of K is zero
         feels no force: its eigenvalue is zero and says nothing.
     """
     matrix = mass_weighted(stiffness_matrix(packing, form), packing)
@@ -251,8 +284,8 @@ def all_modes(matrix: csr_array) -> tuple[Complexes, Complexes, Complexes]:
     return values[order], right, left
 
 
-def mass_weighted(stiffness: csr_array, packing: Packing) -> csr_array:
-    """M^(-1/2) K M^(-1/2), zero rows and all, shape (3N, 3N); 1 / time^2."""
+def mass_weighted(stiffness: csr_array, packing: Packing | Snapshot) -> csr_array:
+    """M^(-1/2) K M^(-1/2), zero rows and all; 1 / time^2."""
     scale = 1.0 / np.sqrt(coordinate_mass(packing))
     rows = np.repeat(scale, np.diff(stiffness.indptr))
     return csr_array(
@@ -260,7 +293,7 @@ def mass_weighted(stiffness: csr_array, packing: Packing) -> csr_array:
     )
 
 
-def eigenvalues(packing: Packing, form: Form = "consistent") -> Complexes:
+def eigenvalues(packing: Packing | Snapshot, form: Form = "consistent") -> Complexes:
     """Every eigenvalue without vectors, by LAPACK's dense solver, in a third of the time of :func:`spectrum`.
 
     Which of the complex pairs exceed their rounding uncertainty is not known without vectors.
@@ -283,12 +316,12 @@ def _sorted(values: Complexes) -> Complexes:
     return np.asarray(values[np.lexsort((values.imag, values.real))], dtype=np.complex128)
 
 
-def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
+def spectrum(packing: Packing | Snapshot, form: Form = "consistent") -> Spectrum:
     """Every eigenvalue, by LAPACK's dense solver; left and right vectors only where complex pairs appear.
 
     Parameters
     ----------
-    packing : Packing
+    packing : Packing or Snapshot
         The configuration, in equilibrium if the result is to mean stability.
     form : {"consistent", "paper"}
         As in :func:`~faultgouge.analysis.stiffness_matrix`.
@@ -304,14 +337,18 @@ def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
     alone = len(matrix) <= DENSE or (sparse != sparse.T).nnz == 0
     values = eigvals(matrix) if len(matrix) and alone else np.zeros(0, complex)
     pairs: list[ComplexPair] = []
-    noise = 0
-    if not alone or np.any(values.imag != 0):
+    noise, negative = 0, np.zeros(0)
+    if not alone or np.any(values.imag != 0) or values.real.min(initial=0.0) < -SAFETY * rounding:
         values, left, right = eig(matrix, left=True, right=True)
         overlap = np.abs(np.sum(left.conj() * right, axis=0))
+        negative = np.sort(values[is_negative(values, overlap, rounding)].real)
         for k in np.flatnonzero(values.imag > 0):
-            vector = np.zeros((3 * len(packing), 1), dtype=np.complex128)
+            vector = np.zeros((packing.coordinates, 1), dtype=np.complex128)
             vector[active, 0] = right[:, k]
-            participation, rotation = float(participation_ratio(vector)[0]), float(rotation_share(vector)[0])
+            participation, rotation = (
+                float(participation_ratio(vector, packing.axes)[0]),
+                float(rotation_share(vector, packing.axes)[0]),
+            )
             pair = ComplexPair(complex(values[k]), float(overlap[k]), participation, rotation)
             if believable(pair.eigenvalue, pair.overlap, rounding):
                 pairs.append(pair)
@@ -321,6 +358,7 @@ def spectrum(packing: Packing, form: Form = "consistent") -> Spectrum:
     return Spectrum(
         eigenvalues=_sorted(values),
         pairs=tuple(pairs),
+        negative=negative,
         noise_pairs=noise,
         rattlers=packing.rattlers,
         rounding=rounding,
@@ -352,7 +390,7 @@ def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
     return np.asarray(2.0 / dt * np.arcsin(0.5 * dt * root), dtype=np.complex128)
 
 
-def largest_frequency(packing: Packing) -> float:
+def largest_frequency(packing: Packing | Snapshot) -> float:
     """omega_max = max sqrt|lambda|; to `LIMIT`, by Arnoldi's iteration (ARPACK), beyond `DENSE` coordinates.
 
     Returns
@@ -375,14 +413,93 @@ def largest_frequency(packing: Packing) -> float:
     return float(np.sqrt(np.abs(largest).max()))
 
 
-def stable_timestep(omega_max: float) -> float:
-    """The limit dt < 2 / omega_max of velocity Verlet, time."""
-    return 2.0 / omega_max
+class StableTimestep(float):
+    """A time step that is the limit of stability, a float with its `error`, both times."""
+
+    error: float
+
+    def __new__(cls, value: float, error: float = 0.0) -> "StableTimestep":
+        """The limit and its error."""
+        made = super().__new__(cls, value)
+        made.error = error
+        return made
+
+
+def stable_timestep(of: float | Packing | Snapshot) -> StableTimestep:
+    r"""The largest stable time step of velocity Verlet.
+
+    Without dissipation it is :math:`2/\omega_{max}`. Dashpots take the velocity of the half step, as in all granular
+    styles of LAMMPS: a motion begins to alternate in sign and to grow where :math:`4 M - 2\,dt\, C - dt^2 K` becomes
+    singular, so that dt = 2/mu with the largest mu of :math:`\mu^2 M - \mu C - K`.
+
+    Parameters
+    ----------
+    of : float, Packing or Snapshot
+        omega_max, radian / time, or a configuration with its dashpots.
+
+    Returns
+    -------
+    StableTimestep
+        Time, infinite for a packing without contacts; `error` is what Arnoldi's iteration leaves, 0 of omega_max.
+
+    Raises
+    ------
+    scipy.sparse.linalg.ArpackError
+        If the iteration does not converge.
+    """
+    if not isinstance(of, Packing | Snapshot):
+        return StableTimestep(2.0 / of)
+    stiffness = mass_weighted(stiffness_matrix(of), of)
+    active = active_coordinates(stiffness)
+    a = stiffness[active][:, active]
+    if not len(active):
+        return StableTimestep(np.inf)
+    damping = mass_weighted(damping_matrix(of), of)[active][:, active] if of.damped else None
+    return _largest_step(a, damping)
+
+
+def _largest_step(a: csr_array, damping: csr_array | None) -> StableTimestep:
+    """2/mu, by LAPACK for few coordinates, by Arnoldi's iteration for others, with the residual as its error."""
+    size = a.shape[0]
+    if size <= FEW:
+        if damping is None:
+            largest = np.sqrt(np.abs(eigvals(a.toarray())).max())
+        else:
+            pencil = np.block([[damping.toarray(), a.toarray()], [np.eye(size), np.zeros((size, size))]])
+            largest = eigvals(pencil).real.max()
+        return StableTimestep(2.0 / float(largest))
+    tolerance = LIMIT_OF_MANY if size > MANY else LIMIT_OF_FEW
+    vector = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
+    # mu^2 is an eigenvalue of A + mu G
+    mu, operator = 0.0, a
+    for loose in (True, *[False] * LOOKS):
+        if damping is None and loose:
+            continue
+        (value,), vectors = eigs(operator, 1, which="LM", v0=vector, tol=0.1 if loose else tolerance, ncv=12)
+        vector = np.ascontiguousarray(
+            vectors[:, 0].real if abs(value.imag) < abs(value) * 1e-3 else vectors.sum(axis=1).real
+        )
+        off = float(np.linalg.norm(operator @ vectors[:, 0] - value * vectors[:, 0]) / abs(value))
+        if damping is None:
+            mu = float(np.sqrt(abs(value)))
+            break
+        # mu^2 = lambda + c (mu - before), c being the slope of lambda in mu, but for what is not symmetric
+        c = float(vector @ (damping @ vector)) / float(vector @ vector)
+        before, mu = mu, 0.5 * (c + float(np.sqrt(c * c + 4 * abs(abs(value) - c * mu))))
+        if abs(mu - before) < tolerance * mu:
+            break
+        operator = a + mu * damping
+    return StableTimestep(2.0 / mu, 2.0 / mu * (0.5 * off + (0.0 if damping is None else abs(mu - before) / mu)))
 
 
 def unit_rounding(matrix: Floats) -> float:
     """u |A|_F with the unit roundoff u = 2^-53: the backward error scale of an eigenvalue solver."""
     return float(0.5 * np.finfo(np.float64).eps * np.linalg.norm(matrix))
+
+
+def is_negative(values: Complexes, overlap: Floats, rounding: float) -> NDArray[np.bool_]:
+    """Which eigenvalues are real and below zero by more than SAFETY kappa u |A|, their own rounding uncertainty."""
+    return (values.imag == 0) & (-values.real * overlap > SAFETY * rounding)
 
 
 def believable(eigenvalue: complex, overlap: float | np.floating, rounding: float) -> bool:

@@ -28,7 +28,7 @@ from ...analysis import Packing, RunFile
 from ...analysis.spectrum.spectrum import dynamical_matrix
 from ...pywrap import Engine, Equilibrium, Record, Scene
 from ...pywrap.lammps.dynamics import Dynamics, Weakening
-from ...pywrap.runs.path import next_equilibrium
+from ...pywrap.runs.path import next_equilibrium, step_of
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.sections import Ramp
 from ...pywrap.settling.bed import settle
@@ -154,7 +154,7 @@ def _switched(feature: Feature, scene: Loaded, steps: int, folder: Path) -> Part
 def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
     """An equilibrium of the ramp, with and without its dumps."""
     wanted = scene.output is not None and scene.output.dumps
-    ramp = scene.ramp or Ramp(step=1e-3, until=1e-3)
+    ramp = scene.ramp or Ramp(step=step_of(scene), until=step_of(scene))
     bounded = scene.model_copy(update={"ramp": ramp})
     # without friction a packing bears no force along the floor
     fx = ramp.step if start.packing.law.frictional else start.fx

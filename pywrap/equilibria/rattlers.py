@@ -90,6 +90,9 @@ def _to_the_middle(branch: Floats, contact: Floats, height: float, radius: float
     """The move of a disk with these branch vectors to its neighbours, of these lengths at contact, shape (2,)."""
     from scipy.optimize import linprog
 
+    # the solver has absolute tolerances: lengths in a power of two near the radius, which rounds nothing
+    unit = 2.0 ** np.frexp(radius)[1]
+    branch, contact, height, radius = branch / unit, contact / unit, height / unit, radius / unit
     move, room = np.zeros(2), TRAVEL * radius
     for _ in range(ROUNDS):
         distance = np.hypot(branch[:, 0] + move[0], branch[:, 1] + move[1])
@@ -105,4 +108,4 @@ def _to_the_middle(branch: Floats, contact: Floats, height: float, radius: float
         move += step[:2]
         if step[2] - narrowest <= GAIN * abs(narrowest):
             break
-    return move
+    return unit * move

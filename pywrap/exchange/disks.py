@@ -78,8 +78,8 @@ class Disks:
     slips : Slips or None
         None if the file has none.
     given : mapping
-        Law, load and inertia, as far as the file has them: kn, kt, mu, exponent, rescaled, cn, ct, tau, fx,
-        fy, inertia_factor.
+        Law, load and inertia, as far as the file has them: kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau,
+        fx, fy, inertia_factor.
     groups : mapping
         Groups of disks by name, as booleans.
     remark : str

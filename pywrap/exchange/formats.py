@@ -6,17 +6,19 @@ A module is imported when a file of its format is met.
 from __future__ import annotations
 
 import re
+import zlib
 from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...analysis import BadInputError, OutputError, Packing, PackingFileError
+from ...analysis.files.text_files import open_text
 from ...analysis.files.wholefile import BEGINNINGS
 from .disks import Disks
 from .quantities import Frame, ModeVectors
 
-NUMBER = re.compile(rb"[-+.\deE]+")
+NUMBER = re.compile(r"[-+.\deE]+")
 
 
 class Format(NamedTuple):
@@ -35,6 +37,8 @@ class Format(NamedTuple):
         Functions in the module; empty for what is not done.
     frames : bool
         Whether a file that is read may hold several frames.
+    text : bool
+        Whether a file that is read may be compressed by gzip, and its name end in .gz.
     alone, film : bool
         Whether one packing is written, and whether several frames are.
     modes : bool
@@ -47,6 +51,7 @@ class Format(NamedTuple):
     reader: str = ""
     writer: str = ""
     frames: bool = False
+    text: bool = True
     alone: bool = True
     film: bool = False
     modes: bool = True
@@ -54,21 +59,21 @@ class Format(NamedTuple):
 
 DATA = Format("LAMMPS data (atom style sphere)", "data", (".data",), "read_data", "write_data", modes=False)
 DUMP = Format("LAMMPS dump", "dump", (".dump", ".lammpstrj"), "read_custom_dump", frames=True)
-RESTART = Format("LAMMPS restart", "restart", (".restart",), "read_restart")
+RESTART = Format("LAMMPS restart", "restart", (".restart",), "read_restart", text=False)
 YADE = Format("YADE's text", "grains", ("line 1 is #format x_y_z_r",), "read_yade")
 MERCURY = Format("MercuryDPM's data", "grains", (".data, line 1 is N time bounds",), "read_mercury", frames=True)
 OTHER = Format("what MDAnalysis reads with radii", "universe", (), "read_universe", frames=True)
 
 FORMATS = (
     Format("VTK", "vtp", (".vtp",), writer="write_vtp"),
-    Format("dumps of the decks", "dump", (".disks",), "read_deck_dump", frames=True),
+    Format("dumps of the decks", "dump", (".disks",), "read_deck_dump", frames=True, text=False),
     Format("extended XYZ", "xyz", (".xyz", ".extxyz"), "read_xyz", "write_xyz", frames=True, film=True),
     DATA,
     DUMP,
     RESTART,
     Format("CSV", "table", (".csv",), "read_table"),
     Format("packing.json", "table", (".json",), "read_json"),
-    Format("GSD", "gsd_file", (".gsd",), "read_gsd", "write_gsd", frames=True, film=True),
+    Format("GSD", "gsd_file", (".gsd",), "read_gsd", "write_gsd", frames=True, text=False, film=True),
     Format("ParaView's list of frames", "vtp", (".pvd",), writer="write_pvd", alone=False, film=True),
     YADE,
     MERCURY,
@@ -85,7 +90,9 @@ FILMS = {each.suffixes[0]: each for each in FORMATS if each.film}
 def known_formats() -> str:
     """All formats that are read, in words."""
     listed = [f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS if each.reader]
-    return ", ".join([*listed, "run.h5", f"and {OTHER.words} (pip install 'faultgouge[export]')"])
+    return ", ".join(
+        [*listed, "each text also as .gz", "run.h5", f"and {OTHER.words} (pip install 'faultgouge[export]')"]
+    )
 
 
 def is_hdf5(path: Path) -> bool:
@@ -107,8 +114,10 @@ def format_of(path: Path) -> Format:
     begun = _by_beginning(path)
     if begun is not None:
         return begun
-    if path.suffix.lower() in READ:
-        return READ[path.suffix.lower()]
+    suffix = Path(path.stem).suffix if path.suffix.lower() == ".gz" else path.suffix
+    found = READ.get(suffix.lower())
+    if found is not None and (suffix == path.suffix or found.text):
+        return found
     begin = path.name.split(".")[0].lower()
     if is_restart(path):
         return RESTART
@@ -127,11 +136,11 @@ def format_of(path: Path) -> Format:
 def _by_beginning(path: Path) -> Format | None:
     """YADE and MercuryDPM, which the first line tells."""
     try:
-        with path.open("rb") as stream:
+        with open_text(path) as stream:
             words = stream.readline(400).split()
-    except OSError:
+    except (OSError, UnicodeDecodeError, EOFError, zlib.error):
         return None
-    if words[:1] == [b"#format"]:
+    if words[:1] == ["#format"]:
         return YADE
     numbers = len(words) in (6, 8) and all(NUMBER.fullmatch(word) for word in words)
     return MERCURY if numbers and ".data" in path.name.lower() else None

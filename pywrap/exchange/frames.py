@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...analysis import BadInputError, Packing, RunFile, nearest_image, touching
+from ...analysis.motion.hysteresis import turning_points
 from .quantities import Frame
 
 
@@ -57,9 +58,12 @@ def frames_of(run: RunFile, numbers: range) -> Iterator[Frame]:
         yield from _of_run(run, numbers)
         return
     first = run.packing(0)
+    way = run.fx
+    if turning_points(way):  # programs want times that grow
+        way = np.append(0.0, np.cumsum(np.abs(np.diff(way))))
     for number in numbers:
         packing = run.packing(number)
-        yield Frame(packing, packing.fx, _displacement(packing, first), whole=True)
+        yield Frame(packing, float(way[number]), _displacement(packing, first), whole=True)
 
 
 def _of_run(run: RunFile, numbers: range) -> Iterator[Frame]:

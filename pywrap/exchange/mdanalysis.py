@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import RunFile, mean_square_displacement
+from ...analysis import PackingFileError, RunFile, mean_square_displacement
 
 try:
     from MDAnalysis.analysis.base import AnalysisBase
@@ -119,10 +119,21 @@ class MeanSquareDisplacement(AnalysisBase):
         D of each frame, length^2.
     times : ndarray, shape (T,)
         Times of the frames.
+
+    Raises
+    ------
+    PackingFileError
+        If the file has a single frame, in which nothing moves.
     """
 
     def __init__(self, atoms: Any, reference: int = 0, **more: Any) -> None:
-        super().__init__(atoms.universe.trajectory, **more)
+        trajectory = atoms.universe.trajectory
+        if len(trajectory) < 2:
+            raise PackingFileError(
+                f"{trajectory.filename} has one equilibrium and no trajectory, so that D would be 0: run `faultgouge "
+                "perturb` with trajectory = true under [output]"
+            )
+        super().__init__(trajectory, **more)
         self._atoms, self._reference = atoms, reference
 
     def _prepare(self) -> None:

@@ -19,7 +19,7 @@ from ...analysis.files.runfile_header import unusual
 from ...analysis.packing.arrays import Floats
 from .disks import Slips
 
-KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
+KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "coulomb", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
 """Names of law, load and inertia in files."""
 
 
@@ -61,7 +61,7 @@ class Frame:
     packing : Packing
         The packing. Its contacts are those that touch, without slips, if it is not `whole`.
     time : float
-        F_x of an equilibrium, or the time of an undamped run.
+        F_x of an equilibrium, or the whole way of F_x where it turns round; or the time of an undamped run.
     displacement : ndarray, shape (N, 2), or None
         From the first frame of a film, length.
     whole : bool

@@ -45,6 +45,7 @@ def read_json(path: Path) -> Disks:
         packing.position,
         packing.radius,
         np.arange(1, len(packing) + 1),
+        packing.mass,
         top=packing.top if packing.top.any() else None,
         box_length=packing.box_length,
     )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ...analysis import PackingFileError
+from ...analysis.files.text_files import open_text
 from ...analysis.packing.arrays import Floats
 
 WORDS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0}
@@ -17,9 +19,10 @@ WORDS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0}
 def lines_of(path: Path) -> list[str]:
     """The lines of a text file."""
     try:
-        return path.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
-        raise PackingFileError(f"{path} cannot be read: {error.strerror}.") from error
+        with open_text(path) as stream:
+            return stream.read().splitlines()
+    except (OSError, EOFError, zlib.error) as error:
+        raise PackingFileError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.") from error
     except UnicodeDecodeError as error:
         raise PackingFileError(f"{path} is no text: {error}.") from error
 

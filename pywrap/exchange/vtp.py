@@ -52,36 +52,45 @@ def write_pvd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
 
 def _tree(frame: Frame, modes: list[ModeVectors]) -> ElementTree.ElementTree:
     packing = frame.packing
-    n, count = len(packing), len(packing.contacts)
-    root = Element("VTKFile", type="PolyData", version="1.0", byte_order="LittleEndian", header_type="UInt64")
-    data = ElementTree.SubElement(root, "PolyData")
-    fields = ElementTree.SubElement(data, "FieldData")
     numbers = quantities.scalars(packing) | ({} if packing.box_length is None else {"box_length": packing.box_length})
     numbers |= frame.number
     numbers |= {f"{mode.name}_eigenvalue": mode.eigenvalue.real for mode in modes}
     numbers |= {f"{mode.name}_eigenvalue_imag": mode.eigenvalue.imag for mode in modes}
+    on_disks, unknown = _of_disks(packing, modes), () if frame.whole else FORCES + SLIPS
+    if frame.displacement is not None:
+        on_disks["displacement"] = quantities.in_space(frame.displacement)
+    on_disks, on_contacts = (
+        {name: values for name, values in each.items() if name not in unknown}
+        for each in (on_disks, _of_contacts(packing))
+    )
+    centres = quantities.in_space(packing.position)
+    return ElementTree.ElementTree(write_poly_data(centres, _ends(packing), numbers, on_disks, on_contacts))
+
+
+def write_poly_data(
+    centres: NDArray, ends: NDArray, numbers: dict[str, float], on_particles: dict[str, NDArray],
+    on_contacts: dict[str, NDArray],
+) -> Element:  # fmt: skip
+    """The page of particles, shape (N, 3), and of contacts with two ends each, shape (2C, 3), with what they have."""
+    n, count = len(centres), len(ends) // 2
+    root = Element("VTKFile", type="PolyData", version="1.0", byte_order="LittleEndian", header_type="UInt64")
+    data = ElementTree.SubElement(root, "PolyData")
+    fields = ElementTree.SubElement(data, "FieldData")
     for name, value in numbers.items():
         _array(fields, name, np.array([value]))
     sizes = {"NumberOfPoints": n + 2 * count, "NumberOfVerts": n, "NumberOfLines": count}
     none = {"NumberOfStrips": 0, "NumberOfPolys": 0}
     piece = ElementTree.SubElement(data, "Piece", {key: str(value) for key, value in (sizes | none).items()})
     on_points = ElementTree.SubElement(piece, "PointData")
-    on_disks, unknown = _of_disks(packing, modes), () if frame.whole else FORCES + SLIPS
-    if frame.displacement is not None:
-        on_disks["displacement"] = quantities.in_space(frame.displacement)
-    for name, values in on_disks.items():
-        if name in unknown:
-            continue
-        fill = 0.0 if name == "radius" else np.nan
-        _array(on_points, name, _padded(values, 2 * count, fill, behind=True))
+    for name, values in on_particles.items():
+        _array(on_points, name, _padded(values, 2 * count, 0.0 if name == "radius" else np.nan, behind=True))
     on_cells = ElementTree.SubElement(piece, "CellData")
-    for name, values in _of_contacts(packing).items():
-        if name not in unknown:
-            _array(on_cells, name, _padded(values, n, np.nan, behind=False))
-    _array(ElementTree.SubElement(piece, "Points"), "Points", _points(packing))
+    for name, values in on_contacts.items():
+        _array(on_cells, name, _padded(values, n, np.nan, behind=False))
+    _array(ElementTree.SubElement(piece, "Points"), "Points", np.concatenate([centres, ends]))
     _cells(piece, "Verts", np.arange(n), 1)
     _cells(piece, "Lines", n + np.arange(2 * count), 2)
-    return ElementTree.ElementTree(root)
+    return root
 
 
 def _of_disks(packing: Packing, modes: list[ModeVectors]) -> dict[str, NDArray]:
@@ -115,11 +124,11 @@ def _of_contacts(packing: Packing) -> dict[str, NDArray]:
     }
 
 
-def _points(packing: Packing) -> NDArray:
+def _ends(packing: Packing) -> NDArray:
     geometry, i = packing.geometry, packing.contacts.i
     first = packing.position[i]
     second = first - geometry.distance[:, None] * geometry.normal
-    return quantities.in_space(np.concatenate([packing.position, np.stack([first, second], axis=1).reshape(-1, 2)]))
+    return quantities.in_space(np.stack([first, second], axis=1).reshape(-1, 2))
 
 
 def _padded(values: NDArray, missing: int, fill: float, *, behind: bool) -> NDArray:

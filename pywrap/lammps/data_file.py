@@ -1,4 +1,6 @@
-"""A packing as a LAMMPS data file."""
+"""A packing as a LAMMPS data file; and the order of the contacts in a dump."""
+
+from pathlib import Path
 
 from ...analysis import Packing
 
@@ -23,14 +25,36 @@ def data_file(packing: Packing) -> str:
 
 def box_lines(packing: Packing) -> list[str]:
     """The box of a data file, with room around the disks."""
-    x, y = packing.position.T
+    x = packing.position[:, 0]
     period = packing.box_length
     margin = 4 * packing.radius.max()
     left, right = (0.0, period) if period is not None else (x.min() - margin, x.max() + margin)
-    # open above: a layer that erupts has room for its own height twice more
-    top = 3 * (y.max() + margin)
+    bottom, top = box_heights(packing)
+    # LAMMPS makes bins along z, too: the disks lie in the plane z = 0, in a box as thick as one of them
+    thickness = float(packing.radius.min())
     return [
         f"{float(left)!r} {float(right)!r} xlo xhi",
-        f"{-float(margin)!r} {float(top)!r} ylo yhi",
-        "-0.5 0.5 zlo zhi",
+        f"{bottom!r} {top!r} ylo yhi",
+        f"{-thickness!r} {thickness!r} zlo zhi",
     ]
+
+
+def box_heights(packing: Packing) -> tuple[float, float]:
+    """Where the box ends below and above, length: a layer that erupts has room for its own height twice more."""
+    margin = 4 * packing.radius.max()
+    return -float(margin), float(3 * (packing.position[:, 1].max() + margin))
+
+
+def sort_contacts(path: Path) -> None:
+    """Bring the rows of a dump of contacts into the order of their disks: LAMMPS's is that of its neighbour lists.
+
+    Force and slip of a contact are the same for either disk as the first one.
+    """
+    lines = path.read_text().splitlines()
+    rows = 1 + next(k for k, line in enumerate(lines) if line.startswith("ITEM: ENTRIES"))
+    pairs = []
+    for line in lines[rows:]:
+        first, second, *numbers = line.split()
+        pairs.append((*sorted((int(first), int(second))), *numbers))
+    lines[rows:] = [" ".join(map(str, pair)) for pair in sorted(pairs)]
+    path.write_text("\n".join(lines) + "\n")

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from ...analysis import Packing
 from ...analysis.motion.signals import Signal
 from ...analysis.packing.arrays import Floats
-from .data_file import data_file
+from .data_file import box_heights, data_file, sort_contacts
 from .decks import DECKS, Decks
 from .displacing import Displacing
 from .dynamics import Dynamics, Weakening
@@ -225,9 +225,18 @@ class Engine:
         return self._kept
 
     def dump(self, stem: Path) -> None:
-        """Write the configuration as LAMMPS dumps in full precision (deck part write.in): STEM.disks and others."""
+        """Write the configuration as LAMMPS dumps in full precision (deck part write.in): STEM.disks and others.
+
+        What is written depends on the configuration alone, and not on what was before.
+        """
+        bottom, top = box_heights(self.packing)
         self._displacing.end()
+        self._decks.command(f"change_box all y final {bottom!r} {top!r} units box")
+        self._decks.command("reset_timestep 0")
         self._decks.include("write.in", name=stem, fx=self._displacing.fx)
+        if self.communicator.rank == 0:
+            sort_contacts(Path(f"{stem}.contacts"))
+        self.communicator.barrier()
 
     @contextmanager
     def undamped(
@@ -294,10 +303,12 @@ class Engine:
                 kt=law.kt,
                 mu=law.mu,
                 exponent=law.exponent,
-                history="rescaled" if law.rescaled else "total",
+                history=law.history,
                 fx=packing.fx,
                 fy=packing.fy,
                 inertia=packing.inertia_factor,
+                mass=float(packing.mass.min()),
+                diameter=2 * float(packing.radius.min()),
                 precision="compensated" if packing.compensated else "double",
             )
             if law.damped:

@@ -122,13 +122,13 @@ class Trial:
 
     @cached_property
     def derivatives(self) -> Derivatives:
-        """Forces and stiffnesses of the contacts."""
-        return self.still.law.derivatives(self.branches.overlap, self.slip, self._parting)
+        """Forces and stiffnesses of the contacts; those that the displacement has led to Coulomb's bound slide on."""
+        return self.still.law.derivatives(self.branches.overlap, self.slip, self._parting, sliding=True)
 
     @property
     def _parting(self) -> NDArray[np.bool_] | float:
         """Contacts whose overlap the displacement has reduced, shape (C,), as far as the law cares."""
-        if not self.still.law.rescaled or self.displacement is None:
+        if not self.still.law.rescales or self.displacement is None:
             return 0.0
         graph, moved = self.graph, self.displacement.reshape(3, -1)[:2]
         branch = moved.take(graph.i, axis=1)

@@ -10,12 +10,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, find_onset
 from ...analysis.damped_onset.modes import Pencil
 from ...analysis.damped_onset.sliced import first_growing
-from ...analysis.damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows, dissipating, dissipative
-from ...analysis.onset import Increments, seeks_all
+from ...analysis.damped_onset.windows import (
+    DampedOnsetError,
+    DampedWindow,
+    damped_windows,
+    dissipating,
+    dissipative,
+    growing_windows,
+)
+from ...analysis.onset import LIMITS, Family, Increments, full_operator, takes_all_modes
+from ...analysis.onset.dense import windows_along
+from ...analysis.onset.modes import contact_states
 from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
@@ -92,6 +102,8 @@ class Ramped:
         fx -> Packing, without dissipation.
     forces : ndarray
         The loads of the ramp, of a packing whose windows are all sought those that have an equilibrium.
+    all_modes : bool
+        Whether all modes can be searched.
     whole : bool
         Whether these are solved for; else they are as they are asked for.
     flows : bool
@@ -100,13 +112,15 @@ class Ramped:
 
     path: EquilibriumPath
     forces: Floats
+    all_modes: bool
     whole: bool
     flows: bool
 
     def undamped(self, watch: Watch = lambda says: None, folder: Path | None = None) -> Onset | None:
-        """All windows without dissipation, or of a large packing the first one; None if there is none."""
+        """All windows without dissipation, or the first one of a ramp that is not whole; None if there is none."""
+        path, first = dissipating(self.path), not self.whole
         try:
-            return find_onset(dissipating(self.path), self.forces, watch=watch, ranks=searching(), folder=folder)
+            return find_onset(path, self.forces, first=first, watch=watch, ranks=searching(), folder=folder)
         except (OnsetError, NoEquilibriumError):
             return None
 
@@ -121,10 +135,17 @@ class Ramped:
 
 
 @contextmanager
-def ramped(scene: Scene, mu: float | None = None, watch: Watch = lambda says: None) -> Iterator[Ramped]:
+def ramped(
+    scene: Scene,
+    mu: float | None = None,
+    watch: Watch = lambda says: None,
+    first: bool = False,
+    bed: Packing | None = None,
+) -> Iterator[Ramped]:
     """Ramp a scene to its end, or to where the packing flows; its equilibria have no dissipation.
 
-    The ramp of a packing of which the first window alone is sought goes as far as somebody asks for equilibria.
+    The ramp of a packing of which the `first` window alone is sought goes as far as somebody asks for equilibria; so
+    does that of every packing of more than `Limits.all_windows` disks. `bed` is as of `settle`.
 
     Raises
     ------
@@ -135,16 +156,17 @@ def ramped(scene: Scene, mu: float | None = None, watch: Watch = lambda says: No
     """
     wanted = loads(needed(scene.ramp, "ramp"))
     scene = scene.model_copy(update={"damping": None})
-    start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"))
+    start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"), bed=bed)
     with Engine(start.packing) as engine:
         path = EquilibriumPath(engine, start, scene, onward=True)
-        forces, whole = wanted, seeks_all(start.packing)
+        forces, all_modes = wanted, takes_all_modes(start.packing)
+        whole = all_modes and not first
         if whole:
             watch(f"ramp up to F_x = {wanted[-1]:g}")
             for _ in path.climb(wanted[1:]):
                 pass
             forces = np.array([each.fx for each in path.kept])
-        yield Ramped(path, forces, whole, len(forces) < len(wanted))
+        yield Ramped(path, forces, all_modes, whole, len(forces) < len(wanted))
 
 
 Dissipation = Callable[[Packing], Packing]
@@ -160,10 +182,13 @@ def damped_onset_run(
     watch: Watch = lambda says: None,
     known: Known = lambda found, fx: None,
     folder: Path | None = None,
+    first: bool = False,
+    bed: Packing | None = None,
 ) -> DampedOnset:
     """The windows of growing motion of a scene for one friction coefficient, and its undamped onset.
 
-    Of a packing of more than `Limits.all_windows` disks these are the first window of either kind.
+    Of a packing of more than `Limits.all_windows` disks these are the first window of either kind, as of every packing
+    if the `first` alone is asked for.
 
     Parameters
     ----------
@@ -179,6 +204,10 @@ def damped_onset_run(
     folder : Path, optional
         Where the search of a large packing leaves what it finds, and goes on from, see
         :func:`~faultgouge.analysis.find_onset`.
+    first : bool
+        Seek the first window of either kind alone; equilibria beyond both are not solved for.
+    bed : Packing, optional
+        As of :func:`~faultgouge.pywrap.settle`.
 
     Raises
     ------
@@ -189,11 +218,13 @@ def damped_onset_run(
     """
     damping = needed(scene.damping, "damping")
     dissipation = partial(dissipative, cn=damping.cn, ct=damping.ct, drag_time=damping.tau)
-    with ramped(scene, mu, watch) as ramp:
+    with ramped(scene, mu, watch, first, bed) as ramp:
         if ramp.whole:
             found = _all_windows(ramp, mu, dissipation, watch, known)
+        elif ramp.all_modes:
+            found = _first_of_all_modes(ramp, mu, dissipation, watch)
         else:
-            found = _first_window(ramp, mu, dissipation, watch, known, folder)
+            found = _first_in_slices(ramp, mu, dissipation, watch, known, folder)
         equilibria = tuple(ramp.path.kept)
         watch("the path once more, with other increments")
         undamped = None if found.undamped is None else with_path_error(found.undamped, ramp.path)
@@ -218,7 +249,66 @@ def _all_windows(ramp: Ramped, mu: float, dissipation: Dissipation, watch: Watch
     return DampedOnset(mu, found, undamped, last if ramp.flows else None)
 
 
-def _first_window(
+def _first_of_all_modes(ramp: Ramped, mu: float, dissipation: Dissipation, watch: Watch) -> DampedOnset:
+    """The first window of either kind of a packing whose modes are all searched, without the errors of the path."""
+    watch("the first pair that becomes complex without dissipation")
+    undamped = ramp.undamped()
+    beneath = Undamped(ramp, np.inf if undamped is None else undamped.fx_c)
+
+    def pencil(fx: float) -> Pencil:
+        return Pencil.of(dissipation(ramp.path(fx)))
+
+    try:
+        found = growing_windows(pencil, ramp.forces, beneath.look, first=True, watch=watch)
+    except NoEquilibriumError as error:
+        raise _nothing_grows(ramp.path.kept[-1].fx, True) from error
+    if not found:
+        raise _nothing_grows(float(ramp.forces[-1]), False)
+    return DampedOnset(mu, found[:1], undamped, None)
+
+
+class Undamped:
+    """The undamped windows of a ramp as far as it has been walked: where growth without dissipation is largest.
+
+    Parameters
+    ----------
+    ramp : Ramped
+        Of a packing whose modes are all searched.
+    first : float
+        The first undamped onset, force; infinite if there is none.
+    """
+
+    def __init__(self, ramp: Ramped, first: float) -> None:
+        loads = ramp.forces
+        begin = int(np.searchsorted(loads, first, side="right")) - 1
+        narrowest = LIMITS.narrowest * float(np.abs(loads).max())
+        states: dict[float, bytes] = {}
+
+        def operator(fx: float) -> csr_array:
+            packing = ramp.path(fx)
+            states[fx] = contact_states(packing)
+            return full_operator(packing)
+
+        family = Family(operator, narrowest, states=states.__getitem__)
+        self._along = iter(windows_along(family, loads[begin:])) if first < loads[-1] else iter(())
+        self._first, self._reached = first, float(loads[max(begin, 0)])
+        self._windows: tuple[Window, ...] = ()
+
+    def look(self, below: float, above: float) -> list[float]:
+        """Onsets between two neighbouring loads, and of windows that end there the middle of what they have there."""
+        if above <= self._first:
+            return []
+        while self._reached < above:
+            try:
+                self._reached, self._windows = next(self._along)
+            except (StopIteration, NoEquilibriumError):
+                self._reached = np.inf
+        onsets = [each.fx_onset for each in self._windows if below < each.fx_onset < above]
+        ends = [each for each in self._windows if each.fx_end is not None and below < each.fx_end < above]
+        return onsets + [0.5 * (max(each.fx_onset, below) + each.fx_end) for each in ends if each.fx_end is not None]
+
+
+def _first_in_slices(
     ramp: Ramped, mu: float, dissipation: Dissipation, watch: Watch, known: Known, folder: Path | None
 ) -> DampedOnset:
     """The first window of either kind of a large packing, without the errors of the path; all ranks search."""

@@ -47,7 +47,6 @@ from ...analysis.damped_onset.modes import DampedMode, Pencil, nearest_mode
 from ...analysis.damped_onset.windows import DampedWindow
 from ...analysis.onset import force_bearing
 from ...analysis.packing.arrays import Floats
-from ...analysis.packing.law import AT_THE_BOUND
 from ..equilibria.quasistatic import Equilibrium
 from ..runs.path import EquilibriumPath
 from .nearby_root import nearby_root
@@ -270,8 +269,7 @@ def bearing_contacts(packing: Packing) -> frozenset[tuple[int, int, bool]]:
     """The contacts (i, j, whether it slides) that carry a force; j = -1 for the floor."""
     carrying = packing.loaded(CARRIES * packing.fy)
     contacts = carrying.contacts
-    limit = carrying.law.slip_limit(carrying.geometry.overlap)
-    slides = np.abs(contacts.slip) > AT_THE_BOUND * limit
+    slides = carrying.law.at_bound(carrying.geometry.overlap, contacts.slip)
     return frozenset(zip(contacts.i.tolist(), contacts.j.tolist(), slides.tolist(), strict=True))
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ...analysis.digits import with_uncertainty
-from ...analysis.onset import full_operator, seeks_all
+from ...analysis.errors import TurningPointError
+from ...analysis.onset import full_operator, takes_all_modes
 from ...analysis.onset.search import windows_rows
 from ...analysis.packing.arrays import Floats
 from ...analysis.spectrum.spectrum import active_coordinates
@@ -67,6 +68,8 @@ def onset_run(
     reached: Callable[[Equilibrium], None] | None = None,
     near_onset: Floats | None = None,
     modes: tuple[int, int] | None = None,
+    first: bool = False,
+    bed: Packing | None = None,
     watch: Watch = lambda says: None,
     folder: Path | None = None,
 ) -> OnsetRun:
@@ -74,7 +77,7 @@ def onset_run(
 
     The error of each onset is the whole one: that of rounding, and that of the path's increments
     (:mod:`~faultgouge.pywrap.onset.path_error`). The ramp goes to its end, or to where the packing flows. Where the
-    first onset alone is sought, and nobody else wants the equilibria, it ends there.
+    first window alone is sought, and nobody else wants the equilibria, it ends there.
 
     Parameters
     ----------
@@ -88,6 +91,10 @@ def onset_run(
         Distances from F_x^c at which equilibria are wanted besides, force.
     modes : tuple of (int, int), optional
         Search these modes alone, see :func:`~faultgouge.analysis.find_onset`.
+    first : bool
+        Seek the first window alone, as of a large packing.
+    bed : Packing, optional
+        As of :func:`~faultgouge.pywrap.settle`.
     watch : callable, optional
         Told in words what is under way in a large packing.
     folder : Path, optional
@@ -101,12 +108,13 @@ def onset_run(
     OnsetError
         If no pair becomes complex up to the ramp's end.
     NoEquilibriumError
-        If the packing flows from the first increment on, or before an onset.
+        If the packing flows from the first increment on, or before an onset; a TurningPointError if an eigenvalue is
+        negative before any is complex.
     """
     wanted = loads(needed(scene.ramp, "ramp"))
-    start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"))
+    start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"), bed=bed)
     _check_modes(start.packing, modes)
-    whole = reached is not None or seeks_all(start.packing, modes)
+    whole = reached is not None or (takes_all_modes(start.packing, modes) and not first)
     reached = reached or (lambda _: None)
     reached(start)
     with Engine(start.packing) as engine:
@@ -119,7 +127,9 @@ def onset_run(
             forces = np.array([each.fx for each in path.kept])
         flows = len(forces) < len(wanted)
         try:
-            onset = find_onset(path, forces, modes=modes, watch=watch, ranks=searching(), folder=folder)
+            onset = find_onset(path, forces, modes=modes, first=first, watch=watch, ranks=searching(), folder=folder)
+        except TurningPointError:
+            raise
         except (OnsetError, NoEquilibriumError) as error:
             if not flows and isinstance(error, OnsetError):
                 raise

@@ -5,6 +5,7 @@ All functions are collective over the ranks of the communicator.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from ...analysis import NoEquilibriumError, Packing
 from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
 from ..lammps.engine import Engine
-from ..scenes.refusals import needed
+from ..scenes.refusals import SceneError, needed
 from ..scenes.scene import Scene
 from ..scenes.sections import Ramp
 from ..settling.bed import settle
@@ -26,8 +27,9 @@ def ramp(
     start: Equilibrium | None = None,
     communicator: MPI.Comm | None = None,
     dumps: Path | None = None,
+    behind: int | None = None,
 ) -> Iterator[Equilibrium]:
-    """Equilibria at F_x = step, 2 step, ... up to the scene's ramp.until.
+    """Equilibria at F_x = step, 2 step, ... up to the scene's ramp.until, or through its turning points.
 
     Parameters
     ----------
@@ -41,6 +43,9 @@ def ramp(
     dumps : Path, optional
         Stem of LAMMPS dumps of each equilibrium k, the first of the ramp being 1: STEM.k.disks and the others of
         write.in. None by default.
+    behind : int, optional
+        How many loads of the ramp, the first of them 0, lie behind `start`, see `count_behind`; by default those up to
+        its F_x on the way to the first turning point.
 
     Yields
     ------
@@ -58,21 +63,23 @@ def ramp(
         start = settle(scene, communicator=communicator)
         yield start
     with Engine(start.packing, communicator) as engine:
-        for k, fx in enumerate(loads(settings)):
-            if fx > start.fx:
-                start = next_equilibrium(engine, start, fx, scene)
-                if dumps is not None:
-                    # in LAMMPS started anew, where contacts stand in an order that no earlier increment has a part in
-                    with Engine(start.packing, communicator) as fresh:
-                        fresh.dump(Path(f"{dumps}.{k}"))
-                yield start
+        wanted = all_loads(settings)
+        if behind is None:
+            behind = int(np.sum(np.abs(_way_to(0.0, settings.first, settings.step)) <= abs(start.fx)))
+        for k, fx in enumerate(wanted[behind:].tolist(), behind):
+            start = next_equilibrium(engine, start, fx, scene)
+            if dumps is not None:
+                engine.restore(start.packing)  # what was found, and not what was tried last
+                engine.dump(Path(f"{dumps}.{k}"))
+            yield start
 
 
 def reach(scene: Scene, fx: float) -> Iterator[Equilibrium]:
-    """The equilibria of a ramp up to and with fx, by the steps of the scene's ramp or, without one, of 1e-3."""
-    step = scene.ramp.step if scene.ramp else 1e-3
+    """The equilibria of a ramp up to and with fx, by the steps of the scene's ramp or, without one, of F_y/3000."""
+    step = step_of(scene)
     step = min(step, fx) or step  # one increment, where the first one of the ramp were too large
-    settings = (scene.ramp or Ramp(until=max(fx, step))).model_copy(update={"step": step, "until": max(fx, step)})
+    settings = scene.ramp or Ramp(step=step, until=step)
+    settings = settings.model_copy(update={"step": step, "until": max(fx, step)})
     bounded = scene.model_copy(update={"ramp": settings})
     for last in ramp(bounded):
         yield last
@@ -82,13 +89,74 @@ def reach(scene: Scene, fx: float) -> Iterator[Equilibrium]:
         yield next_equilibrium(engine, last, fx, bounded)
 
 
+def step_of(scene: Scene) -> float:
+    """Increment of F_x on the way to an undamped run, force."""
+    return scene.ramp.step if scene.ramp else scene.load.fy / 3000
+
+
 def loads(settings: Ramp) -> Floats:
-    """F_x of the equilibria of a ramp, force, from 0: multiples of the step, to the bit, and `until` in the end."""
-    # half a step in a million is far above the rounding of until/step, and far below a step
-    rounding = 5e-7
-    multiples = np.arange(int(settings.until / settings.step * (1 + rounding)) + 1, dtype=np.float64) * settings.step
-    left = settings.until - multiples[-1]
-    return np.append(multiples, settings.until) if left > rounding * settings.until else multiples
+    """F_x of the equilibria up to the first turning point of a ramp, force, from 0: where onsets are sought.
+
+    Raises
+    ------
+    SceneError
+        If F_x goes below 0 first.
+    """
+    if settings.first < 0:
+        raise SceneError(
+            f"ramp.until goes to F_x = {settings.first:g} first, and onsets are sought above 0: give a first turning "
+            "point above 0"
+        )
+    return _way_to(0.0, settings.first, settings.step)
+
+
+def all_loads(settings: Ramp) -> Floats:
+    """F_x of all equilibria of a ramp, force, from 0 through its turning points: multiples of the step in between, the
+    same to the bit on each way."""
+    way = _way_to(0.0, settings.first, settings.step)
+    for point in settings.turning_points[1:]:
+        way = np.append(way, _way_to(float(way[-1]), point, settings.step)[1:])
+    return way
+
+
+def _way_to(begin: float, end: float, step: float) -> Floats:
+    """From one load to another, force: multiples of the step, to the bit, between both."""
+    # half a step in a million is far above the rounding of end/step, and far below a step
+    rounding = 5e-7 * max(abs(begin), abs(end)) / step
+    sign = 1.0 if end > begin else -1.0
+    first, last = (math.floor(sign * load / step + rounding) for load in (begin, end))
+    # adding 0 makes 0 of -0
+    way = np.append(begin, sign * np.arange(first + 1, last + 1, dtype=np.float64) * step + 0.0)
+    return np.append(way, end) if sign * (end - way[-1]) > rounding * step else way
+
+
+def count_behind(settings: Ramp, reached: Floats) -> int:
+    """How many loads of a ramp lie behind a run that reached these; F_x of its equilibria, force.
+
+    Raises
+    ------
+    SceneError
+        If the run went another way.
+    """
+    wanted = all_loads(settings)
+    count = min(len(wanted), len(reached))
+    same = wanted[:count] == reached[:count]
+    if same.all():
+        return count
+    k = int(np.argmin(same))
+    # `until` of one of the two is no multiple of the step, and the other one goes on from there
+    if k == len(reached) - 1 and k > 0 and _between(reached[k], wanted[k - 1], wanted[k]):
+        return k
+    if k == len(wanted) - 1 and k > 0 and _between(wanted[k], reached[k - 1], reached[k]):
+        return len(wanted)
+    raise SceneError(
+        f"the run has gone to F_x = {reached[k]:g} where ramp.until leads to F_x = {wanted[k]:g}: give another name "
+        "with -o, or delete it"
+    )
+
+
+def _between(load: float, one: float, other: float) -> bool:
+    return bool(min(one, other) < load < max(one, other))
 
 
 def next_equilibrium(
@@ -150,22 +218,22 @@ class EquilibriumPath:
     ) -> None:
         self.engine, self.scene, self._onward = engine, scene, onward
         self.kept = [start, *further]
-        # an equilibrium, and another one near it
-        self._beside = (self.kept[-1], self.kept[-2]) if further else None
+        self._beside: tuple[Equilibrium, Equilibrium] | None = None  # a kept one, and the last one found above it
 
     def __call__(self, fx: float) -> Packing:
         """The packing in equilibrium at fx."""
         below = next((each for each in reversed(self.kept) if each.fx <= fx), self.kept[0])
         if below.fx == fx:
             return below.packing
-        beside = self._beside[1] if self._beside and self._beside[0] is below else None
-        onward = self._onward and fx > self.kept[-1].fx
-        found = next_equilibrium(self.engine, below, fx, self.scene, beside, onward)
         if fx > self.kept[-1].fx:
+            # from the ramp alone, so that it does not depend on what is asked for in between
+            beside = self.kept[-2] if len(self.kept) > 1 else None
+            found = next_equilibrium(self.engine, below, fx, self.scene, beside, self._onward)
             self.kept.append(found)
-            self._beside = found, below
-        else:
-            self._beside = below, found
+            return found.packing
+        beside = self._beside[1] if self._beside and self._beside[0] is below else None
+        found = next_equilibrium(self.engine, below, fx, self.scene, beside, onward=False)
+        self._beside = below, found
         return found.packing
 
     def climb(self, forces: Floats) -> Iterator[Equilibrium]:

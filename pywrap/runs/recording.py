@@ -8,10 +8,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+import numpy as np
 from mpi4py import MPI
 
-from ...analysis import RunFile
+from ...analysis import RunFile, solid_fraction
 from ...analysis.files.wholefile import check_folder
+from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Motion, Weakening
 from ..scenes.refusals import SceneError
@@ -88,6 +90,11 @@ class Record:
         return Equilibrium(file.packing(), float(row["residual"]), float(row["floor"]), int(row["evaluations"]), way)
 
     @property
+    def forces(self) -> Floats:
+        """F_x of the equilibria in the file, force; the same on all ranks."""
+        return from_root(self.communicator, lambda: np.zeros(0) if self._file is None else self._file.fx)
+
+    @property
     def complete(self) -> bool:
         """Whether the run has come to its end; the same on all ranks."""
         return bool(from_root(self.communicator, lambda: self._file is not None and self._file.complete))
@@ -105,7 +112,8 @@ class Record:
         """Write one equilibrium."""
         if self.communicator.rank == 0:
             if self._file is None:
-                self._file = RunFile.create(self.path, equilibrium.packing, self._attributes())
+                attributes = self._attributes() | {"solid_fraction": solid_fraction(equilibrium.packing)}
+                self._file = RunFile.create(self.path, equilibrium.packing, attributes)
             file = self._file
             with file.change():
                 file.complete = False
@@ -207,7 +215,7 @@ class Record:
         count = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}{more}"
         self._said(f"{self.path} holds {count}; {goes_on}")
 
-    def _attributes(self) -> dict[str, str | int]:
+    def _attributes(self) -> dict[str, str | int | float]:
         return {
             "task": self.task,
             "scene": json.dumps(self.scene.resolved()),

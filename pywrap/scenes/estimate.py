@@ -7,8 +7,8 @@ core of 2020, within a factor of three or so, and say whether to wait or to come
 
 A contact that carries the force f has :math:`\delta = (f/k_n)^{1/p}` and the stiffness
 :math:`k = p\, k_n \delta^{p-1}`, with p = 3/2 for Hertz. A time step is a share of :math:`(m/k)^{1/2}`, a disk falls
-under :math:`F_y` through the medium at the speed :math:`F_y^{1/2}`: their ratio, :math:`(k_n/F_y)^{1/3}` for Hertz,
-is what the steps of a settling grow with.
+under :math:`F_y` through the medium at the speed :math:`(F_y d/m)^{1/2}`, d its diameter: their ratio,
+:math:`(k_n d^{3/2}/F_y)^{1/3}` for Hertz, is what the steps of a settling grow with.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .keys import Keys
 from .packing_section import GeneratedPacking
 from .refusals import SceneError
 
-Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "reproduce"]
+Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "onset --all", "reproduce"]
 
 EPSILON = 2.3e-16
 
@@ -138,8 +138,9 @@ def estimated(scene: Keys, task: Task) -> Estimate:
     ----------
     scene : Scene
         What is wanted.
-    task : {"settle", "ramp", "perturb", "onset", "reproduce"}
-        Each includes the settling; perturb the ramp up to its equilibrium, onset that up to its end, reproduce the
+    task : {"settle", "ramp", "perturb", "onset", "onset --all", "reproduce"}
+        Each includes the settling; perturb the ramp up to its equilibrium, onset that
+        up to the first window, with --all up to its end, reproduce the
         onset, a run whose growth is measured and, where the scene has [friction], the runs of [perturb].
     """
     disks = scene.packing.disks
@@ -147,11 +148,17 @@ def estimated(scene: Keys, task: Task) -> Estimate:
     increments, kept = 0.0, 1.0
     ramp, perturb = scene.ramp, scene.perturb
     seconds = 0.0
-    if task in ("ramp", "onset", "reproduce") and ramp is not None:
+    if task in ("ramp", "onset", "onset --all", "reproduce") and ramp is not None:
         # the layer slides on whatever bears it once F_x exceeds mu F_y
-        increments = min(ramp.until, max(scene.law.mus) * scene.load.fy + ramp.step) / ramp.step
+        way = ramp.length if task == "ramp" else abs(ramp.first)
+        if len(ramp.turning_points) == 1 or task != "ramp":
+            way = min(way, max(scene.law.mus) * scene.load.fy + ramp.step)
+        increments = way / ramp.step
+        if task == "onset":
+            first = FIRST[scene.damping is not None] * scene.load.fy / disks
+            increments = min(increments, math.ceil(first / ramp.step))
     if task == "perturb" and perturb is not None:
-        increments = perturb.fx / (ramp.step if ramp is not None else 1e-3)
+        increments = perturb.fx / (ramp.step if ramp is not None else scene.load.fy / 3000)
     if ramp is not None and ramp.method == "overdamped":
         steps += increments * _overdamped_steps(scene)
     else:
@@ -163,16 +170,16 @@ def estimated(scene: Keys, task: Task) -> Estimate:
         steps += GROWTH
         if perturb is not None and scene.friction is not None:
             steps += TRIGGERING_RUNS * perturb.time / (perturb.time_step or _undamped_step(scene))
-    if task in ("onset", "reproduce"):
-        search = _search_seconds(scene, increments, task == "onset" and scene.damping is not None)
+    if task in ("onset", "onset --all", "reproduce"):
+        search = _search_seconds(scene, increments, task != "reproduce" and scene.damping is not None)
         seconds = len(scene.law.mus) * (seconds + search)
         kept = increments + 1
     seconds += steps * (SECONDS_A_STEP[0] + SECONDS_A_STEP[1] * disks)
     memory = disks * (BYTES_AT_ALL + kept * BYTES_KEPT)
-    if task in ("onset", "reproduce") and disks > DENSE:
+    if task in ("onset", "onset --all", "reproduce") and disks > DENSE:
         # the ramp ends at the first onset, and few equilibria are kept
         memory = max(memory, disks * BYTES_AT_ALL + _searched_bytes(disks))
-    written = 0.0 if task == "onset" else disks * BYTES_WRITTEN * (increments + 1)
+    written = 0.0 if task.startswith("onset") else disks * BYTES_WRITTEN * (increments + 1)
     return Estimate(disks, steps, increments, memory, written, seconds)
 
 
@@ -183,7 +190,7 @@ def foreseen(scene: Keys, task: Task, packings: int = 1) -> str:
     ----------
     scene : Scene
         What is wanted.
-    task : {"settle", "ramp", "perturb", "onset", "reproduce"}
+    task : {"settle", "ramp", "perturb", "onset", "onset --all", "reproduce"}
         As in `estimated`.
     packings : int
         How many packings of the scene, one after the other.
@@ -281,10 +288,11 @@ def _law(scene: Keys) -> MindlinLaw:
 
 
 def _settling_steps(scene: Keys) -> float:
-    stiff = _stiffness(scene, FORCE_CHAINS * scene.load.fy)
-    if scene.packing.settle_friction if isinstance(scene.packing, GeneratedPacking) else False:
-        return SETTLING_WITH_FRICTION * 4 * stiff / scene.load.fy  # overdamped, with damping 1
-    return SETTLING * math.sqrt(8 * stiff / scene.load.fy) / 0.8
+    assert isinstance(scene.packing, GeneratedPacking)
+    stiff = _stiffness(scene, FORCE_CHAINS * scene.load.fy) * 2 * min(scene.packing.radii) / scene.load.fy
+    if scene.packing.settle_friction:
+        return SETTLING_WITH_FRICTION * 4 * stiff  # overdamped
+    return SETTLING * math.sqrt(8 * stiff) / 0.8
 
 
 def _overdamped_step(scene: Keys) -> float:
@@ -297,14 +305,19 @@ def _overdamped_steps(scene: Keys) -> float:
 
 
 def _undamped_step(scene: Keys) -> float:
-    lightest = min(1.0, scene.inertia_factor)
+    packing = scene.packing
+    lightest = min(1.0, scene.inertia_factor) * ((isinstance(packing, GeneratedPacking) and packing.mass) or 1.0)
     return 0.1 * math.sqrt(lightest / (6 * _stiffness(scene, scene.load.fy)))
 
 
 def _remedy(scene: Keys, task: Task) -> str:
     if task == "perturb":
         return "lower perturb.time, or raise perturb.time_step"
-    return "take a larger ramp.step, or fewer disks" if task in ("ramp", "onset", "reproduce") else "take fewer disks"
+    return (
+        "take a larger ramp.step, or fewer disks"
+        if task in ("ramp", "onset", "onset --all", "reproduce")
+        else "take fewer disks"
+    )
 
 
 def _installed_memory() -> float:

@@ -1,14 +1,18 @@
 """All keys of a scene, section by section, each section checked by itself."""
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import Discriminator, Tag
+from pydantic import Discriminator, Tag, ValidationInfo, field_validator
 
 from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
 from .refusals import Section
 from .sections import Damping, Friction, Law, Load, Output, Perturb, Ramp, Relax
 from .study_sections import Eruptions, Modes, Trigger
 from .units_section import Units
+
+STEPS = 3e4
+"""Increments of F_x up to F_y where a scene does not say: the paper's 1e-4 of 3."""
 
 
 class Keys(Section):
@@ -42,6 +46,13 @@ class Keys(Section):
     units: Units | None = None
     damping: Damping | None = None
     output: Output | None = None
+
+    @field_validator("ramp", mode="before")
+    @classmethod
+    def _step_of_the_load(cls, ramp: object, info: ValidationInfo) -> object:
+        if isinstance(ramp, Mapping) and "step" not in ramp and "load" in info.data:
+            return {**ramp, "step": info.data["load"].fy / STEPS}
+        return ramp
 
     @property
     def inertia_factor(self) -> float:

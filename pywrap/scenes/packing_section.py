@@ -43,8 +43,9 @@ class GeneratedPacking(Section):
         True: settled with friction, so that the packing carries tangential load from the start. The paper
         does not say which.
     masses : {"equal", "spheres"}
-        Equal masses, of one, as in the paper; or those of spheres of one material, as the cube of the radius, the
-        smallest one.
+        Equal masses, as in the paper; or those of spheres of one material, as the cube of the radius.
+    mass : float or None
+        Mass of the smallest disks. None: one, the paper's unit.
     """
 
     disks: int = Field(100, gt=0, le=10_000_000)
@@ -56,6 +57,7 @@ class GeneratedPacking(Section):
     periodic: bool = True
     settle_friction: bool = False
     masses: Literal["equal", "spheres"] = "equal"
+    mass: Positive | None = None
 
     @field_validator("top", mode="before")
     @classmethod
@@ -94,9 +96,9 @@ class GeneratedPacking(Section):
         return loose_start(self.disks, self.radii, self.top, self.width, self.seed, periodic=self.periodic, draw=draw)
 
     def mass_of(self, radius: Floats) -> Floats:
-        """Masses of disks, shape (N,), in units of that of the smallest."""
+        """Masses of disks, shape (N,)."""
         power = 3 if self.masses == "spheres" else 0
-        return np.asarray((radius / min(self.radii)) ** power)
+        return np.asarray((self.mass or 1.0) * (radius / min(self.radii)) ** power)
 
 
 class StoredPacking(Section):

@@ -40,8 +40,8 @@ class Scene(Keys):
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
         perturb, ramp = self.perturb, self.ramp
-        if perturb and ramp and perturb.fx > ramp.until:
-            says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.until}: ramp further"
+        if perturb and ramp and perturb.fx > max(0.0, ramp.first):
+            says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
             raise refusal("perturb.fx", says)
         if perturb and isinstance(perturb.target, tuple) and isinstance(self.packing, GeneratedPacking):
             beyond = [disk for disk in perturb.target if disk >= self.packing.disks]

@@ -5,6 +5,7 @@ Defaults are the paper's values where it gives one; the docstrings say where it 
 
 import re
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -12,6 +13,9 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from ...analysis.packing.law import EXPONENTS
 from .refusals import NotNegative, Positive, Section, is_number, refusal
 from .signal_keys import SignalKeys
+
+NUMBER = r"\d+(?:\.\d*)?(?:[eE][-+]?\d+)?"
+"""A number without a sign, in text."""
 
 EQUILIBRIA = 10_000_000
 """Of a ramp: half a day and 150 GB for 100 disks."""
@@ -32,9 +36,10 @@ class Law(Section):
         `reproduce` take every one and all else the first.
     exponent : float
         p of the repulsion kn overlap^p: 1.5 (Hertz, the paper's) or 1 (harmonic disks).
-    history : {"total", "rescaled"}
+    history : {"total", "rescaled", "coulomb"}
         What contacts remember: the whole slip, as in the paper, or the slip rescaled while overlaps grow, which creates
-        no energy (:mod:`~faultgouge.analysis.packing.law`).
+        no energy, or the force of a spring behind Coulomb's slider: the law of Cundall and Strack, without the paper's
+        smoothing, which creates no energy either (:mod:`~faultgouge.analysis.packing.law`).
     """
 
     kn: Positive
@@ -42,7 +47,7 @@ class Law(Section):
     kt: NotNegative = Field("2/7 kn")  # type: ignore[assignment]
     mu: float | tuple[float, ...] = 1.0
     exponent: float = 1.5
-    history: Literal["total", "rescaled"] = "total"
+    history: Literal["total", "rescaled", "coulomb"] = "total"
 
     @model_validator(mode="before")
     @classmethod
@@ -58,7 +63,7 @@ class Law(Section):
             return kt
         if "kn" not in info.data:
             return 0.0  # kn is missing or refused, and that is what gets reported
-        match = re.fullmatch(r"(?:(\d+(?:\.\d+)?)(?:/(\d+(?:\.\d+)?))? )?kn", kt.strip())
+        match = re.fullmatch(rf"(?:({NUMBER})(?:/({NUMBER}))? )?kn", kt.strip())
         numerator, denominator = (float(number or 1) for number in match.groups()) if match else (0.0, 0.0)
         if denominator == 0:
             raise refusal("", f'= "{kt}" is no share of kn: give a number, or a share such as "2/7 kn"')
@@ -149,9 +154,10 @@ class Ramp(Section):
     Attributes
     ----------
     step : float
-        Increment of F_x.
-    until : float
-        Last F_x.
+        Size of the increments of F_x. A scene may leave it out: a 30,000th of F_y, the paper's 1e-4 of 3.
+    until : float or tuple of float
+        Last F_x; or turning points, to which F_x goes one after the other, up, down and below zero. `onset` seeks on
+        the way to the first one.
     method : {"newton", "overdamped"}
         How each equilibrium is found. The paper's is overdamped dynamics.
     force_tolerance : float or None
@@ -159,19 +165,46 @@ class Ramp(Section):
         the scene's units. None: what the rounding of the coordinates allows.
     """
 
-    step: Positive = 1e-4
-    until: Positive
+    step: Positive
+    until: float | tuple[float, ...]
     method: Literal["newton", "overdamped"] = "newton"
     force_tolerance: Positive | None = None
 
+    @field_validator("until", mode="before")
+    @classmethod
+    def _turning_points(cls, until: object) -> object:
+        points = tuple(until) if isinstance(until, (list, tuple)) else (until,)
+        if not points or not all(is_number(point) for point in points):
+            raise refusal("", f"= {until!r} is refused: give a force, or a list of forces between which F_x goes")
+        for here, there in pairwise((0.0, *points)):
+            if here == there:
+                raise refusal("", f"= {until!r} leaves F_x at {here:g}: give a force at which F_x turns round")
+        return tuple(map(float, points)) if len(points) > 1 else float(points[0])
+
     @model_validator(mode="after")
     def _one_step_at_least(self) -> "Ramp":
-        if self.step > self.until:
-            raise refusal("step", f"= {self.step} is larger than until = {self.until}: take a smaller step")
-        if not self.until / self.step < EQUILIBRIA:
-            says = f"= {self.step:g} makes {self.until / self.step:.2g} equilibria up to until = {self.until:g}"
+        if self.step > abs(self.first):
+            raise refusal("step", f"= {self.step} is larger than until = {self.first}: take a smaller step")
+        count = self.length / self.step
+        if not count < EQUILIBRIA:
+            says = f"= {self.step:g} makes {count:.2g} equilibria up to until = {self.turning_points[-1]:g}"
             raise refusal("step", f"{says}, and {EQUILIBRIA:.0e} are the most: take a larger step")
         return self
+
+    @property
+    def turning_points(self) -> tuple[float, ...]:
+        """Forces to which F_x goes, one after the other."""
+        return self.until if isinstance(self.until, tuple) else (self.until,)
+
+    @property
+    def first(self) -> float:
+        """The first of them."""
+        return self.turning_points[0]
+
+    @property
+    def length(self) -> float:
+        """Of the whole way of F_x, force."""
+        return sum(abs(there - here) for here, there in pairwise((0.0, *self.turning_points)))
 
 
 class Perturb(SignalKeys):
@@ -274,6 +307,6 @@ class Output(Section):
 
 def _multiple_of_v0(text: str) -> float:
     """10 for "10 v0"; 0 for what is no multiple."""
-    match = re.fullmatch(r"(?:(\d+(?:\.\d+)?(?:e\d+)?) )?v0", text.strip())
+    match = re.fullmatch(rf"(?:({NUMBER}) )?v0", text.strip())
     factor = float(match[1] or 1) if match else 0.0
     return factor if is_number(factor) else 0.0

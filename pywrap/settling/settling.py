@@ -109,7 +109,7 @@ def settled(engine: Engine, loose: Packing, watch: Watch = lambda says: None, be
             return equilibrate(engine, Equilibrium.of(packing), 0.0).packing
         except NoEquilibriumError:
             return packing if loose.law.frictional else minimized(packing)[0]
-    watch(f"dynamics down to {TOLERANCES[0] * loose.fy:.0e} on a disk")
+    watch(f"dynamics down to {TOLERANCES[0]:.0e} F_y on a disk")
     if bed:
         engine.settle(TOLERANCES[0] * loose.fy, _height(loose) / loose.position[:, 1].max(), _viscosity(loose), STEPS)
     else:
@@ -122,7 +122,7 @@ def settled(engine: Engine, loose: Packing, watch: Watch = lambda says: None, be
         packing, found = minimized(packing)
         if found:
             return packing
-        watch(f"dynamics down to {finer * loose.fy:.0e} on a disk")
+        watch(f"dynamics down to {finer:.0e} F_y on a disk")
         engine.damp(packing, finer * loose.fy, STEPS)
     return minimized(engine.packing)[0]
 

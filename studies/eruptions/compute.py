@@ -7,8 +7,8 @@ is the size of the eruption at that load.
 
 **Over** is a run at time t when the largest D of its second half, (t/2, t], is at most 1.5 times that of the quarter
 before, (t/4, t/2], and when D has had the time to grow by `DECADES` decades at the spectrum's rate. A stable packing
-is watched for `QUIET` times and then said to be stable. A run that is not over in the time of the scene is cut off,
-and its size is a lower bound. A layer that has slid by the diameter of a disk *flows*.
+is watched for `QUIET` times and then said to be stable, unless D *rises* all the same. A run that is not over in the
+time of the scene is cut off, and its size is a lower bound. A layer that has slid by the diameter of a disk *flows*.
 
 **What ends the growth** is what has happened by the time at which D first reaches a tenth of its largest value. The
 contacts are looked at in each sample: *opens* if a contact of the start has opened by then, *slides* if none has, but
@@ -62,7 +62,11 @@ WORK_STEPS = 2000
 Look = dict[str, float]
 """A packing in the course of a run."""
 
-Ends = Literal["opens", "slides", "law", "flows", "stable", "cut off"]
+RISES = 1e4
+"""Factor from the D of the first time unit from which D of a linearly stable packing has risen: rounding alone drifts
+by a few hundred times in `QUIET`."""
+
+Ends = Literal["opens", "slides", "law", "flows", "stable", "rises", "cut off"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +117,7 @@ def erupt(start: Start) -> dict[str, Any]:
                     break
             balance = _balance(dynamics, start.packing)
     columns: dict[str, Floats] = {name: np.array([each[name] for each in looks]) for name in looks[0]}
-    time, msd = columns["time"], columns["msd"]
+    time = columns["time"]
     return {
         "fx": start.packing.fx,
         "damped": start.damped,
@@ -123,7 +127,7 @@ def erupt(start: Start) -> dict[str, Any]:
         "slip": float(np.abs(columns["slip"]).max()),
         **{name: int(columns[name].max()) for name in ("lost", "gained", "sliding")},
         **_ending(start, looks, columns, rate),
-        "noise": float(msd[time <= 1].max(initial=float(msd[0]))),
+        "noise": _noise(columns),
         "balance": balance,
         "series": {name: column.tolist() for name, column in columns.items()},
     }
@@ -219,10 +223,15 @@ def _balance(dynamics: Dynamics, packing: Packing) -> float:
     return float(abs(after - before - work) / max(abs(work), after, before))
 
 
+def _noise(columns: dict[str, Floats]) -> float:
+    """Largest D of the first time unit."""
+    return float(columns["msd"][columns["time"] <= 1].max(initial=float(columns["msd"][0])))
+
+
 def _ending(start: Start, looks: list[Look], columns: dict[str, Floats], rate: float) -> dict[str, Any]:
     """When and by what the growth ended, see the module."""
     ended: float | None = None
-    ends: Ends = "stable"
+    ends: Ends = "stable" if columns["msd"].max() <= RISES * _noise(columns) else "rises"
     if rate > 0:
         place = int(np.argmax(columns["msd"] >= TENTH * columns["msd"].max()))
         ended = float(columns["time"][place])

@@ -12,13 +12,14 @@ from ...figures.series import few_decades, positive
 from ...figures.style import INK, styled
 from ..rows import columns
 
-MARKERS = {"opens": "o", "slides": "s", "law": "D", "flows": "^", "cut off": "X", "stable": "."}
+MARKERS = {"opens": "o", "slides": "s", "law": "D", "flows": "^", "cut off": "X", "rises": "v", "stable": "."}
 WORDS = {
     "opens": "a contact opens",
     "slides": "a contact slides",
     "law": "curvature of the law",
     "flows": "the layer flows",
     "cut off": "not over yet",
+    "rises": "D rises, though linearly stable",
     "stable": "stable: no growth",
 }
 

@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import NoEquilibriumError
+from ...analysis.motion.growth import ABOVE
 from ...pywrap import Scene, SceneError
 from ...pywrap.runs.path import loads
 from ...pywrap.scenes.refusals import needed
@@ -67,7 +68,8 @@ def _page(result: Result) -> Result:
     free = [run for run in runs if not run["damped"]]
     damped = {run["fx"]: run for run in runs if run["damped"]}
     damping = result["scene"].get("damping") or {}
-    grown = [run["msd"] for run in free if run["ends"] != "stable"]
+    grown = [run["msd"] for run in free if run["ends"] != "stable" and run["msd"] > ABOVE * run["noise"]]
+    small = [run for run in runs if run["ends"] != "stable" and run["msd"] <= ABOVE * run["noise"]]
     return {
         "runs": runs,
         "fy": result["scene"]["load"]["fy"],
@@ -75,6 +77,7 @@ def _page(result: Result) -> Result:
         "beside": [(run, damped[run["fx"]]) for run in free if run["fx"] in damped],
         "damping": ", ".join(f"{key} = {value:g}" for key, value in damping.items() if value),
         "decades": float(np.log10(max(grown) / min(grown))) if grown else 0.0,
+        "small": len(small),
         "noise": (min(run["noise"] for run in runs), max(run["noise"] for run in runs)),
         "balance": max(run["balance"] for run in free),
         "criterion": (OVER, DECADES, QUIET),
@@ -97,7 +100,7 @@ def eruptions_of(scene: Scene, _: object) -> Result:
 
 def _checked(scene: Scene) -> Eruptions:
     """The section [eruptions] of a scene whose ramp reaches its loads."""
-    until = needed(scene.ramp, "ramp").until
+    until = needed(scene.ramp, "ramp").first
     if scene.eruptions is None:
         raise SceneError("the scene has no section [eruptions]: add it, with load, a list of F_x")
     last = max(scene.eruptions.load)

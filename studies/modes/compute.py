@@ -15,6 +15,9 @@ over the number of eigenvalues; rattlers have none.
 the largest eigenvalue, so that a pair beyond that bound is real without a look at its vectors. Of the others the
 vectors are computed, and decide.
 
+**Where the branch ends.** A real negative eigenvalue is the classical instability: Newton's method has passed a turning
+point, and no packing reaches such an equilibrium by itself. The loads of a packing end before it ("turning point").
+
 **Large packings.** Of more than `ALL` disks the pairs are counted in slices of the spectrum, with a stated error
 (:mod:`~faultgouge.studies.modes.sliced`): the key pairs_error of a load.
 
@@ -42,7 +45,16 @@ from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigsh
 
-from ...analysis import NoEquilibriumError, Packing, dynamical_matrix, eigenpairs, eigenvalues, stiffness_matrix
+from ...analysis import (
+    NoEquilibriumError,
+    Packing,
+    dynamical_matrix,
+    eigenpairs,
+    eigenvalues,
+    growth_rate,
+    negative_eigenvalues,
+    stiffness_matrix,
+)
 from ...analysis.spectrum.spectrum import (
     SAFETY,
     Complexes,
@@ -51,7 +63,7 @@ from ...analysis.spectrum.spectrum import (
     mass_weighted,
     unit_rounding,
 )
-from ...pywrap import Scene
+from ...pywrap import Equilibrium, Scene
 from ...pywrap.runs.path import EquilibriumPath
 from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.study_sections import Modes
@@ -86,11 +98,14 @@ class Counted:
         Number of eigenvalues.
     error : int or None
         Of the number of pairs, where these are counted in slices.
+    negative : tuple of float
+        The real negative eigenvalues, the most negative first, 1 / time^2.
     """
 
     omega: Complexes
     modes: int
     error: int | None = None
+    negative: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, values: Complexes) -> Counted:
@@ -99,12 +114,14 @@ class Counted:
         return cls(omega[np.argsort(-omega.imag)], len(values))
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers: pairs, share, growth_rate, omega (of the fastest pair), least_q."""
+        """Plain numbers: pairs, negative, share, growth_rate, omega (of the fastest pair), least_q."""
         fastest = self.omega[0] if len(self.omega) else None
+        rates = [growth_rate(value) for value in self.negative[:1]] + [2 * w.imag for w in self.omega[:1]]
         return {
             "pairs": len(self.omega),
             "share": 2 * len(self.omega) / self.modes if self.modes else 0.0,
-            "growth_rate": 0.0 if fastest is None else float(2 * fastest.imag),
+            "negative": len(self.negative),
+            "growth_rate": float(max(rates, default=0.0)),
             "omega": None if fastest is None else float(fastest.real),
             "least_q": float(np.min(self.omega.real / (2 * self.omega.imag))) if len(self.omega) else None,
         }
@@ -120,7 +137,8 @@ def counted(packing: Packing) -> Counted:
     """
     if len(packing) > ALL:
         found, error = sliced(packing)
-        return replace(Counted.of(found), modes=dynamical_matrix(packing)[0].shape[0], error=error)
+        size, negative = dynamical_matrix(packing)[0].shape[0], tuple(negative_eigenvalues(packing).tolist())
+        return replace(Counted.of(found), modes=size, error=error, negative=negative)
     values = eigenvalues(packing)
     rounding = unit_rounding(dynamical_matrix(packing)[0].data)
     surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))
@@ -128,7 +146,7 @@ def counted(packing: Packing) -> Counted:
     noise = [k for k in doubtful if not _is_real(packing, values[k], rounding)]
     values = values.copy()
     values[noise] = values[noise].real
-    return Counted.of(values)
+    return replace(Counted.of(values), negative=tuple(negative_eigenvalues(packing).tolist()))
 
 
 def _is_real(packing: Packing, value: complex, rounding: float) -> bool:
@@ -185,10 +203,10 @@ def modes(scene: Scene, start: Start) -> dict[str, Any]:
     NoEquilibriumError
         If the packing does not settle.
     """
-    return along_ramp(scene, start, _load)
+    return along_ramp(scene, start(scene.law.mus[0]), _load)
 
 
-def along_ramp(scene: Scene, start: Start, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
+def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
     """What there is to see of the packing at each load of [modes] that it bears.
 
     Parameters
@@ -201,7 +219,6 @@ def along_ramp(scene: Scene, start: Start, look: Callable[[Packing], dict[str, A
         Packing -> the numbers of one load.
     """
     step, wanted = needed(scene.ramp, "ramp").step, (scene.modes or Modes()).fx_over_fy
-    rest = start(scene.law.mus[0])
     row: dict[str, Any] = {"ends": "until", "loads": []}
     with path_from(rest, scene) as path:
         for share in sorted(wanted):
@@ -209,6 +226,9 @@ def along_ramp(scene: Scene, start: Start, look: Callable[[Packing], dict[str, A
                 packing = _climbed(path, share * scene.load.fy, step)
             except NoEquilibriumError:
                 row["ends"] = "no equilibrium"
+                break
+            if len(negative_eigenvalues(packing)):
+                row["ends"] = "turning point"
                 break
             row["loads"].append({"fx_over_fy": share, "fx": packing.fx} | look(packing))
     return row | {"reach": path.kept[-1].fx, "contacts": len(rest.packing.contacts)}
@@ -241,7 +261,7 @@ def _load(packing: Packing) -> dict[str, Any]:
         row |= {"participation": float(pair.participation[0]), "rotation": float(pair.rotation[0])}
     if len(packing) <= SMALL:
         row["b_of"] = switched(packing)
-        if packing.law.rescaled:
+        if packing.law.rescales:
             row["while"] = parting(packing)
     digits = [[float(f"{w.real:.{DIGITS}g}"), float(f"{w.imag:.{DIGITS}g}")] for w in found.omega.tolist()]
     return row | {"frequencies": digits}

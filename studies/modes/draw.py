@@ -45,7 +45,7 @@ def over_load(courses: Mapping[str, Course], names: Sequence[str] = ("share", "g
     figure = Figure((3.6 * len(names), 3.4), layout="constrained")
     for axes, name in zip(np.atleast_1d(figure.subplots(1, len(names))), names, strict=True):
         for number, (label, course) in enumerate(courses.items()):
-            _band(axes, course["loads"], np.array(course[name], dtype=float), f"C{number}", label)
+            draw_band(axes, course["loads"], np.array(course[name], dtype=float), f"C{number}", label)
         axes.set(xscale="log", xlabel=r"$F_x/F_y$", ylabel=LABELS[name])
         seen = {load for course in courses.values() for load in course["loads"]}
         axes.set_xticks([load for load in TICKS if load in seen], [f"{load:g}" for load in TICKS if load in seen])
@@ -61,7 +61,7 @@ def over_load(courses: Mapping[str, Course], names: Sequence[str] = ("share", "g
     return figure
 
 
-def _band(axes: Axes, loads: Sequence[float], values: Any, colour: str, label: str) -> None:
+def draw_band(axes: Axes, loads: Sequence[float], values: Any, colour: str, label: str) -> None:
     shown = np.where(np.isfinite(values) & (values > 0), values, np.nan)
     axes.plot(loads, shown[:, 0], "o-", color=colour, label=label, markersize=3)
     axes.fill_between(loads, shown[:, 1], shown[:, 2], color=colour, alpha=0.2, linewidth=0)
@@ -118,36 +118,3 @@ class PlaneFilm(Film):
 
 def _title(load: Mapping[str, Any]) -> str:
     return f"$F_x/F_y$ = {load['fx_over_fy']:g}: {100 * load['share']:.0f} % complex"
-
-
-@styled
-def collapse(sizes: Mapping[int, Course], power: float, random: Mapping[int, Course]) -> Figure:
-    """Shares over the load times a power of the number of disks, and shares of random matrices over the measured ones.
-
-    Parameters
-    ----------
-    sizes : mapping
-        Number of disks -> course.
-    power : float
-        The load goes as N^power at a given share.
-    random : mapping
-        Number of disks -> loads, measured, random and formula, lists of [median, low, high].
-    """
-    figure = Figure((8.5, 3.6), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    for number, (disks, course) in enumerate(sizes.items()):
-        scaled = [load * (disks / 100) ** -power for load in course["loads"]]
-        _band(left, scaled, np.array(course["share"], dtype=float), f"C{number}", str(disks))
-    left.set(xscale="log", xlabel=rf"$F_x/F_y \;(N/100)^{{{-power:.2f}}}$", ylabel=LABELS["share"])
-    left.legend(title="disks")
-    for number, (disks, course) in enumerate(random.items()):
-        measured, drawn, formula = (np.array(course[name])[:, 0] for name in ("measured", "random", "formula"))
-        right.plot(measured, drawn, "o", color=f"C{number}", markersize=4, label=f"{disks}")
-        right.plot(measured, formula, "x", color=f"C{number}", markersize=4)
-    right.plot([0, 0.7], [0, 0.7], "-", color="0.6", linewidth=1, zorder=0)
-    right.set(xlabel="share, measured", ylabel="share, random matrices (o), formula (x)", xlim=(0, 0.7), ylim=(0, 0.7))
-    if random:
-        right.legend(title="disks")
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-    return figure

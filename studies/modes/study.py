@@ -16,8 +16,7 @@ from ..sweep.points import Sweep
 from ..sweep.table import Row, write_csv
 from ..sweep.tasks import TASKS
 from .draw import PlaneFilm, over_load, plane
-from .numbers import along
-from .tables import Table
+from .table import Table, along
 
 COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q", "pairs_error")
 

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import Growth, RunFile, Spectrum, discrete_frequency, fit_growth, spectrum
+from ...analysis import Growth, Packing, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
+from ...analysis.motion.growth import BELOW_TOP, growing_range
 from ...analysis.onset.pair_form import pair_eigenvalues
 from ...analysis.packing.packing import Floats
 from ...figures.pair import PairCurve
@@ -86,21 +87,23 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
             f"F_x = {fx:g} is below the onset {weakened[0].onset.fx_c:g} of the weakened friction, too: no "
             "window between the two, and nothing to erupt."
         )
-    if fx >= run.onset.fx_c:
-        return f"F_x = {fx:g} is above the onset {run.onset.fx_c:g}: nothing is stable there to be triggered."
     *_, start = reach(scene, fx)  # to the bit the one of `perturb`, and so is v_0
+    modes = spectrum(start.packing)
+    if not modes.is_stable:
+        what = f"{len(modes.pairs)} complex pairs and {len(modes.negative)} negative eigenvalues"
+        return f"At F_x = {fx:g} the packing has {what} already: nothing is stable there to be triggered."
     lower = max(0.0, 2 * weakened[0].onset.fx_c - fx) if weakened else None
     control = None if lower is None else equilibrium_at(scene, run.equilibria, lower)
     return trigger(scene, start, control, run, path)
 
 
-def recorded_ramp(scene: Scene, mu: float, path: Path) -> OnsetRun:
-    """Ramp and onset for one friction coefficient; every equilibrium goes to the file."""
+def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = None) -> OnsetRun:
+    """Ramp and onset for one friction coefficient, from a settled bed; every equilibrium goes to the file."""
     one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
-    near = NEARBY * needed(scene.ramp, "ramp").until
+    near = NEARBY * needed(scene.ramp, "ramp").first
     path.unlink(missing_ok=True)
     with Record(path, one) as record:
-        run = onset_run(one, mu, reached=record.append, near_onset=near)
+        run = onset_run(one, mu, reached=record.append, near_onset=near, bed=bed)
         record.finish()
     return run
 
@@ -111,15 +114,14 @@ def growth_run(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
     spectra = [spectrum(each.packing) for each in candidates]
     best = int(np.argmax([_dominance(each) for each in spectra]))
     start, modes = candidates[best], spectra[best]
-    if not modes.pairs:
+    if not _dominance(modes):
         first = run.onset.windows[0]
         raise SceneError(
             f"no load of the ramp lies in a window of complex eigenvalues, of which the first begins at "
             f"F_x = {first.fx_onset:.6g}: take a smaller ramp.step, so that a run above the onset has where to start"
         )
     dt = time_step(start.packing)
-    fastest = max(modes.pairs, key=lambda pair: pair.growth_rate)
-    predicted = float(2 * np.abs(discrete_frequency(fastest.eigenvalue, dt).imag))
+    predicted = modes.growth_rate(dt)
     settings = Perturb(fx=start.fx, time=min(EFOLDS / predicted, LONGEST_RUN * dt), inertia_factor=scene.inertia_factor)
     # disks that have moved by a tenth of the smallest overlap certainly move otherwise than the spectrum says
     ceiling = (0.1 * start.packing.loaded(start.residual).geometry.overlap.min()) ** 2
@@ -133,25 +135,16 @@ def growth_run(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
         file.append_series("undamped", **series)
     time, msd = series["time"], series["msd"]
     try:
-        measured = fit_growth(time, msd, *_growing(msd, ceiling))
+        measured = fit_growth(time, msd, *growing_range(time, msd, min(ceiling, BELOW_TOP * float(msd.max()))))
     except ValueError:
         measured = None
     return GrowthRun(start, time, msd, modes, dt, predicted, measured)
 
 
-def _growing(msd: Floats, ceiling: float) -> tuple[float, float]:
-    """Bounds of D between which one pair grows alone: above the noise of all modes, below where D levels off.
-
-    The noise is what D shows in the first quarter of its way to the ceiling; three decades above it, the fastest pair
-    has left the others behind. Three decades below its largest value D has not levelled off.
-    """
-    upper = min(ceiling, 1e-3 * float(msd.max()))
-    way = int(np.argmax(msd >= upper))
-    return 1e3 * float(np.median(msd[: max(way // 4, 1)])), upper
-
-
 def _dominance(modes: Spectrum) -> float:
-    """Growth rate of the fastest pair, less that of the second: how fast it gets ahead."""
+    """Growth rate of the fastest pair, less that of the second: how fast it gets ahead; 0 of a packing that buckles."""
+    if len(modes.negative):
+        return 0.0
     rates = sorted((pair.growth_rate for pair in modes.pairs), reverse=True)
     return rates[0] - (rates[1] if len(rates) > 1 else 0.0) if rates else 0.0
 
@@ -169,6 +162,7 @@ def summary_of(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> dict[st
                 "floor": run.equilibria[-1].floor,
                 "contacts": len(run.equilibria[0].packing.contacts),
                 "rattlers": run.equilibria[0].packing.rattlers.tolist(),
+                "solid_fraction": solid_fraction(run.equilibria[0].packing),
                 "flows_beyond": run.flows_beyond,
                 "onset": run.onset.as_dict(),
             }

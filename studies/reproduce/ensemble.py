@@ -88,6 +88,16 @@ def ensemble(
     return result
 
 
+VERDICTS = {
+    "grows": "D grows after its jump, at the rate of the spectrum",
+    "jump alone": "a jump, and no growth after it",
+    "unexplained": "D rises after its jump, and not at the rate of the spectrum",
+    "too short": "the layer exceeds v0 too late in the run to tell a jump from growth",
+    "does not weaken": "the layer does not exceed v0",
+}
+"""What the run with mu(v) of a packing shows, in words."""
+
+
 def summary(scene: Scene, rows: list[Row]) -> dict[str, Any]:
     """Numbers for ensemble.json, from the rows of the sweep."""
     count = len(frictions(scene))
@@ -114,6 +124,7 @@ def summary(scene: Scene, rows: list[Row]) -> dict[str, Any]:
         "control_rise_quartiles": np.quantile(controls, QUARTILES).tolist() if controls else None,
         "unstable_when_weakened": share(sum(each["rate"] > 0 for each in eruptions), len(eruptions)),
         "grows": share(sum(map(grows, eruptions)), len(eruptions)),
+        "perturbation_shows": share(sum(each["perturbation_shows"] for each in eruptions), len(eruptions)),
     }
 
 
@@ -141,8 +152,9 @@ def sentence(row: Row) -> str:
     found = row["result"].get("eruption")
     if found:
         parts.append(
-            f"D rises {rise(found):.1f} decades at {found['fx']:.6g} (control: {rise(found, 'control'):.1f}) and "
-            f"{'grows' if grows(found) else 'does not grow'} after its jump"
+            f"D rises {rise(found):.1f} decades at {found['fx']:.6g} (control: {rise(found, 'control'):.1f}): "
+            f"{VERDICTS[found['verdict']]}"
+            + ("" if found["perturbation_shows"] else ", and the perturbation drowns in rounding")
         )
     if row["says"] is not None:
         parts.append(f"failed: {row['says']}")

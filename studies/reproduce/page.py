@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis import Onset
+from ...analysis.packing.solid_fraction import solid_fraction, solid_fraction_below_top
 from ...figures.pages import render
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
@@ -28,17 +30,19 @@ def report(
     `found` is a sentence where there is nothing to trigger, and None if no scene asks for it; `another` has the ramps
     of the packing that is triggered, if it is another one.
     """
+    settled = runs[0].equilibria[0].packing
     order = sorted(runs, key=lambda run: run.mu)
     triggering = found if isinstance(found, Triggering) else None
     return render(
         __package__ or "",
         "report.md.j2",
-        packing=runs[0].equilibria[0].packing,
+        packing=settled,
+        solid_fraction=(solid_fraction(settled), solid_fraction_below_top(settled)),
         ramp=scene.ramp,
         runs=runs,
         last=runs[0].equilibria[-1],
         residual=max(each.residual for run in runs for each in run.equilibria),
-        mus_rise=all(a.onset.fx_c < b.onset.fx_c for a, b in pairwise(order)),
+        earlier=[_is_earlier(a.onset, b.onset) for a, b in pairwise(order)],
         growth=growth,
         triggering=triggering,
         says=found,
@@ -49,14 +53,21 @@ def report(
     )
 
 
+def _is_earlier(one: Onset, other: Onset) -> bool | None:
+    """Whether an onset comes before another one; None where their errors do not tell."""
+    apart = other.fx_c - one.fx_c
+    return None if abs(apart) <= one.error + other.error else apart > 0
+
+
 def _triggered(found: Triggering) -> dict[str, Any]:
     """What the section on triggering needs beside the runs."""
     numbers = summary(found)
+    jump = numbers["jump"]
     return {
         "numbers": numbers,
         "calibrated": isinstance(needed(found.scene.friction, "friction").v0, str),
         "highest_speed": float(np.abs(found.runs["erupting"]["layer_velocity"]).max()),
-        "jumped": float(np.log10(numbers["jump"] / numbers["largest_D"]["perturbed"])),
+        "jumped": None if jump is None else float(np.log10(jump / numbers["largest_D"]["perturbed"])),
         "above_noise": ABOVE_NOISE,
     }
 

@@ -9,6 +9,7 @@ from ...analysis.digits import with_uncertainty
 from ...analysis.files.wholefile import make_folder, write_json, write_text
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
+from ...pywrap.settling.bed import settled_bed
 from ..frame import draw_all
 from ..hands import Say
 from ..triggering.compute import summary as triggering_summary
@@ -70,10 +71,14 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
 
 def _ramps(scene: Scene, path: Path, say: Say) -> list[OnsetRun]:
     """Ramp and onset for each friction coefficient, the first in the file of that name, the others beside it."""
-    runs = []
+    # a packing that settles with friction is another one for each coefficient
+    shared = not getattr(scene.packing, "settle_friction", False)
+    if shared:
+        say("settling")
+    bed, runs = settled_bed(scene) if shared else None, []
     for number, mu in enumerate(scene.law.mus):
-        say(f"mu = {mu:g}: settling, ramp and onset")
+        say(f"mu = {mu:g}: {'' if shared else 'settling, '}ramp and onset")
         here = path if number == 0 else path.with_stem(f"{path.stem}-mu{mu:g}")
-        runs.append(recorded_ramp(scene, mu, here))
+        runs.append(recorded_ramp(scene, mu, here, bed))
         say(f"mu = {mu:g}: F_x^c = {with_uncertainty(runs[-1].onset.fx_c, runs[-1].onset.error)}")
     return runs

@@ -85,7 +85,7 @@ def run_sweep(
             missing = [point for point in points if point.key not in known]
             if len(missing) < len(points):
                 say(f"{len(points) - len(missing)} of {len(points)} points are in {output / LINES} already")
-            with closing(computed(pool, sweep.task, missing)) as ended:
+            with closing(computed(pool, sweep.located_task, missing)) as ended:
                 for row in progress(rows.kept(output / LINES, ended), len(missing)):
                     known[row["key"]] = row
             table = [known[point.key] for point in points]
@@ -130,7 +130,8 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> list[Row]:
         each.pop("shard", None)
         if each != asked[0]:
             raise SceneError(f"{part} is of another sweep than {parts[0]}: merge parts of one sweep")
-    sweep = Sweep.from_mapping(asked[0], TASKS, name=str(parts[0] / ASKED))
+    code = asked[0].pop("code", "")
+    sweep = Sweep.from_mapping(asked[0], TASKS, name=str(parts[0] / ASKED), code=code)
     known: dict[str, Row] = {}
     for part in parts:
         known |= stored(part / LINES)

@@ -24,9 +24,9 @@ Reach = tuple[float, bool]
 
 
 def draw_sweep(rows: Sequence[Row], folder: Path, say: Callable[[str], None]) -> str:
-    """Save results.png and results.svg, and return words for that; none where there is no picture."""
+    """Save results.png and results.svg, and return words for that; none where rows have no onsets and no runs."""
     reaches = [(row, reach) for row in rows if (reach := reach_of(row)) is not None]
-    runs = [(row, run) for row in rows for run in row["result"].get("runs", [])]
+    runs = [(row, run) for row in rows for run in _dicts(row["result"].get("runs")) if {"fx", "msd"} <= run.keys()]
     if not reaches and not runs:
         return ""
     with spared(f"{folder}/results.png", say):
@@ -38,9 +38,14 @@ def draw_sweep(rows: Sequence[Row], folder: Path, say: Callable[[str], None]) ->
 def reach_of(row: Row) -> Reach | None:
     """How far the (first) ramp of a row went without a window; None if the row has no ramp."""
     result = row["result"]
-    end = next(iter(result.get("ramps", [])), result)
+    end = next(iter(_dicts(result.get("ramps"))), result)
     reach = end.get("reach", end.get("fx_c"))
-    return None if reach is None else (float(reach), end["ends"] == "onset")
+    return (float(reach), end["ends"] == "onset") if isinstance(reach, float) and "ends" in end else None
+
+
+def _dicts(value: Any) -> list[dict[str, Any]]:
+    """The dicts of a list; rows of a user's function may have anything under any name."""
+    return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
 
 
 def draw_pairs(axes: Axes, packings: Iterable[tuple[Row, Row, bool]], **style: Any) -> None:

@@ -12,24 +12,25 @@ in all, and *ancestors* are the two modes of the packing at F_x = 0, by number, 
 with their share of it in *ancestry*. At F_x = 0 K does not depend on mu where slips are zero: two onsets of one packing
 at different mu are of one pair if their ancestors are the same.
 
-**The error** is that of :func:`~faultgouge.analysis.find_onset`: of the solution for the edge and of the equilibria's
-residual. How F_x^c depends on the increments of the ramp is not in it.
+**The error** is the whole one, as that of `faultgouge onset`, and F_x^c is the same: the path is solved again with
+other increments (:mod:`~faultgouge.pywrap.onset.path_error`). *error_of_path* is what these do. It is None where no
+equilibrium is found at the onset a second time, and the error then is that of rounding alone.
 """
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
 from scipy.linalg import eigh, eigvals
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
-from ...analysis.onset import force_bearing, full_operator, seeks_all
+from ...analysis.onset import force_bearing, full_operator, takes_all_modes
 from ...analysis.packing.packing import Floats, Indices
 from ...analysis.spectrum.eigenpairs import eigenpairs
 from ...analysis.spectrum.spectrum import active_coordinates
 from ...pywrap import Scene, SceneError
+from ...pywrap.onset.path_error import with_path_error
 from ...pywrap.runs.path import EquilibriumPath, loads
 from ...pywrap.scenes.refusals import needed
 from ..packings import Start, pairs, path_from, sliding
@@ -60,31 +61,23 @@ def onset(scene: Scene, start: Start) -> dict[str, Any]:
         row: dict[str, Any] = {"ends": ends, "fx_c": None, "reach": reach}
         row |= {"contacts": len(rest.packing.contacts), "rattlers": len(rest.packing.rattlers)}
         if found is not None:
-            window = found.windows[0]
-            row |= {"fx_c": window.fx_onset, "error": window.error, "kind": window.kind, "lambda": window.eigenvalue}
+            seen, window = found.windows[0], with_path_error(found, path).windows[0]
+            row |= {"fx_c": window.fx_onset, "error": window.error, "error_of_path": window.path_error}
+            row |= {"kind": window.kind, "lambda": window.eigenvalue}
             row |= {"fx_end": window.fx_end, "overlap": window.overlap, "doubtful": len(found.doubtful)}
-            row |= pair(path(window.fx_onset * (1 - BESIDE)), rest.packing, window.eigenvalue)
+            row |= pair(path(seen.fx_onset * (1 - BESIDE)), rest.packing, window.eigenvalue)
     return row
 
 
 def first_window(path: EquilibriumPath, scene: Scene) -> tuple[Ends, float, Onset | None]:
     """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one."""
-    assert scene.ramp is not None
-    steps = loads(scene.ramp)
-    narrowest = 1e-7 * scene.ramp.until  # as find_onset takes it on the whole ramp
-    # increment by increment where a search looks at the whole of what it is given
-    parts = list(pairwise(steps)) if seeks_all(path.kept[0].packing) else [steps]
-    for part in parts:
-        try:
-            for fx in part if len(part) == 2 else ():
-                path(float(fx))
-            found = find_onset(path, part, narrowest=narrowest)
-        except NoEquilibriumError:
-            return "flows", path.kept[-1].fx, None
-        except OnsetError:
-            continue
-        return "onset", found.fx_c, found
-    return "until", path.kept[-1].fx, None
+    try:
+        found = find_onset(path, loads(needed(scene.ramp, "ramp")), first=True)
+    except NoEquilibriumError:
+        return "flows", path.kept[-1].fx, None
+    except OnsetError:
+        return "until", path.kept[-1].fx, None
+    return "onset", found.fx_c, found
 
 
 def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
@@ -106,7 +99,7 @@ def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
         "opened": len(before - now),
         "closed": len(now - before),
     }
-    if seeks_all(packing):
+    if takes_all_modes(packing):
         row |= _among_all(packing, rest, eigenvalue, near.right.real)
     return row
 

@@ -1,6 +1,6 @@
 """A sweep: one scene with lists of values for some of its keys, in TOML.
 
-    task = "onset"
+    task = "onset"                                 # or "file.py:function", see user_function
     [sweep]
     "packing.seed" = "1:200"                       # 1, 2, ..., 200
     "law.mu" = [1.0, 0.8]
@@ -28,6 +28,7 @@ from typing import Any
 
 from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.refusals import read_toml
+from .user_function import is_user_function, locate, user_function
 
 MOST_POINTS = 1_000_000
 """Points of a sweep at the most: more is a slip of the pen."""
@@ -78,16 +79,22 @@ class Sweep:
     Attributes
     ----------
     task : str
-        Name of a task.
+        Name of a task, or "file.py:function" as it was given.
     axes : dict
         Values by swept key; several keys that vary together are one, separated by commas.
     scene : dict
         What all scenes share, sections by name.
+    code : str
+        Of a function of the user's, sixteen hexadecimal digits that stand for its code; else empty.
+    folder : Path
+        From which the file of such a function counts.
     """
 
     task: str
     axes: dict[str, list[Any]]
     scene: dict[str, Any]
+    code: str = ""
+    folder: Path = Path()
 
     @classmethod
     def from_toml(cls, path: str | Path, tasks: Mapping[str, object]) -> Sweep:
@@ -97,18 +104,29 @@ class Sweep:
 
     @classmethod
     def from_mapping(
-        cls, mapping: Mapping[str, Any], tasks: Mapping[str, object], folder: Path = Path(), name: str = "sweep"
+        cls,
+        mapping: Mapping[str, Any],
+        tasks: Mapping[str, object],
+        folder: Path = Path(),
+        name: str = "sweep",
+        code: str = "",
     ) -> Sweep:
         """Make a sweep from what a TOML file would hold; SceneError if it describes none.
 
-        A relative packing.file counts from `folder`.
+        A relative packing.file, and the file of a function, count from `folder`. A function whose `code` is given is
+        not looked for.
         """
         unknown = sorted(mapping.keys() - {"task", "sweep", "scene"})
         if unknown:
             raise SceneError(f"{name}: {unknown[0]} is no key of a sweep: it has task, [sweep] and [scene.SECTION].")
         task = mapping.get("task")
-        if task not in tasks:
-            raise SceneError(f"{name}: task = {task!r} is refused: give one of {', '.join(sorted(tasks))}.")
+        if isinstance(task, str) and is_user_function(task):
+            code = code or user_function(locate(task, folder)).code
+        elif task not in tasks:
+            raise SceneError(
+                f"{name}: task = {task!r} is refused: give one of {', '.join(sorted(tasks))}, or a function of "
+                'yours as "file.py:function".'
+            )
         for section in ("sweep", "scene"):
             if not isinstance(mapping.get(section, {}), Mapping):
                 raise SceneError(f"{name}: {section} is not a section: write [{section}] and its keys below.")
@@ -119,11 +137,16 @@ class Sweep:
         scene = {part: _absolute(part, values, folder) for part, values in mapping.get("scene", {}).items()}
         for key in axes.keys() & {"packing.file"}:
             axes[key] = [str((folder / str(each)).resolve()) for each in axes[key]]
-        sweep = cls(str(task), axes, scene)
+        sweep = cls(str(task), axes, scene, code, folder)
         says = [point.says for point in sweep.points]
         if all(each is not None for each in says):  # what is wrong with every scene is refused before any work is done
             raise SceneError(f"{name}: no point of the sweep is a scene that can be run: {says[0]}")
         return sweep
+
+    @property
+    def located_task(self) -> str:
+        """The task, with the path of its file from the root if it is a function of a file."""
+        return locate(self.task, self.folder) if self.code else self.task
 
     @property
     def names(self) -> list[str]:
@@ -147,12 +170,17 @@ class Sweep:
         try:
             scene = Scene.from_mapping(mapping)
         except SceneError as error:
-            return Point(number, values, None, str(error).removeprefix("scene: "), digest([self.task, mapping]))
-        return Point(number, values, scene, None, digest([self.task, scene.resolved()]))
+            return Point(number, values, None, str(error).removeprefix("scene: "), digest([self._known_as, mapping]))
+        return Point(number, values, scene, None, digest([self._known_as, scene.resolved()]))
+
+    @property
+    def _known_as(self) -> str:
+        """What stands for the task in the keys of rows: of a function its name and its code, wherever its file is."""
+        return f"{self.task.rpartition(':')[2]} {self.code}" if self.code else self.task
 
     def as_dict(self) -> dict[str, Any]:
         """The sweep as JSON holds it."""
-        return {"task": self.task, "sweep": self.axes, "scene": self.scene}
+        return {"task": self.task, "sweep": self.axes, "scene": self.scene} | ({"code": self.code} if self.code else {})
 
 
 def shard(points: tuple[Point, ...], part: tuple[int, int]) -> tuple[Point, ...]:

@@ -2,31 +2,29 @@
 
 A task takes the scene and a function that gives its settled packing for a friction coefficient, and returns one row:
 numbers, words, lists and dicts of these. A task that settles by itself leaves the function alone. What one task costs
-is a power of the number of disks, measured, for `sweep --dry-run`.
+is a power of the number of disks, measured, for `sweep --dry-run`. A task may be a function of the user's, too
+(:mod:`.user_function`); what that costs is told by the rows that are there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import median
 from typing import Any
 
 from ...pywrap import Scene
 from ...pywrap.scenes.study_sections import Modes
 from ..eruptions.study import eruptions_of
-from ..genericity.levels import growth, levels
-from ..genericity.surrogates import surrogates
 from ..modes.compute import modes
-from ..modes.loss import loss
-from ..modes.lossy_runs import lossy_runs
-from ..modes.random_matrices import random_matrices
 from ..packings import Start
 from ..trigger.compute import settings
 from ..trigger.study import trigger
-from ..yielding.compute import yielding
 from .onset import onset
 from .points import Point
+from .table import Row
 from .triggering import triggering
+from .user_function import UserFunction, is_user_function, user_function
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ def _disks(scene: Scene) -> float:
 
 
 def _increments(scene: Scene) -> float:
-    return 1.0 if scene.ramp is None else scene.ramp.until / scene.ramp.step
+    return 1.0 if scene.ramp is None else abs(scene.ramp.first) / scene.ramp.step
 
 
 def _onset(scene: Scene) -> float:
@@ -82,46 +80,57 @@ def _modes(scene: Scene) -> float:
     return 0.02 * _loads(scene) * _disks(scene) ** 2.7 + 3e-3 * _increments(scene) * _disks(scene)
 
 
-def _loss(scene: Scene) -> float:
-    """Pencils along a ramp: 8 s for 100 disks and 5 loads."""
-    return 1.6 * _loads(scene) * _disks(scene) ** 2.3
-
-
 TASKS: Mapping[str, Task] = {
     "onset": Task(onset, _onset),
     "triggering": Task(triggering, _triggering),
     "trigger": Task(trigger, _trigger),
     "eruptions": Task(eruptions_of, _eruptions),
     "modes": Task(modes, _modes),
-    "loss": Task(loss, _loss),
-    "lossy runs": Task(lossy_runs, _loss),
-    "random matrices": Task(random_matrices, lambda scene: 3 * _modes(scene)),
-    # the path to static yield, fifteen runs from equilibria and four with a load that rises
-    "yield": Task(yielding, lambda scene: 60.0 * _disks(scene)),
-    # dense decompositions
-    "levels": Task(levels, lambda scene: 0.1 * _disks(scene) ** 3),
-    "growth": Task(growth, lambda scene: 0.1 * _increments(scene) * _disks(scene) ** 3),
-    "surrogates": Task(surrogates, lambda scene: 3 * _onset(scene)),
 }
 
 
-def estimate(task: str, points: Sequence[Point]) -> list[str]:
-    """The cost of points that are not known yet, in plain words: CPU time of the task, and of settling packings."""
+def task_of(name: str) -> Task | UserFunction:
+    """A task by its name, or the function of the user's that has this located name."""
+    return user_function(name) if is_user_function(name) else TASKS[name]
+
+
+def estimate(task: str, points: Sequence[Point], known: Iterable[Row] = ()) -> list[str]:
+    """The cost of points that are not known yet, in plain words: CPU time of the task, and of settling packings.
+
+    Of a function of the user's, the known rows tell it.
+    """
     scenes = [point.scene for point in points if point.scene is not None]
-    seconds = [TASKS[task].seconds(scene) for scene in scenes]
     settlings = {point.settling: point.scene for point in points if point.scene is not None}
-    settling = sum(0.3 * _disks(scene) ** 1.3 for scene in settlings.values())  # 0.3 s for 100 disks
     refused = len(points) - len(scenes)
     return [
         f"{len(scenes)} scenes to compute, {len(settlings)} packings to settle",
         *([f"{refused} points make no scene, and will say why"] if refused else []),
+        _expected_of_rows([row["cpu_seconds"] for row in known if row["says"] is None], len(scenes))
+        if is_user_function(task)
+        else _expected(TASKS[task], scenes, settlings.values()),
+    ]
+
+
+def _expected(task: Task, scenes: Sequence[Scene], settled: Iterable[Scene]) -> str:
+    seconds = [task.seconds(scene) for scene in scenes]
+    settling = sum(0.3 * _disks(scene) ** 1.3 for scene in settled)  # 0.3 s for 100 disks
+    return (
         f"about {_span(sum(seconds) + settling)} of one core, {_span(settling)} of it for settling; the longest scene "
         f"takes about {_span(max(seconds, default=0.0))} (from 100 disks and measured exponents: right within a factor "
-        "of three)",
-    ]
+        "of three)"
+    )
+
+
+def _expected_of_rows(seconds: Sequence[float], missing: int) -> str:
+    if not seconds:
+        return "how long a scene takes is not known before the first of them: begin, and ask again"
+    return (
+        f"about {_span(median(seconds) * missing)} of one core, if a scene takes {_span(median(seconds))} as in the "
+        f"{len(seconds)} rows that are there"
+    )
 
 
 def _span(seconds: float) -> str:
     if seconds < 120:
-        return f"{seconds:.0f} s"
+        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

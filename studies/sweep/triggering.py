@@ -19,13 +19,12 @@ the length of the run; so the rate is kept beside all this.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
-from ...analysis import FaultgougeError, Packing, spectrum
+from ...analysis import FaultgougeError
 from ...pywrap import Engine, Equilibrium, Scene
 from ...pywrap.lammps.dynamics import Weakening
 from ...pywrap.onset.path_error import with_path_error
@@ -35,13 +34,23 @@ from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction, Perturb
 from ..packings import Start
 from ..statistics import lowers
-from ..triggering.compute import GROWTH_FACTOR, Series, calibrated, equilibrium_at, jump, largest, series_of
+from ..triggering.compute import (
+    Series,
+    calibrated,
+    differs,
+    equilibrium_at,
+    foresee,
+    judge,
+    largest,
+    series_of,
+    weakened_rate,
+)
 from .onset import first_window
 
 Row = dict[str, Any]
 
-FINEST_STEP = 1e-3
-"""Increment of F_x below which a ramp only costs: onsets are solved for, and come out the same."""
+FINEST_STEP = 1 / 3000
+"""Increment of F_x, in units of F_y, below which a ramp only costs: onsets are solved for, and come out the same."""
 
 LONGEST_TIME = 200.0
 """Length of the undamped runs, time, at the most: with 100 disks, four of them take some 30 s."""
@@ -53,8 +62,8 @@ def rise(eruption: Row, of: str = "weakening") -> float:
 
 
 def grows(eruption: Row) -> bool:
-    """Whether D goes on to grow after the jump."""
-    return bool(eruption["weakening"] >= GROWTH_FACTOR * eruption["jump"])
+    """Whether D goes on to grow after the jump, at the rate of the spectrum with the weakened friction."""
+    return bool(eruption["verdict"] == "grows")
 
 
 def triggering(scene: Scene, start: Start) -> Row:
@@ -131,7 +140,7 @@ def economical(scene: Scene) -> Scene:
     """The scene with increments and undamped runs that take seconds a packing, see `FINEST_STEP` and `LONGEST_TIME`."""
     changes: dict[str, Any] = {}
     if scene.ramp is not None:
-        step = min(max(scene.ramp.step, FINEST_STEP), scene.ramp.until)
+        step = min(max(scene.ramp.step, FINEST_STEP * scene.load.fy), scene.ramp.first)
         changes["ramp"] = scene.ramp.model_copy(update={"step": step})
     if scene.perturb is not None:
         changes["perturb"] = scene.perturb.model_copy(update={"time": min(scene.perturb.time, LONGEST_TIME)})
@@ -153,7 +162,10 @@ def eruption(
         fx, fx_control : the middle of the window, and the control below it, force per disk of the upper layer; rate :
         growth rate of D with the weakened friction at fx, from the spectrum, 1 / time, 0 if it is stable; unperturbed,
         perturbed, weakening, control : largest D, length^2, of the three runs at fx, and with mu(v) at fx_control;
-        jump : largest D of the run with mu(v) in its first part, `JUMP_SHARE`.
+        verdict, weakens_at, jump : whether D grows after its jump, when friction weakens, and the largest D shortly
+        after that (`Outcome` of :mod:`~faultgouge.studies.triggering.compute`); fitted_rate : of D after the jump, or
+        None; foreseen_jump : by linear theory, length^2; perturbation_shows : whether the perturbed run differs from
+        the unperturbed one.
     """
     middle = 0.5 * (window[0] + window[1])
     loads = middle, max(0.0, 2 * window[0] - middle)
@@ -166,23 +178,21 @@ def eruption(
 
     quiet = run(start, 0.0)
     weakening = calibrated(friction, quiet)
-    weakened = run(start, settings.amplitude, weakening)
+    perturbed, weakened = run(start, settings.amplitude), run(start, settings.amplitude, weakening)
+    foreseen = foresee(start, friction.mu_ss * start.packing.law.mu, weakened, weakening.v0)
+    outcome = judge(weakened, weakening.v0, foreseen)
     return {
         "fx": start.fx,
         "fx_control": below.fx,
         "rate": weakened_rate(start.packing, friction.mu_ss),
         "unperturbed": largest(quiet),
-        "perturbed": largest(run(start, settings.amplitude)),
+        "perturbed": largest(perturbed),
         "weakening": largest(weakened),
         "control": largest(run(below, settings.amplitude, weakening)),
-        "jump": jump(weakened),
+        "verdict": outcome.verdict,
+        "weakens_at": outcome.crossing,
+        "jump": outcome.jump,
+        "fitted_rate": None if outcome.fitted is None else outcome.fitted.rate,
+        "foreseen_jump": foreseen.jump,
+        "perturbation_shows": differs(perturbed, quiet),
     }
-
-
-def weakened_rate(packing: Packing, mu_ss: float) -> float:
-    """Fastest growth rate of D with friction mu mu_ss in the same configuration, 1 / time; 0 if it is stable."""
-    law = replace(packing.law, mu=mu_ss * packing.law.mu)
-    limit = law.slip_limit(packing.geometry.overlap)
-    slip = np.clip(packing.contacts.slip, -limit, limit)
-    modes = spectrum(replace(packing, law=law, contacts=replace(packing.contacts, slip=slip)))
-    return max((pair.growth_rate for pair in modes.pairs), default=0.0)

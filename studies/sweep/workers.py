@@ -27,7 +27,8 @@ from ..hands import Processes
 from ..packings import Start
 from .points import Point
 from .table import Row
-from .tasks import TASKS
+from .tasks import task_of
+from .user_function import UserFunctionError
 
 TRIES = 3
 """Deaths of workers, without a point that ends in between, after which a point and not an accident is to blame."""
@@ -125,8 +126,10 @@ def examined(task: str, point: Point, bed: Packing | None, keep: bool) -> tuple[
     if point.scene is not None:
         with threadpool_limits(1):
             try:
-                row["result"] = TASKS[task].run(point.scene, _starter(point.scene, beds))
+                row["result"] = task_of(task).run(point.scene, _starter(point.scene, beds))
                 row["says"] = row["result"].pop("says", None)
+            except UserFunctionError as error:
+                row["says"] = f"scene {point.number}: {error}"
             except FAILURES as error:
                 row["says"] = str(error) or type(error).__name__
     row["seconds"] = round(time.perf_counter() - begin[0], 3)

@@ -35,6 +35,7 @@ from ...pywrap.runs.undamped import time_step
 from ...pywrap.scenes.study_sections import Trigger
 from ...pywrap.scenes.units import RealUnits
 from ...pywrap.settling.bed import settle
+from ..eruptions.compute import growth_rate
 from ..packings import path_from
 
 Row = dict[str, Any]
@@ -117,6 +118,11 @@ def frequencies(packing: Packing, wanted: Trigger) -> Floats:
 def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats) -> list[Row]:
     """a_c at one distance from K, C and M.
 
+    Raises
+    ------
+    SceneError
+        If the packing is unstable there.
+
     Returns
     -------
     list of dict
@@ -124,6 +130,11 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
         acceleration of the floor; stationary : what it were, v_0/abs(H(omega)), without a transient; reached : when the
         layer is fastest, time.
     """
+    if growth_rate(packing) > 0:
+        raise SceneError(
+            f"at F_x = {packing.fx:.10g}, below the onset, the packing is unstable already (by another window, or a "
+            "negative eigenvalue): nothing is at rest there to be triggered; take other distances or another seed"
+        )
     wanted, v0 = settings(scene), threshold(scene)
     force = layer_force(packing, 1.0) if wanted.on == "layer" else floor_force(packing)
     response = impulse_response(packing, force)

@@ -8,7 +8,12 @@ that is fast enough to weaken the friction, mu(v), of all contacts.
 A rise of D alone is no instability. As soon as mu(v) has fallen, every contact that carries tangential load carries
 less of it, and the equilibrium is elsewhere: D *jumps* to the square of that distance, in a packing that is stable with
 the weakened friction as well. A control run says how far: mu(v) at a force as far below the onset of the weakened
-friction as the run is above it. What tells an instability from the jump is that D *grows* on after it.
+friction as the run is above it. The jump counts from the moment at which the layer exceeds v_0: before, nothing has
+weakened. What tells an instability from the jump is that D *grows* on after it, beyond the jump that linear theory
+foresees, at a fitted rate that agrees with that of the spectrum with the weakened friction (:func:`judge`).
+
+A perturbation that drowns in the rounding noise triggers nothing: the layer then exceeds v_0 by chance, or because v_0
+is that noise.
 
 Closer and closer to the onset, the response of the pair that is about to coalesce grows as
 :math:`\epsilon^{-1/2}`, and damping cuts it off where its time tau falls below :math:`\tau_d`.
@@ -17,14 +22,14 @@ Closer and closer to the onset, the response of the pair that is about to coales
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from mpi4py import MPI
 
-from ...analysis import RunFile, fit_growth
+from ...analysis import Growth, Packing, RunFile, fit_growth, spectrum
 from ...analysis.motion.power_law import PowerLaw, fit_power_law
 from ...analysis.motion.response import Response, layer_force, linear_response
 from ...analysis.onset.pair_form import PairForm, pair_forms
@@ -52,8 +57,13 @@ SENSITIVE = 1e-2
 longer the whole of it."""
 
 GROWTH_FACTOR = 2.0
-"""Factor from the jump to the largest D from which on D has grown. Without an instability, the phases in which many
-modes happen to meet change the maximum by some ten percent."""
+"""Factor between two largest D from which on they differ. Without an instability, the phases in which many modes happen
+to meet change the maximum by some ten percent."""
+
+AGREES = 0.25
+"""Largest relative difference between the fitted rate and that of the spectrum of an instability, beside three standard
+errors. The spectrum is that of the start; after the jump the disks lie elsewhere, and the rate of a pair near its onset
+changes by some ten percent."""
 
 ABOVE_NOISE = 1e3
 """How much stronger the perturbation is that is compared with the linear response: a million times in D."""
@@ -85,7 +95,11 @@ class Triggering:
     response : Response
         Of the linearised packing to that perturbation, time step included.
     foreseen : Forecast
-        Of the run with mu(v), by linear theory.
+        Of the run with mu(v) after friction has weakened, by linear theory.
+    outcome : Outcome
+        What the run with mu(v) shows.
+    control_rate : float or None
+        Growth rate of D with the weakened friction where the control starts, from the spectrum; 0 if it is stable.
     sensitive : Sensitivity
         The response on the way to the onset.
     """
@@ -96,14 +110,9 @@ class Triggering:
     runs: dict[str, Series]
     response: Response
     foreseen: Forecast
+    outcome: Outcome
+    control_rate: float | None
     sensitive: Sensitivity
-
-    @property
-    def crossing(self) -> float | None:
-        """The time at which the layer of the run with mu(v) first exceeds v_0, or None."""
-        run = self.runs["erupting"]
-        faster = np.abs(run["layer_velocity"]) > self.weakening.v0
-        return float(run["time"][np.argmax(faster)]) if faster.any() else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,11 +143,28 @@ class Sensitivity:
         """The pairs of which damping may take half of the response."""
         return tuple(pair for pair in self.pairs if pair.amplitude() >= LEAST_CROSSOVER)
 
+    @property
+    def plateaus(self) -> dict[str, float] | None:
+        """Ratio of the undamped amplitudes of the nearest and the furthest pair of `near`, and of their epsilon^(-1/2).
+
+        None if there are no two.
+        """
+        if len(self.near) < 2:
+            return None
+        near, far = sorted((self.near[0], self.near[-1]), key=lambda pair: pair.form.epsilon)
+        theory = float(np.sqrt(far.form.epsilon / near.form.epsilon))
+        return {"measured": near.amplitude() / far.amplitude(), "theory": theory}
+
 
 def series_of(samples: Iterable[Sample]) -> Series:
     """What a run yields, as arrays of shape (T,)."""
     rows = [vars(sample) for sample in samples]
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def differs(run: Series, other: Series) -> bool:
+    """Whether the largest D of a run stands out of that of another one."""
+    return largest(run) >= GROWTH_FACTOR * largest(other)
 
 
 def largest(run: Series) -> float:
@@ -152,9 +178,82 @@ def calibrated(friction: Friction, unperturbed: Series) -> Weakening:
     return weakening_of(friction, float(v0))
 
 
-def jump(run: Series) -> float:
-    """The largest D in the first `JUMP_SHARE` of a run, length^2."""
-    return float(run["msd"][run["time"] <= JUMP_SHARE * run["time"][-1]].max())
+def crossing(run: Series, v0: float) -> float | None:
+    """The time at which the layer of a run first exceeds v_0, or None."""
+    faster = np.abs(run["layer_velocity"]) > v0
+    return float(run["time"][np.argmax(faster)]) if faster.any() else None
+
+
+Verdict = Literal["does not weaken", "too short", "jump alone", "grows", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run with mu(v) shows.
+
+    Attributes
+    ----------
+    verdict : str
+        "does not weaken" : the layer never exceeds v_0. "too short" : the run ends before the jump is over. "jump
+        alone" : D stays within `GROWTH_FACTOR` of the larger of the jump and the one foreseen. "grows" : it goes
+        beyond both, at a rate that agrees with the spectrum's. "unexplained" : it goes beyond both, at no such rate.
+    crossing : float or None
+        When the layer first exceeds v_0, time.
+    jump : float or None
+        Largest D within the `JUMP_SHARE` of the run that follows, length^2.
+    growth : float or None
+        Decades from the jump to the largest D afterwards.
+    fitted : Growth or None
+        Of D from ten times the jump to a tenth of its largest value, where there is a decade between.
+    """
+
+    verdict: Verdict
+    crossing: float | None = None
+    jump: float | None = None
+    growth: float | None = None
+    fitted: Growth | None = None
+
+
+def judge(run: Series, v0: float, foreseen: Forecast) -> Outcome:
+    """Whether a run with mu(v) shows an instability, or the jump of the equilibrium alone.
+
+    Parameters
+    ----------
+    run : dict of ndarray
+        The run.
+    v0 : float
+        Velocity of the layer above which friction weakens, length / time.
+    foreseen : Forecast
+        Of linear theory with the weakened friction.
+    """
+    when = crossing(run, v0)
+    if when is None:
+        return Outcome("does not weaken")
+    time, msd = run["time"], run["msd"]
+    over = when + JUMP_SHARE * time[-1]
+    if over >= time[-1]:
+        return Outcome("too short", when)
+    jump = float(msd[(time >= when) & (time <= over)].max())
+    later = time >= when
+    top = float(msd[later].max())
+    try:
+        fitted = fit_growth(time[later], msd[later], 10 * jump, 0.1 * top)
+    except ValueError:
+        fitted = None
+    verdict: Verdict = "unexplained"
+    if top < GROWTH_FACTOR * max(jump, foreseen.jump):
+        verdict = "jump alone"
+    elif fitted is not None and foreseen.rate > 0:
+        off = abs(fitted.rate - foreseen.rate)
+        verdict = "grows" if off <= max(AGREES * foreseen.rate, 3 * fitted.error) else "unexplained"
+    return Outcome(verdict, when, jump, float(np.log10(top / jump)), fitted)
+
+
+def foresee(start: Equilibrium, mu: float, run: Series, v0: float) -> Forecast:
+    """The forecast for what is left of a run once the layer has exceeded v_0; of the whole run if it never does."""
+    length = float(run["time"][-1])
+    left = length - (crossing(run, v0) or 0.0)
+    return forecast(start, mu, max(left, JUMP_SHARE * length), JUMP_SHARE * length)
 
 
 def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: OnsetRun, path: Path) -> Triggering:
@@ -205,8 +304,18 @@ def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: O
         omega=settings.omega or 0.0,
         dt=time_step(packing, settings.time_step),
     )
-    foreseen = forecast(start, packing.law.mu * friction.mu_ss, settings.time)
-    return Triggering(scene, start, weakening, runs, response, foreseen, sensitivity(ramp))
+    foreseen = foresee(start, packing.law.mu * friction.mu_ss, runs["erupting"], weakening.v0)
+    outcome = judge(runs["erupting"], weakening.v0, foreseen)
+    steady = None if below is None else weakened_rate(below.packing, friction.mu_ss)
+    return Triggering(scene, start, weakening, runs, response, foreseen, outcome, steady, sensitivity(ramp))
+
+
+def weakened_rate(packing: Packing, mu_ss: float) -> float:
+    """Fastest growth rate of D with friction mu mu_ss in the same configuration, 1 / time; 0 if it is stable."""
+    law = replace(packing.law, mu=mu_ss * packing.law.mu)
+    limit = law.slip_limit(packing.geometry.overlap)
+    slip = np.clip(packing.contacts.slip, -limit, limit)
+    return spectrum(replace(packing, law=law, contacts=replace(packing.contacts, slip=slip))).growth_rate()
 
 
 def equilibrium_at(
@@ -235,31 +344,27 @@ def summary(triggering: Triggering) -> dict[str, Any]:
     sensitive, runs = triggering.sensitive, triggering.runs
     erupting, strong = runs["erupting"], runs["strong"]["msd"]
     most = {name: largest(runs[name]) for name in ("unperturbed", "perturbed", "erupting")}
-    growth = float(np.log10(most["erupting"] / jump(erupting)))
+    outcome = triggering.outcome
     return {
         "fx": triggering.start.fx,
         "v0": triggering.weakening.v0,
         "v_ss": triggering.weakening.v_ss,
         "largest_D": most,
         "rise_in_decades": float(np.log10(most["erupting"] / most["perturbed"])),
-        "jump": jump(erupting),
-        "grows_after_the_jump": bool(growth >= np.log10(GROWTH_FACTOR)),
-        "growth_in_decades": growth,
-        "growth_after_the_jump": _fitted(erupting),
+        "perturbation_shows": differs(runs["perturbed"], runs["unperturbed"]),
+        "verdict": outcome.verdict,
+        "weakens_at": outcome.crossing,
+        "jump": outcome.jump,
+        "growth_in_decades": outcome.growth,
+        "growth_after_the_jump": None if outcome.fitted is None else asdict(outcome.fitted),
         "forecast": asdict(triggering.foreseen),
         "largest_D_of_the_control": largest(runs["control"]) if "control" in runs else None,
+        "rate_of_the_control": triggering.control_rate,
         "linear_response_deviation": float(np.abs(strong - triggering.response.msd).max() / strong.max()),
         "smallest_mu": float(erupting["friction"].min()),
         "amplitude_exponent": sensitive.fit.exponent,
         "amplitude_exponent_error": sensitive.fit.error,
         "distances": [float(sensitive.distance.min()), float(sensitive.distance.max())],
         "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in sensitive.near],
+        "plateaus": sensitive.plateaus,
     }
-
-
-def _fitted(run: Series) -> dict[str, float] | None:
-    """Growth of D from ten times the jump to a tenth of its largest value; None if there is no decade between."""
-    try:
-        return asdict(fit_growth(run["time"], run["msd"], 10 * jump(run), 0.1 * largest(run)))
-    except ValueError:
-        return None

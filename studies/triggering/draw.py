@@ -48,7 +48,7 @@ def figures(found: Triggering) -> Figures:
     chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, 4).astype(int))] if near else []
     return {
         "figure2": lambda: friction_law_figure(replace(weak, v0=0.0, v_ss=1.0), mu),
-        "figure5a": lambda: eruption_figure(*three, runs.get("control"), found.crossing),
+        "figure5a": lambda: eruption_figure(*three, runs.get("control"), found.outcome.crossing),
         "figure5b": lambda: weakening_figure(np.abs(erupting["layer_velocity"]), erupting["friction"], weak, mu),
         "figure6": measured_friction_figure,
         "response": lambda: response_figure(runs["strong"], found.response.msd),

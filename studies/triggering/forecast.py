@@ -24,8 +24,8 @@ from ...pywrap.scenes.refusals import needed
 from ..packings import seeded
 
 JUMP_SHARE = 0.05
-"""Share of the run with mu(v) that shows the jump: 10 of 200 time units, where the slowest modes of 100 disks have
-periods of 6, and the fastest pairs have just begun to stand out."""
+"""Share of the run with mu(v) that shows the jump, from the moment on at which friction weakens: 10 of 200 time units,
+where the slowest modes of 100 disks have periods of 6, and the fastest pairs have just begun to stand out."""
 
 SAMPLES = 2000
 """Times at which the linear motion is looked at."""
@@ -51,13 +51,13 @@ class Forecast:
     Attributes
     ----------
     jump : float
-        Largest D in the first `JUMP_SHARE` of the run, length^2.
+        Largest D within the window of the jump, length^2.
     growth : float
         Decades from the jump to the largest D of the whole run; without bound, where a pair grows.
     room : float
         Decades from the jump to the D at which the motion ceases to be linear.
     rate : float
-        Growth rate of D of the fastest pair, 1 / time; 0 if none grows.
+        Growth rate of D of the fastest motion, 1 / time; 0 if none grows.
     """
 
     jump: float
@@ -66,21 +66,24 @@ class Forecast:
     rate: float
 
 
-def forecast(start: Equilibrium, mu: float, time: float) -> Forecast:
-    """Jump and growth of an equilibrium whose friction coefficient becomes `mu`, in a run of length `time`."""
+def forecast(start: Equilibrium, mu: float, time: float, window: float | None = None) -> Forecast:
+    """Jump and growth of an equilibrium whose friction coefficient becomes `mu`, in the `time` that follows.
+
+    The jump is what happens within `window`, by default `JUMP_SHARE` of the time.
+    """
     packing = start.packing
     weak = replace(packing, law=replace(packing.law, mu=mu))
     times = time * np.arange(1, SAMPLES + 1) / SAMPLES
     with np.errstate(over="ignore"):
         msd = LinearMotion.of(weak).response(times, force=weak.net_force - packing.net_force).msd
     msd = np.fmin(msd, np.finfo(float).max)
-    first = float(msd[times <= JUMP_SHARE * time].max())
+    first = float(msd[times <= (JUMP_SHARE * time if window is None else window)].max(initial=msd[0]))
     overlap = packing.loaded(start.residual).geometry.overlap.min()
     return Forecast(
         jump=first,
         growth=float(np.log10(msd.max() / first)),
         room=float(np.log10((LINEAR * overlap) ** 2 / first)),
-        rate=max((pair.growth_rate for pair in spectrum(weak).pairs), default=0.0),
+        rate=spectrum(weak).growth_rate(),
     )
 
 

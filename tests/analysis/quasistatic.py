@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 from faultgouge.analysis import FLOOR, Contacts, NoEquilibriumError, Packing, stiffness_matrix, touching
 
 
-def plain_force(kn, kt, mu, overlap, slip, exponent=1.5):
+def plain_force(kn, kt, mu, overlap, slip, exponent=1.5, coulomb=False):
     """f_n and f_t, from the formulas, in whatever arithmetic the arguments bring."""
     if overlap <= 0:
         return 0, 0
@@ -25,7 +25,7 @@ def plain_force(kn, kt, mu, overlap, slip, exponent=1.5):
     limit = mu * (kn / kt) * overlap
     slip = min(max(slip, -limit), limit)
     x = abs(slip) / limit
-    return normal, -kt * overlap ** (exponent - 1) * (1 + x - x**2) * slip
+    return normal, -kt * overlap ** (exponent - 1) * (1 if coulomb else 1 + x - x**2) * slip
 
 
 def moved(old: Packing, q: np.ndarray, fx: float) -> Packing:

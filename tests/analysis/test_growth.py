@@ -1,9 +1,20 @@
 """Growth rates from D(t): of motions whose rate is known, between noise and ceiling."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from faultgouge.analysis import fit_growth, growth_rate, mean_square_displacement
+from faultgouge.analysis import (
+    Contacts,
+    MindlinLaw,
+    Packing,
+    fit_growth,
+    growth_of_run,
+    growth_rate,
+    mean_square_displacement,
+    spectrum,
+)
 
 
 def motion(eigenvalue, vector, time):
@@ -69,3 +80,65 @@ def test_mean_square_displacement_of_wrapped_positions():
     d = mean_square_displacement(np.array([reference, moved]), reference, box_length=10.0)
     np.testing.assert_allclose(d, [0, (0.04 + 0.25) / 2], rtol=1e-12, atol=0)
     assert mean_square_displacement(moved, reference) > 50
+
+
+def run_of(rate, length, share=1e-4, noise=1e-26):
+    """D of noise, of which one motion with a share of it grows."""
+    time = np.linspace(0.1, length, 4000)
+    return time, noise * (1 + np.sin(time) ** 2 + share * np.exp(rate * time))
+
+
+def test_growth_of_a_run_stands_beside_its_prediction(path):
+    packing = path(0.022)
+    rate = spectrum(packing).growth_rate()
+    found = growth_of_run(packing, *run_of(rate, 40 / rate))
+    assert found.predicted == rate
+    assert (found.pairs, found.negative, found.enough) == (len(spectrum(packing).pairs), 0, True)
+    # the noise adds a thousandth at the lower bound
+    assert found.measured.rate == pytest.approx(rate, rel=1e-3)
+    assert found.as_dict()["growth"].keys() >= {"measured", "error", "predicted", "from", "to"}
+    # a run that ends while D still grows is followed to its end
+    found = growth_of_run(packing, *run_of(rate, 21 / rate))
+    assert found.measured.end == pytest.approx(21 / rate, rel=1e-2)
+    short = growth_of_run(packing, *run_of(rate, 6 / rate))
+    assert (short.measured, short.enough) == (None, False)
+    # a tenth of the share of one of 300 modes, three decades above the noise, and one more
+    assert short.needed * rate == pytest.approx(np.log(1e4 * 3000), rel=1e-12)
+    assert "6.0 e-foldings" in short.says
+
+
+def test_growth_of_a_stable_start_is_not_invented(path):
+    """However D rises."""
+    stable, time = path(0.02), np.linspace(0.1, 100, 2000)
+    for packing, words in (
+        (stable, "linearly stable"),
+        (replace(path(0.022), drag_time=1.0), "the dissipation takes away"),
+    ):
+        found = growth_of_run(packing, time, 1e-26 * np.exp(0.3 * time))
+        assert (found.measured, found.predicted, found.needed, found.enough) == (None, 0, None, None)
+        assert found.as_dict()["growth"] is None
+        assert words in found.says
+
+
+def test_growth_with_weakened_friction_counts_from_the_moment_it_weakens(path):
+    """Stable with mu = 1, unstable with 0.8: D jumps at t = 100 and grows from there."""
+    packing = path(0.0205)
+    weak = growth_of_run(replace(packing, law=replace(packing.law, mu=0.8)), *run_of(0, 1)).predicted
+    assert growth_of_run(packing, *run_of(0, 1)).predicted == 0 < weak
+    time = np.linspace(0.1, 100 + 40 / weak, 8000)
+    later = np.maximum(time - 100, 0)
+    msd = 1e-26 * np.exp(0.1 * np.minimum(time, 100)) + (time >= 100) * 1e-18 * (1 + 1e-3 * np.exp(weak * later))
+    found = growth_of_run(packing, time, msd, np.where(time < 100, 1.0, 0.8))
+    assert (found.predicted, found.weakened) == (weak, 0.8)
+    assert found.measured.start > 100
+    # the jump is a tenth of D at the lower bound, and no part of it at the upper one
+    assert found.measured.rate == pytest.approx(weak, rel=0.02)
+
+
+def test_a_packing_that_buckles_says_so():
+    law = MindlinLaw(2e5, 0.0, 0.0)
+    contacts = Contacts([0, 0], [-1, 1], [0, 0])
+    column = Packing(position=[[0, 0.49], [0, 1.47]], radius=[0.5, 0.5], contacts=contacts, law=law)
+    found = growth_of_run(column, *run_of(0.1, 1.0))
+    assert (found.pairs, found.negative) == (0, 1)
+    assert "1 negative eigenvalue" in found.says

@@ -1,5 +1,7 @@
 """The contact law against ten lines of arithmetic, against 30-digit derivatives, and in its properties."""
 
+from dataclasses import replace
+
 import mpmath
 import numpy as np
 import pytest
@@ -11,14 +13,15 @@ from faultgouge.analysis import MindlinLaw
 
 LAWS = [MindlinLaw(kn, kt, 0.2, exponent) for kn in (1.0, 2e5) for kt in (0.3, 5e4) for exponent in (1.5, 1.0)]
 RESCALED = MindlinLaw(2e5, 6e4, 0.8, rescaled=True)
+SLIDERS = [MindlinLaw(2e5, 6e4, 0.8, exponent, coulomb=True) for exponent in (1.5, 1.0)]
 both_exponents = pytest.mark.parametrize("exponent", [1.5, 1.0])
 OVERLAPS = (1e-9, 6e-4, 0.2)
 SHARES = (-2.0, -1.0, -0.999, -1 / 3, -1e-6, 0.0, 1e-6, 0.5, 1.0, 3.0)
 
 
-def derivatives(law, overlap, slip, parting=0.5):
+def derivatives(law, overlap, slip, parting=0.5, sliding=False):
     """All that the law says of one contact, as numbers."""
-    found = law.derivatives(np.array([overlap]), np.array([slip]), np.array([parting]))
+    found = law.derivatives(np.array([overlap]), np.array([slip]), np.array([parting]), sliding)
     return type(found)(*(float(part[0]) for part in found))
 
 
@@ -33,11 +36,12 @@ shares = st.integers(-3000, 3000).map(lambda thousandths: thousandths / 1000)
     exponent=st.sampled_from([1.5, 1.0]),
     overlap=st.sampled_from([-0.1, 0.0]) | st.floats(1e-8, 1.0),
     share=shares,
+    coulomb=st.booleans(),
 )
-def test_forces(kn, kt, mu, exponent, overlap, share):
-    law = MindlinLaw(kn, kt, mu, exponent)
+def test_forces(kn, kt, mu, exponent, overlap, share, coulomb):
+    law = MindlinLaw(kn, kt, mu, exponent, coulomb=coulomb)
     slip = share * (float(law.slip_limit(overlap)) or 1e-3)
-    normal, tangential = plain_force(kn, kt, mu, overlap, slip, exponent)
+    normal, tangential = plain_force(kn, kt, mu, overlap, slip, exponent, coulomb)
     # A handful of rounded operations each.
     assert law.normal_force(overlap) == pytest.approx(normal, rel=1e-15)
     assert law.tangential_force(overlap, slip) == pytest.approx(tangential, rel=2e-15)
@@ -73,9 +77,27 @@ def test_derivatives_have_all_digits(law, overlap, share):
         assert found.overlap_derivative == pytest.approx(float(by_overlap), abs=scale * law.mu * law.kn / law.kt)
 
 
+@pytest.mark.parametrize("law", SLIDERS)
+@pytest.mark.parametrize("overlap", OVERLAPS)
+@pytest.mark.parametrize("share", SHARES)
+def test_a_slider_has_derivatives_for_each_direction(law, overlap, share):
+    """A spring whose force stays while a contact closes and falls with the stiffness while the contact parts; at the
+    bound, and if it slides on, Coulomb's force."""
+    slip = float(law.clamped(overlap, share * law.slip_limit(overlap)))
+    stiffness, force = law.kt * overlap ** (law.exponent - 1), float(law.tangential_force(overlap, slip))
+    for parting in (0.0, 0.5, 1.0):
+        for sliding in (False, True):
+            a, b = -stiffness, parting * (law.exponent - 1) * force / overlap
+            if sliding and abs(share) >= 1:
+                a, b = 0.0, np.sign(force) * law.mu * law.normal_stiffness(overlap)
+            found = derivatives(law, overlap, slip, parting, sliding)
+            assert found.slip_derivative == pytest.approx(a, rel=1e-15)
+            assert found.overlap_derivative == pytest.approx(b, rel=4e-15)
+
+
 def stored(law, overlap, slip):
     """Work that it takes to slip as far at constant overlap: the integral of the force."""
-    x = abs(slip) / float(law.slip_limit(overlap))
+    x = 0.0 if law.coulomb else abs(slip) / float(law.slip_limit(overlap))
     return law.kt * overlap ** (law.exponent - 1) * slip**2 * (1 / 2 + x / 3 - x**2 / 4)
 
 
@@ -95,12 +117,28 @@ legs = st.lists(st.tuples(st.floats(1e-5, 1e-2), st.floats(-3e-2, 3e-2)), min_si
 """In steps of up to three slip limits of the largest overlap, at overlaps over three decades."""
 
 
+@pytest.mark.parametrize("kind", [{"rescaled": True}, {"coulomb": True}, {"coulomb": True, "exponent": 1.0}])
 @given(mu=st.floats(1e-2, 10), path=legs)
-def test_rescaled_slips_create_no_energy(mu, path):
+def test_no_energy_is_created(kind, mu, path):
     """Whatever the path, closed or not: from a contact without slip nothing can be had that was not put in."""
-    law = MindlinLaw(2e5, 6e4, mu, rescaled=True)
+    law = MindlinLaw(2e5, 6e4, mu, **kind)
     most = sum(abs(increment) for _, increment in path) * mu * float(law.normal_force(1e-2))
     assert work_along(law, path) >= -1e-14 * most
+
+
+CYCLE = [(1e-3, 1.6e-3), (2e-3, 0.0), (2e-3, -1.6e-3), (1e-3, 0.0)]
+"""Slipped, pressed, slipped back, and parted to the overlap that it began with."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "gained"),
+    [({}, True), ({"rescaled": True}, False), ({"coulomb": True}, False)],
+    ids=["total", "rescaled", "slider"],
+)
+def test_energy_of_a_closed_cycle(kind, gained):
+    law = MindlinLaw(2e5, 6e4, 0.8, **kind)
+    work = work_along(law, CYCLE)
+    assert (work < -1e-6) if gained else (work > 1e-6)
 
 
 def test_what_is_rescaled():
@@ -131,8 +169,11 @@ def test_contacts_that_slide_or_are_open_have_no_dashpots(exponent):
     law = MindlinLaw(2e5, 6e4, 0.8, exponent, cn=3.0, ct=5.0)
     # the overlap of a contact that slides, computed again from coordinates up to 10
     clamped = law.slip_limit(1e-3 + 1e-15 * np.arange(-2, 3))
+    slider = replace(law, coulomb=True)
     for slip in (clamped, -clamped):
         assert not law.dashpots(np.full(5, 1e-3), slip)[1].any()
+        assert not slider.dashpots(np.full(5, 1e-3), slip, sliding=True)[1].any()
+        np.testing.assert_array_equal(slider.dashpots(np.full(5, 1e-3), slip)[1], 5.0 * law.growth(np.full(5, 1e-3)))
     assert not np.any(law.dashpots(np.array([0.0, -1e-3]), np.zeros(2)))
 
 
@@ -153,3 +194,13 @@ def test_impossible_parameters(field, values):
     for value in values:
         with pytest.raises(ValueError, match=rf"^{field} = |^a {field} history needs exponent"):
             MindlinLaw(**({"kn": 1.0, "kt": 1.0, "mu": 1.0, "exponent": 1.0} | {field: value}))
+
+
+def test_a_law_has_one_history():
+    with pytest.raises(ValueError, match="rescaled and coulomb are two histories"):
+        MindlinLaw(1.0, 1.0, 1.0, rescaled=True, coulomb=True)
+    assert [each.history for each in (MindlinLaw(1.0, 1.0, 1.0), RESCALED, SLIDERS[0])] == [
+        "total",
+        "rescaled",
+        "coulomb",
+    ]

@@ -62,9 +62,10 @@ def test_what_was_written_is_what_is_read(tmp_path, states):
         ({"exponent": 1.5}, {}, {"box_length"}),
         ({"exponent": 1.5, "cn": 0.1, "ct": 0.2}, {"drag_time": 0.3}, {"box_length", "cn", "ct", "drag_time"}),
         ({"exponent": 1.5, "rescaled": True}, {}, {"box_length", "rescaled"}),
+        ({"exponent": 1.5, "coulomb": True}, {}, {"box_length", "coulomb"}),
         ({"exponent": 1.0, "kt": 0.0}, {"box_length": None}, {"exponent"}),
     ],
-    ids=["undamped", "damped", "rescaled", "open sides, harmonic, without friction"],
+    ids=["undamped", "damped", "rescaled", "slider", "open sides, harmonic, without friction"],
 )
 def test_what_is_not_there_is_not_in_the_file(tmp_path, cluster, law, changes, stored):
     state = replace(cluster, law=replace(cluster.law, **law), **changes)

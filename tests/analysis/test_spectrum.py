@@ -17,6 +17,7 @@ from faultgouge.analysis import (
     eigenpairs,
     eigenvalues,
     growth_rate,
+    negative_eigenvalues,
     normal_modes,
     spectrum,
     stable_timestep,
@@ -141,8 +142,24 @@ def test_negative_eigenvalues_grow():
     # f_n/r on the relative motion of two equal masses.
     slope = -2 * law.kn * 0.02**1.5 / 0.98
     assert result.unstable == pytest.approx(np.array([slope]), rel=1e-12)
+    assert not result.is_stable
+    assert negative_eigenvalues(column) == pytest.approx(np.array([slope]), rel=1e-12)
     assert result.growth_rate() == pytest.approx(2 * np.sqrt(-slope), rel=1e-12)
     assert result.growth_rate(dt=1e-3) == pytest.approx(2 * abs(discrete_frequency(slope, 1e-3).imag), rel=1e-12)
+
+
+def test_negative_eigenvalues_of_more_disks_than_the_dense_solver_takes():
+    """Five columns under different loads among a thousand disks on the floor."""
+    law, floor = MindlinLaw(2e5, 0.0, 0.0), np.arange(1005)
+    overlap = np.array([0.01, 0.012, 0.015, 0.018, 0.02])
+    base = np.column_stack([2.0 * floor, np.where(floor < 5, 0.49, 0.495)])
+    top = np.column_stack([2.0 * np.arange(5), 1.49 - overlap])
+    contacts = Contacts([*floor, *range(5)], [*np.full(1005, -1), *range(1005, 1010)], np.zeros(1010))
+    columns = Packing(position=np.vstack([base, top]), radius=np.full(1010, 0.5), contacts=contacts, law=law)
+    expected = np.sort(-2 * law.kn * overlap**1.5 / (1 - overlap))
+    np.testing.assert_allclose(negative_eigenvalues(columns), expected, rtol=1e-9)
+    stable = replace(columns, contacts=Contacts(floor, np.full(1005, -1), np.zeros(1005)))
+    assert len(negative_eigenvalues(stable)) == 0
 
 
 def test_imaginary_part_grows_as_the_root_of_the_distance(path):

@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 from reference_layer import LAYER, toml
 
-from faultgouge.analysis import RunFile, eigenvalues, mean_square_displacement, read_dump, spectrum
+from faultgouge.analysis import (
+    Contacts,
+    MindlinLaw,
+    Packing,
+    RunFile,
+    eigenvalues,
+    mean_square_displacement,
+    read_dump,
+    spectrum,
+)
 from faultgouge.analysis.motion.transient import transient_gains
 from faultgouge.commands import terminal
 from faultgouge.pywrap import Record, Scene, settle
@@ -91,7 +100,9 @@ def test_settle_finishes_a_settling_and_no_ramp(faultgouge, tmp_path, loads):
 def test_perturb_writes_the_series_and_the_trajectory_that_is_asked_for(faultgouge, tmp_path):
     done = faultgouge("perturb", "scene.toml", "--json")
     series = json.loads(done.stdout)
-    assert ", at most " in done.stderr
+    assert done.stderr.endswith("written to perturb.h5\n")
+    assert (series["growth"], series["predicted_rate"], series["time_needed"]) == (None, 0, None)
+    assert "linearly stable" in series["says"]
     assert series["time"][-1] == pytest.approx(0.5, abs=1e-3)
     # a stable packing at rest: D stays at the rounding of coordinates, the residual over the softest mode squared
     assert 0 < max(series["msd"]) < 1e-22
@@ -136,6 +147,41 @@ def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves
     assert (gain["displacement"], gain["time"], gain["energy"]) == (displacement.gain, displacement.time, energy.gain)
     said = faultgouge_here("spectrum", run).stdout
     assert f"a start at rest grows by up to {displacement.gain:.6g} times in |q|^2" in said
+
+
+@pytest.mark.slow
+def test_spectrum_calls_no_packing_stable_that_buckles_or_moves(faultgouge_here, tmp_path):
+    """Two disks on top of each other, in balance and pressed together too far; side by side they are stable."""
+    law = MindlinLaw(2e5, 2e5 * 2 / 7, 1.0)
+    overlap = (3.0 / 2e5) ** (2 / 3)
+    stands = Packing(
+        position=[[2.0, 0.5 - overlap], [2.0, 1.5 - 2 * overlap]],
+        radius=[0.5, 0.5],
+        top=[False, True],
+        contacts=Contacts([0, 0], [-1, 1], [0, 0]),
+        law=law,
+        box_length=4.0,
+        fy=3.0,
+    )
+    beside = replace(stands, position=[[1.0, 0.5 - overlap], [3.0, 0.5 - overlap]], top=[True, True])
+    packings = {
+        "buckles": stands,
+        "moves": replace(beside, position=[[1.0, 0.49], [3.0, 0.49]], contacts=Contacts([0, 1], [-1, -1], [0, 0])),
+        "stands": replace(beside, contacts=Contacts([0, 1], [-1, -1], [0, 0])),
+    }
+    said, printed = {}, {}
+    for name, packing in packings.items():
+        with RunFile.create(tmp_path / f"{name}.h5", packing) as file:
+            file.append(packing)
+            file.complete = True
+        said[name] = faultgouge_here("spectrum", f"{name}.h5").stdout
+        printed[name] = json.loads(faultgouge_here("spectrum", f"{name}.h5", "--json").stdout)
+    assert [each["stable"] for each in printed.values()] == [False, None, True]
+    assert ["linearly stable" in each for each in said.values()] == [False, False, True]
+    assert printed["buckles"]["negative"][0] == pytest.approx(-1.5025124716, rel=1e-9)
+    assert "negative eigenvalue -1.50251247" in said["buckles"]
+    assert "not in equilibrium" in said["moves"]
+    assert "volume fraction" in said["stands"]
 
 
 @pytest.mark.slow

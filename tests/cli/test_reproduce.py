@@ -51,6 +51,7 @@ def test_reproduce(faultgouge, tmp_path):
     # 40 time units are enough for friction to weaken and the equilibrium to jump; growth takes longer
     assert triggering["rise_in_decades"] > 7
     assert triggering["jump"] > 1e6 * triggering["largest_D"]["perturbed"]
+    assert triggering["verdict"] != "grows"
     assert triggering["largest_D_of_the_control"] > 0
     assert triggering["smallest_mu"] == pytest.approx(0.8, abs=1e-6)
     perturbed = faultgouge("perturb", "scene.toml")

@@ -12,7 +12,7 @@ from docs.run_page import commands, run
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
-PROSE = [*PAGES, *sorted((ROOT / "docs").glob("*/*.md"))]
+PROSE = [*PAGES, *sorted((ROOT / "docs").glob("*/*.md")), *sorted((ROOT / "research").glob("*/*.md"))]
 NOTEBOOKS = ROOT / "docs" / "notebooks"
 NAMES = ("exceptional_point", "own_packing")
 EXPLANATIONS = ("physics", "numerics", "complex_pairs", "arithmetic", "dissipation")
@@ -21,8 +21,12 @@ NO_PROSE = re.compile(r"^(```|\$\$).*?^(```|\$\$)$|^(\||    ).*?$", re.MULTILINE
 
 
 def anchors(page):
-    """The headings of a page as links name them."""
-    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
+    """The headings of a page, and of the page that it includes, as links name them."""
+    text = page.read_text()
+    included = re.match(r"```{include} (\S+)", text)
+    if included:
+        return anchors(page.parent / included[1])
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
@@ -70,6 +74,7 @@ def test_a_wrong_page_is_found_out(tmp_path):
         pytest.param("docs/decks.md", 4, 0, marks=pytest.mark.ranks),
         ("docs/tutorial.md", None, 5),
         ("docs/api.md", None, 1),
+        ("docs/howto_sweep.md", 2, 0),
     ],
 )
 def test_a_page_shows_what_its_commands_print(tmp_path, page, count, pictures):

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from reference_layer import LAYER, toml
 
-from faultgouge.analysis import Contacts, MindlinLaw, RunFile, nearest_image, normal_modes
+from faultgouge.analysis import Contacts, MindlinLaw, PackingFileError, RunFile, nearest_image, normal_modes
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.exchange import (
     ModeVectors,
@@ -55,7 +55,9 @@ def back(disks):
     return packing_of(disks, MindlinLaw(**law), upper_layer(disks, None), **given, drag_time=drag_time)
 
 
-@pytest.mark.parametrize("kind", ["as it is", "open sides", "compensated", "rescaled", "no contacts", "far image"])
+@pytest.mark.parametrize(
+    "kind", ["as it is", "open sides", "compensated", "rescaled", "coulomb", "no contacts", "far image"]
+)
 def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
     packing, c = sheared, sheared.contacts
     if kind == "open sides":
@@ -65,8 +67,8 @@ def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
     elif kind == "compensated":
         low = 1e-18 * np.arange(len(c))
         packing = replace(packing, position_low=packing.position * 1e-17, contacts=c.slipped(c.slip, low))
-    elif kind == "rescaled":
-        packing = replace(packing, law=replace(packing.law, rescaled=True))
+    elif kind in ("rescaled", "coulomb"):
+        packing = replace(packing, law=replace(packing.law, **{kind: True}))
     elif kind == "no contacts":
         packing = replace(packing, contacts=Contacts([], [], []))
     elif kind == "far image":
@@ -275,6 +277,15 @@ def test_d_of_t_in_mdanalysis_is_that_of_the_run(run, mdanalysis, ours):
     share = packing.top.mean()
     weighted = share * layer.results.msd + (1 - share) * bed.results.msd
     np.testing.assert_allclose(weighted, everything.results.msd, rtol=1e-13)
+
+
+@pytest.mark.slow
+def test_d_of_a_file_without_a_trajectory_is_refused(tmp_path, reference_packing, mdanalysis, ours):
+    with RunFile.create(tmp_path / "still.h5", reference_packing(1.0)) as file:
+        file.append(reference_packing(1.0))
+    universe = mdanalysis.Universe(str(tmp_path / "still.h5"))
+    with pytest.raises(PackingFileError, match="trajectory = true under"):
+        ours.MeanSquareDisplacement(universe.atoms)
 
 
 @pytest.mark.slow

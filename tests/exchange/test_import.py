@@ -276,7 +276,7 @@ def test_from_a_pour_to_the_film_of_the_mode(tmp_path):
         program, *words = command.split()
         done = subprocess.run([BIN / program, *words], cwd=tmp_path, capture_output=True, text=True, timeout=600)
         assert done.returncode == 0, done.stderr
-        said[" ".join([program, *words[:1]])] = done.stderr
+        said[" ".join([program, *words[:1]])] = done.stdout + done.stderr
     assert "brought to rest" in said["faultgouge import"]
     onset = re.search(r"F_x\^c = ([\d.]+)", said["faultgouge onset"])
     assert onset

@@ -89,18 +89,53 @@ def test_consistent_form_is_the_derivative_of_the_forces(reference_packing, mu, 
     assert np.abs(central - matrix).max() < tolerance * np.abs(matrix).max()
 
 
+def rates(packing, displacement):
+    """How fast each contact opens and slips on a displacement."""
+    contacts, normal, tangent = packing.contacts, packing.geometry.normal, packing.geometry.tangent
+    x, y, u = (part[contacts.i] for part in displacement.reshape(3, -1))
+    other = np.where(contacts.floor, 0.0, displacement.reshape(3, -1)[:, contacts.j])
+    branch = np.column_stack([x - other[0], y - other[1]])
+    return np.sum(normal * branch, axis=1), np.sum(tangent * branch, axis=1) - (u + other[2])
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("mu", "exponent"), [(0.3, 1.5), (1.0, 1.0)], ids=["Hertz", "harmonic"])
+def test_matrix_of_a_slider_is_the_one_sided_derivative(reference_packing, mu, sign, exponent):
+    """Of each contact what a displacement asks for: it closes or parts, and at the bound it slides or sticks."""
+    packing = reference_packing(mu)
+    packing = replace(packing, law=replace(packing.law, exponent=exponent, coulomb=True))
+    packing = with_slips(packing, [-1.0, 0.05, 0.5, 0.99, 1.0, -0.2, 0.1])
+    difference, law, slip = differences(packing, sign), packing.law, packing.contacts.slip
+    matrix, seen = np.empty_like(difference), np.zeros(4)
+    for k, column in enumerate(sign * np.eye(len(matrix))):
+        opens, slips = rates(packing, column)
+        # how fast the size of the slip nears the limit, which falls while the contact opens
+        rescaled = law.rescales * np.minimum(opens, 0.0) * np.abs(slip) / (2 * packing.geometry.overlap)
+        nears = np.sign(slip) * slips + rescaled + opens * law.mu * law.kn / law.kt
+        seen += [
+            np.sum(law.at_bound(packing.geometry.overlap, slip) & (a * opens > 0) & (b * nears > 0))
+            for a in (-1, 1)
+            for b in (-1, 1)
+        ]
+        matrix[:, k] = stiffness_matrix(packing, parting=opens > 0, sliding=nears > 0)[:, [k]].toarray()[:, 0]
+    # as of rescaled slips, below; harmonic disks are as stiff in every contact as in the stiffest one
+    scale = (4e-7 if exponent > 1 else 8e-7) * np.abs(matrix).max()
+    assert np.abs(difference - matrix).max() < scale
+    assert seen.all()
+    for other in (stiffness_matrix(packing), stiffness_matrix(packing, sliding=True)):
+        assert np.abs(difference - other.toarray()).max() > 100 * scale
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("mu", [1.0, 0.3])
 def test_matrix_of_rescaled_slips_is_the_one_sided_derivative(reference_packing, mu, sign):
     """Each column with the derivative of each contact that its displacement asks for: it closes, or it parts."""
     packing = with_slips(reference_packing(mu), [-1.0, 0.05, 0.5, 0.99, 1.0, -0.2, 0.1])
     packing = replace(packing, law=replace(packing.law, rescaled=True))
-    contacts, difference = packing.contacts, differences(packing, sign)
+    difference = differences(packing, sign)
     matrix = np.empty_like(difference)
     for k, column in enumerate(sign * np.eye(len(matrix))):
-        moved = column.reshape(3, -1)[:2].T
-        branch = moved[contacts.i] - np.where(contacts.floor[:, None], 0.0, moved[contacts.j])
-        opens = np.einsum("cd,cd->c", packing.geometry.normal, branch)
+        opens, _ = rates(packing, column)
         matrix[:, k] = stiffness_matrix(packing, parting=opens > 0)[:, [k]].toarray()[:, 0]
     # as above; differences to one side are divided by half the width
     assert np.abs(difference - matrix).max() < 4e-7 * np.abs(matrix).max()

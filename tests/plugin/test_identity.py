@@ -27,7 +27,7 @@ DAMPED = {"cn": 5.0, "ct": 3.0, "drag": "drag 50.0"}
 KINDS = {
     "double": DOUBLE | UNDAMPED,
     "compensated": COMPENSATED | UNDAMPED,
-    "rescaled, damped": DOUBLE | DAMPED | {"history": "rescaled"},
+    "slider, damped": DOUBLE | DAMPED | {"history": "coulomb"},
     "harmonic, damped, compensated": COMPENSATED | DAMPED | {"exponent": 1, "kn": 1e4},
 }
 

@@ -125,14 +125,16 @@ def test_equilibria_are_the_same_to_the_bit_and_time_steps_stay_below_what_dashp
         time_step(packing, 1.01 * longest)
 
 
-@pytest.mark.parametrize("precision", ["double", "compensated"])
-def test_rescaled_slips_climb_with_newtons_method(precision):
+@pytest.mark.parametrize(
+    ("history", "precision"), [("rescaled", "double"), ("coulomb", "double"), ("coulomb", "compensated")]
+)
+def test_histories_climb_with_newtons_method(history, precision):
     """Increments of half the length lead to nearly the same slips; those of the total law are others."""
-    law = {"law": {"kn": 2e5, "history": "rescaled"}, "precision": precision}
+    law = {"law": {"kn": 2e5, "history": history}, "precision": precision}
     found = []
     for step in (2e-2, 1e-2):
         *_, last = ramp(Scene.from_mapping(SETTLED | law | {"ramp": {"step": step, "until": 0.12}}))
-        assert last.packing.law.rescaled
+        assert last.packing.law.history == history
         assert last.residual < 10 * last.floor
         found.append(last)
     *_, total = ramp(Scene.from_mapping(SETTLED | {"ramp": {"step": 2e-2, "until": 0.12}}))

@@ -77,7 +77,8 @@ def test_every_key_reaches_the_scene_and_the_resolved_scene_gives_the_same(chang
 
 
 @pytest.mark.parametrize(
-    ("kt", "number"), [("2/7 kn", 57142.857142857145), ("0.5 kn", 1e5), ("kn", 2e5), (0, 0.0), (57000, 57000.0)]
+    ("kt", "number"),
+    [("2/7 kn", 57142.857142857145), ("0.5 kn", 1e5), ("1e-1 kn", 2e4), ("kn", 2e5), (0, 0.0), (57000, 57000.0)],
 )
 def test_kt_is_a_number_or_a_share_of_kn(kt, number):
     assert Scene.from_mapping(merged({"law.kt": kt})).law.kt == number
@@ -93,6 +94,9 @@ def test_velocity_scale_is_a_number_or_a_multiple_of_the_threshold(v_ss, scale):
 @pytest.mark.parametrize("path", sorted((ROOT / "scenes").glob("*.toml")), ids=lambda path: path.stem)
 def test_shipped_scenes_are_scenes(path):
     scene = Scene.from_toml(path)
+    if path.stem == "quartz_si":  # in other units
+        assert scene.load.fy / (scene.law.kn * 1e-4**1.5) == pytest.approx(74.7 / 2e5, rel=1e-3)
+        return
     assert scene.law.kn == 2e5
     quartz = {"quartz": 74.7, "quartz_1MPa": 7.47, "quartz_10MPa": 74.7, "quartz_100MPa": 747}
     assert scene.load.fy == quartz.get(path.stem, 3.0)

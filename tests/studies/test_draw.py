@@ -9,9 +9,8 @@ from faultgouge.analysis import Growth
 from faultgouge.analysis.motion.power_law import PowerLaw
 from faultgouge.analysis.onset.pair_form import PairForm
 from faultgouge.analysis.spectrum.normal_form import NormalForm
+from faultgouge.figures.series import draw_growth
 from faultgouge.pywrap.lammps.dynamics import Weakening
-from faultgouge.studies.dissipation.draw import dissipation_figure
-from faultgouge.studies.reproduce.draw import growth_figure
 from faultgouge.studies.triggering.compute import Sensitivity
 from faultgouge.studies.triggering.draw import (
     DAMPING,
@@ -24,6 +23,7 @@ from faultgouge.studies.triggering.draw import (
     share,
     weakening_figure,
 )
+from research.dissipation.draw import dissipation_figure
 
 PAPERS = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=0.0, v_ss=1.0)
 
@@ -104,12 +104,25 @@ def test_response_lies_over_the_run(runs):
 def test_growth_draws_the_predicted_slope_beside_the_data():
     time = np.linspace(0, 100, 501)
     msd = 1e-25 * (1 + np.exp(0.4 * time))
-    _, predicted = growth_figure(time, msd, 0.4, Growth(0.402, 1e-3, 12.0, 20.0, 90.0)).axes[0].lines
+    _, predicted = draw_growth(time, msd, 0.4, Growth(0.402, 1e-3, 12.0, 20.0, 90.0)).axes[0].lines
     (t0, t1), (d0, d1) = predicted.get_data()
     assert (t0, t1) == (20.0, 90.0)
     assert np.log(d1 / d0) / (t1 - t0) == pytest.approx(0.4, rel=1e-12)  # rounding of exp and log
     # A decade and a half above; where the floor still adds 3e-4 of D to the first point of the window.
     assert d0 / msd[100] == pytest.approx(10**1.5, rel=1e-3)
+
+
+def test_growth_that_was_not_reached_has_its_slope_and_a_stable_start_none():
+    time = np.linspace(0, 20, 201)
+    msd = 1e-25 * (1 + 0.5 * np.sin(time) ** 2)
+    _, predicted = draw_growth(time, msd, 0.036, None).axes[0].lines
+    (t0, t1), (d0, d1) = predicted.get_data()
+    assert (t0, t1) == (0, 20)
+    assert np.log(d1 / d0) / 20 == pytest.approx(0.036, rel=1e-12)
+    # a slope that leaves the picture ends where a decade and a half above D ends
+    _, steep = draw_growth(time, msd, 10.0, None).axes[0].lines
+    assert steep.get_xdata()[1] < 20
+    assert len(draw_growth(time, msd, 0.0, None).axes[0].lines) == 1
 
 
 def test_dissipation_shows_predictions_and_onsets_and_where_there_is_no_gain():

@@ -52,7 +52,9 @@ def row(seed, ramps=(), lowered=None, eruption=None, says=None):
 def eruption(rise):
     """A rise over 1e-23, after a jump to 1e-14 that the control shows as well."""
     largest = {"unperturbed": 1e-25, "perturbed": 1e-23, "weakening": 1e-23 * 10**rise, "control": 1e-14}
-    return {"fx": 0.015, "fx_control": 0.005, "rate": 1.0, **largest, "jump": 1e-14}
+    verdict = "grows" if rise > 10 else "jump alone"
+    shows = rise > 0
+    return {"fx": 0.015, "fx_control": 0.005, "rate": 1.0, **largest, "verdict": verdict, "perturbation_shows": shows}
 
 
 BEYOND = ("until", 0.03)
@@ -133,6 +135,7 @@ def test_eruptions_are_counted(scene):
     assert {name: (each["count"], each["of"]) for name, each in result["rises"].items()} == {"5": (3, 4), "10": (2, 4)}
     assert [each["count"] for each in result["control_rises"].values()] == [4, 0]
     assert (result["grows"]["count"], result["grows"]["of"]) == (2, 4)
+    assert (result["perturbation_shows"]["count"], result["perturbation_shows"]["of"]) == (3, 4)
     assert (result["lowered"]["count"], result["lowered"]["of"]) == (5, 6)
     assert result["rise_quartiles"] == pytest.approx([4.5, 8.5, 11.25])
     assert [each["seed"] for each in result["failed"]] == [7]

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from reference_layer import SMALL, toml
 
-from faultgouge.analysis import spectrum, stiffness_matrix
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, spectrum, stiffness_matrix
 from faultgouge.analysis.onset import LIMITS
-from faultgouge.pywrap import Engine, Scene, equilibrate, settle
+from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 from faultgouge.studies.modes.compute import antisymmetric_norm, counted, modes, switched
-from faultgouge.studies.modes.sets import sets
 from faultgouge.studies.modes.sliced import sliced
 from faultgouge.studies.packings import sliding
+from research.modes.sets import sets
 
 SCENE = SMALL | {
     "packing": {"disks": 60, "width": 9.2, "seed": 77},
@@ -48,6 +48,28 @@ def test_counts_and_bounds_are_those_of_numpy(loaded):
         assert bound == pytest.approx(np.linalg.norm(0.5 * (dense - dense.T), 2), rel=1e-5)
         assert (found.omega**2).imag.max(initial=0.0) <= bound
     assert len(found.omega) > 3
+
+
+def test_a_packing_that_buckles_ends_its_branch_and_counts():
+    """Two disks on top of each other: no complex pair, and D grows all the same."""
+    contacts, law = Contacts([0, 0], [-1, 1], [0, 0]), MindlinLaw(2e5, 2e5 * 2 / 7, 1.0)
+    overlap = (3.0 / 2e5) ** (2 / 3)
+    column = Packing(
+        position=[[2.0, 0.5 - overlap], [2.0, 1.5 - 2 * overlap]],
+        radius=[0.5, 0.5],
+        top=[False, True],
+        contacts=contacts,
+        law=law,
+        box_length=4.0,
+        fy=3.0,
+    )
+    found = counted(column).as_dict()
+    assert (found["pairs"], found["negative"]) == (0, 1)
+    assert found["growth_rate"] == pytest.approx(spectrum(column).growth_rate(), rel=1e-9)
+    # the ramp has come to the first load of the scene, 0.02 F_y
+    there = Equilibrium(replace(column, fx=0.02 * 3.0), 0.0, 1e-11, 1)
+    row = modes(Scene.from_mapping(SCENE), lambda mu: there)
+    assert (row["ends"], row["loads"]) == ("turning point", [])
 
 
 def test_without_b_no_pair_is_complex(loaded):

@@ -2,25 +2,16 @@
 
 import json
 import re
-import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-from reference_layer import parted
 from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import RunFile
 from faultgouge.figures.pages import WIDTH, filled
 from faultgouge.figures.style import spared
-from faultgouge.studies.genericity.page import write_page
 from faultgouge.studies.packings import distance
 from faultgouge.studies.sweep.draw import draw_sweep
-from faultgouge.studies.yielding.compute import CONTROLLED
-from faultgouge.studies.yielding.page import numbers, rows_of, text, write_lasting
-
-DOCS = Path(__file__).parents[2] / "docs"
-ROWS, FAILED = rows_of(DOCS / "yield" / "tables" / "quartz_100.jsonl")
 
 
 @pytest.fixture
@@ -60,20 +51,6 @@ def test_an_interrupt_is_no_failed_picture(said):
     assert said == []
 
 
-def test_genericity_keeps_its_numbers_and_its_page_which_are_those_of_the_docs(tmp_path, no_pictures, said):
-    docs = DOCS / "genericity"
-    for table in (*docs.glob("*/results.csv"), docs / "made.json"):
-        (tmp_path / table.relative_to(docs)).parent.mkdir(exist_ok=True)
-        shutil.copy(table, tmp_path / table.relative_to(docs))
-    write_page(tmp_path, said.append)
-    assert (tmp_path / "genericity.md").read_text() == (docs / "genericity.md").read_text()
-    (words, found), (stored, expected) = (parted(each / "genericity.json") for each in (tmp_path, docs))
-    assert words == stored
-    assert found == pytest.approx(expected, rel=1e-12)
-    assert len(said) == 4
-    assert all("was not drawn (RuntimeError: no font at all)" in sentence for sentence in said)
-
-
 def test_a_spectrum_keeps_its_eigenvalues_and_draw_its_words(
     tmp_path, reference_packing, faultgouge_here, no_pictures, monkeypatch
 ):
@@ -97,38 +74,8 @@ def test_a_sweep_keeps_its_rows(tmp_path, no_pictures, said):
     assert "results.png was not drawn (RuntimeError" in said[0]
 
 
-def test_the_page_of_yield_is_that_of_its_table():
-    assert (DOCS / "yield" / "yield.md").read_text() == text(numbers(ROWS), len(ROWS), FAILED)
-
-
-def test_layers_without_loss_flow_below_their_static_yield_and_lossy_ones_do_not():
-    assert all(row["static"] >= row["newton"] for row in ROWS)
-    undamped, *lossy = numbers(ROWS)["yields"]
-    assert undamped["flow"] > len(ROWS) / 2
-    assert undamped["share"][2] < 1
-    assert all(each["flow"] == 0 and each["share"] == [1, 1, 1] for each in lossy)
-    # with more loss the same layers flow as the load rises, and all of them beyond the end of Newton's branch
-    flowing = {0.9: [], 0.5: [], 0.1: []}
-    for k, row in enumerate(ROWS):
-        for run in row["loading"]:
-            assert run["flows"] is None or row["newton"] < run["flows"] < row["static"]
-            if run["rate"] == CONTROLLED and run["flows"] is not None and run["restitution"] in flowing:
-                flowing[run["restitution"]].append(k)
-    assert flowing[0.9] == flowing[0.5] == flowing[0.1] != []
-
-
 def test_disks_that_carry_nothing_have_no_part_in_d(reference_packing):
     packing = reference_packing(1.0)
     position = packing.position + 1e-3
     position[packing.rattlers] += 1.0
     assert distance(packing, replace(packing, position=position)) == pytest.approx(2e-6, rel=1e-9)
-
-
-def test_the_page_of_layers_left_to_themselves_is_that_of_its_tables_and_other_pages_say_the_same(tmp_path):
-    shutil.copytree(DOCS / "yield" / "tables", tmp_path / "tables")
-    written = write_lasting(tmp_path).read_text()
-    assert (DOCS / "yield" / "further.md").read_text() == written
-    referee = " ".join((DOCS / "modes" / "referee.md").read_text().split())
-    assert "restitution 0.9, 5 of 20 (11 to 47 %) layers vibrate" in " ".join(written.split())
-    assert "[lossy layers](../yield/further.md), 5 of 20, vibrate" in referee
-    assert "5 of 20 vibrate on" in referee

@@ -19,7 +19,8 @@ from faultgouge.studies.sweep import workers
 from faultgouge.studies.sweep.compute import merge, run_sweep, stored
 from faultgouge.studies.sweep.draw import draw_sweep
 from faultgouge.studies.sweep.points import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
+from faultgouge.studies.sweep.tasks import TASKS, estimate
+from faultgouge.studies.sweep.user_function import user_function
 from faultgouge.studies.sweep.workers import WorkerError, computed
 
 AXES = {"packing.seed": "1:4", "law.mu": [1.0, 0.5, -1.0]}
@@ -93,6 +94,80 @@ def test_a_stored_packing_is_found_from_another_folder(tmp_path):
     sweep = Sweep.from_mapping(mapping, TASKS, tmp_path)
     assert Sweep.from_mapping(sweep.as_dict(), TASKS).points == sweep.points
     assert sweep.points[0].scene.packing.file == tmp_path / "packing.json"
+
+
+FUNCTIONS = '''
+import numpy as np
+
+def contacts(scene, settled):
+    """A docstring."""
+    if scene.packing.seed == 2:
+        raise KeyError("no such grain")
+    return {"contacts": np.int64(len(settled.packing.contacts)), "of": {"x": settled.packing.position[:2, 0]}}
+
+def seed_of(scene):
+    return scene.packing.seed
+
+def three(scene, settled, more):
+    return {}
+'''
+
+
+def function_sweep(folder, function, axes=None):
+    scene = {"task": f"ask.py:{function}", "sweep": axes or {"packing.seed": "1:2"}, "scene": SMALL}
+    return Sweep.from_mapping(scene, TASKS, folder)
+
+
+def test_a_function_of_the_users_is_a_task_and_its_errors_are_rows(tmp_path):
+    (tmp_path / "ask.py").write_text(FUNCTIONS)
+    first, second = run_sweep(function_sweep(tmp_path, "contacts"), tmp_path / "out", say=id, workers=2)
+    rest = settle(Scene.from_mapping(SMALL | {"packing": SMALL["packing"] | {"seed": 1}})).packing
+    assert first["result"] == {"contacts": len(rest.contacts), "of": {"x": rest.position[:2, 0].tolist()}}
+    assert second["says"] == "scene 1: contacts failed with KeyError: 'no such grain' (ask.py, line 7)"
+    (wrong, _) = run_sweep(function_sweep(tmp_path, "seed_of"), tmp_path / "wrong", say=id)
+    assert "returned int: return a dict" in wrong["says"]
+
+
+def test_rows_of_a_function_are_known_by_its_code_and_shards_merge_without_it(tmp_path):
+    file = tmp_path / "ask.py"
+    file.write_text(FUNCTIONS)
+    before = [point.key for point in function_sweep(tmp_path, "contacts").points]
+    parts = [tmp_path / "a", tmp_path / "b"]
+    for k, part in enumerate(parts, 1):
+        run_sweep(function_sweep(tmp_path, "contacts"), part, (k, 2), say=id)
+    file.write_text(FUNCTIONS.replace("A docstring.", "Other words.") + "# a comment\n")
+    user_function.cache_clear()
+    assert [point.key for point in function_sweep(tmp_path, "contacts").points] == before
+    file.write_text(FUNCTIONS.replace("== 2", "== 3"))
+    user_function.cache_clear()
+    assert not set(before) & {point.key for point in function_sweep(tmp_path, "contacts").points}
+    file.unlink()
+    assert [row["key"] for row in merge(parts, tmp_path / "whole", id)] == before
+
+
+@pytest.mark.parametrize(
+    ("task", "says"),
+    [
+        ("none.py:contacts", "there is no file"),
+        ("ask.py:nothing", "has no function nothing"),
+        ("ask.py:three", r"takes 3 arguments: a task is three\(scene\)"),
+        ("no.such.module:f", "cannot be imported"),
+        ("broken.py:f", "cannot be imported .SyntaxError"),
+    ],
+)
+def test_a_function_that_cannot_be_called_is_refused_before_work(tmp_path, task, says):
+    (tmp_path / "ask.py").write_text(FUNCTIONS)
+    (tmp_path / "broken.py").write_text("def")
+    with pytest.raises(SceneError, match=says):
+        Sweep.from_mapping({"task": task, "scene": SMALL}, TASKS, tmp_path)
+
+
+def test_known_rows_tell_how_long_a_function_takes(tmp_path):
+    (tmp_path / "ask.py").write_text(FUNCTIONS)
+    sweep = function_sweep(tmp_path, "contacts")
+    assert "is not known before the first" in estimate(sweep.located_task, sweep.points)[-1]
+    known = [{"says": None, "cpu_seconds": seconds} for seconds in (1.0, 30.0, 90.0)]
+    assert estimate(sweep.located_task, sweep.points, known)[-1].startswith("about 60 s of one core")
 
 
 @pytest.mark.slow

@@ -18,20 +18,26 @@ from .terminal import (
     PackingFile,
     ScenePath,
     print_json,
+    print_line,
     read_scene,
     say,
     say_way,
-    show_table,
     status,
     stored_packing,
+    stored_snapshot,
+    table_of,
 )
 
 if TYPE_CHECKING:
-    from ..analysis import DampedWindow, Packing, Spectrum, Window
+    from ..analysis import DampedWindow, Packing, Snapshot, Spectrum, Window
     from ..pywrap import Equilibrium, Scene
     from ..pywrap.onset.damped import DampedOnset
 
 app = typer.Typer()
+
+IN_BALANCE = 1e-4
+"""Force left on a disk, in units of the largest contact force, up to which a packing is in equilibrium. Dumps with few
+digits leave 1e-6; a packing before it is brought to rest, 1e-2 and more."""
 
 Slices = Annotated[
     Path | None,
@@ -53,9 +59,10 @@ def spectrum(
     as_json: AsJson = False,
 ) -> None:
     """Eigenvalues of a stored packing, its complex pairs and its rattlers."""
+    from faultgouge.analysis import Snapshot, solid_fraction
     from faultgouge.analysis import spectrum as eigenvalues_of
 
-    packing = stored_packing(file, frame)
+    packing = stored_snapshot(file) or stored_packing(file, frame)
     if values:
         _values(packing, as_json)
         return
@@ -74,17 +81,20 @@ def spectrum(
             ],
             "pair_count": len(result.pairs),
             "least_q": result.least_q if result.pairs else None,
+            "negative": result.negative.tolist(),
+            "stable": result.is_stable if _in_balance(packing) else None,
             "largest_growth_rate": result.growth_rate(),
             "rattlers": result.rattlers.tolist(),
             "fx": packing.fx,
             "residual": packing.residual,
+            "solid_fraction": None if isinstance(packing, Snapshot) else solid_fraction(packing),
             "noise_pairs": result.noise_pairs,
             "transient_gain": gain,
         }
     )
 
 
-def _values(packing: Packing, as_json: bool) -> None:
+def _values(packing: Packing | Snapshot, as_json: bool) -> None:
     """Eigenvalues without vectors: as JSON, or a line each."""
     from faultgouge.analysis import eigenvalues
 
@@ -96,23 +106,53 @@ def _values(packing: Packing, as_json: bool) -> None:
         print(f"{real:.17g} {imaginary:.17g}")
 
 
-def _print_spectrum(packing: Packing, result: Spectrum, gain: dict[str, Any] | None) -> None:
+def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[str, Any] | None) -> None:
+    from faultgouge.analysis import Snapshot, growth_rate, solid_fraction
+
     real = result.eigenvalues.real
-    print(
-        f"F_x = {packing.fx:g}: {len(real)} eigenvalues from {real.min():.6g} to {real.max():.6g}, "
-        f"{len(result.rattlers)} rattlers left out"
-    )
+    what, fraction = f"F_x = {packing.fx:g}", ""
+    if isinstance(packing, Snapshot):
+        what = f"{len(packing)} {'spheres' if packing.dimension == 3 else 'disks'} as LAMMPS left them"
+        bound = int(packing.contacts.at_bound.sum())
+        if bound:
+            acts = "slide" if packing.contacts.sliding.any() else "stick"
+            say(f"{bound} of {len(packing.contacts)} contacts are at Coulomb's bound; they {acts} here")
+    else:
+        fraction = f"; volume fraction {solid_fraction(packing):.4f}"
+    span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ", as no particle touches another"
+    print(f"{what}: {len(real)} eigenvalues{span}, {len(result.rattlers)} rattlers left out{fraction}")
+    if not _in_balance(packing):
+        print(
+            f"not in equilibrium: a force of {packing.residual:.3g} is left on a disk, and of a packing that moves the "
+            "spectrum tells no stability"
+        )
+    for value in result.negative:
+        print(f"negative eigenvalue {value:.10g}: D grows as exp({growth_rate(value):.6g} t), without oscillation")
     for pair in result.pairs:
         print(
             f"complex pair {pair.eigenvalue.real:.10g} +- {pair.eigenvalue.imag:.10g} i: "
             f"D grows as exp({pair.growth_rate:.6g} t), |y^H x| = {pair.overlap:.2g}"
         )
+    if len(result.negative):
+        print(f"unstable as a column that buckles: negative eigenvalues: {len(result.negative)}")
     if result.pairs:
         print(
             f"{len(result.pairs)} complex pairs; least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}"
         )
-    else:
-        print("no complex pair: linearly stable")
+    if result.is_stable and _in_balance(packing):
+        free = result.free
+        but = (
+            f", but for {free} eigenvalues of zero: such a motion meets no force, and is not driven back"
+            if free
+            else ""
+        )
+        print(
+            f"no complex pair and no negative eigenvalue: linearly stable{but}"
+            if len(real)
+            else "no disk touches another or the floor: there is nothing to be stable"
+        )
+    if not isinstance(packing, Snapshot) and (packing.law.damped or packing.drag_time is not None):
+        print("dashpots and drag are left out here: `faultgouge onset` of the scene counts them in")
     if gain is not None:
         print(
             f"a start at rest grows by up to {gain['displacement']:.6g} times in |q|^2, within t = {gain['time']:.6g} "
@@ -124,11 +164,16 @@ def _print_spectrum(packing: Packing, result: Spectrum, gain: dict[str, Any] | N
         print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
 
 
-def _gain_of(packing: Packing) -> dict[str, Any] | None:
+def _in_balance(packing: Packing | Snapshot) -> bool:
+    """Whether what is left of the forces on a disk is rounding, of a dump's digits at most."""
+    return packing.residual <= IN_BALANCE * float(packing.normal_force.max(initial=0.0))
+
+
+def _gain_of(packing: Packing | Snapshot) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None if unstable, too large, or where it fails."""
     from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
 
-    if len(packing) > MOST_DISKS:
+    if packing.coordinates > 3 * MOST_DISKS:
         return None
     try:
         displacement, energy = transient_gains(packing)
@@ -161,27 +206,36 @@ def onset(
         ),
     ] = None,
     slices: Slices = None,
+    every: Annotated[
+        bool,
+        typer.Option("--all", help="All windows up to ramp.until, of a packing of up to 300 disks: takes longer."),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """The onset F_x^c and the windows of complex eigenvalues, for each friction coefficient of the scene.
+    """The onset F_x^c, for each friction coefficient of the scene. The ramp ends there.
 
-    With a section [damping]: the windows in which some motion grows in spite of
-    the dissipation, or because of it, and beside them the undamped onset.
+    Two eigenvalues become complex at F_x^c. With a section [damping], some motion
+    grows from F_x^c on in spite of the dissipation, or because of it; the
+    undamped onset stands beside. --all gives all windows up to the ramp's end.
     """
     from faultgouge.analysis.files.wholefile import check_folder
+    from faultgouge.pywrap.settling.bed import shared_bed
 
-    wanted, part = read_scene(scene, "onset"), None if modes is None else _modes(modes)
+    wanted, part = read_scene(scene, "onset --all" if every else "onset"), None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if output:
         check_folder(output)
     folder = _search_folder(slices, output)
+    tell = say if as_json else print_line
+    with status("settling") as show:
+        bed = shared_bed(wanted, watch=lambda what: show(f"settling: {what}"))
     found: list[dict[str, Any]] = []
     for mu in wanted.law.mus:
         if wanted.damping is not None:
-            found.append(_damped_onset(wanted, mu, output, folder, found))
+            found.append(_damped_onset(wanted, mu, bed, not every, tell, output, folder, found))
         else:
-            found.append(_undamped_onset(part, folder, wanted, mu))
+            found.append(_undamped_onset(part, folder, wanted, mu, bed, not every, tell))
     result = _written(output, found)
     if is_root() and folder is not None and not slices:
         shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
@@ -209,25 +263,56 @@ def _search_folder(slices: Path | None, output: Path | None) -> Path | None:
     return None if output is None or (output.exists() and not output.is_file()) else Path(f"{output}.slices")
 
 
-def _undamped_onset(modes: tuple[int, int] | None, folder: Path | None, scene: Scene, mu: float) -> dict[str, Any]:
+Tell = Callable[[str], None]
+"""Where results go: to standard output, or beside the JSON to standard error."""
+
+
+def _undamped_onset(
+    modes: tuple[int, int] | None,
+    folder: Path | None,
+    scene: Scene,
+    mu: float,
+    bed: Packing | None,
+    first: bool,
+    tell: Tell,
+) -> dict[str, Any]:
     """The onset of a scene, as its JSON; and what a user reads of it."""
     from faultgouge.analysis.digits import with_uncertainty
     from faultgouge.pywrap.onset.undamped import onset_run
 
     with status(f"mu = {mu:g}") as show:
         watch = partial(_under_way, show, f"mu = {mu:g}", folder=folder)
-        run = onset_run(scene, mu, modes=modes, watch=watch, folder=folder)
-    found = run.onset.windows
-    real = _in_si(scene, [(each.fx_onset, abs(each.eigenvalue) ** 0.5) for each in found])
+        run = onset_run(scene, mu, modes=modes, first=first, bed=bed, watch=watch, folder=folder)
+    onset = run.onset
+    real = _in_si(scene, [(each.fx_onset, abs(each.eigenvalue) ** 0.5) for each in onset.windows])
+    si, opening = real.get("si", []), onset.windows[0]
     among = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
-    say(f"mu = {mu:g}: F_x^c = {with_uncertainty(run.onset.fx_c, run.onset.error)}{among}")
-    _show_windows(found, real.get("si", []))
-    _say_what_is_uncertain(run.equilibria, run.onset.doubtful, "a pair was expected to become complex", found)
-    return {"mu": mu} | run.onset.as_dict() | {"flows_beyond": run.flows_beyond} | real
+    if opening.kind == "start":
+        why = f"an eigenvalue is {opening.eigenvalue:.6g}" if onset.at_start is None else str(onset.at_start)
+        tell(f"mu = {mu:g}: unstable at F_x = {opening.fx_onset:g}{among}, before any shear is added: {why}")
+    else:
+        tell(f"mu = {mu:g}: F_x^c = {with_uncertainty(onset.fx_c, onset.error)}{among}")
+    if onset.complete:
+        _show_windows(onset.windows, si, tell)
+    elif opening.kind != "start":
+        how = "two eigenvalues merge" if opening.kind == "coalescence" else "contacts change"
+        tell(f"mu = {mu:g}: {how} there, and become complex about {opening.eigenvalue:.6g} ({opening.kind})")
+        _tell_in_si(mu, si, tell)
+    if onset.ends is not None and onset.complete:
+        tell(f"mu = {mu:g}: the branch of equilibria ends before F_x = {onset.ends:g}, where an eigenvalue is negative")
+    _say_what_is_uncertain(run.equilibria, onset.doubtful, "a pair was expected to become complex", onset.windows)
+    return {"mu": mu} | onset.as_dict() | {"flows_beyond": run.flows_beyond} | real
 
 
 def _damped_onset(
-    scene: Scene, mu: float, output: Path | None, folder: Path | None, before: list[dict[str, Any]]
+    scene: Scene,
+    mu: float,
+    bed: Packing | None,
+    first: bool,
+    tell: Tell,
+    output: Path | None,
+    folder: Path | None,
+    before: list[dict[str, Any]],
 ) -> dict[str, Any]:
     """The onset of a scene with dissipation, as its JSON; and what a user reads of it.
 
@@ -244,21 +329,32 @@ def _damped_onset(
 
     with status(f"mu = {mu:g}") as show:
         watch = partial(_under_way, show, f"mu = {mu:g}", folder=folder, tells=output is None)
-        run = damped_onset_run(scene, mu, watch, known, folder)
-    first = run.windows[0]
-    say(
-        f"mu = {mu:g}: with dissipation F_x^c = {with_uncertainty(run.fx_c, run.error)} ({first.kind}, "
-        f"omega = {first.frequency:.6g})"
-    )
+        run = damped_onset_run(scene, mu, watch, known, folder, first, bed)
+    opening = run.windows[0]
+    if opening.kind == "start":
+        tell(
+            f"mu = {mu:g}: unstable at F_x = {opening.fx_onset:g} in spite of the dissipation, before any shear is "
+            f"added: a motion of omega = {opening.frequency:.6g} grows"
+        )
+    else:
+        tell(
+            f"mu = {mu:g}: with dissipation F_x^c = {with_uncertainty(run.fx_c, run.error)} ({opening.kind}, "
+            f"omega = {opening.frequency:.6g})"
+        )
     undamped = run.undamped
     without = "none on this ramp" if undamped is None else f"F_x^c = {with_uncertainty(undamped.fx_c, undamped.error)}"
-    say(f"mu = {mu:g}: without dissipation {without}")
+    tell(f"mu = {mu:g}: without dissipation {without}")
     real = _in_si(scene, [(each.fx_onset, each.frequency) for each in run.windows])
-    for each in real.get("si", [])[:1]:
-        stress, ratio, frequency = _columns(each)
-        say(f"mu = {mu:g}: in SI a shear stress of {stress} Pa, {ratio} of the overburden, at {frequency} Hz")
+    _tell_in_si(mu, real.get("si", []), tell)
     _say_what_is_uncertain(run.equilibria, run.doubtful, "a motion was expected to grow", run.windows)
     return {"mu": mu} | run.as_dict() | real
+
+
+def _tell_in_si(mu: float, si: Sequence[dict[str, float]], tell: Tell) -> None:
+    """The first window in real units, where the scene has some."""
+    for each in si[:1]:
+        stress, ratio, frequency = _columns(each)
+        tell(f"mu = {mu:g}: in SI a shear stress of {stress} Pa, {ratio} of the overburden, at {frequency} Hz")
 
 
 def _in_si(scene: Scene, windows: Sequence[tuple[float, float]]) -> dict[str, list[dict[str, float]]]:
@@ -297,8 +393,8 @@ def _say_what_is_uncertain(
         )
 
 
-def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]]) -> None:
-    """The windows of complex eigenvalues as a table, on standard error; in SI where the scene has units."""
+def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]], tell: Tell) -> None:
+    """The windows of complex eigenvalues as a table; in SI where the scene has units."""
     from faultgouge.analysis.digits import with_uncertainty
 
     rows = []
@@ -307,7 +403,7 @@ def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]]) -> 
         numbers = _columns(si[k]) if si else [f"{each.eigenvalue:.6g}"]
         rows.append([with_uncertainty(each.fx_onset, each.error), until, *numbers, each.kind])
     more = ("in Pa", "F_x/F_y", "in Hz") if si else ("eigenvalue",)
-    show_table(("from F_x", "to F_x", *more, "begins with"), rows)
+    tell(table_of(("from F_x", "to F_x", *more, "begins with"), rows))
 
 
 def _under_way(

@@ -10,7 +10,7 @@ import typer
 from ..guard import keeps
 from ..ranks import is_root
 from .pictures import modes_of
-from .terminal import Frame, PackingFile, progress, say, status, stored_packing
+from .terminal import Frame, PackingFile, progress, say, status, stored_packing, stored_snapshot
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -24,8 +24,8 @@ Source = Annotated[
     Path,
     typer.Argument(
         metavar="FILE",
-        help="LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, packing.json, "
-        "or what MDAnalysis reads with radii.",
+        help="A LAMMPS deck (.in); or LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended "
+        "XYZ, GSD, packing.json, or what MDAnalysis reads with radii.",
         show_default=False,
     ),
 ]
@@ -67,18 +67,34 @@ def import_(
     contacts: Slips = None,
     frame: Annotated[int | None, typer.Option(help="Which of several frames; negative ones from the last.")] = None,
     relax: Annotated[bool, typer.Option("--relax", help="Bring to rest what is out of balance.")] = False,
+    slides: Annotated[
+        bool, typer.Option("--slides", help="Of a deck: contacts at Coulomb's bound slide; they stick by default.")
+    ] = False,
 ) -> None:
     """Take a packing of another code, as run.h5 for draw, spectrum, and the key packing.file of a scene.
 
     A packing in balance is taken as it is, to the bit. With --relax one out of balance
     comes to rest under law and load: without friction, which then begins with zero
     slips; with friction if the file has slips. What moved is said.
+
+    A LAMMPS deck (NAME.in, in.NAME) is run in its own folder, and its last state is
+    kept as it stands, with LAMMPS's own granular styles, disks or spheres.
     """
     from faultgouge.analysis.files.wholefile import check_folder
 
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
     check_folder(output)
+    if file.suffix == ".in" or file.name.startswith("in."):
+        given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame, relax or None]
+        if floor or any(each is not None for each in given):
+            raise typer.BadParameter(
+                f"{file} is a deck, which says all by itself: leave all options but -o and --slides"
+            )
+        _import_deck(file, output, slides)
+        return
+    if slides:
+        raise typer.BadParameter("--slides is for a LAMMPS deck (.in): leave it out")
     disks = _placed(file, frame, floor, width, contacts)
     laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
     packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
@@ -93,6 +109,19 @@ def import_(
         f"{len(packing)} disks, {int(packing.top.sum())} of them the upper layer, {contacts_of}; residual "
         f"{packing.residual:.2g}; written to {output}"
     )
+
+
+def _import_deck(file: Path, output: Path, slides: bool) -> None:
+    """Run a deck and keep its last state."""
+    from faultgouge.analysis.files.snapshot_file import write_snapshot
+    from faultgouge.pywrap.granular.deck import run_deck
+
+    keeps(f"nothing has been written to {output} yet")
+    with status(f"{file}: LAMMPS runs"):
+        snapshot = run_deck(file, slides=slides)
+    if is_root():
+        write_snapshot(output, snapshot, {"deck": file.read_text(errors="replace")})
+    say(f"{repr(snapshot).removeprefix('<Snapshot: ').removesuffix('>')}; written to {output}")
 
 
 @app.command(epilog="Example: faultgouge export run.h5 --mode pair -o packing.vtp")
@@ -130,6 +159,14 @@ def export(
         if mode is not None or frame != -1:
             raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")
         _export_frames(file, frames, output)
+        return
+    snapshot = stored_snapshot(file)
+    if snapshot is not None:
+        if is_root():
+            from faultgouge.pywrap.exchange.snapshot_export import modes_of_snapshot, write_snapshot_for_others
+
+            found = [] if mode is None else modes_of_snapshot(snapshot, mode)
+            say(f"{write_snapshot_for_others(output, snapshot, found)}; written to {output}")
         return
     check_writer(output, mode is not None)
     packing = stored_packing(file, frame)
@@ -200,7 +237,7 @@ def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[st
     values = options if scene else {**disks.given, **options}
     _refuse_gaps(disks, top, scene, values)
     layer = upper_layer(disks, top)
-    wanted = _scene(scene, values)
+    wanted = _scene(scene, values, float(disks.radius.min()))
     load = load_of(wanted) | {"fx": 0.0} | {key: values[key] for key in ("fx", "inertia_factor") if key in values}
     return packing_of(disks, law_of(wanted, wanted.law.mus[0]), layer, **load)
 
@@ -225,17 +262,17 @@ def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict
     raise BadInputError(f"{disks.source} does not say {missing}: add {options}, as in `{example}`{ways}")
 
 
-def _scene(scene: Path | None, values: dict[str, Any]) -> Scene:
-    """The scene, or one that says what options and file say."""
+def _scene(scene: Path | None, values: dict[str, Any], smallest: float) -> Scene:
+    """The scene, or one that says what options and file say; with disks of the smallest radius in place of its own."""
     from faultgouge.pywrap.scenes.scene import Scene
 
+    packing = {"radii": [smallest], "width": 20 * smallest}
     if scene is not None:
-        return Scene.from_toml(scene, packing={})
+        return Scene.from_toml(scene, packing=packing)
     damping = {key: values[key] for key in ("cn", "ct", "tau") if key in values}
     law: dict[str, Any] = {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values}
-    if values.get("rescaled"):
-        law["history"] = "rescaled"
-    sections = {"packing": {}, "law": law, "load": {"fy": values["fy"]}}
+    law["history"] = next((name for name in ("rescaled", "coulomb") if values.get(name)), "total")
+    sections = {"packing": packing, "law": law, "load": {"fy": values["fy"]}}
     return Scene.from_mapping(sections | ({"damping": damping} if damping else {}))
 
 

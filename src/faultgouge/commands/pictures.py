@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..ranks import is_root
-from .terminal import Frame, PackingFile, progress, say, stored_packing
+from .terminal import Frame, PackingFile, progress, refuse_snapshot, say, stored_packing, stored_series
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -45,30 +45,47 @@ WhichColour = Annotated[
 @app.command(epilog="Example: faultgouge draw run.h5 --mode pair -o mode.svg")
 def draw(
     file: PackingFile,
-    frame: Frame = -1,
+    frame: Annotated[
+        int | None,
+        typer.Option(help="Which equilibrium, by default the last; negative ones count from it.", show_default=False),
+    ] = None,
     mode: WhichMode = None,
     color: WhichColour = Colour.MOBILISED,
     output: Annotated[
         Path, typer.Option("-o", "--output", help="The picture: .png, .svg or .pdf.", show_default=True)
     ] = Path("picture.png"),
 ) -> None:
-    """Draw a stored packing, with its force chains or with one of its modes.
+    """Draw a stored packing, with its force chains or with one of its modes; a cycle of loads; of perturb.h5 D(t).
 
     Disks are to scale: the upper layer is yellow, rattlers are hollow. Bars are
     contacts: their width is the normal force. Of a mode, arrows are displacements
     and colours rotations; participation ratio and share of rotation stand above.
+    A ramp with turning points is drawn as F_x over the displacement of the upper
+    layer, and perturb.h5 as D(t) with the slope that the spectrum predicts; with
+    --frame or --mode their packing.
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
-    packing = stored_packing(file, frame)
+    refuse_snapshot(file)
+    packing, series, cycle = stored_packing(file, -1 if frame is None else frame), None, []
+    if frame is None and mode is None:
+        series, cycle = stored_series(file), _cycle(file)
     if not is_root():
         return
-    from faultgouge.figures import draw_packing
+    from faultgouge.analysis.motion.growth import growth_of_run
+    from faultgouge.figures import draw_cycle, draw_packing
     from faultgouge.figures.mode import draw_modes
     from faultgouge.figures.packing import in_words
+    from faultgouge.figures.series import draw_growth
     from faultgouge.figures.style import save_as
 
-    if mode is None:
+    if cycle:
+        figure = draw_cycle(cycle)
+    elif series is not None:
+        growth = growth_of_run(packing, series["time"], series["msd"], series["friction"])
+        say(growth.says)
+        figure = draw_growth(series["time"], series["msd"], growth.predicted, growth.measured)
+    elif mode is None:
         say(in_words(packing))
         figure = draw_packing(packing, color=color.value, caption=True)
     else:
@@ -105,6 +122,7 @@ def movie(
     from faultgouge.figures.writers import check_name, write_film
 
     check_name(output)
+    refuse_snapshot(file)
     count = max(2, round(seconds * rate))
     if not is_root():
         return
@@ -151,6 +169,7 @@ def view(
 
     check_library()
     check_folder(output)
+    refuse_snapshot(file)
     if not is_root():
         return
     with RunFile(file) as run:
@@ -164,6 +183,17 @@ def view(
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
     write_view(packings, output, title, series, lambda them: progress(them, "loads"))
     say(f"{len(packings)} loads, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
+
+
+def _cycle(file: Path) -> list[Packing]:
+    """The equilibria of a ramp with turning points; none of another file."""
+    from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.hysteresis import turning_points
+
+    if file.suffix == ".disks":
+        return []
+    with RunFile(file) as run:
+        return [run.packing(k) for k in range(len(run))] if turning_points(run.fx) else []
 
 
 def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int) -> Film:

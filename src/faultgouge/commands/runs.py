@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from importlib.resources import files
 from math import ceil
 from pathlib import Path
@@ -11,11 +12,13 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import AsJson, Out, ScenePath, print_json, progress, read_scene, say, say_way, status
+from .terminal import AsJson, Out, ScenePath, print_json, progress, read_scene, say, say_way, status, tell
 
 if TYPE_CHECKING:
+    from faultgouge.analysis.motion.hysteresis import Hysteresis
     from faultgouge.pywrap import Equilibrium, Record, Scene
     from faultgouge.pywrap.lammps.dynamics import Weakening
+    from faultgouge.pywrap.scenes.sections import Ramp
 
 app = typer.Typer()
 
@@ -43,7 +46,7 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
     packing = last.packing
-    say(
+    tell(
         f"{len(packing)} disks, {len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers; "
         f"residual {last.residual:.2g} (rounding floor {last.floor:.2g}); written to {output}"
     )
@@ -51,41 +54,65 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
 
 @app.command(epilog="Example: mpiexec -n 2 faultgouge ramp paper.toml -o run.h5")
 def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False) -> None:
-    """Raise F_x from equilibrium to equilibrium, each stored as it is reached."""
+    """Raise F_x from equilibrium to equilibrium, each stored as it is reached.
+
+    With turning points in ramp.until F_x goes up, down and below zero, and what is
+    left when F_x comes back is said: the displacement of the layer, and the work of
+    the loads.
+    """
     from faultgouge.pywrap import Record
     from faultgouge.pywrap import ramp as ramp_up
-    from faultgouge.pywrap.runs.path import loads
+    from faultgouge.pywrap.runs.path import all_loads, count_behind
     from faultgouge.pywrap.scenes.refusals import needed
 
     wanted = read_scene(scene, "ramp")
     settings = needed(wanted.ramp, "ramp")
     with Record(output, wanted, saved=keeps) as record:
         start = _settled(wanted, record)
-        total, done = len(loads(settings)), round(start.fx / settings.step) + 1
+        total, done = len(all_loads(settings)), count_behind(settings, record.forces)
         dumps = output.with_suffix("") if wanted.output is not None and wanted.output.dumps else None
-        for equilibrium in progress(ramp_up(wanted, start, dumps=dumps), "equilibria", total, done):
+        for equilibrium in progress(ramp_up(wanted, start, dumps=dumps, behind=done), "equilibria", total, done):
             say_way(equilibrium)
             record.append(equilibrium)
         record.finish()
     assert record.last is not None
-    say(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")
+    if not is_root():
+        return
+    left = _hysteresis(output, settings)
     if as_json:
-        print_json({"equilibria": _equilibria(output)})
+        print_json({"equilibria": _equilibria(output), "hysteresis": None if left is None else asdict(left)})
+        return
+    tell(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")
+    if left is not None:
+        tell(
+            f"F_x is back at {left.fx:g}: the upper layer has moved by {left.remaining:.4g} since it was there first, "
+            f"and the loads have done the work {left.work:.4g} on it"
+        )
 
 
 @app.command(epilog="Example: faultgouge perturb paper.toml -o run.h5")
 def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
-    """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t)."""
+    """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t).
+
+    It says whether D grew, at what rate, what the spectrum of the equilibrium
+    predicts, and whether the run was long enough. Of several friction coefficients
+    the first one is run.
+    """
     from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.growth import growth_of_run
     from faultgouge.pywrap import Record, reach
+    from faultgouge.pywrap.runs.path import step_of
+    from faultgouge.pywrap.runs.undamped import sampling
     from faultgouge.pywrap.scenes.refusals import needed
 
     wanted = read_scene(scene, "perturb")
     settings = needed(wanted.perturb, "perturb")
+    mus = wanted.law.mus
+    if len(mus) > 1:
+        say(f"mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene, is run")
     with Record(output, wanted, task="perturb", saved=keeps) as record:
         if record.last is None:
-            step = wanted.ramp.step if wanted.ramp else 1e-3  # as in `reach`
-            total = ceil(settings.fx / step * (1 - 1e-9)) + 1
+            total = ceil(settings.fx / step_of(wanted) * (1 - 1e-9)) + 1
             for start in progress(reach(wanted, settings.fx), "equilibria", total):
                 say_way(start)
             _lines(wanted, start)  # refuses what the packing does not allow, before anything is written
@@ -97,10 +124,21 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         for sample in progress(run, "samples", _lines(wanted, record.last)):
             last, largest = sample, max(largest, sample.msd)
         record.finish()
-    say(f"D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}; written to {output}")
+    if not is_root():
+        return
+    with RunFile(output) as file:
+        series, packing = file.series("undamped"), file.packing()
+    dt = sampling(settings, packing)[0]
+    growth = growth_of_run(packing, series["time"], series["msd"], series["friction"], dt)
     if as_json:
-        with RunFile(output) as file:
-            print_json({name: column.tolist() for name, column in file.series("undamped").items()})
+        columns = {name: column.tolist() for name, column in series.items()}
+        print_json({"mu": mus[0], "fx": packing.fx} | growth.as_dict() | columns)
+    else:
+        print(
+            f"F_x = {packing.fx:g}, mu = {mus[0]:g}: D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}"
+        )
+        print(growth.says, flush=True)  # before what follows on standard error
+    say(f"written to {output}")
 
 
 def _lines(scene: Scene, start: Equilibrium) -> int:
@@ -127,6 +165,17 @@ def _weakening(scene: Scene, record: Record) -> Weakening | None:
     weakening = weakening_of(scene.friction, threshold)
     say(f"v0 = {threshold:.3g}{why}, v_ss = {weakening.v_ss:.3g}")
     return weakening
+
+
+def _hysteresis(path: Path, settings: Ramp) -> Hysteresis | None:
+    """What is left when F_x comes back; None on a ramp without turning points."""
+    from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.hysteresis import hysteresis
+
+    if len(settings.turning_points) < 2:
+        return None
+    with RunFile(path) as file:
+        return hysteresis([file.packing(k) for k in range(len(file))])
 
 
 def _equilibria(path: Path) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Many scenes: sweep, merge, and the studies of how generic the onset is, and of the complex modes beyond it."""
+"""Many scenes: sweep, merge, and the complex modes over the load."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ def sweep(
 ) -> None:
     """One task for every scene of a product of keys: results.jsonl, the table results.csv, and a picture.
 
-    A sweep names a task (onset, triggering, ...); below [sweep] lists of values
+    A sweep names a task (onset, triggering, ..., or a function of your own as
+    "file.py:function"); below [sweep] lists of values
     or ranges for any keys of a scene, as in "packing.seed" = "1:200"; and below
     [scene.SECTION] what all scenes share. Every result is written as it ends,
     and the same command goes on where it was cut off. A scene that fails
@@ -47,7 +48,7 @@ def sweep(
         if is_root():
             known = stored(output / LINES)
             missing = [point for point in part_of(wanted.points, part) if point.key not in known]
-            for line in estimate(wanted.task, missing):
+            for line in estimate(wanted.task, missing, known.values()):
                 say(line)
         return
     keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there")
@@ -78,34 +79,6 @@ def _shard(text: str) -> tuple[int, int]:
     if not (part.isdecimal() and of.isdecimal() and 1 <= int(part) <= int(of)):
         raise typer.BadParameter(f"--shard {text}: give the part and the number of parts, as in --shard 1/3")
     return int(part), int(of)
-
-
-@app.command(epilog="Example: faultgouge genericity -o genericity")
-def genericity(
-    output: Folder = Path("genericity"),
-    share: Annotated[
-        float, typer.Option(min=0.005, max=1.0, help="Share of the packings of each set; a larger one goes on.")
-    ] = 1.0,
-    workers: Workers = None,
-    page: Annotated[
-        bool, typer.Option("--page", help="Compute nothing: the page from the tables that are there.")
-    ] = False,
-) -> None:
-    """How generic the onset is, how it depends on the number of disks, and why: tables, pictures and a page.
-
-    Onsets of 200 packings for five friction coefficients, of packings of 50 to
-    10,000 disks, of random matrices and of shuffled contacts. It takes an hour or
-    two on one core, and goes on where it was cut off; --share 0.1 is done in
-    minutes.
-    """
-    from faultgouge.studies.genericity.compute import compute
-    from faultgouge.studies.genericity.page import write_page
-
-    if not page:
-        keeps(f"{output} has the scenes that have ended; the same command goes on from there")
-        compute(output, say, lambda ended, count: progress(ended, "scenes", count), share, workers)
-    if is_root():
-        say(f"written: {write_page(output, say)}")
 
 
 @app.command(epilog="Example: faultgouge modes modes.toml -o modes")

@@ -1,13 +1,14 @@
 """What the commands share: their common options, and how they speak.
 
-Results go to files and, with --json, to standard output; progress and messages go to standard error. Rank 0 alone
-speaks.
+Results go to files and to standard output, as JSON or in words; progress and messages go to standard error. Rank 0
+alone speaks.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
@@ -20,7 +21,7 @@ import typer
 from ..ranks import is_root
 
 if TYPE_CHECKING:
-    from faultgouge.analysis import Packing
+    from faultgouge.analysis import Packing, Snapshot
     from faultgouge.pywrap import Equilibrium, Scene
     from faultgouge.pywrap.scenes.estimate import Task
 
@@ -56,6 +57,26 @@ def read_scene(path: Path, task: Task | None = None, packings: int = 1) -> Scene
     return scene
 
 
+def stored_snapshot(file: Path) -> Snapshot | None:
+    """The snapshot of a run.h5 that holds one; None of all other files."""
+    from faultgouge.analysis.files.snapshot_file import holds_snapshot, read_snapshot
+
+    return read_snapshot(file) if holds_snapshot(file) else None
+
+
+def refuse_snapshot(file: Path) -> None:
+    """Say of a run.h5 that holds a snapshot what shows it."""
+    from faultgouge.analysis import BadInputError
+
+    snapshot = stored_snapshot(file)
+    if snapshot is not None:
+        what = "spheres" if snapshot.dimension == 3 else "disks of another law"
+        raise BadInputError(
+            f"{file} holds {what} as LAMMPS left them: `faultgouge export {file} --mode 0 -o packing.vtp` shows them "
+            "in ParaView, and -o packing.xyz in OVITO."
+        )
+
+
 def stored_packing(file: Path, frame: int = -1) -> Packing:
     """A packing of a run.h5, or of the dumps that decks write."""
     from faultgouge.analysis import RunFile, read_dump
@@ -68,16 +89,40 @@ def stored_packing(file: Path, frame: int = -1) -> Packing:
         return run.packing(frame)
 
 
+def stored_series(file: Path) -> dict[str, Any] | None:
+    """The time series of the undamped run in a perturb.h5; None of another file, or where the run has not begun."""
+    from faultgouge.analysis import RunFile
+
+    if file.suffix == ".disks":
+        return None
+    with RunFile(file) as run:
+        series = run.series("undamped") if "undamped" in run.names_of_series else None
+        is_run = run.attributes.get("task") == "perturb"
+    return series if is_run and series is not None and len(series["time"]) > 1 else None
+
+
 def print_json(value: dict[str, Any]) -> None:
     """The result on standard output."""
     if is_root():
         print(json.dumps(value, indent=1))
 
 
+def print_line(message: str) -> None:
+    """A result on standard output."""
+    if is_root():
+        print(message, flush=True)
+
+
 def say(message: str) -> None:
     """A line on standard error."""
     if is_root():
         print(message, file=sys.stderr)
+
+
+def tell(result: str) -> None:
+    """A line of the result on standard output, for people; `print_json` is for programs, and goes instead of it."""
+    if is_root():
+        print(result)
 
 
 def say_way(equilibrium: Equilibrium) -> None:
@@ -121,7 +166,7 @@ def status(what: str) -> Iterator[Callable[[str], None]]:
 
 
 def progress(items: Iterable[T], what: str, total: int | None = None, done: int = 0) -> Iterator[T]:
-    """The items, with a progress bar on a terminal; off a terminal with a line a minute."""
+    """The items, with a progress bar on a terminal; off a terminal with a line a minute. Both say how long is left."""
     from rich.console import Console
 
     console = Console(stderr=True)
@@ -129,14 +174,23 @@ def progress(items: Iterable[T], what: str, total: int | None = None, done: int 
         total = len(items)
     if not console.is_terminal or not is_root():
         among = "" if total is None else f" of {total}"
+        begin = time.monotonic()
         with status(f"{what}: {done}{among}") as show:
             for number, item in enumerate(items, done + 1):
-                show(f"{what}: {number}{among}")
+                left = 0.0 if total is None else (time.monotonic() - begin) / (number - done) * (total - number)
+                show(f"{what}: {number}{among}" + (f", about {left / 60:.0f} min left" if left > 60 else ""))
                 yield item
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(what, total=total, completed=done)
         for item in items:
@@ -144,15 +198,13 @@ def progress(items: Iterable[T], what: str, total: int | None = None, done: int 
             yield item
 
 
+def table_of(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table as lines of text, whose columns are as wide as what is in them."""
+    lines = [list(headings), *map(list, rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join("   ".join(map(str.ljust, line, widths)).rstrip() for line in lines)
+
+
 def show_table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
     """A table on standard error."""
-    if not is_root():
-        return
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(*headings, box=box.SIMPLE_HEAD)
-    for row in rows:
-        table.add_row(*row)
-    Console(stderr=True, highlight=False).print(table)
+    say(table_of(headings, rows))

@@ -321,3 +321,11 @@ def test_loads_without_equilibrium_are_gone_around(hole, error):
     assert abs(window.fx_onset - 0.3) <= window.error + DIGITS
     assert window.error <= error
     assert window.fx_end == pytest.approx(0.7, abs=DIGITS)
+
+
+def test_the_first_window_alone_is_that_of_all_and_nothing_beyond_it_is_asked_for(path):
+    every, asked = find_onset(path, path.grid[18:]), []
+    first = find_onset(lambda fx: asked.append(fx) or path(fx), path.grid[18:], first=True)
+    assert first.fx_c == pytest.approx(every.fx_c, abs=first.error + every.error)
+    assert len(first.windows) == 1
+    assert max(asked) == min(fx for fx in path.grid if fx > first.fx_c)

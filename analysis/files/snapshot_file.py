@@ -1,0 +1,103 @@
+"""A run.h5 that holds a Snapshot, to the bit, in two or three dimensions.
+
+The file is sealed as every run.h5 is (:mod:`.sealedfile`), and H5MD 1.1::
+
+    /h5md                             version, author, creator
+    /particles/particles/position     (1, N, 3)  centres; z = 0 of disks
+    /particles/particles/box          dimension 3; lengths of the edges, and which are periodic
+    /snapshot/<name>                  fields of :class:`~faultgouge.analysis.Snapshot`
+    /snapshot/contacts/<name>         fields of :class:`~faultgouge.analysis.LinearisedContacts`
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ..errors import PackingFileError
+from ..packing.snapshot import PER_CONTACT, LinearisedContacts, Snapshot
+from .runfile_header import CHECKED, CREATOR, program_version
+from .sealedfile import new_file, opened, write
+from .wholefile import is_sealed
+
+SCALARS = ("dimension", "fx", "load_error")
+ARRAYS = ("position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind")
+
+
+def write_snapshot(path: Path, snapshot: Snapshot, attributes: Mapping[str, str | int | float] | None = None) -> None:
+    """Write a snapshot; an existing file is replaced.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    snapshot : Snapshot
+        What it is to hold.
+    attributes : mapping, optional
+        Attributes of the root, such as the deck.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    with new_file() as file:
+        header = file.create_group("h5md")
+        header.attrs["version"] = np.array([1, 1])
+        header.create_group("author").attrs["name"] = CREATOR
+        header.create_group("creator").attrs.update({"name": CREATOR, "version": program_version()})
+        particles = file.create_group("particles/particles")
+        position = np.zeros((1, len(snapshot), 3))
+        position[0, :, : snapshot.dimension] = snapshot.position
+        for name, value in (("value", position), ("step", np.zeros(1, int)), ("time", np.zeros(1))):
+            particles.create_dataset(f"position/{name}", data=value)
+        box = particles.create_group("box")
+        box.attrs["dimension"] = 3
+        box.attrs["boundary"] = ["periodic" if each else "none" for each in snapshot.periodic]
+        box.create_dataset("edges", data=np.linalg.norm(snapshot.box, axis=1))
+        group = file.create_group("snapshot")
+        for name in SCALARS:
+            group.attrs[name] = getattr(snapshot, name)
+        for name in ARRAYS:
+            group.create_dataset(name, data=getattr(snapshot, name))
+        for name in PER_CONTACT:
+            values = getattr(snapshot.contacts, name)
+            group.create_dataset(
+                f"contacts/{name}", data=values, **(CHECKED if len(values) else {}), chunks=len(values) > 0 or None
+            )
+        for name, said in (attributes or {}).items():
+            file.attrs[name] = said
+        write(path, file)
+
+
+def holds_snapshot(path: Path) -> bool:
+    """Whether a file is an HDF5 file with a snapshot in it; false for whatever cannot be read."""
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            return "snapshot" in file
+    except OSError:
+        return False
+
+
+def read_snapshot(path: Path) -> Snapshot:
+    """The snapshot of a file.
+
+    Raises
+    ------
+    PackingFileError
+        If the file is missing, damaged, or holds none.
+    """
+    if not path.is_file():
+        raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
+    is_sealed(path)  # refuses what has changed
+    with opened(path) as file:
+        try:
+            group = file["snapshot"]
+            contacts = LinearisedContacts(**{name: group["contacts"][name][()] for name in PER_CONTACT})
+            arrays = {name: group[name][()] for name in ARRAYS}
+            numbers = {name: group.attrs[name].item() for name in SCALARS}
+            return Snapshot(contacts=contacts, **arrays, **numbers)
+        except Exception as error:  # h5py raises nearly every exception there is, depending on what is damaged
+            said = (str(error).strip() or type(error).__name__).rstrip(".")
+            raise PackingFileError(f"{path} holds no snapshot that can be read: {said}.") from error

@@ -1,0 +1,89 @@
+r"""Hysteresis of a layer that is loaded and unloaded: what is left when F_x comes back.
+
+Contacts that slide remember: F_x over the mean displacement u of the upper layer is another curve on the way back. Let
+F_x be at its last value for the first time at equilibrium a, and for the last time at equilibrium b, with a turning
+point in between. If all contacts came back to where they were, so would the layer. What is left is
+
+.. math:: \Delta u = u_b - u_a, \qquad
+          W = \sum_{top} \int_a^b (F_x\, \mathrm d x_i - F_y\, \mathrm d y_i),
+
+the remaining displacement and the work of the loads, by the trapezoidal rule over the equilibria; F_y is constant, and
+its part is exact. Where the layer has come back, W is what friction has turned into heat, plus what contacts that have
+rearranged still hold, or minus what they have set free. The rule's error falls as the square of the increments.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..packing.arrays import Floats
+from ..packing.geometry import nearest_image
+from ..packing.packing import Packing
+
+
+@dataclass(frozen=True)
+class Hysteresis:
+    """A path of loads that comes back.
+
+    Attributes
+    ----------
+    fx : float
+        The last F_x, where the path has been before.
+    begin : int
+        Which equilibrium that was, counted from 0.
+    remaining : float
+        Displacement of the upper layer along x since then, length.
+    work : float
+        Of the loads on all disks of the layer since then, force length.
+    """
+
+    fx: float
+    begin: int
+    remaining: float
+    work: float
+
+
+def layer_displacement(packings: Sequence[Packing]) -> Floats:
+    """Mean displacement (x, y) of the upper layer since the first of some equilibria, length, shape (T, 2).
+
+    Parameters
+    ----------
+    packings : sequence of Packing
+        Equilibria one after the other, all of the same disks; without an upper layer the mean is over all disks.
+    """
+    first = packings[0]
+    upper = first.top if first.top.any() else np.ones(len(first), dtype=bool)
+    moved = np.zeros((len(packings), 2))
+    for k in range(1, len(packings)):
+        here, there = packings[k - 1], packings[k]
+        step = nearest_image(there.position[upper] - here.position[upper], first.box_length)
+        if here.position_low is not None and there.position_low is not None:
+            step = step + (there.position_low[upper] - here.position_low[upper])
+        moved[k] = step.mean(axis=0)
+    return np.cumsum(moved, axis=0)
+
+
+def turning_points(fx: Floats) -> list[int]:
+    """Which loads of a path are larger than both neighbours, or smaller; indices from 0."""
+    steps = np.diff(fx)
+    return [k + 1 for k in range(len(steps) - 1) if steps[k] * steps[k + 1] < 0]
+
+
+def hysteresis(packings: Sequence[Packing]) -> Hysteresis | None:
+    """What is left when F_x comes back; None if the last F_x has not been met before a turning point.
+
+    Parameters
+    ----------
+    packings : sequence of Packing
+        Equilibria one after the other, all of the same disks.
+    """
+    fx = np.array([packing.fx for packing in packings])
+    turns, begin = turning_points(fx), int(np.argmax(fx == fx[-1]))
+    if not any(begin < turn < len(fx) - 1 for turn in turns):
+        return None
+    moved = layer_displacement(packings)[begin:]
+    last, disks = packings[-1], int(packings[0].top.sum())
+    mean = 0.5 * (fx[begin + 1 :] + fx[begin:-1])
+    work = mean @ np.diff(moved[:, 0]) - last.fy * (moved[-1, 1] - moved[0, 1])
+    return Hysteresis(last.fx, begin, float(moved[-1, 0] - moved[0, 0]), disks * float(work))

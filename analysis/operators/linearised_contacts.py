@@ -1,0 +1,154 @@
+r"""Stiffness and damping of a packing from its linearised contacts, in two and three dimensions.
+
+For one contact of i and j let :math:`\mathbf u = \mathrm d\mathbf r_i - \mathrm d\mathbf r_j`,
+:math:`\mathbf w = s_i\, \mathrm d\boldsymbol\theta_i + s_j\, \mathrm d\boldsymbol\theta_j`, and
+:math:`P = 1 - \mathbf n \mathbf n^T`. Then
+
+.. math::
+
+    \mathrm d\delta &= -\mathbf n \cdot \mathbf u, \qquad \mathrm d\mathbf n = P \mathbf u / r, \qquad
+    \mathrm d\mathbf s = P \mathbf u + \mathbf n \times \mathbf w \\
+    \mathbf F_i &= f_n \mathbf n + \mathbf f_t = -\mathbf F_j, \qquad
+    \mathbf T_i = -l_i\, \mathbf n \times \mathbf f_t, \qquad \mathbf T_j = -l_j\, \mathbf n \times \mathbf f_t \\
+    \mathrm d\mathbf f_t &= -k_t' S\, \mathrm d\mathbf s + \mathbf b\, \mathrm d\delta
+    - \mathbf n\, (\mathbf f_t \cdot \mathrm d\mathbf n) \\
+    \mathrm d\mathbf F_i &= f_n' \mathbf n\, \mathrm d\delta + f_n\, \mathrm d\mathbf n + \mathrm d\mathbf f_t \\
+    \mathrm d\mathbf T_i &= -l_i\, (\mathrm d\mathbf n \times \mathbf f_t + \mathbf n \times \mathrm d\mathbf f_t)
+    - l_i'\, \mathbf n \times \mathbf f_t\, \mathrm d\delta .
+
+S is P where the contact sticks; where it slides, it is P without the direction of :math:`\mathbf f_t`: sideways the
+contact is as stiff as before. The last term of :math:`\mathrm d\mathbf f_t` turns the force with the contact, as a code
+does that projects its history onto the new plane. A twist about n changes nothing. The arms of slip s and of torque l
+are both the radius in LAMMPS's gran/* styles; its `granular` takes the radius for the slip and
+:math:`R - \delta/2` for the torque, so that K is not symmetric even without b. A wall is a partner that has no
+coordinates, and :math:`1/r = 0`. The three columns of a particle's spin about its only contact vanish together:
+such motions have the eigenvalue zero.
+
+Dashpots are the same formulas with velocities for displacements,
+:math:`f_n' \to c_n`, :math:`k_t' \to c_t`, and without forces. (Bonfanti et al., arXiv:1909.05070, have K of a smooth
+law in three dimensions.)
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
+
+from ..packing.arrays import Floats, Indices, derived
+from ..packing.snapshot import LinearisedContacts, Snapshot
+
+
+def contact_derivatives(contacts: LinearisedContacts, parting: ArrayLike = 0.5) -> tuple[Floats, Floats, Floats]:
+    """Derivatives of force and torque by u and w, and what the arms of torques add.
+
+    Returns
+    -------
+    force, torque : ndarray, shape (C, 2, 3, 3)
+        d F_i, and d (n x f_t), by u and by w: force / length.
+    growth : ndarray, shape (C, 3, 3)
+        (n x f_t) d delta by u: what a lever arm that shrinks with the overlap adds.
+    """
+    c, one = contacts, np.eye(3)
+    n, ft, b = c.normal, c.tangential_force, c.overlap_derivative(parting)
+    plane = one - _outer(n, n)
+    size = np.linalg.norm(ft, axis=1, keepdims=True)
+    along = np.divide(ft, size, out=np.zeros_like(ft), where=size > 0) * c.sliding[:, None]
+    resisting = c.tangential_stiffness[:, None, None] * (plane - _outer(along, along))
+    overlap, turn, cross = -n, plane / c.distance[:, None, None], _cross_matrix(n)
+    ft_by_u = -resisting @ plane + _outer(b, overlap) - _outer(n, np.einsum("ca,cab->cb", ft, turn))
+    ft_by_w = -resisting @ cross
+    force_by_u = _outer(c.normal_stiffness[:, None] * n, overlap) + c.normal_force[:, None, None] * turn + ft_by_u
+    torque_by_u = cross @ ft_by_u - _cross_matrix(ft) @ turn
+    force = np.stack([force_by_u, ft_by_w], axis=1)
+    return force, np.stack([torque_by_u, cross @ ft_by_w], axis=1), _outer(np.cross(n, ft), overlap)
+
+
+def assembled_stiffness(snapshot: Snapshot, parting: ArrayLike = 0.5) -> csr_array:
+    """K = -dF/dq of a snapshot; see :func:`~faultgouge.analysis.stiffness_matrix`."""
+    return _assemble(snapshot, snapshot.contacts, parting)
+
+
+def assembled_damping(snapshot: Snapshot) -> csr_array:
+    """C = -dF/d(dq/dt) of a snapshot; see :func:`~faultgouge.analysis.damping_matrix`."""
+    c = snapshot.contacts
+    none, still = np.zeros(len(c)), np.zeros((len(c), 3))
+    # the direction in which a contact slides is that of its tangential force, which has no part in C but for this
+    sliding = np.divide(c.tangential_force, 1.0, out=still.copy(), where=c.sliding[:, None])
+    dashpots = derived(
+        c, normal_force=none, tangential_force=sliding, closing=still, parting=still, distance=np.full(len(c), np.inf),
+        normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot, lever_slope=none,
+    )  # fmt: skip
+    return _assemble(snapshot, dashpots, 0.5)
+
+
+def _assemble(snapshot: Snapshot, contacts: LinearisedContacts, parting: ArrayLike) -> csr_array:
+    """-dF/dq: rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact."""
+    count, c, pair = len(snapshot), contacts, ~contacts.wall
+    force, torque, growth = contact_derivatives(c, parting)
+    partners = np.stack([c.i, np.where(pair, c.j, 0)])
+    radius = snapshot.radius[partners]
+    rolling, lever = c.slip_arm.T / radius, c.lever_arm.T / radius
+    takes_part = snapshot.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
+    # axes first: all that follows walks along contacts
+    force, torque, growth = (np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (force, torque, growth))
+    blocks = np.empty((2, 2, 6, 6, len(c)))
+    for p, of in enumerate((-1.0, 1.0)):  # the partner whose force changes, and the sign of -F
+        for q, by in enumerate((1.0, -1.0)):  # the partner that moves
+            both = (takes_part[p] & takes_part[q]).astype(np.float64)
+            blocks[p, q, :3, :3] = (of * by * both) * force[0]
+            blocks[p, q, :3, 3:] = (of * both * rolling[q]) * force[1]
+            # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
+            blocks[p, q, 3:, :3] = (by * both * lever[p]) * torque[0] - (by * both * c.lever_slope / radius[p]) * growth
+            blocks[p, q, 3:, 3:] = (both * lever[p] * rolling[q]) * torque[1]
+    if snapshot.dimension == 2:
+        in_plane = np.array([0, 1, 5])
+        blocks = blocks[:, :, in_plane[:, None], in_plane]
+    diagonal = np.zeros((*blocks.shape[2:4], count))
+    for row, column in np.ndindex(*diagonal.shape[:2]):
+        for p in (0, 1):
+            diagonal[row, column] += np.bincount(partners[p], blocks[p, p, row, column], count)
+    first, second = partners[:, pair]
+    every = np.arange(count)
+    rows, columns = np.concatenate([every, first, second]), np.concatenate([every, second, first])
+    return _from_blocks(
+        rows, columns, np.concatenate([diagonal, blocks[0, 1][..., pair], blocks[1, 0][..., pair]], axis=2), count
+    )
+
+
+def _from_blocks(rows: Indices, columns: Indices, blocks: Floats, count: int) -> csr_array:
+    """A matrix in the order of axes, from blocks of particles; those of the same place, of two images, are added."""
+    key = rows * count + columns
+    order = np.argsort(key, kind="stable")
+    begins = np.flatnonzero(np.diff(key[order], prepend=-1))
+    rows, columns = rows[order][begins], columns[order][begins]
+    values = blocks[..., order]
+    if len(begins) < len(order):
+        values = np.add.reduceat(values, begins, axis=2)
+    axes = len(blocks)
+    # a row of an axis has its neighbours once for each axis of the columns
+    neighbours = np.bincount(rows, minlength=count)
+    starts = np.concatenate([[0], np.cumsum(neighbours)])
+    inside = np.arange(len(rows)) - starts[rows]
+    data = np.empty((axes, axes * len(rows)))
+    indices = np.empty(axes * len(rows), dtype=np.int32)
+    for axis in range(axes):
+        place = axes * starts[rows] + axis * neighbours[rows] + inside
+        indices[place] = axis * count + columns
+        data[:, place] = values[:, axis]
+    pointers = (axes * starts[:-1] + np.arange(axes)[:, None] * axes * len(rows)).ravel()
+    pointers = np.append(pointers, axes * axes * len(rows))
+    size = axes * count
+    matrix = csr_array((data.ravel(), np.tile(indices, axes), pointers), shape=(size, size))
+    matrix.eliminate_zeros()
+    return matrix
+
+
+def _outer(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[:, :, None] * b[:, None, :])
+
+
+def _cross_matrix(a: Floats) -> Floats:
+    """[a] with [a] x = a x x, shape (C, 3, 3)."""
+    found = np.zeros((len(a), 3, 3))
+    found[:, 0, 1], found[:, 0, 2], found[:, 1, 2] = -a[:, 2], a[:, 1], -a[:, 0]
+    found[:, 1, 0], found[:, 2, 0], found[:, 2, 1] = a[:, 2], -a[:, 1], a[:, 0]
+    return found

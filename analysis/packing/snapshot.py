@@ -1,0 +1,417 @@
+r"""A packing as some other code holds it, in two or three dimensions: what each contact does to first order.
+
+A contact law, whatever it is, enters the operators through a few numbers at each contact: the normal, the distance and
+the lever arms; the normal and the tangential force; and the derivatives of both. `LinearisedContacts` has them,
+`Snapshot` adds the particles, and :mod:`~faultgouge.analysis.operators.linearised_contacts` makes the operators.
+
+**Coordinates** are translations and rotations as lengths, :math:`R\theta`, axis by axis:
+(x.., y.., R theta..) of disks and (x.., y.., z.., R theta_x.., R theta_y.., R theta_z..) of spheres. Vectors always
+have three components; those of disks lie in the plane, and disks turn about z.
+
+**Two derivatives.** Some laws have another derivative :math:`b = \partial \mathbf f_t / \partial \delta` while the
+overlap grows than while it falls (LAMMPS's mindlin_rescale). Both are kept; every operator takes the share of contacts
+that part (:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks on the way back and slides on
+the way on. `sliding` chooses.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arrays import (
+    Floats,
+    Indices,
+    booleans,
+    derived,
+    floats,
+    frozen,
+    integers,
+    number,
+    positive_each,
+    same_bits,
+    settle,
+)
+from .law import MindlinLaw
+from .packing import Packing
+
+WALL = -1
+"""The index that stands for a wall as the second partner of a contact."""
+
+AT_COULOMBS_BOUND = 1 - 1e-6
+"""Share of mu f_n from which on a contact counts as one at the bound. A packing at rest has a residual of 1e-6 of its
+forces or less, and a dashpot has carried that much of the tangential force."""
+
+PER_CONTACT = {
+    "i": (), "j": (), "normal": (3,), "distance": (), "overlap": (), "slip_arm": (2,), "lever_arm": (2,),
+    "lever_slope": (), "normal_force": (), "tangential_force": (3,), "normal_stiffness": (), "tangential_stiffness": (),
+    "closing": (3,), "parting": (3,), "friction": (), "sliding": (), "normal_dashpot": (), "tangential_dashpot": (),
+}  # fmt: skip
+"""Fields of `LinearisedContacts`, with the shape of each for one contact."""
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class LinearisedContacts:
+    """What each contact does to first order; C contacts, arrays are copied and made read-only.
+
+    Parameters
+    ----------
+    i : array_like of int, shape (C,)
+        First partner.
+    j : array_like of int, shape (C,)
+        Second partner; -1 is a wall, which neither moves nor turns.
+    normal : array_like, shape (C, 3)
+        Unit vector n towards i.
+    distance : array_like, shape (C,)
+        Length r of the branch vector between two centres; infinite for a wall, whose normal does not turn.
+    overlap : array_like, shape (C,)
+        delta, length.
+    slip_arm : array_like, shape (C, 2)
+        Arms s_i, s_j of the slip: the rolling s_i d theta_i + s_j d theta_j slides the contact; length.
+    lever_arm : array_like, shape (C, 2)
+        Arms l_i, l_j of the torques -l n x f_t; length.
+    lever_slope : array_like, shape (C,)
+        -d l / d delta: 0 where the arm is a radius, 1/2 where it ends in the middle of the overlap.
+    normal_force : array_like, shape (C,)
+        f_n, force, positive for a repulsion.
+    tangential_force : array_like, shape (C, 3)
+        f_t, force on i.
+    normal_stiffness, tangential_stiffness : array_like, shape (C,)
+        d f_n / d delta and -d f_t / d s, force / length.
+    closing, parting : array_like, shape (C, 3)
+        b = d f_t / d delta at constant slip while the overlap grows, and while the overlap falls; force / length.
+    friction : array_like, shape (C,)
+        mu f_n, Coulomb's bound, force; infinite where there is none.
+    sliding : array_like of bool, shape (C,)
+        Contacts that slide: they resist no slip along f_t, and b is that of f_t = mu f_n.
+    normal_dashpot, tangential_dashpot : array_like, shape (C,)
+        Force time / length.
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit, or a number is not finite.
+    """
+
+    i: Indices
+    j: Indices
+    normal: Floats
+    distance: Floats
+    overlap: Floats
+    slip_arm: Floats
+    lever_arm: Floats
+    lever_slope: Floats
+    normal_force: Floats
+    tangential_force: Floats
+    normal_stiffness: Floats
+    tangential_stiffness: Floats
+    closing: Floats
+    parting: Floats
+    friction: Floats
+    sliding: NDArray[np.bool_]
+    normal_dashpot: Floats
+    tangential_dashpot: Floats
+
+    def __init__(self, **given: ArrayLike) -> None:
+        if given.keys() != PER_CONTACT.keys():
+            raise ValueError(f"Contacts need {', '.join(PER_CONTACT)}; these are {', '.join(given)}.")
+        count = len(np.atleast_1d(np.asarray(given["i"])))
+        values: dict[str, NDArray] = {name: integers(name, given[name]) for name in ("i", "j")}
+        values["sliding"] = booleans("sliding", given["sliding"], count)
+        for name in ("distance", "friction"):  # may be infinite
+            values[name] = np.array(given[name], dtype=np.float64)
+            floats(name, np.where(values[name] == np.inf, 0.0, values[name]), (count,))
+        for name in PER_CONTACT.keys() - values.keys():
+            values[name] = floats(name, given[name], (count, *PER_CONTACT[name]))
+        if len(values["i"]) != len(values["j"]) or np.any(values["i"] == values["j"]):
+            raise ValueError("Every contact has two different partners, i and j.")
+        settle(self, **{name: values[name] for name in PER_CONTACT})
+
+    def __len__(self) -> int:
+        return len(self.i)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether every array is the same to the bit."""
+        return same_bits(self, other) if isinstance(other, LinearisedContacts) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((len(self), self.overlap.tobytes()))
+
+    @property
+    def wall(self) -> NDArray[np.bool_]:
+        """Which contacts are with a wall, shape (C,)."""
+        return self.j == WALL
+
+    @property
+    def at_bound(self) -> NDArray[np.bool_]:
+        """Which contacts are at Coulomb's bound, shape (C,)."""
+        tangential = np.linalg.norm(self.tangential_force, axis=1)
+        return (tangential > 0) & (tangential >= AT_COULOMBS_BOUND * self.friction)
+
+    def overlap_derivative(self, parting: ArrayLike = 0.5) -> Floats:
+        """b of each contact, shape (C, 3), with a share of contacts that part, shape () or (C,)."""
+        share = np.broadcast_to(np.asarray(parting, dtype=np.float64), (len(self),))[:, None]
+        stick = (1 - share) * self.closing + share * self.parting
+        # a sliding contact keeps |f_t| = mu f_n, in the direction in which it slides
+        slide = np.divide(
+            self.tangential_force * self.normal_stiffness[:, None], self.normal_force[:, None],
+            out=np.zeros_like(stick), where=self.normal_force[:, None] != 0,
+        )  # fmt: skip
+        return np.where(self.sliding[:, None], slide, stick)
+
+    def chosen(self, which: NDArray) -> "LinearisedContacts":
+        """Some of the contacts, by a mask or by numbers."""
+        return derived(self, **{name: np.array(getattr(self, name)[which]) for name in PER_CONTACT})
+
+
+def linearised(
+    law: MindlinLaw, overlap: Floats, slip: Floats, tangent: Floats, **where: ArrayLike
+) -> LinearisedContacts:
+    """Contacts of the smooth law of this package, along a tangent, shape (C, 3); `where` has all other fields.
+
+    They resist no slip at Coulomb's bound, on either side: that is the derivative of the smooth law.
+    """
+    grows, falls = (law.derivatives(overlap, slip, share) for share in (0.0, 1.0))
+    along, across = law.dashpots(overlap, slip)
+    count = len(overlap)
+    return LinearisedContacts(
+        overlap=overlap,
+        lever_slope=np.zeros(count),
+        normal_force=grows.normal_force,
+        tangential_force=grows.tangential_force[:, None] * tangent,
+        normal_stiffness=grows.normal_stiffness,
+        tangential_stiffness=-grows.slip_derivative,
+        closing=grows.overlap_derivative[:, None] * tangent,
+        parting=falls.overlap_derivative[:, None] * tangent,
+        friction=law.mu * grows.normal_force if law.frictional else np.full(count, np.inf),
+        sliding=np.zeros(count, dtype=np.bool_),
+        normal_dashpot=along,
+        tangential_dashpot=across,
+        **where,
+    )
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class Snapshot:
+    """Particles as they stand, in two or three dimensions, with their linearised contacts.
+
+    Parameters
+    ----------
+    dimension : int
+        2 or 3.
+    position : array_like, shape (N, d)
+        Centres, length.
+    radius, mass, inertia : array_like, shape (N,)
+        Radii, masses and moments of inertia, positive.
+    contacts : LinearisedContacts
+        The contacts.
+    box : array_like, shape (3, 3)
+        Edges of the box in rows, length; a sheared box has edges that are not along the axes.
+    origin : array_like, shape (3,)
+        Its lower corner.
+    periodic : array_like of bool, shape (3,)
+        Along which edges it is periodic.
+    load : array_like, shape (N, 2, 3)
+        Force and torque on each particle besides those of its contacts, of a packing at rest.
+    free : array_like of bool, shape (N,), optional
+        Particles that move; those that are held take part in contacts alone. All by default.
+    ids : array_like of int, shape (N,), optional
+        Numbers that the other code has given to the particles; 1 to N by default.
+    kind : array_like of int, shape (N,), optional
+        Their types; 1 by default.
+    fx : float
+        Value of the load parameter at which the snapshot was taken, if it is one of a path.
+    load_error : float
+        Error of `fx` that goes with what is out of balance, in units of `fx`.
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit, a number is not finite or has the wrong sign, or a contact names no particle.
+    """
+
+    dimension: int
+    position: Floats
+    radius: Floats
+    mass: Floats
+    inertia: Floats
+    contacts: LinearisedContacts
+    box: Floats
+    origin: Floats
+    periodic: NDArray[np.bool_]
+    load: Floats
+    free: NDArray[np.bool_]
+    ids: Indices
+    kind: Indices
+    fx: float
+    load_error: float
+
+    def __init__(
+        self,
+        *,
+        dimension: int,
+        position: ArrayLike,
+        radius: ArrayLike,
+        mass: ArrayLike,
+        inertia: ArrayLike,
+        contacts: LinearisedContacts,
+        box: ArrayLike,
+        origin: ArrayLike,
+        periodic: ArrayLike,
+        load: ArrayLike,
+        free: ArrayLike | None = None,
+        ids: ArrayLike | None = None,
+        kind: ArrayLike | None = None,
+        fx: float = 0.0,
+        load_error: float = 0.0,
+    ) -> None:
+        n = len(np.atleast_1d(np.asarray(radius)))
+        if dimension not in (2, 3) or n == 0:
+            raise ValueError(f"A snapshot has particles in two or three dimensions, not {n} in {dimension}.")
+        sizes = {"radius": radius, "mass": mass, "inertia": inertia}
+        settle(
+            self,
+            dimension=int(dimension),
+            position=floats("position", position, (n, dimension)),
+            **{name: positive_each(name, floats(name, value, (n,))) for name, value in sizes.items()},
+            contacts=contacts,
+            box=floats("box", box, (3, 3)),
+            origin=floats("origin", origin, (3,)),
+            periodic=booleans("periodic", periodic, 3),
+            load=floats("load", load, (n, 2, 3)),
+            free=booleans("free", np.ones(n, bool) if free is None else free, n),
+            ids=integers("ids", np.arange(1, n + 1) if ids is None else ids),
+            kind=integers("kind", np.ones(n, int) if kind is None else kind),
+            fx=number("fx", fx),
+            load_error=number("load_error", load_error),
+        )
+        if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= n:
+            raise ValueError(f"A contact names a particle beyond the last one, {n - 1}.")
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether every array and number is the same to the bit."""
+        return same_bits(self, other) if isinstance(other, Snapshot) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((len(self), self.fx, self.position.tobytes()))
+
+    def __repr__(self) -> str:
+        what = "disks" if self.dimension == 2 else "spheres"
+        count, walls = len(self.contacts), int(self.contacts.wall.sum())
+        bound = int(self.contacts.at_bound.sum())
+        slide = ", which slide" if self.contacts.sliding.any() else ", which stick" if bound else ""
+        return (
+            f"<Snapshot: {len(self)} {what}, {count - walls} contacts between them and {walls} with walls, "
+            f"{bound} at Coulomb's bound{slide}, {len(self.rattlers)} rattlers, residual {self.residual:.3g}>"
+        )
+
+    @classmethod
+    def of_packing(cls, packing: Packing) -> "Snapshot":
+        """The linearised contacts of a packing of this package's own, without its drag."""
+        g, c, n = packing.geometry, packing.contacts, len(packing)
+        flat = np.zeros(len(c))
+        arms = np.column_stack([packing.radius[c.i], np.where(c.floor, 0.0, packing.radius[c.j])])
+        contacts = linearised(
+            packing.law, g.overlap, c.slip, np.column_stack([g.tangent, flat]), i=c.i, j=c.j, slip_arm=arms,
+            lever_arm=arms, normal=np.column_stack([g.normal, flat]), distance=np.where(c.floor, np.inf, g.distance),
+        )  # fmt: skip
+        load = np.zeros((n, 2, 3))
+        load[packing.top, 0, :2] = packing.fx, -packing.fy
+        return cls(
+            dimension=2, position=packing.position, radius=packing.radius, mass=packing.mass,
+            inertia=packing.inertia_factor * packing.mass * packing.radius**2, contacts=contacts,
+            box=np.diag([packing.box_length or 0.0, 0.0, 0.0]), origin=np.zeros(3),
+            periodic=np.array([packing.box_length is not None, False, False]), load=load, fx=packing.fx,
+        )  # fmt: skip
+
+    @property
+    def axes(self) -> int:
+        """Coordinates of each particle: 3 of a disk, 6 of a sphere."""
+        return 3 if self.dimension == 2 else 6
+
+    @property
+    def coordinates(self) -> int:
+        """Number of all coordinates."""
+        return self.axes * len(self)
+
+    @property
+    def coordinate_mass(self) -> Floats:
+        """Masses of the coordinates, m of translations and I/R^2 of rotations, shape (axes N,)."""
+        turning = self.inertia / self.radius**2
+        return np.concatenate([self.mass] * self.dimension + [turning] * (self.axes - self.dimension))
+
+    @property
+    def damped(self) -> bool:
+        """Whether contacts have dashpots."""
+        return bool(self.contacts.normal_dashpot.any() or self.contacts.tangential_dashpot.any())
+
+    @property
+    def top(self) -> NDArray[np.bool_]:
+        """The disks of a driven layer, of which a snapshot knows none, shape (N,)."""
+        return np.zeros(len(self), dtype=np.bool_)
+
+    @property
+    def normal_force(self) -> Floats:
+        """f_n of each contact, force, shape (C,)."""
+        return self.contacts.normal_force
+
+    @cached_property
+    def rattlers(self) -> Indices:
+        """Indices of the particles that touch nothing."""
+        alone = np.ones(len(self), dtype=np.bool_)
+        alone[self.contacts.i] = False
+        alone[self.contacts.j[~self.contacts.wall]] = False
+        return frozen(np.flatnonzero(alone))
+
+    @cached_property
+    def net_force(self) -> Floats:
+        """Force and torque on each particle, its load included, shape (N, 2, 3)."""
+        return frozen(self.load + self.contact_force)
+
+    @cached_property
+    def contact_force(self) -> Floats:
+        """Force and torque of its contacts on each particle, shape (N, 2, 3)."""
+        c, total = self.contacts, np.zeros((len(self), 2, 3))
+        force = c.normal_force[:, None] * c.normal + c.tangential_force
+        turn, pair = -np.cross(c.normal, c.tangential_force), ~c.wall
+        np.add.at(total, c.i, np.stack([force, c.lever_arm[:, :1] * turn], axis=1))
+        np.add.at(total, c.j[pair], np.stack([-force, c.lever_arm[:, 1:] * turn], axis=1)[pair])
+        return frozen(total)
+
+    @property
+    def residual(self) -> float:
+        """Largest |(F, T/R)| on a particle that moves and has a contact, force; zero if none has."""
+        force = self.net_force.copy()
+        force[:, 1] /= self.radius[:, None]
+        size = np.where(self.free, np.sqrt(np.sum(force * force, axis=(1, 2))), 0.0)
+        return float(np.delete(size, self.rattlers).max(initial=0.0))
+
+    @property
+    def contact_states(self) -> bytes:
+        """Which particles touch, and which contacts slide; equal for equal states."""
+        c = self.contacts
+        order = np.lexsort((c.j, c.i))
+        return np.array([c.i, c.j, c.sliding], dtype=np.int64)[:, order].tobytes()
+
+    def loaded(self, least: float) -> "Snapshot":
+        """The snapshot without the contacts that carry no more than a given normal force."""
+        kept = self.contacts.normal_force > least
+        return self if np.all(kept) else derived(self, contacts=self.contacts.chosen(kept))
+
+    def loaded_by(self, load: ArrayLike) -> "Snapshot":
+        """The snapshot with other forces and torques besides those of contacts, shape (N, 2, 3)."""
+        return derived(self, load=floats("load", load, self.load.shape))
+
+    def with_sliding(self, sliding: ArrayLike | None = None) -> "Snapshot":
+        """The snapshot with other contacts that slide, by a mask, shape (C,); those at Coulomb's bound by default."""
+        c = self.contacts
+        which = np.array(c.at_bound) if sliding is None else booleans("sliding", sliding, len(c))
+        return derived(self, contacts=derived(c, sliding=which))
+
+
+Configuration = TypeVar("Configuration", bound=Packing | Snapshot)

@@ -1,0 +1,45 @@
+r"""How much of a layer is solid: its volume fraction phi, in the plane an area fraction.
+
+.. math:: \phi = \frac{A(H)}{L\, H}
+
+H is the mean height of the centres of the upper layer above the floor, L the period, or without one the width from
+the leftmost to the rightmost point of the disks, and A(H) the area of all disks below H: of a disk that H cuts, the
+part below. Rattlers count. An overlap counts for either of its disks, which adds less than a thousandth at usual loads.
+
+The cut at the centres leaves out the ragged surface, where there is no more a packing to speak of. The floor, beside
+which disks fill the plane less well, is left in. :func:`solid_fraction_below_top` counts the surface, too.
+"""
+
+import numpy as np
+
+from .packing import Packing
+
+
+def solid_fraction(packing: Packing) -> float:
+    """Volume fraction phi of a layer below the mean height of its upper layer's centres.
+
+    Parameters
+    ----------
+    packing : Packing
+        With an upper layer; without one, H is the largest height of a centre.
+
+    Returns
+    -------
+    float
+        NaN of disks whose centres are not above the floor y = 0.
+    """
+    heights = packing.position[:, 1]
+    return _solid_below(packing, float(heights[packing.top].mean() if packing.top.any() else heights.max()))
+
+
+def solid_fraction_below_top(packing: Packing) -> float:
+    """Volume fraction below the highest point of any disk: the ragged surface counts as a part of the layer."""
+    return _solid_below(packing, float((packing.position[:, 1] + packing.radius).max()))
+
+
+def _solid_below(packing: Packing, height: float) -> float:
+    x, radius = packing.position[:, 0], packing.radius
+    width = packing.box_length or float((x + radius).max() - (x - radius).min())
+    above = np.clip((height - packing.position[:, 1]) / radius, -1.0, 1.0)  # of the cut, from the centre
+    area = radius**2 * (np.pi - np.arccos(above) + above * np.sqrt(1.0 - above**2))
+    return float(area.sum() / (width * height)) if height > 0 else float("nan")

@@ -1,0 +1,75 @@
+r"""Negative eigenvalues of the stability operator: the classical instability, for packings of any size.
+
+A real :math:`\lambda < 0` makes :math:`\omega` imaginary: disks leave the equilibrium without oscillation, D as
+:math:`e^{2 \sqrt{-\lambda}\, t}`. With dissipation such an eigenvalue still has a real :math:`s > 0`. Along a branch of
+equilibria :math:`\lambda` goes through zero at a turning point. Newton's method may step across one.
+
+Most packings have none, and that is proved without an eigenvalue: every eigenvalue of A has
+:math:`\mathrm{Re}\,\lambda \ge \min \lambda(S)` with :math:`S = (A + A^T)/2` (Bendixson, Acta Math. 25, 359
+(1902)), and factors :math:`L D L^T` of S with positive pivots say that S is positive definite (Sylvester's law of
+inertia). Else the factors of :math:`S + c` give a bound :math:`-c` below all real parts, and all real negative
+eigenvalues lie within c/2 of -c/2, where Arnoldi's iteration with that shift finds every eigenvalue.
+"""
+
+import numpy as np
+from scipy.sparse import csc_array, eye_array
+
+from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
+from ..packing.packing import Floats, Packing
+from .eigenpairs import eigenpairs
+from .spectrum import DENSE, SAFETY, dynamical_matrix, is_negative, spectrum, unit_rounding
+
+SPREAD = 4.0
+"""Factor from one bound that is tried to the next: each costs factors, and a loose one more eigenvalues."""
+
+FIRST = 16
+"""Eigenvalues that are asked for at first; twice as many until the interval is covered."""
+
+
+def negative_eigenvalues(packing: Packing) -> Floats:
+    """The real negative eigenvalues of a packing, beyond their rounding uncertainty.
+
+    Where the symmetric part of the operator is positive definite, a sparse factorisation shows that there are none.
+
+    Parameters
+    ----------
+    packing : Packing
+        In equilibrium.
+
+    Returns
+    -------
+    ndarray, shape (B,)
+        The most negative first, 1 / time^2. Empty where nothing buckles; complex pairs are another matter.
+    """
+    matrix, _ = dynamical_matrix(packing)
+    size, rounding = matrix.shape[0], unit_rounding(matrix.data)
+    symmetric = csc_array(0.5 * (matrix + matrix.T))
+    bound = SAFETY * rounding
+    if _is_positive(symmetric, bound):
+        return np.zeros(0)
+    if size <= DENSE:
+        return spectrum(packing).negative
+    bound = max(bound, np.finfo(float).eps ** 0.5 * float(np.abs(matrix.data).max()))
+    while not _is_positive(symmetric, bound):
+        bound *= SPREAD
+    count = FIRST
+    while True:
+        count = min(count, size - 2)
+        found = eigenpairs(packing, -0.5 * bound, count)
+        if count == size - 2 or np.abs(found.values + 0.5 * bound).max() > 0.5 * bound:
+            break
+        count *= 2
+    # Arnoldi's real eigenvalues may carry an imaginary part of their own rounding
+    values = np.where(np.abs(found.values.imag) * found.overlap > SAFETY * rounding, found.values, found.values.real)
+    return np.sort(values[is_negative(values, found.overlap, rounding)].real)
+
+
+def _is_positive(symmetric: csc_array, shift: float) -> bool:
+    """Whether S + shift has positive pivots alone."""
+    size = symmetric.shape[0]
+    if size == 0:
+        return True
+    try:
+        return symmetric_lu(csc_array(symmetric + shift * eye_array(size)), symmetric=True).negative == 0
+    except SingularMatrixError:
+        return False

@@ -1,9 +1,0 @@
-"""The pages of the study of yield from their tables: python docs/yield/make.py."""
-
-from pathlib import Path
-
-from faultgouge.studies.yielding.page import write_lasting, write_page
-
-if __name__ == "__main__":
-    folder = Path(__file__).parent
-    print(write_page(folder), write_lasting(folder), sep="\n")

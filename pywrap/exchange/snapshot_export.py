@@ -1,0 +1,143 @@
+"""Snapshots for ParaView (.vtp) and OVITO (.xyz): particles with forces and modes, contacts as lines.
+
+A .vtp is laid out as that of a Packing (:mod:`.vtp`): N centres, then two ends for each contact.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis import BadInputError, OutputError, Snapshot
+from ...analysis.packing.arrays import Floats
+from .vtp import write_poly_data
+
+
+@dataclass(frozen=True, eq=False)
+class SnapshotMode:
+    """A mode of a snapshot: its name, its eigenvalue, 1 / time^2, and q, shape (axes N,)."""
+
+    name: str
+    eigenvalue: complex
+    vector: NDArray[np.complex128]
+
+    def fields(self, snapshot: Snapshot) -> dict[str, Floats]:
+        """Translations and rotations R theta, shape (N, 3), by the names that they have in a file."""
+        found, d = {}, snapshot.dimension
+        parts = self.vector.reshape(snapshot.axes, -1)
+        for part, moved in (("", parts.real), ("_imag", parts.imag)):
+            if not part or np.any(moved):
+                translation, rotation = np.zeros((2, len(snapshot), 3))
+                translation[:, :d], rotation[:, 3 - len(moved[d:]) :] = moved[:d].T, moved[d:].T
+                found |= {f"{self.name}{part}": translation, f"{self.name}{part}_rotation": rotation}
+        return found
+
+
+def modes_of_snapshot(snapshot: Snapshot, which: str) -> list[SnapshotMode]:
+    """The fastest growing pair, or the mode of a number, counted by eigenvalue from 0.
+
+    Raises
+    ------
+    BadInputError
+        If there is none.
+    """
+    from ...analysis import normal_modes, spectrum
+
+    modes = normal_modes(snapshot)
+    if which == "pair":
+        pairs = spectrum(snapshot).pairs
+        if not pairs:
+            raise BadInputError("--mode pair: the packing has no complex pair; give the number of a mode, from 0")
+        number = int(np.argmin(np.abs(modes.values - pairs[0].eigenvalue)))
+    elif which.isdecimal() and int(which) < len(modes.values):
+        number = int(which)
+    else:
+        raise BadInputError(f"--mode {which}: give pair, or a number from 0 to {len(modes.values) - 1}")
+    vector = modes.right[:, number] / np.sqrt(snapshot.coordinate_mass)
+    return [SnapshotMode(f"mode_{number}", complex(modes.values[number]), vector / np.abs(vector).max())]
+
+
+def write_snapshot_for_others(path: Path, snapshot: Snapshot, modes: Sequence[SnapshotMode] = ()) -> str:
+    """Write a .vtp or an .xyz; what is in it, in words.
+
+    Raises
+    ------
+    BadInputError
+        If the suffix is another one.
+    OutputError
+        If the file cannot be written.
+    """
+    writers = {".vtp": _write_vtp, ".xyz": _write_xyz}
+    if path.suffix not in writers:
+        raise BadInputError(f"-o {path}: a snapshot goes into {', '.join(writers)}; give it one of these suffixes.")
+    try:
+        writers[path.suffix](path, snapshot, modes)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror}.") from error
+    return f"{len(snapshot)} particles, {len(snapshot.contacts)} contacts, {len(modes)} modes"
+
+
+def _in_space(snapshot: Snapshot) -> Floats:
+    return np.pad(snapshot.position, ((0, 0), (0, 3 - snapshot.dimension)))
+
+
+def _of_particles(snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> dict[str, Floats]:
+    c, pair = snapshot.contacts, ~snapshot.contacts.wall
+    count, pressure = (
+        np.bincount(c.i, weight, len(snapshot)) + np.bincount(c.j[pair], weight[pair], len(snapshot))
+        for weight in (np.ones(len(c)), c.normal_force)
+    )
+    values = {
+        "radius": snapshot.radius,
+        "mass": snapshot.mass,
+        "id": snapshot.ids.astype(np.float64),
+        "type": snapshot.kind.astype(np.float64),
+        "free": snapshot.free.astype(np.float64),
+        "load": snapshot.load[:, 0],
+        "net_force": snapshot.net_force[:, 0],
+        "net_torque": snapshot.net_force[:, 1],
+        "normal_force": pressure,
+        "coordination": count,
+    }
+    for mode in modes:
+        values |= mode.fields(snapshot)
+    return values
+
+
+def _write_vtp(path: Path, snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> None:
+    c, position = snapshot.contacts, _in_space(snapshot)
+    first = position[c.i]
+    reach = np.where(c.wall, snapshot.radius[c.i] - c.overlap, c.distance)
+    numbers = {f"{mode.name}_eigenvalue": mode.eigenvalue.real for mode in modes}
+    numbers |= {f"{mode.name}_eigenvalue_imag": mode.eigenvalue.imag for mode in modes}
+    share = np.divide(
+        np.linalg.norm(c.tangential_force, axis=1), c.friction, out=np.zeros(len(c)), where=c.friction > 0
+    )
+    on_contacts = {
+        "contact_i": snapshot.ids[c.i].astype(np.float64),
+        "contact_j": np.where(c.wall, 0, snapshot.ids[np.maximum(c.j, 0)]).astype(np.float64),
+        "contact_force": c.normal_force[:, None] * c.normal + c.tangential_force,
+        "contact_normal_force": c.normal_force,
+        "contact_tangential_force": c.tangential_force,
+        "contact_overlap": c.overlap,
+        "contact_mobilised": share,
+    }
+    ends = np.stack([first, first - reach[:, None] * c.normal], axis=1).reshape(-1, 3)
+    tree = write_poly_data(position, ends, numbers, _of_particles(snapshot, modes), on_contacts)
+    ElementTree.ElementTree(tree).write(path, xml_declaration=True, encoding="utf-8")
+
+
+def _write_xyz(path: Path, snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> None:
+    columns = {"pos": _in_space(snapshot)} | _of_particles(snapshot, modes)
+    columns = {("forces" if name == "net_force" else name): value for name, value in columns.items()}
+    properties = ":".join(f"{name}:R:{1 if value.ndim == 1 else value.shape[1]}" for name, value in columns.items())
+    lattice = " ".join(repr(float(value)) for value in snapshot.box.ravel())
+    sides = " ".join("T" if each else "F" for each in snapshot.periodic)
+    origin = " ".join(repr(float(value)) for value in snapshot.origin)
+    rows = np.column_stack([value if value.ndim == 2 else value[:, None] for value in columns.values()])
+    with path.open("w") as stream:
+        stream.write(f'{len(snapshot)}\nLattice="{lattice}" Origin="{origin}" pbc="{sides}" Properties={properties}\n')
+        stream.writelines(" ".join(map(repr, row)) + "\n" for row in rows.tolist())

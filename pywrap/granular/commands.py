@@ -1,0 +1,208 @@
+"""The commands of a deck that say how particles interact and move, from a log or a list of lines.
+
+LAMMPS hands out neither kn, kt and mu of its granular styles nor the words of its fixes. A log has all of them, with
+variables filled in: a command with a $ stands there twice, as it was written and as LAMMPS understood it.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from ...analysis import FaultgougeError
+
+HISTORY = ("gran/hooke/history", "gran/hertz/history", "granular")
+"""LAMMPS's pair styles with a tangential history."""
+
+OWN = "mindlin/smooth"
+
+COHESIVE = ("jkr", "dmt", "mdr")
+SUFFIXES = ("/omp", "/kk", "/intel", "/gpu", "/opt")
+DISSOLVED = {"twisting": "twisting friction", "rolling": "rolling friction", "heat": "heat conduction"}
+TANGENTIAL = (
+    "linear_history", "linear_history_classic", "mindlin", "mindlin_classic", "mindlin/force", "mindlin_rescale",
+    "mindlin_rescale/force",
+)  # fmt: skip
+
+
+class SnapshotError(FaultgougeError):
+    """A packing of LAMMPS cannot be taken as it stands: one sentence with what would do."""
+
+
+@dataclass(frozen=True)
+class Commands:
+    """What a deck says of contacts and of motion.
+
+    Attributes
+    ----------
+    pair : tuple of str
+        The line of pair_style and those of pair_coeff that hold.
+    fixes : dict
+        Lines of all fixes by their IDs.
+    """
+
+    pair: tuple[str, ...]
+    fixes: dict[str, str]
+
+    @property
+    def style(self) -> str:
+        """The pair style, without the suffix of an accelerator."""
+        return without_suffix(self.pair[0].split()[1])
+
+
+def without_suffix(style: str) -> str:
+    """A style as LAMMPS's manual names it."""
+    for suffix in SUFFIXES:
+        style = style.removesuffix(suffix)
+    return style
+
+
+def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
+    """Commands from the lines of a log, or from some that a user gives.
+
+    Raises
+    ------
+    SnapshotError
+        If no line is a pair_style, or a line that a user gives has a variable in it.
+    """
+    style, coefficients, fixes = "", [], {}
+    for line in _whole(lines):
+        words = line.split("#")[0].split()
+        if not words:
+            continue
+        if "$" in line and words[0] in ("pair_style", "pair_coeff", "fix"):
+            if log:
+                continue  # the line that follows has numbers
+            raise SnapshotError(f"{line.strip()!r} has a variable: write its number, as a log of LAMMPS has it.")
+        if words[0] == "clear":
+            style, coefficients, fixes = "", [], {}
+        elif words[0] == "pair_style" and len(words) > 1:
+            if not style or style.split()[1] != words[1]:
+                coefficients = []
+            style = " ".join(words)
+        elif words[0] == "pair_coeff":
+            coefficients.append(" ".join(words))
+        elif words[0] == "fix" and len(words) > 3:
+            fixes[words[1]] = " ".join(words)
+        elif words[0] == "unfix" and len(words) == 2:
+            fixes.pop(words[1], None)
+    if not style:
+        where = "The log of this LAMMPS has" if log else "The commands have"
+        raise SnapshotError(
+            f"{where} no pair_style: give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the "
+            "deck as commands=[...]."
+        )
+    return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes)
+
+
+def _whole(lines: Iterable[str]) -> Iterable[str]:
+    """Lines with those joined that end with an &."""
+    begun = ""
+    for line in lines:
+        part = line.rstrip()
+        if part.endswith("&"):
+            begun += part[:-1] + " "
+            continue
+        yield begun + part
+        begun = ""
+
+
+def check_pair(commands: Commands, styles: Iterable[str]) -> None:
+    """Refuse pair styles and models of contacts that have no linearised contacts here.
+
+    Parameters
+    ----------
+    commands : Commands
+        Of the deck.
+    styles : iterable of str
+        All pair styles that this LAMMPS knows.
+    """
+    words, known = commands.pair[0].split(), set(styles)
+    used = [without_suffix(words[1])]
+    if used[0].startswith("hybrid"):
+        used = [without_suffix(word) for word in words[2:] if word in known]
+        if "overlay" in words[1] and len(used) > 1:
+            raise SnapshotError(f"pair_style {words[1]} adds several forces at a contact: use one granular style.")
+    for style in used:
+        if style == "gran/hooke":
+            raise SnapshotError("pair_style gran/hooke has no tangential history: use gran/hooke/history.")
+        if style not in HISTORY and (style != OWN or len(used) > 1):
+            raise SnapshotError(
+                f"pair_style {style} is none of {', '.join(HISTORY)} and {OWN}: only these have contacts to linearise."
+            )
+    if "granular" in used:
+        for line in commands.pair[1:]:
+            _check_model(line.split("granular", 1)[-1].split() if "granular" in line else line.split()[3:], line)
+
+
+def _check_model(words: list[str], line: str) -> None:
+    """Refuse what a model of `granular` has beside normal and tangential forces."""
+    if not words or words[0] in HISTORY[:2]:
+        return
+    for word in words:
+        if word in COHESIVE:
+            raise SnapshotError(f"{line!r}: {word} is cohesive; use hooke, hertz or hertz/material.")
+    for keyword, name in DISSOLVED.items():
+        if keyword in words and words[words.index(keyword) + 1 :][:1] != ["none"]:
+            raise SnapshotError(f"{line!r} has {name}, which is not linearised here: leave {keyword} out.")
+    model = (words[words.index("tangential") + 1 :] if "tangential" in words else ["none"])[:1]
+    if model[0] not in TANGENTIAL:
+        raise SnapshotError(f"{line!r}: tangential {model[0]} keeps no history; use {', '.join(TANGENTIAL)}.")
+
+
+def check_fixes(styles: dict[str, str], commands: Commands) -> None:
+    """Refuse fixes that move or hold particles, walls or the box in ways that contacts do not tell.
+
+    Parameters
+    ----------
+    styles : dict
+        Styles of the fixes of the instance, by their IDs.
+    """
+    refused = {
+        "rigid": "holds particles together in bodies, whose modes are not those of particles: leave it out",
+        "poems": "holds particles together in bodies, whose modes are not those of particles: leave it out",
+        "move": "moves particles: unfix it, and let the packing come to rest",
+        "deform": "moves the box: unfix it, and let the packing come to rest",
+        "setforce": "holds some coordinates: use fix freeze, or leave the particles out of fix nve/sphere",
+        "wall/gran/region": "has curved walls: use planes of fix wall/gran",
+    }
+    for name, style in styles.items():
+        plain = without_suffix(style)
+        for begin, says in refused.items():
+            if plain == begin or (begin in ("rigid", "poems", "wall/gran/region") and plain.startswith(begin)):
+                raise SnapshotError(f"fix {name} {style} {says}.")
+        if plain.startswith("wall/") and plain not in ("wall/gran", "wall/mindlin/smooth"):
+            raise SnapshotError(f"fix {name} {style} is no wall of contacts: use planes of fix wall/gran.")
+        if plain.startswith("wall/"):
+            line = commands.fixes.get(name)
+            if line is None or without_suffix(line.split()[3]) != plain:
+                raise SnapshotError(
+                    f"The commands have no line of fix {name} {style}: give the line that the deck has among commands."
+                )
+            if plain == "wall/gran":
+                _check_wall(name, line)
+
+
+def _check_wall(name: str, line: str) -> None:
+    words = line.split()
+    for word, says in {
+        "region": "is a region: use a plane, xplane, yplane or zplane",
+        "zcylinder": "is a cylinder: use a plane, xplane, yplane or zplane",
+        "wiggle": "moves: let it rest without wiggle",
+        "shear": "moves: let it rest without shear",
+        "temperature": "conducts heat, which is not linearised here: leave temperature out",
+    }.items():
+        if word in words[4:]:
+            raise SnapshotError(f"The wall of fix {name} {says}.")
+    if "contacts" not in words:
+        raise SnapshotError(f"fix {name} wall/gran does not hand out its contacts: write contacts at its end.")
+    if words[4] == "hooke":
+        raise SnapshotError(f"fix {name} wall/gran hooke has no tangential history: use hooke/history.")
+    if words[4] == "granular":
+        _check_model(words[5:], line)
+
+
+def wall_plane(line: str) -> tuple[int, float | None, float | None]:
+    """Axis, lower and upper position of the planes of a fix wall/gran."""
+    words = line.split()
+    at = next(k for k, word in enumerate(words) if word in ("xplane", "yplane", "zplane"))
+    low, high = (None if word == "NULL" else float(word) for word in words[at + 1 : at + 3])
+    return "xyz".index(words[at][0]), low, high

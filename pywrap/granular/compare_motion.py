@@ -1,0 +1,139 @@
+r"""LAMMPS's own motion from small velocities beside that of the linearised packing: the proof of a Snapshot.
+
+From rest with the velocities :math:`\mathbf v_0` small motion is
+
+.. math:: \begin{pmatrix} q \\ \dot q \end{pmatrix}(t) = e^{t G} \begin{pmatrix} 0 \\ \mathbf v_0 \end{pmatrix}, \qquad
+    G = \begin{pmatrix} 0 & 1 \\ -M^{-1} K & -M^{-1} C \end{pmatrix} .
+
+LAMMPS runs twice, with :math:`\pm \mathbf v_0`, in copies of the process, without drag. Half of the difference has
+neither the motion of what was out of balance nor terms of second order in :math:`\mathbf v_0`. What is left falls with
+the square of the amplitude, and with the time step: as its square without dashpots, in proportion to it with them,
+since LAMMPS takes the velocity of the half step for them.
+
+Two things do not fall. A law with two derivatives (mindlin_rescale) is compared with the mean of both, from which it
+differs to second order in their difference. And LAMMPS turns the history of `granular` only where it has left the
+contact's plane by 1e-10 of Coulomb's bound, so that an amplitude below that leaves forces that do not turn.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import block_array, csr_array, diags_array
+from scipy.sparse.linalg import expm_multiply
+
+from ...analysis import Snapshot, damping_matrix, stiffness_matrix
+from ...analysis.packing.arrays import Floats
+from ...analysis.spectrum.spectrum import active_coordinates, mass_weighted
+from . import reading
+from .commands import SnapshotError
+
+
+@dataclass(frozen=True, eq=False)
+class MotionComparison:
+    """Velocities of LAMMPS and of the linearised packing after some time.
+
+    Attributes
+    ----------
+    difference : float
+        |measured - predicted| / |predicted| of the velocities, weighted with the root of the masses.
+    time, timestep : float
+        The time, a whole number of steps, and the step.
+    measured, predicted : ndarray, shape (E,)
+        Velocities times the root of the masses, of the coordinates that feel a force.
+    """
+
+    difference: float
+    time: float
+    timestep: float
+    measured: Floats
+    predicted: Floats
+
+    def __float__(self) -> float:
+        return self.difference
+
+
+def compare_motion(
+    lmp: Any, snapshot: Snapshot, time: float, amplitude: float, *, timestep: float | None = None, seed: int = 0
+) -> MotionComparison:
+    """LAMMPS's undamped motion from small velocities against exp(t G).
+
+    Drag (fix viscous) is left out, dashpots at the contacts are in both. The instance does not change.
+
+    Parameters
+    ----------
+    lmp : lammps.lammps
+        The instance, as it was when the snapshot was taken; on one rank.
+    snapshot : Snapshot
+        Of :func:`~faultgouge.pywrap.from_lammps`.
+    time : float
+        How long, positive.
+    amplitude : float
+        Size of the random velocities, length / time: so small that displacements stay far below all overlaps.
+    timestep : float, optional
+        Time step of LAMMPS; that of the instance by default.
+    seed : int
+        Of the velocities.
+
+    Returns
+    -------
+    MotionComparison
+        `difference` is the relative difference; it is also the value of ``float(...)``.
+
+    Raises
+    ------
+    SnapshotError
+        If the instance has several ranks or threads, or other particles than the snapshot.
+    """
+    if not reading.can_copy(lmp):
+        raise SnapshotError("compare_motion runs LAMMPS in copies of the process: use one rank and one thread.")
+    step = float(lmp.extract_global("dt")) if timestep is None else float(timestep)
+    steps = max(1, round(time / step))
+    stiffness = mass_weighted(stiffness_matrix(snapshot), snapshot)
+    active = active_coordinates(stiffness)
+    root = np.sqrt(snapshot.coordinate_mass)
+    start = np.zeros(snapshot.coordinates)
+    start[active] = amplitude * np.random.Generator(np.random.PCG64(seed)).standard_normal(len(active))
+    there, back = (reading.in_a_copy(lambda v=sign * start: _run(lmp, snapshot, v, step, steps)) for sign in (1, -1))
+    measured = (0.5 * (there - back) * root)[active]
+    a = stiffness[active][:, active]
+    g = mass_weighted(damping_matrix(snapshot), snapshot)[active][:, active]
+    predicted = _velocity(a, g, (start * root)[active], step * steps)
+    difference = float(np.linalg.norm(measured - predicted) / np.linalg.norm(predicted))
+    return MotionComparison(difference, step * steps, step, measured, predicted)
+
+
+def _velocity(a: csr_array, g: csr_array, start: Floats, time: float) -> Floats:
+    """Velocities of z'' + G z' + A z = 0 from z = 0, with z in units of 1/omega so that both halves weigh as much."""
+    size = len(start)
+    omega = float(np.sqrt(np.abs(a).sum(axis=1).max()))
+    system = csr_array(block_array([[None, omega * diags_array(np.ones(size))], [-a / omega, -g]]))
+    return np.asarray(expm_multiply(time * system, np.concatenate([np.zeros(size), start])))[size:]
+
+
+def _run(lmp: Any, snapshot: Snapshot, velocity: Floats, step: float, steps: int) -> Floats:
+    """Velocities of the coordinates after some steps of LAMMPS."""
+    lmp.command("log none")
+    reading.quieten(lmp, drag=True)
+    d, parts = snapshot.dimension, velocity.reshape(snapshot.axes, -1)
+    spin = parts[d:] / snapshot.radius
+
+    def places() -> Floats:
+        ids = lmp.numpy.extract_atom("id")[: lmp.extract_setting("nlocal")]
+        found = np.minimum(np.searchsorted(snapshot.ids, ids), len(snapshot) - 1)
+        if len(ids) != len(snapshot) or np.any(snapshot.ids[found] != ids):
+            raise SnapshotError("The instance has other particles than the snapshot: take a new one.")
+        return found
+
+    place = places()
+    v, omega = (lmp.numpy.extract_atom(name)[: len(place)] for name in ("v", "omega"))
+    v[:] = omega[:] = 0.0
+    v[:, :d] = parts[:d, place].T
+    omega[:, 3 - len(spin) :] = spin[:, place].T
+    lmp.command(f"timestep {step:.17g}")
+    lmp.command(f"run {steps} post no")
+    place, found = places(), np.zeros_like(parts)
+    v, omega = (lmp.numpy.extract_atom(name)[: len(place)] for name in ("v", "omega"))
+    found[:d, place] = v[:, :d].T
+    found[d:, place] = (omega[:, 3 - len(spin) :] * snapshot.radius[place, None]).T
+    return found.ravel()

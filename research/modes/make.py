@@ -1,0 +1,76 @@
+"""The study of complex modes: its tables computed, its page made from them, or a tenth of them computed again.
+
+python -m research.modes.make compute FOLDER [SET ...]   what the tables lack of all sets, resumable; hours
+python -m research.modes.make page                       the pages, modes.json and the pictures, from the tables
+python -m research.modes.make check FOLDER [SET ...]     one packing in ten once more, compared with the tables
+
+Without a SET, such as "loss 100", all of them.
+"""
+
+import sys
+from math import isclose
+from pathlib import Path
+from typing import Any
+
+from faultgouge.studies.sweep.compute import run_sweep
+from faultgouge.studies.sweep.points import Sweep
+from faultgouge.studies.sweep.tasks import TASKS
+from research.modes.packing_rows import condense, known
+from research.modes.page import write_page
+from research.modes.sets import SHARES, sets
+
+HERE = Path(__file__).parent
+TABLES = HERE / "tables"
+
+
+def compute(folder: Path, names: list[str], shares: tuple[float, ...] = SHARES, tables: Path | None = None) -> None:
+    """The sweeps of the study, round by round, but for the packings of the tables."""
+    for share in shares:
+        for name, sweep in sets(share).items():
+            rows = {} if tables is None else known(tables, name)
+            seeds = [point.values["packing.seed"] for point in sweep.points if point.values["packing.seed"] not in rows]
+            if seeds and (not names or name in names):
+                print(f"{name}: {len(seeds)} packings", flush=True)
+                rest = {"task": sweep.task, "sweep": {"packing.seed": seeds}, "scene": sweep.scene}
+                run_sweep(Sweep.from_mapping(rest, TASKS), folder / name.replace(" ", "_"), workers=None)
+
+
+def check(folder: Path, names: list[str]) -> None:
+    """The first tenth of the packings of each set, compared with the tables: every number of every load."""
+    compute(folder, names, (0.1,))
+    condense(folder, folder / "tables")
+    compared, wrong = 0, []
+    for path in sorted((folder / "tables").glob("*.jsonl")):
+        before = known(TABLES, path.stem)
+        for seed, row in known(folder / "tables", path.stem).items():
+            for one, other in zip(row.get("loads", ()), before[seed].get("loads", ()), strict=True):
+                compared += 1
+                differ = different(one, other)
+                wrong += [f"{path.stem}, seed {seed}, F_x/F_y = {one['fx_over_fy']}: {key}" for key in differ]
+    print("\n".join([f"{compared} loads compared, {len(wrong)} numbers of them differ", *wrong]))
+    sys.exit(len(wrong) > 0)
+
+
+def different(one: Any, other: Any, name: str = "") -> list[str]:
+    """Names of what differs: numbers count as equal to six digits, and rates that were measured in runs to three."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        keys = one.keys() & other.keys()  # what an older row lacks was added later
+        return [each for key in sorted(keys) for each in different(one.get(key), other.get(key), f"{name} {key}")]
+    if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+        return [each for k, pair in enumerate(zip(one, other, strict=True)) for each in different(*pair, f"{name} {k}")]
+    if isinstance(one, float) and isinstance(other, (int, float)):
+        return [] if isclose(one, other, rel_tol=1e-3 if "measured" in name else 1e-6) else [name.strip()]
+    return [] if one == other else [name.strip()]
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["compute", folder, *names]:
+            compute(Path(folder), names, tables=TABLES)
+            condense(Path(folder), TABLES)
+        case ["page"]:
+            print(write_page(TABLES, HERE))
+        case ["check", folder, *names]:
+            check(Path(folder), names)
+        case _:
+            sys.exit(__doc__)

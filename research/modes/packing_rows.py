@@ -1,0 +1,72 @@
+"""The tables of the study: a line for each packing, with its loads."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from faultgouge.analysis.files.wholefile import write_text
+from faultgouge.studies.modes.table import Table
+from faultgouge.studies.rows import read_rows
+from faultgouge.studies.sweep.compute import LINES, stored
+
+ENDING = ".jsonl"
+
+DIGITS = 7
+"""Of the numbers in a table."""
+
+LEFT_OUT = ("frequencies",)
+"""What a line of a table lacks of a result: as long as the spectrum itself."""
+
+
+def condense(results: Path, tables: Path) -> None:
+    """Add what the sweeps have left, a folder a set, to the tables; a packing that is in both is the new one.
+
+    Parameters
+    ----------
+    results : Path
+        With a folder for each set.
+    tables : Path
+        The folder of the tables.
+    """
+    tables.mkdir(parents=True, exist_ok=True)
+    for folder in sorted(path for path in results.iterdir() if (path / LINES).exists()):
+        rows = known(tables, folder.name) | {row["seed"]: row for row in map(_line, stored(folder / LINES).values())}
+        write_text(table_of(tables, folder.name), "".join(json.dumps(rows[seed]) + "\n" for seed in sorted(rows)))
+
+
+def table_of(tables: Path, name: str) -> Path:
+    """The file of a set's table."""
+    return tables / f"{name.replace(' ', '_')}{ENDING}"
+
+
+def known(tables: Path, name: str) -> dict[int, dict[str, Any]]:
+    """The rows of a set's table by seed; none where there is no table."""
+    path = table_of(tables, name)
+    return {row["seed"]: row for row in read_rows(path)} if path.exists() else {}
+
+
+def _line(row: dict[str, Any]) -> dict[str, Any]:
+    result = row["result"]
+    loads = [_rounded({k: v for k, v in load.items() if k not in LEFT_OUT}) for load in result.get("loads", [])]
+    line = {"seed": row["values"]["packing.seed"], "says": row["says"], "cpu_seconds": row["cpu_seconds"]}
+    return line | result | {"loads": loads}
+
+
+def _rounded(value: Any) -> Any:
+    """Numbers to the digits that a table keeps."""
+    if isinstance(value, dict):
+        return {key: _rounded(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_rounded(each) for each in value]
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+
+
+def read_tables(folder: Path) -> dict[str, Table]:
+    """The tables of a folder by name; packings that failed are left out, and counted by `failures`."""
+    found = {}
+    for path in sorted(folder.glob(f"*{ENDING}")):
+        name = path.stem.replace("_", " ")
+        found[name] = Table(name, tuple(row for row in read_rows(path) if row["says"] is None))
+    return found

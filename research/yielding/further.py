@@ -1,0 +1,96 @@
+"""Lossy layers left to themselves with both histories of the slip, and layers of 400 disks: the tables of further.md.
+
+python -m research.yielding.further rest FOLDER [SEED ...]      rows of lasting.jsonl
+python -m research.yielding.further large FOLDER [SEED ...]     rows of quartz_400.jsonl, as those of the task "yield"
+"""
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from faultgouge.pywrap import Engine, Equilibrium, Scene, settle
+from faultgouge.pywrap.runs.undamped import time_step
+from faultgouge.studies.packings import distance, shake
+from faultgouge.studies.rows import append
+from faultgouge.studies.sweep.points import read_toml
+from research.modes.loss import with_dashpots
+from research.yielding.compute import NOISE, dashpots, dynamic, dynamic_runs
+from research.yielding.static import branch, layer_slip
+
+SCENE = Path(__file__).parent / "yield.toml"
+HISTORIES = ("total", "rescaled")
+TIME, WINDOW = 300, 50
+LARGE = {"disks": 400, "width": 23.8, "top": 20}
+
+
+def scene(seed: int, **packing: Any) -> Scene:
+    """The scene of the sweep with another seed and other packings."""
+    given = read_toml(SCENE, "sweep")["scene"]
+    given["packing"] |= {"seed": seed} | packing
+    return Scene.from_mapping(given)
+
+
+def with_history(start: Equilibrium, history: str) -> Equilibrium:
+    """The same state: the force is one function of overlap and slip, and only what the slip does later differs."""
+    law = replace(start.packing.law, rescaled=history == "rescaled")
+    return replace(start, packing=replace(start.packing, law=law))
+
+
+def lasting(seed: int) -> Iterator[dict[str, Any]]:
+    """Runs from the equilibria of total slips at 0.97 and 0.9 of the static yield with noise, with either history."""
+    given = scene(seed)
+    path = branch(settle(given))
+    for share in (0.97, 0.9):
+        here = path.borne(share * path.kept[-1].fx)
+        if here is None:
+            continue
+        for history in HISTORIES:
+            start = with_history(here, history)
+            known = {"seed": seed, "share": share, "fx_over_fy": here.fx / given.load.fy, "history": history}
+            if history == "rescaled":  # those of total slips are in quartz_100.jsonl
+                yield known | {"restitution": 1.0} | dynamic(start, 0.0, seed)
+            for restitution in (0.9, 0.7) if share > 0.9 else ():
+                yield known | {"restitution": restitution} | left_alone(start, dashpots(given, restitution), seed)
+
+
+def left_alone(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
+    """A run with dashpots and no other loss: mean kinetic energy in windows of time, slip of the layer.
+
+    "moves" is the range of the slip after the first window, "fastest" the share of one disk in the last energy.
+    """
+    packing = with_dashpots(start.packing, cn)
+    dt, energies, slips = time_step(packing), [], [0.0]
+    with Engine(packing) as engine:
+        shake(engine, packing, NOISE, seed)
+        before = engine.packing
+        with engine.undamped(dt) as dynamics:
+            for time in range(1, TIME + 1):
+                motion = dynamics.advance(int(time / dt) - dynamics.steps)
+                now = engine.packing
+                slips.append(slips[-1] + layer_slip(before, now))
+                before = now
+                each = 0.5 * packing.mass * np.sum(motion.velocity**2, axis=1)
+                energies.append(float(each.sum()))
+    early, late = (float(np.mean(energies[first : first + WINDOW])) for first in (WINDOW, TIME - WINDOW))
+    last = {"D": distance(packing, now), "slip": slips[-1], "fastest": float(each.max() / each.sum())}
+    return {"time": TIME, "early": early, "late": late, "moves": float(np.ptp(slips[WINDOW + 1 :]))} | last
+
+
+def large(seed: int) -> Iterator[dict[str, Any]]:
+    """Static yield and dynamic runs of 400 disks."""
+    given = scene(seed, **LARGE)
+    path = branch(settle(given))
+    known = {"seed": seed, "newton": path.newton / given.load.fy, "static": path.kept[-1].fx / given.load.fy}
+    yield known | {"dynamic": dynamic_runs(given, path)}
+
+
+if __name__ == "__main__":
+    kind, folder, *seeds = sys.argv[1:]
+    compute, name = {"rest": (lasting, "lasting"), "large": (large, "quartz_400")}[kind]
+    for seed in map(int, seeds or range(1, 21)):
+        for row in compute(seed):
+            append(Path(folder) / f"{name}.jsonl", row)

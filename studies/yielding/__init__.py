@@ -1,1 +1,0 @@
-"""The yield of a layer: static, dynamic, and under loads that rise at a finite rate."""

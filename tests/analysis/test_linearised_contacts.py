@@ -1,0 +1,254 @@
+"""K and C of linearised contacts: a force law in extended precision, symmetries, and the operators of disks."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from faultgouge.analysis import (
+    LinearisedContacts,
+    Snapshot,
+    damping_matrix,
+    eigenvalues,
+    linear_response,
+    normal_modes,
+    spectrum,
+    stable_timestep,
+    stiffness_matrix,
+    transient_gain,
+)
+from faultgouge.analysis.packing.snapshot import PER_CONTACT
+
+STEP = np.longdouble(1e-8)
+"""Of central differences. Their error is 1e-16 of the third derivative, the rounding of long doubles 1e-11."""
+
+
+def cross(a, b):
+    """np.cross has no long doubles of one vector each that it does not warn about."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+@pytest.fixture(params=[2, 3], ids=["disks", "spheres"])
+def bed(request) -> Snapshot:
+    return make(request.param)
+
+
+def make(d: int, *, arms_meet: bool = False, walls: bool = True, slides: bool = True) -> Snapshot:
+    """Six particles in no balance, every two of which touch, with a wall below the first two."""
+    rng = np.random.default_rng(7 + d)
+    n = 6
+    position = np.zeros((n, 3))
+    position[:, :d] = rng.normal(size=(n, d))
+    i, j = np.triu_indices(n, 1)
+    radius = rng.uniform(0.5, 1.0, n)
+    if walls:
+        i, j = np.append(i, [0, 1]), np.append(j, [-1, -1])
+    wall = j < 0
+    branch = np.where(wall[:, None], np.eye(3)[d - 1] * 0.9, position[i] - position[j])
+    distance = np.linalg.norm(branch, axis=1)
+    normal = branch / distance[:, None]
+    count = len(i)
+    overlap = rng.uniform(0.01, 0.02, count)
+    tangential = rng.normal(size=(count, 3))
+    tangential[:, d:] = 0
+    tangential -= normal * np.sum(normal * tangential, axis=1)[:, None]
+    arms = np.column_stack([radius[i], np.where(wall, 0, radius[j])])
+    slope = np.zeros(count)
+    if arms_meet:
+        arms = np.column_stack([0.4 * distance, 0.6 * distance])
+    lever = arms if arms_meet else np.where(arms > 0, arms - 0.5 * overlap[:, None], 0)
+    if not arms_meet:
+        slope[:] = 0.5
+    fn = rng.uniform(1, 2, count)
+    size = np.linalg.norm(tangential, axis=1)
+    sliding = np.arange(count) % 3 == 0 if slides else np.zeros(count, bool)
+    contacts = LinearisedContacts(
+        i=i, j=j, normal=normal, distance=np.where(wall, np.inf, distance), overlap=overlap, slip_arm=arms,
+        lever_arm=lever, lever_slope=slope, normal_force=fn, tangential_force=tangential,
+        normal_stiffness=1.5 * fn / overlap, tangential_stiffness=rng.uniform(50, 90, count),
+        closing=0.5 * tangential / overlap[:, None], parting=0.5 * tangential / overlap[:, None],
+        friction=np.where(sliding, size, 10 * size), sliding=sliding, normal_dashpot=rng.uniform(1, 2, count),
+        tangential_dashpot=rng.uniform(1, 2, count),
+    )  # fmt: skip
+    mass = rng.uniform(1, 2, n)
+    return Snapshot(
+        dimension=d, position=position[:, :d], radius=radius, mass=mass, inertia=0.4 * mass * radius**2,
+        contacts=contacts, box=np.eye(3), origin=np.zeros(3), periodic=np.zeros(3, bool), load=np.zeros((n, 2, 3)),
+    )  # fmt: skip
+
+
+def forces(bed: Snapshot, q):
+    """Forces on all coordinates after a small displacement: Hertz, and a history that turns with its contact."""
+    d, n, c = bed.dimension, len(bed), bed.contacts
+    move, turn = np.zeros((2, n, 3), np.longdouble)
+    parts = q.reshape(bed.axes, n)
+    move[:, :d] = parts[:d].T
+    turn[:, 3 - len(parts[d:]) :] = (parts[d:] / bed.radius).T
+    total = np.zeros((2, n, 3), np.longdouble)
+    for k in range(len(c)):
+        i, j, wall = c.i[k], c.j[k], c.j[k] < 0
+        u = move[i] - (0 if wall else move[j])
+        w = c.slip_arm[k, 0] * turn[i] + (0 if wall else c.slip_arm[k, 1] * turn[j])
+        n0 = c.normal[k].astype(np.longdouble)
+        n0 = n0 / np.sqrt(n0 @ n0)  # a unit vector to more digits than doubles have
+        branch = n0 * (1 if wall else c.distance[k]) + u
+        length = np.sqrt(branch @ branch)
+        normal = n0 if wall else branch / length
+        closer = -(n0 @ u) if wall else c.distance[k] - length
+        delta = c.overlap[k] + closer
+        fn = c.normal_force[k] * (delta / c.overlap[k]) ** np.longdouble(1.5)
+        old = c.tangential_force[k].astype(np.longdouble)
+        old = old - n0 * (n0 @ old)
+        pull = old - c.tangential_stiffness[k] * (u - n0 * (n0 @ u) + cross(n0, w))
+        if c.sliding[k]:
+            pull *= np.sqrt(old @ old) * fn / c.normal_force[k] / np.sqrt(pull @ pull)
+        else:
+            pull = pull + old * (np.sqrt(delta / c.overlap[k]) - 1)
+        pull = pull - normal * (normal @ pull)
+        for p, (who, sign) in enumerate(((i, 1), (j, -1))[: 1 if wall else 2]):
+            total[0, who] += sign * (fn * normal + pull)
+            total[1, who] -= (c.lever_arm[k, p] - c.lever_slope[k] * closer) * cross(normal, pull) / bed.radius[who]
+    return np.concatenate([total[0, :, :d].T.ravel(), total[1, :, 3 - len(parts[d:]) :].T.ravel()])
+
+
+def test_differences_of_forces_in_extended_precision(bed):
+    k = stiffness_matrix(bed).toarray()
+    found = np.empty(k.shape)
+    for column in range(len(k)):
+        q = np.zeros(len(k), np.longdouble)
+        q[column] = STEP
+        found[:, column] = -(forces(bed, q) - forces(bed, -q)) / (2 * STEP)
+    # the third derivative is that of lengths of 1e-2: 1e-16/1e-4; the unit vectors of doubles are off by 1e-16
+    assert np.abs(found - k).max() < 2e-10 * np.abs(k).max()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_operators_of_disks(cluster, share):
+    from dataclasses import replace
+
+    rescaled = cluster.law.exponent == 1.5
+    packing = replace(cluster, law=replace(cluster.law, cn=1.3, ct=0.4, rescaled=rescaled), inertia_factor=0.5)
+    snapshot = Snapshot.of_packing(packing)
+    for one, other in (
+        (stiffness_matrix(packing, parting=share), stiffness_matrix(snapshot, parting=share)),
+        (damping_matrix(packing), damping_matrix(snapshot)),
+    ):
+        assert abs(one - other).max() < 4e-15 * abs(one).max()  # a few roundings
+    assert list(snapshot.rattlers) == list(packing.rattlers)
+    assert snapshot.coordinate_mass == pytest.approx(packing.coordinate_mass, rel=1e-15)
+    net = packing.net_force.reshape(3, -1)
+    turned = snapshot.net_force[:, 1, 2] / packing.radius
+    assert np.array([*snapshot.net_force[:, 0, :2].T, turned]) == pytest.approx(net, abs=1e-12 * np.abs(net).max())
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_momentum_and_angular_momentum(d):
+    bed = make(d, arms_meet=True, walls=False)
+    k, n = stiffness_matrix(bed).toarray(), len(bed)
+    scale = 1e-13 * np.abs(k).max()
+    shift = np.kron(np.eye(bed.axes)[:d], np.ones(n))
+    assert np.abs(k @ shift.T).max() < scale
+    assert np.abs(shift @ k).max() < scale
+    assert np.abs(shift @ damping_matrix(bed)).max() < scale
+    position = np.zeros((n, 3))
+    position[:, :d] = bed.position
+    for axis in range(3) if d == 3 else (2,):
+        about = np.eye(3)[axis]
+        moved, turned = np.cross(about, position), np.outer(bed.radius, about)
+        rotation = np.concatenate([moved[:, :d].T.ravel(), (turned if d == 3 else turned[:, 2:]).T.ravel()])
+        # forces and torques turn with the packing, and no contact slips; but a twist about n turns no tangential force
+        c = bed.contacts
+        dn = np.cross(about, c.normal)
+        dft = np.cross(about, c.tangential_force) - (c.normal @ about)[:, None] * np.cross(c.normal, c.tangential_force)
+        force = c.normal_force[:, None] * dn + dft
+        twist = -(np.cross(dn, c.tangential_force) + np.cross(c.normal, dft))
+        total = np.zeros((2, n, 3))
+        for side, sign in ((0, 1), (1, -1)):
+            who = (c.i, c.j)[side]
+            np.add.at(total[0], who, sign * force)
+            np.add.at(total[1], who, c.lever_arm[:, side, None] * twist / bed.radius[who, None])
+        expected = np.concatenate([total[0, :, :d].T.ravel(), total[1, :, 0 if d == 3 else 2 :].T.ravel()])
+        assert np.abs(k @ rotation + expected).max() < 10 * scale
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_turned_and_mirrored(d, mirrored):
+    bed = make(d)
+    turn = np.eye(3)
+    turn[:d, :d] = np.linalg.qr(np.random.default_rng(1).normal(size=(d, d)))[0]
+    turn[:, 0] *= np.sign(np.linalg.det(turn)) * (-1 if mirrored else 1)
+    values = {name: getattr(bed.contacts, name) for name in PER_CONTACT}
+    for name, shape in PER_CONTACT.items():
+        if shape == (3,):
+            values[name] = values[name] @ turn.T
+    other = Snapshot(**{name: getattr(bed, name) for name in bed.__dataclass_fields__} | {
+        "contacts": LinearisedContacts(**values), "position": bed.position @ turn[:d, :d].T})  # fmt: skip
+    spin = np.linalg.det(turn) * turn  # rotations are pseudovectors
+    whole = np.zeros((bed.axes, bed.axes))
+    whole[:d, :d], whole[d:, d:] = turn[:d, :d], spin if d == 3 else spin[2:, 2:]
+    whole = np.kron(whole, np.eye(len(bed)))
+    for operator in (stiffness_matrix, damping_matrix):
+        k = operator(bed).toarray()
+        assert np.abs(operator(other).toarray() - whole @ k @ whole.T).max() < 1e-13 * np.abs(k).max()
+
+
+def test_spin_about_the_only_contact_costs_nothing():
+    bed = make(3, walls=False, slides=False)
+    pair = bed.contacts.chosen(np.arange(1))
+    values = {name: getattr(bed, name) for name in bed.__dataclass_fields__} | {"contacts": pair}
+    two = Snapshot(**values)
+    assert list(two.rattlers) == [2, 3, 4, 5]
+    found = spectrum(two)
+    # three translations and three twists or common turns, and the soft ones of a force that is not in balance
+    assert np.sum(np.abs(found.eigenvalues) < 1e-12 * np.abs(found.eigenvalues).max()) >= 6
+    assert len(found.pairs) == 0
+
+
+def test_held_particles_take_part_in_contacts_alone(bed):
+    free = np.arange(len(bed)) != 2
+    held = Snapshot(**{name: getattr(bed, name) for name in bed.__dataclass_fields__} | {"free": free})
+    coordinates = np.tile(free, bed.axes)
+    k, less = stiffness_matrix(bed).toarray(), stiffness_matrix(held).toarray()
+    assert (
+        np.abs(less[np.ix_(coordinates, coordinates)] - k[np.ix_(coordinates, coordinates)]).max()
+        < 1e-14 * np.abs(k).max()
+    )
+    assert not less[~coordinates].any()
+    assert not less[:, ~coordinates].any()
+
+
+def test_the_analysis_takes_a_snapshot_as_a_packing(bed):
+    mass = bed.coordinate_mass
+    k, c = stiffness_matrix(bed).toarray(), damping_matrix(bed).toarray()
+    values = np.linalg.eigvals(k / mass[:, None])
+    order = np.lexsort((values.imag, values.real))
+    assert eigenvalues(bed) == pytest.approx(values[order], abs=1e-9 * np.abs(values).max())
+    n = len(k)
+    push = np.random.default_rng(0).normal(size=n)
+    still = np.zeros((n, n))
+    system = np.block([[still, np.eye(n)], [-k / mass[:, None], -c / mass[:, None]]])
+    moved = expm(0.3 * system) @ np.concatenate([push, np.zeros(n)])
+    found = linear_response(bed, [0.3], initial=push)
+    assert found.displacement[0] == pytest.approx(moved[:n], abs=1e-9 * np.abs(moved[:n]).max())
+    d = bed.dimension
+    assert found.msd[0] == pytest.approx(np.sum(moved[: d * len(bed)] ** 2) / len(bed), rel=1e-9)
+    share = normal_modes(bed).rotation
+    assert np.all((share >= 0) & (share <= 1))
+    mu = np.linalg.eigvals(np.block([[c / mass[:, None], k / mass[:, None]], [np.eye(n), still]])).real.max()
+    step = stable_timestep(bed)
+    assert step == pytest.approx(2 / mu, rel=1e-7)
+    assert abs(step - 2 / mu) <= step.error + 1e-12 * step
+
+
+def test_gain_of_a_snapshot(path):
+    packing = path(0.0215)
+    one, other = transient_gain(packing), transient_gain(Snapshot.of_packing(packing))
+    assert (other.gain, other.time) == pytest.approx((one.gain, one.time), rel=1e-6)
+    assert other.disk == one.disk
+
+
+@pytest.mark.parametrize("change", [{"normal": np.zeros((3, 2))}, {"overlap": np.full(17, np.nan)}, {"i": [1.5]}])
+def test_contacts_that_are_none(change):
+    values = {name: getattr(make(3).contacts, name) for name in PER_CONTACT}
+    with pytest.raises(ValueError, match=r"shape|finite|integers"):
+        LinearisedContacts(**values | change)

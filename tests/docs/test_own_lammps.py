@@ -1,0 +1,27 @@
+"""The page about LAMMPSes of one's own: its script runs, and finds what the page says."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PAGE = Path(__file__).parents[2] / "docs" / "howto_own_lammps.md"
+
+
+@pytest.mark.slow
+def test_script_of_the_page(tmp_path):
+    text = PAGE.read_text()
+    blocks = dict(re.findall(r"^```\w+\n# ([\w.]+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL))
+    assert blocks.keys() == {"slope.in", "look.py"}
+    for name, block in blocks.items():
+        (tmp_path / name).write_text(block)
+    first = re.search(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)[1]
+    with (tmp_path / "look.py").open("a") as script:  # the three lines at the top of the page
+        script.write(first)
+    done = subprocess.run([sys.executable, "look.py"], cwd=tmp_path, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    assert "40 spheres" in done.stdout
+    assert "LAMMPS moves as K and C say: True" in done.stdout
+    assert "<Spectrum: 240 eigenvalues" in done.stdout

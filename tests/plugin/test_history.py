@@ -1,0 +1,301 @@
+"""Rescaled slips, and Coulomb's slider: LAMMPS against the law, against LAMMPS's own style, and growth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, fit_growth, stiffness_matrix
+from faultgouge.analysis.spectrum.spectrum import mass_weighted
+from faultgouge.pywrap import Scene, perturb, ramp
+from faultgouge.pywrap.lammps.engine import Engine
+
+KN, KT = 2e5, 2e5 * 2 / 7
+LAW = MindlinLaw(KN, KT, 1.0, rescaled=True)
+SLIDER = MindlinLaw(KN, KT, 1.0, coulomb=True)
+
+arithmetics = pytest.mark.parametrize("compensated", [False, True], ids=["double", "compensated"])
+
+
+def on(other, overlap, slip, compensated=False, law=LAW):
+    """Disk 0 on another disk, whose number is 1, or on the floor, which has -1."""
+    position = np.array([[1.0, 3.0], [1.0, 4.0 - overlap]] if other == 1 else [[1.0, 0.5 - overlap]])
+    low = np.zeros_like(position) if compensated else None
+    contact, radius = Contacts([0], [other], [slip]), [0.5] * len(position)
+    return Packing(position=position, radius=radius, contacts=contact, law=law, position_low=low)
+
+
+def moved(packing, closer=0.0, turned=0.0):
+    """The displacement that presses a contact, and has it slip by turning the last disk."""
+    displacement = np.zeros((3, len(packing)))
+    displacement[1:, -1] = -closer, turned
+    return displacement.ravel()
+
+
+@arithmetics
+@pytest.mark.parametrize("other", [1, -1], ids=["two disks", "floor"])
+@pytest.mark.parametrize("closer", [3e-3, 1e-6, -1e-6, -5e-4])
+@pytest.mark.parametrize("law", [LAW, SLIDER], ids=["smooth", "slider"])
+def test_slip_is_rescaled_while_the_overlap_grows(other, closer, compensated, law):
+    packing = on(other, 1e-3, 2e-4, compensated=compensated, law=law)
+    with Engine(packing) as engine:
+        after = engine.displace(packing, moved(packing, closer))
+        again = engine.displace(packing, np.zeros(3 * len(packing)))
+        force = engine.net_force
+    before, now = packing.geometry.overlap[0], after.geometry.overlap[0]
+    # coordinates are rounded at 4e-16, overlaps with them
+    assert after.contacts.slip[0] == pytest.approx(2e-4 * min(1.0, np.sqrt(before / now)), rel=1e-12)
+    assert after.contacts.slip[0] == pytest.approx(float(law.remembered(2e-4, before, now)), rel=1e-12)
+    assert np.array_equal(again.contacts.slip, [2e-4])
+    assert -force[-1] == pytest.approx(float(packing.tangential_force[0]), rel=1e-12)
+
+
+@pytest.mark.parametrize("other", [1, -1], ids=["two disks", "floor"])
+def test_slipping_and_pressing_at_once_is_second_order_in_the_step(other):
+    errors = []
+    for steps in (8, 16, 32):
+        packing = on(other, 1e-3, 0.0)
+        with Engine(packing) as engine:
+            for _ in range(steps):
+                packing = engine.displace(packing, moved(packing, 3e-3 / steps, 1e-4 / steps))
+        # s delta^(1/2) = c (integral of delta^(1/2) over the slip) with delta from 1e-3 to 4e-3
+        exact = -1e-4 * (2 / 3) * (4e-3**1.5 - 1e-3**1.5) / 3e-3 / np.sqrt(4e-3)
+        errors.append(abs(packing.contacts.slip[0] - exact))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.05)
+
+
+def test_a_slider_keeps_its_force_while_pressed_and_loses_it_in_proportion_while_parted():
+    packing = on(1, 1e-3, 2e-4, law=SLIDER)
+    with Engine(packing) as engine:
+        pressed = engine.displace(packing, moved(packing, 3e-3))
+        parted = engine.displace(pressed, moved(pressed, -1.75e-3))
+        bound = engine.displace(parted, moved(parted, -2.24e-3))
+    forces = [float(each.tangential_force[0]) for each in (packing, pressed, parted, bound)]
+    assert forces[0] == pytest.approx(-KT * np.sqrt(1e-3) * 2e-4, rel=1e-12)
+    assert forces[1] == pytest.approx(forces[0], rel=1e-12)
+    assert forces[2] == pytest.approx(forces[0] * np.sqrt(2.25 / 4.0), rel=1e-12)
+    assert forces[3] == pytest.approx(-KN * 1e-5**1.5, rel=1e-10)  # an overlap of 1e-5 is known to 4e-11
+
+
+SCRIPT = """
+units           lj
+dimension       2
+boundary        f f p
+atom_style      sphere
+atom_modify     map yes
+comm_modify     vel yes
+region          box block -5 5 -5 5 -0.5 0.5
+create_box      1 box
+create_atoms    1 single 0.0 0.0 0.0
+create_atoms    1 single 0.0 0.999 0.0
+set             group all diameter 1.0
+neigh_modify    delay 0 every 1
+{style}
+timestep        {dt}
+group           upper id 2
+compute         each all property/atom fx
+compute         force upper reduce sum c_each
+thermo_style    custom step c_force
+thermo          0
+"""
+LEG = """
+set             group all omega 0.0 0.0 {spin}
+fix             move upper move linear 0.0 {speed} 0.0
+run             {steps} post no
+print           "$(c_force:%.17g)" append forces screen no
+unfix           move
+"""
+
+
+@pytest.mark.slow
+def test_linear_limit_is_lammps_rescale_force(lmp, tmp_path):
+    """mu is so large that x is 1e-6; a leg either turns the disks or presses them, and is then exact in both."""
+    # the built-in styles have the root of the effective radius, 1/2, in their stiffnesses
+    ours = f"pair_style mindlin/smooth {KN} {KT} 1e6 history {{}}\npair_coeff * *"
+    theirs = f"pair_style granular\npair_coeff * * hertz {2 * KN} 0.0 tangential {{}} {2 * KT} 0.0 1e6 damping velocity"
+    styles = {name: ours.format(name) for name in ("total", "rescaled")}
+    styles |= {name: theirs.format(name) for name in ("mindlin", "mindlin_rescale", "mindlin_rescale/force")}
+    legs = [(1e-4, 0), (0, -2e-3), (1e-4, 0), (0, 1e-3), (-3e-4, 0), (0, 2e-3), (0, -2e-3), (2e-4, 0)]
+    script = "".join(LEG.format(spin=spin, speed=speed, steps=200) for spin, speed in legs)
+    forces = {}
+    for name, style in styles.items():
+        lmp(SCRIPT.format(style=style, dt=1e-3) + script)
+        forces[name] = np.loadtxt(tmp_path / "forces")
+        (tmp_path / "forces").unlink()
+    scale = np.abs(forces["rescaled"]).max()
+    close = {"atol": 1e-5 * scale, "rtol": 0}  # of the smoothing, x = 1e-6 at each step
+    np.testing.assert_allclose(forces["rescaled"], forces["mindlin_rescale/force"], **close)
+    np.testing.assert_allclose(forces["total"], forces["mindlin"], **close)
+    assert np.abs(forces["rescaled"] - forces["mindlin_rescale"]).max() > 0.05 * scale
+
+
+SLIDES = [
+    (1e-2, 0),
+    (0, -2e-3),
+    (3e-3, 0),
+    (0, 2.5e-3),
+    (-5e-4, 0),
+    (-2e-2, 0),
+    (0, 1e-3),
+    (0, 4e-3),
+    (0, -9e-3),
+    (4e-3, 0),
+]
+"""Spins and speeds: the contact slides, sticks when it is pressed or turned back, slides since it parts, and is lost
+and met again."""
+
+
+@pytest.fixture
+def slider_and_theirs(lmp, tmp_path):
+    """Forces after legs of 200 steps of 1e-3: ours, and those of LAMMPS's style or wall granular."""
+
+    def forces(legs, *, wall=False, radius=0.5, refined=1):
+        # the built-in styles have the root of the effective radius in their stiffnesses, and a wall the disk's own
+        root = np.sqrt(0.5 if wall else 0.5 * radius / (0.5 + radius))
+        kn, kt, low = KN / root, KT / root, 0.5 - radius
+        tangential = f"tangential mindlin_rescale/force {kt} 0.0 0.5 damping velocity"
+        styles = {
+            "ours": f"pair_style mindlin/smooth {KN} {KT} 0.5 history coulomb\npair_coeff * *\n",
+            "theirs": f"pair_style granular\npair_coeff * * hertz {kn} 0.0 {tangential}\n",
+        }
+        body = SCRIPT.replace("diameter 1.0", "diameter 1.0\nset atom 1 diameter {diameter}")
+        body = body.replace("single 0.0 0.0", "single 0.0 {low}")
+        if wall:  # the first disk is out of reach
+            body = body.replace("single 0.0 {low}", "single 4.0 4.0") + "fix floor upper {floor}\n"
+        ours = f"wall/mindlin/smooth {KN} {KT} 0.5 ylo 0.5 history coulomb"
+        floors = {"ours": ours, "theirs": f"wall/gran granular hertz {kn} 0.0 {tangential} yplane 0.5 NULL"}
+        run = "".join(LEG.format(spin=spin, speed=speed, steps=200 * refined) for spin, speed in legs)
+        found = []
+        for name, style in styles.items():
+            made = body.format(style=style, dt=1e-3 / refined, diameter=2 * radius, low=low, floor=floors[name])
+            lmp(made + run)
+            found.append(np.loadtxt(tmp_path / "forces"))
+            (tmp_path / "forces").unlink()
+        return found
+
+    return forces
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [{}, {"radius": 0.7}, {"wall": True}], ids=["two disks", "of two sizes", "floor"])
+def test_slider_is_lammps_rescale_force(slider_and_theirs, kind):
+    """Also where the contact slides. A leg either turns the disks or presses them: what both do at once LAMMPS counts
+    with the stiffness at the end of a step, and the plugin with the mean of both ends."""
+    ours, theirs = slider_and_theirs(SLIDES, **kind)
+    # a step takes a slip from velocities, and so to 1e-16 of its force
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-13 * np.abs(theirs).max())
+    assert len(np.unique(np.round(ours, 12))) > 6
+
+
+@pytest.mark.slow
+def test_slider_turned_and_pressed_at_once_is_lammps_in_the_limit_of_small_steps(slider_and_theirs):
+    legs = [(1e-3, -2e-3), (-1.5e-3, 1e-3), (1e-3, 2e-3), (5e-3, -2e-3), (-2e-4, 5e-4)]
+    apart = []
+    for refined in (1, 2, 4):
+        ours, theirs = slider_and_theirs(legs, refined=refined)
+        apart.append(np.abs(ours - theirs).max() / np.abs(ours).max())
+    assert apart[0] < 1e-2
+    assert np.log2(np.divide(apart[:-1], apart[1:])) == pytest.approx([1.0, 1.0], abs=0.1)
+
+
+def test_slider_obeys_friction_that_weakens_during_a_run(lmp, tmp_path):
+    """And when friction is as strong as before, the force stays what it was."""
+    style = f"pair_style mindlin/smooth {KN} {KT} 0.5 history coulomb\npair_coeff * *"
+    weaker = "variable mu equal 0.2\nfix weaker all adapt 1 pair mindlin/smooth mu * * v_mu\nrun 1\n"
+    strong = "unfix weaker\nvariable mu equal 0.5\nfix strong all adapt 1 pair mindlin/smooth mu * * v_mu\nrun 1\n"
+    say = 'print "$(c_force:%.17g)" append forces screen no\n'
+    slide = LEG.format(spin=1e-2, speed=0, steps=200)
+    stop = "set group all omega 0.0 0.0 0.0\nfix move upper move linear 0.0 0.0 0.0\n"
+    lmp(SCRIPT.format(style=style, dt=1e-3) + slide + stop + weaker + say + strong + say)
+    forces = np.loadtxt(tmp_path / "forces") / (KN * 1e-3**1.5)
+    np.testing.assert_allclose(np.abs(forces), [0.5, 0.2, 0.2], rtol=1e-12)
+
+
+def vibrate(engine, packing, direction, width, cycles):
+    """The packing after some cycles, and the forces where each half of the last cycle ends."""
+    engine.displace(packing, width * direction)
+    ends = []
+    packing = engine.displace(packing, width * direction)
+    for _ in range(cycles):
+        ends = [engine.net_force.copy()]
+        for sign in (-1, 1):
+            packing = engine.displace(packing, sign * 2 * width * direction)
+            ends.append(engine.net_force.copy())
+    return packing, ends
+
+
+def test_a_vibration_shakes_contacts_down_to_the_default_matrix(reference_packing):
+    """Contacts at the bound among them: from the second cycle on they stick. The mean of both halves of a cycle, in one
+    of which a contact parts and in the other closes, is the matrix with half of either derivative."""
+    packing = reference_packing(0.3)
+    limit = packing.law.slip_limit(packing.geometry.overlap)
+    slip = np.resize([-1.0, 0.05, 0.5, 0.99, 1.0, -0.2, 0.1], len(limit)) * limit
+    law = replace(packing.law, coulomb=True)
+    packing = replace(packing, law=law, contacts=packing.contacts.slipped(slip))
+    matrix, slides = stiffness_matrix(packing), stiffness_matrix(packing, sliding=True)
+    rng, width = np.random.default_rng(5), 2.0**-27
+    with Engine(packing) as engine:
+        for _ in range(3):
+            direction = np.round(rng.uniform(-1, 1, 3 * len(packing)), 2)
+            _, (right, left, again) = vibrate(engine, packing, direction, width, 3)
+            measured = (0.5 * (right + again) - left) / (-2 * width)
+            # changes by the vibration, 1e-8 over the smallest overlaps, and forces rounded at 1e-16 of K over 1e-8
+            scale = 1e-5 * np.abs(matrix @ direction).max()
+            np.testing.assert_allclose(measured, matrix @ direction, rtol=0, atol=scale)
+            assert np.abs(measured - slides @ direction).max() > 1e3 * scale
+            engine.restore(packing)
+
+
+@pytest.mark.slow
+def test_growth_is_that_of_the_mean_of_both_derivatives():
+    """D(t) of an undamped run: its rate lies a few per cent below that of K, since tangential forces fall meanwhile."""
+    scene = Scene.from_mapping(
+        {
+            "packing": {"disks": 100, "width": 11.9, "seed": 5},
+            "law": {"kn": 2e5, "history": "rescaled"},
+            "load": {"fy": 3.0},
+            "ramp": {"step": 3e-3, "until": 0.3},
+            "perturb": {"fx": 0.3, "time": 10.0, "amplitude": 1e-7, "omega": 50.0},
+        }
+    )
+    *_, last = ramp(scene)
+    rates = {}
+    for share in (0.0, 0.5, 1.0):
+        matrix = mass_weighted(stiffness_matrix(last.packing, parting=share), last.packing).toarray()
+        rates[share] = 2 * np.sqrt(np.linalg.eigvals(matrix).astype(complex)).imag.max()
+    time, msd = np.array([(sample.time, sample.msd) for sample in perturb(scene, last, samples=500, early=0)]).T
+    grows = slice(np.flatnonzero(msd > 1e-17)[0], np.flatnonzero(msd > 1e-13)[0])
+    measured = np.polyfit(time[grows], np.log(msd[grows]), 1)[0]
+    assert 0.93 * rates[0.5] < measured < rates[0.5]
+    assert measured < 0.9 * rates[0.0]
+    assert measured > 1.1 * rates[1.0]
+
+
+@pytest.mark.long
+def test_a_slider_grows_as_contacts_do_that_have_been_shaken_down():
+    """Four contacts are at the bound. K in which they slide on, or with one of both derivatives for all contacts, is
+    far off."""
+    scene = Scene.from_mapping(
+        {
+            "packing": {"disks": 100, "width": 11.9, "seed": 2},
+            "law": {"kn": 2e5, "history": "coulomb"},
+            "load": {"fy": 3.0},
+            "ramp": {"step": 6e-3, "until": 0.6},
+            "perturb": {"fx": 0.6, "time": 64.0, "amplitude": 1e-9, "omega": 30.0},
+        }
+    )
+    *_, last = ramp(scene)
+    assert last.packing.law.at_bound(last.packing.geometry.overlap, last.packing.contacts.slip).any()
+
+    def rate(**branch):
+        matrix = mass_weighted(stiffness_matrix(last.packing, **branch), last.packing).toarray()
+        return 2 * np.sqrt(np.linalg.eigvals(matrix).astype(complex)).imag.max()
+
+    time, msd = np.array([(sample.time, sample.msd) for sample in perturb(scene, last, samples=400, early=0)]).T
+    measured = fit_growth(time, msd, 1e-16, 1e-9).rate
+    # in five packings 0.87 to 1.13: the mean is the first harmonic alone, and the force falls a little in each period
+    assert 0.85 * rate() < measured < 1.15 * rate()
+    assert measured > 2 * rate(parting=0.0)
+    assert measured < 0.6 * rate(parting=1.0)
+    assert measured < 0.3 * rate(sliding=True)

@@ -1,0 +1,105 @@
+"""No hidden unit: lengths, forces and masses scaled by any factors give the same dimensionless results."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faultgouge.analysis import MindlinLaw
+from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, perturb, ramp
+from faultgouge.pywrap.equilibria.rattlers import middle_of_cage
+from faultgouge.pywrap.settling.bed import own_units
+
+UNITS = st.floats(-9, 9).map(lambda power: 10.0**power)
+
+
+def scene(length=1.0, force=1.0, mass=1.0, precision="double", **packing):
+    time = (mass * length / force) ** 0.5
+    return Scene.from_mapping(
+        {
+            "precision": precision,
+            "packing": {
+                "disks": 12,
+                "radii": [0.5 * length, 0.7 * length],
+                "width": 4.1 * length,
+                "mass": mass,
+                "seed": 3,
+                **packing,
+            },
+            "law": {"kn": 2e5 * force / length**1.5, "mu": 0.5},
+            "load": {"fy": 3.0 * force},
+            "ramp": {"step": 2e-3 * force, "until": 4e-3 * force},
+            "perturb": {"fx": 0.0, "time": 0.5 * time, "amplitude": 1e-4 * force, "omega": 1.0 / time},
+        }
+    )
+
+
+def dimensionless(length=1.0, force=1.0, mass=1.0, precision="double"):
+    wanted = scene(length, force, mass, precision)
+    path = list(ramp(wanted))
+    *_, last = perturb(wanted, path[-1], samples=1, early=0)
+    packing = path[-1].packing
+    return {
+        "position": packing.position / length,
+        "slip": packing.contacts.slip / length,
+        "residual": path[-1].residual / force,
+        "msd": last.msd / length**2,
+        "velocity": last.layer_velocity / (length * force / mass) ** 0.5,
+    }
+
+
+@settings(max_examples=50, deadline=None)
+@given(UNITS, UNITS)
+def test_scenes_that_differ_in_units_settle_the_same_numbers(length, force):
+    def settles(units):
+        return own_units(units.packing, MindlinLaw(units.law.kn, units.law.kt, 1.0), units.load.fy)
+
+    mine, yours = settles(scene(length, force)), settles(scene())
+    assert mine[1:] == yours[1:]
+    assert (mine[0].radii, mine[0].width) == (yours[0].radii, yours[0].width) == ((0.5, 0.7), 4.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["double", "compensated"])
+@settings(max_examples=3, deadline=None)
+@given(UNITS, UNITS, UNITS)
+def test_random_units_have_the_same_dimensionless_results(precision, length, force, mass):
+    mine, yours = dimensionless(length, force, mass, precision), dimensionless(precision=precision)
+    for name, tolerance in (("position", 1e-13), ("slip", 1e-13)):  # roundings of coordinates of 4, over soft modes
+        np.testing.assert_allclose(mine[name], yours[name], rtol=0, atol=tolerance)
+    assert mine["residual"] < 10 * yours["residual"]
+    assert mine["msd"] == pytest.approx(yours["msd"], rel=1e-6)  # of 1e-5 lengths; rounding is 1e-10 of these
+    assert mine["velocity"] == pytest.approx(yours["velocity"], rel=1e-6)
+
+
+def test_powers_of_two_change_no_bit():
+    mine, yours = dimensionless(2.0**-20, 2.0**-10, 2.0**-14), dimensionless()
+    for name, value in yours.items():
+        assert np.array_equal(mine[name], value), name
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e-4, 1e3])
+def test_the_reference_packing_in_any_length(reference_packing, length):
+    def onward(unit):
+        one = reference_packing(1.0)
+        law = replace(one.law, kn=one.law.kn / unit**1.5, kt=one.law.kt / unit**1.5)
+        scaled = replace(
+            one, position=unit * one.position, radius=unit * one.radius, box_length=unit * one.box_length, law=law
+        )
+        with Engine(scaled) as engine:
+            found = equilibrate(engine, Equilibrium.of(scaled), 1e-3)
+        return found.packing.position / unit
+
+    np.testing.assert_allclose(onward(length), onward(1.0), rtol=0, atol=1e-12)
+
+
+def test_the_middle_of_a_cage_is_the_same_in_any_length(reference_packing):
+    one = reference_packing(0.0)
+    small = replace(
+        one, position=2.0**-30 * one.position, radius=2.0**-30 * one.radius, box_length=2.0**-30 * one.box_length
+    )
+    disks = one.rattlers
+    assert len(disks)
+    assert np.array_equal(middle_of_cage(small, disks), 2.0**-30 * middle_of_cage(one, disks))

@@ -1,0 +1,443 @@
+"""Snapshots of LAMMPS's own packings: LAMMPS's motion beside exp(t G), b of two spheres, refusals, what changes."""
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import damping_matrix, spectrum, stiffness_matrix
+
+LAWS = {
+    "gran/hooke/history": ("gran/hooke/history 5e2 2e2 {g} {g} 3.0 1", ["* *"], "hooke/history 5e2 2e2 {w} {w} 3.0 1"),
+    "gran/hertz/history": ("gran/hertz/history 3e3 NULL {g} {g} 3.0 1", ["* *"], "hertz/history 3e3 9e2 {w} {w} 3.0 1"),
+    "linear_history": (
+        "granular", ["* * hooke 5e2 {g} tangential linear_history 2e2 1.0 3.0 damping mass_velocity"],
+        "granular hooke 5e2 {w} tangential linear_history 2e2 1.0 3.0 damping velocity",
+    ),
+    "mindlin": (
+        "granular",
+        ["1 1 hertz 3e3 {g} tangential mindlin 9e2 1.0 3.0", "2 2 hertz 5e3 {g} tangential mindlin 2e3 1.0 3.0"],
+        "granular hertz 3e3 {w} tangential mindlin 9e2 1.0 3.0",
+    ),
+    "mindlin/force": (
+        "granular", ["* * hertz/material 3e3 {g} 0.3 tangential mindlin/force NULL 1.0 3.0 damping viscoelastic"],
+        "granular hertz/material 5e3 {w} 0.2 tangential mindlin/force NULL 1.0 3.0",
+    ),
+    "mindlin_rescale": (
+        "granular", ["* * hertz 3e3 {g} tangential mindlin_rescale 9e2 1.0 3.0"],
+        "granular hertz 3e3 {w} tangential mindlin_rescale 9e2 1.0 3.0",
+    ),
+    "mindlin_rescale/force": (
+        "granular", ["* * hertz 3e3 {g} tangential mindlin_rescale/force 9e2 1.0 3.0"],
+        "granular hertz 3e3 {w} tangential mindlin_rescale/force 9e2 1.0 3.0",
+    ),
+    "tsuji": (
+        "granular", ["* * hertz 3e3 {e} tangential mindlin/force 9e2 1.0 3.0 damping tsuji"],
+        "granular hertz/material 3e3 {e} 0.3 tangential mindlin/force 9e2 0.5 3.0 damping coeff_restitution",
+    ),
+}  # fmt: skip
+"""Pair style, coefficients and wall, with dashpots g and w, or a restitution e.
+
+The coefficient of friction is 3, so that no contact comes to rest at Coulomb's bound. They are soft: overlaps are a
+hundredth of a radius, so that velocities of 1e-5 are small beside them and large beside rounding."""
+
+RESCALED = ("mindlin_rescale", "mindlin_rescale/force")
+OWN = "mindlin/smooth 2e5 6e4 0.5"
+ALMOST_NONE = "1e-12"
+"""A dashpot: LAMMPS's walls have forces that are no numbers with one of 0."""
+
+
+def instance(*arguments: str):
+    """LAMMPS on the ranks of this process, with the plugin."""
+    from faultgouge.pywrap import Engine  # loads what is needed, in order
+
+    assert Engine
+    from mpi4py import MPI
+
+    from faultgouge.pywrap.lammps.instance import lammps_instance
+
+    return lammps_instance(MPI.COMM_WORLD, *arguments or (None,))
+
+
+def command(lmp, lines: str) -> None:
+    for line in lines.strip().splitlines():
+        lmp.command(line)
+
+
+def start(lmp, d: int, count: int) -> None:
+    """Particles of two sizes above a floor, in a sheared box of spheres, or one of disks."""
+    rng = np.random.default_rng(5)
+    width = 3.0 if d == 3 else 4.4
+    box = "prism 0 3 0 3 0 40 0.5 0 0" if d == 3 else "block 0 4.4 0 40 -0.5 0.5"
+    command(lmp, f"""
+units lj
+dimension {d}
+atom_style sphere
+atom_modify map array
+boundary {"p p f" if d == 3 else "p f p"}
+newton off
+comm_modify vel yes
+region box {box} units box
+create_box 2 box
+neighbor 0.2 bin
+neigh_modify every 1 delay 0 check yes
+""")  # fmt: skip
+    across = int(width // 1.05)
+    layer = across ** (d - 1)
+    for k in range(count):
+        a, b = k % layer % across, k % layer // across
+        x, y = (np.array([a, b]) + 0.5) * width / across + rng.uniform(-0.1, 0.1, 2)
+        height = 0.55 + 1.02 * (k // layer)
+        place = (x, y, height) if d == 3 else (x, height, 0.0)
+        lmp.command(f"create_atoms {1 + k % 2} single {' '.join(f'{p:.17g}' for p in place)} units box")
+    command(lmp, "set type 1 diameter 0.8\nset type 2 diameter 1.0\nset group all density 1.5")
+
+
+def with_law(lmp, law: str, d: int, g: str, w: str, e: tuple[str, str]) -> None:
+    style, coefficients, wall = (LAWS | {"own": (OWN, ["* *"], "")})[law]
+    lmp.command(f"pair_style {style.format(g=g)}")
+    for each in coefficients:
+        lmp.command(f"pair_coeff {each.format(g=g, e=e[0])}")
+    plane = "zplane" if d == 3 else "yplane"
+    if w:
+        lmp.command(f"fix floor all wall/gran {wall.format(w=w, e=e[1])} {plane} 0 NULL contacts")
+
+
+@pytest.fixture(scope="module")
+def beds(tmp_path_factory):
+    """Packings at rest on a slope, by law, dimension and whether they have dashpots; made once each."""
+    made = {}
+
+    def make(law: str, d: int, damped: bool):
+        if (law, d, damped) not in made:
+            lmp = instance(tmp_path_factory.mktemp("log") / "log.lammps")
+            start(lmp, d, 20 if d == 3 else 18)
+            with_law(lmp, law, d, "40", "40" if damped else ALMOST_NONE, ("0.2", "0.2" if damped else "1.0"))
+            slope = "0.1 0 -1" if d == 3 else "0.05 -1 0"
+            command(lmp, f"""
+fix load all gravity 1.0 vector {slope}
+fix move all nve/sphere
+fix drag all viscous 1.5
+timestep 0.002
+thermo 100000
+""")  # fmt: skip
+            from faultgouge.pywrap import from_lammps
+
+            for _ in range(12):
+                lmp.command("run 20000")
+                found = from_lammps(lmp, balance=np.inf)
+                if found.residual < 1e-9 * found.contacts.normal_force.mean():
+                    break
+            if not damped:
+                with_law(lmp, law, d, ALMOST_NONE, "", ("1.0", "1.0"))
+            made[law, d, damped] = lmp
+        return made[law, d, damped]
+
+    return make
+
+
+def state(lmp) -> np.ndarray:
+    """All that moves, in the order of the IDs."""
+    count = lmp.extract_setting("nlocal")
+    order = np.argsort(lmp.numpy.extract_atom("id")[:count])
+    return np.concatenate([lmp.numpy.extract_atom(name)[:count][order] for name in ("x", "v", "omega", "f", "torque")])
+
+
+CASES = [
+    pytest.param(
+        law, damped, d, id=f"{law}-{'dashpots' if damped else 'elastic'}-{d}",
+        marks=pytest.mark.slow if law in ("gran/hertz/history", "mindlin") and damped == (d == 3) else pytest.mark.long,
+    )
+    for law in LAWS for damped in (False, True) for d in (2, 3) if damped or law != "tsuji"
+]  # fmt: skip
+"""Tsuji's polynomial has a dashpot for a restitution of 1, too."""
+
+
+@pytest.mark.parametrize(("law", "damped", "d"), CASES)
+def test_motion_of_lammps(beds, law, damped, d):
+    """The difference falls as the square of the time step, or in proportion to it with dashpots."""
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    lmp = beds(law, d, damped)
+    snapshot = from_lammps(lmp)
+    contacts = snapshot.contacts
+    assert len(contacts) > len(snapshot)
+    assert snapshot.damped
+    steps = [(2e-4 if damped else 8e-4) / 2**k for k in range(4)]
+    runs = [compare_motion(lmp, snapshot, 0.2, 4e-5, timestep=step) for step in steps]
+    error = [run.difference for run in runs]
+    assert not contacts.at_bound.any()
+    if law in RESCALED:
+        # the mean of two derivatives: what is left is of second order in their difference
+        assert error[-1] < 0.1
+        return
+    order = 1 if damped else 2
+    assert error[2] / error[3] == pytest.approx(2**order, rel=0.1)
+    # extrapolated to a step of zero: without the terms in h and h^2, or in h^2 and h^4
+    # `granular` turns a history that leaves its plane by 1e-10 of the bound, 5e-6 of what this motion adds to forces
+    tolerance = 1e-6 if law.startswith("gran/") else 5e-6
+    first, second, third = (run.measured for run in runs[1:])
+    rest = (8 * third - 6 * second + first) / 3 if damped else (64 * third - 20 * second + first) / 45
+    assert np.linalg.norm(rest - runs[0].predicted) < tolerance * np.linalg.norm(rest)
+
+
+def test_a_look_changes_nothing(beds, tmp_path):
+    """The run that follows is the same to the bit, while particles still collide and slide."""
+    from faultgouge.pywrap import from_lammps
+
+    ends = []
+    for looks in (0, 2):
+        lmp = instance(tmp_path / f"log{looks}")
+        start(lmp, 3, 12)
+        with_law(lmp, "mindlin_rescale/force", 3, "100", "100", ("", ""))
+        command(lmp, f"""
+fix load all gravity 1.0 vector 0.8 0 -1
+fix move all nve/sphere
+timestep 0.004
+dump 1 all custom 100 {tmp_path}/dump{looks} id x
+fix mean all ave/time 10 1 10 c_thermo_temp file {tmp_path}/mean{looks}
+run 1950
+""")  # fmt: skip
+        before = state(lmp)
+        for _ in range(looks):
+            found = from_lammps(lmp, balance=np.inf)
+            assert found.contacts.at_bound.any()
+        assert np.array_equal(state(lmp), before)
+        lmp.command("run 500")
+        ends.append(state(lmp))
+        lmp.close()
+    assert np.array_equal(*ends)
+    for name in ("dump", "mean"):
+        assert (tmp_path / f"{name}0").read_bytes() == (tmp_path / f"{name}2").read_bytes()
+    one, other = ((tmp_path / f"log{looks}").read_text().count("run ") for looks in (0, 2))
+    assert one == other
+
+
+@pytest.mark.parametrize(
+    ("law", "closing", "parting"),
+    [("gran/hooke/history", 0, 0), ("gran/hertz/history", 0.5, 0.5), ("linear_history", 0, 0), ("mindlin", 0.5, 0.5),
+     ("mindlin/force", 0, 0), ("mindlin_rescale", 0.5, 1), ("mindlin_rescale/force", 0, 0.5), ("tsuji", 0, 0)],
+)  # fmt: skip
+def test_b_of_two_spheres(law, closing, parting):
+    """d ln f_t / d ln delta where two spheres in LAMMPS have slipped, and then close or part with the same slip."""
+    lmp = instance()
+    command(lmp, """
+units lj
+atom_style sphere
+atom_modify map array sort 0 0
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -3 3 -3 3 -3 3 units box
+create_box 2 box
+create_atoms 1 single -0.495 0 0 units box
+create_atoms 1 single 0.495 0 0 units box
+set group all diameter 1
+set group all mass 1e6
+timestep 1e-3
+group one id 1
+""")  # fmt: skip
+    with_law(lmp, law, 3, ALMOST_NONE, "", ("1.0", "1.0"))
+    lmp.numpy.extract_atom("omega")[0, 2] = 1e-2
+    lmp.command("run 1 post no")
+    lmp.numpy.extract_atom("omega")[:] = 0.0
+    lmp.command("run 0 post no")
+    for speed, expected in ((-0.02, parting), (0.02, closing)):
+        before, place = abs(lmp.numpy.extract_atom("f")[0, 1]), lmp.numpy.extract_atom("x")[0, 0]
+        command(lmp, f"fix go one move linear {speed} 0 0 units box\nrun 10 post no\nunfix go")
+        lmp.numpy.extract_atom("v")[:] = 0.0
+        lmp.command("run 0 post no")
+        after, moved = abs(lmp.numpy.extract_atom("f")[0, 1]), lmp.numpy.extract_atom("x")[0, 0]
+        overlaps = np.log((0.505 + moved) / (0.505 + place))
+        assert np.log(after / before) / overlaps == pytest.approx(expected, abs=1e-6)
+    lmp.close()
+
+
+def two(pair: str, coefficients: str, more: str = ""):
+    """Two spheres that touch, with some commands; a LAMMPS without a log, and what it was told of contacts."""
+    lmp = instance()
+    told = [f"pair_style {pair}", *(f"pair_coeff {each}" for each in coefficients.split(";")), *more.splitlines()]
+    command(lmp, """
+units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -4 4 -4 4 0 8 units box
+create_box 1 box
+create_atoms 1 single 0 0 0.495 units box
+create_atoms 1 single 0 0.6 1.275 units box
+set group all diameter 1.0
+set group all density 1
+""" + "\n".join([*told, "run 0"]))  # fmt: skip
+    return lmp, told
+
+
+MOVES = "\nfix move all nve/sphere"
+HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
+
+
+@pytest.mark.parametrize(
+    ("pair", "coefficients", "more", "says"),
+    [
+        ("gran/hooke 1e4 NULL 1 1 0.5 1", "* *", MOVES, "use gran/hooke/history"),
+        ("lj/cut 2.5", "* * 1 1", MOVES, "only these have contacts"),
+        ("granular", "* * hertz 1e5 1 tangential linear_nohistory 1 0.5", MOVES, "keeps no history"),
+        ("granular", "* * jkr 1e5 1 0.3 1 tangential mindlin NULL 1 0.5", MOVES, "cohesive"),
+        ("granular", "* * hertz 1e5 1 tangential mindlin 1e4 1 0.5 rolling sds 1e4 1 0.1", MOVES, "rolling friction"),
+        ("granular", "* * hertz 1e5 1 tangential mindlin 1e4 1 0.5 twisting sds 1 1 1", MOVES, "twisting friction"),
+        ("hybrid/overlay gran/hooke/history 1e4 NULL 1 1 0.5 1 lj/cut 1.2", "* * gran/hooke/history;* * lj/cut 1 1",
+         MOVES, "adds several forces"),
+        (HERTZ, "* *", "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL" + MOVES, "write contacts"),
+        (HERTZ, "* *", "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL shear x 1 contacts" + MOVES,
+         "without shear"),
+        (HERTZ, "* *", "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zcylinder 3 contacts" + MOVES, "cylinder"),
+        (HERTZ, "* *", "fix r all rigid/small molecule", "bodies"),
+        (HERTZ, "* *", "fix n all nve", "use fix nve/sphere"),
+        (HERTZ, "* *", "fix s all setforce 0 NULL NULL" + MOVES, "fix freeze"),
+        (HERTZ, "* *", "", "Nothing moves"),
+        (HERTZ, "* *", MOVES, "The packing moves"),
+    ],
+)  # fmt: skip
+def test_what_is_refused(pair, coefficients, more, says):
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    if "rigid" in more:
+        pytest.importorskip("lammps")
+        lmp, told = two(pair, coefficients)
+        if not lmp.has_style("fix", "rigid/small"):
+            pytest.skip("this LAMMPS has no fix rigid")
+        lmp.command("fix r all rigid group 1 all")
+    else:
+        lmp, told = two(pair, coefficients, more.strip())
+    with pytest.raises(SnapshotError, match=says) as refusal:
+        from_lammps(lmp, told)
+    assert "\n" not in str(refusal.value)
+    lmp.close()
+
+
+def test_commands_that_are_not_those_of_the_instance():
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    lmp, told = two(HERTZ, "* *", MOVES.strip())
+    with pytest.raises(SnapshotError, match=r"no log to read its commands from: give the lines pair_style"):
+        from_lammps(lmp)
+    other = [told[0].replace("1e5", "2e5"), *told[1:]]
+    with pytest.raises(SnapshotError, match=r"normal forces of the contacts of types 1 and 1 are not those"):
+        from_lammps(lmp, other)
+    with pytest.raises(SnapshotError, match=r"pair_style gran/hooke/history, and the instance has gran/hertz"):
+        from_lammps(lmp, ["pair_style gran/hooke/history 1 1 1 1 1 1"])
+    with pytest.raises(SnapshotError, match="has a variable: write its number"):
+        from_lammps(lmp, ["pair_style gran/hertz/history ${kn} 1 1 1 1 1"])
+    with pytest.raises(SnapshotError, match="no pair_style"):
+        from_lammps(lmp, told[2:])
+    lmp.close()
+
+
+def test_frozen_particles_and_inertia():
+    """What fix freeze holds has no rows in K; LAMMPS's discs have another moment of inertia."""
+    from faultgouge.pywrap import from_lammps
+
+    more = "group still id 1\nfix hold still freeze\nfix move all nve/sphere"
+    lmp, told = two(HERTZ, "* *", more)
+    found = from_lammps(lmp, told, balance=np.inf)
+    assert list(found.free) == [False, True]
+    assert found.inertia == pytest.approx(0.4 * found.mass * 0.25)
+    k = stiffness_matrix(found).toarray()
+    assert not k[::2].any()
+    assert k[1::2, 1::2].any()
+    # LAMMPS's effective mass is then that of the other particle
+    assert found.contacts.normal_dashpot == pytest.approx(
+        1.0 * found.mass[1] * np.sqrt(0.25 * found.contacts.overlap), rel=1e-9
+    )
+    lmp.close()
+
+
+def test_our_own_style():
+    """A packing of mindlin/smooth is the Packing that the decks' own way gives."""
+    from dataclasses import replace
+
+    from faultgouge.analysis import Contacts, MindlinLaw, Packing, Snapshot
+    from faultgouge.pywrap import from_lammps
+
+    lmp = instance()
+    start(lmp, 2, 8)
+    told = ["pair_style mindlin/smooth 2e5 6e4 0.5 damping 10 5", "pair_coeff * *",
+            "fix floor all wall/mindlin/smooth 2e5 6e4 0.5 ylo 0.0 damping 10 5",
+            "fix move all nve/disc 0.5"]  # fmt: skip
+    command(
+        lmp,
+        "\n".join(
+            [*told, "fix load all gravity 1 vector 0.2 -1 0", "fix drag all viscous 1", "timestep 0.001", "run 9000"]
+        ),
+    )
+    found = from_lammps(lmp, told, balance=np.inf)
+    c = found.contacts
+    assert c.wall.any()
+    assert (~c.wall).any()
+    law = MindlinLaw(2e5, 6e4, 0.5, cn=10, ct=5)
+    # the slips, from the forces: LAMMPS's own numbers are not asked twice
+    tangent = np.column_stack([-c.normal[:, 1], c.normal[:, 0]])
+    force = np.einsum("ca,ca->c", c.tangential_force[:, :2], tangent)
+    limit = law.slip_limit(c.overlap)
+    x = np.linspace(-1, 1, 200_001)
+    slip = np.interp(-force / (law.mu * c.normal_force), np.sign(x) * (np.abs(x) + x**2 - np.abs(x) ** 3), x) * limit
+    packing = Packing(position=found.position, radius=found.radius, mass=found.mass, inertia_factor=0.5, law=law,
+                      box_length=4.4, contacts=Contacts(c.i, c.j, slip))  # fmt: skip
+    one, other = stiffness_matrix(packing), stiffness_matrix(found)
+    # x on a grid of 1e-5, to second order
+    assert abs(one - other).max() < 1e-8 * abs(one).max()
+    calm = replace(packing, law=replace(law, cn=0, ct=0))
+    assert abs(stiffness_matrix(Snapshot.of_packing(calm)) - one).max() < 1e-14 * abs(one).max()
+    assert abs(damping_matrix(packing) - damping_matrix(found)).max() < 1e-8 * abs(damping_matrix(packing)).max()
+    lmp.close()
+
+
+@pytest.mark.slow
+def test_pairs_at_rest_on_a_slope(beds):
+    """mindlin/force has no complex pair, and gran/hertz/history has some (research/laws)."""
+    from faultgouge.pywrap import from_lammps
+
+    assert len(spectrum(from_lammps(beds("gran/hertz/history", 3, True))).pairs) > 0
+    found = from_lammps(beds("mindlin/force", 3, True))
+    if not found.contacts.at_bound.any():
+        assert len(spectrum(found).pairs) == 0
+
+
+RANKS = """
+import sys
+import numpy as np
+from mpi4py import MPI
+sys.path[:0] = sys.argv[1:]
+from test_from_lammps import command, instance, start, with_law
+from faultgouge.pywrap import from_lammps
+from pathlib import Path
+lmp = instance(Path("log"))
+start(lmp, 3, 20)
+with_law(lmp, "mindlin", 3, "40", "40", ("", ""))
+command(lmp, "fix load all gravity 1.0 vector 0.1 0 -1\\nfix move all nve/sphere\\nfix drag all viscous 1.5\\n"
+             "timestep 0.002\\nthermo 10000\\nrun 5000")
+found = from_lammps(lmp, balance=np.inf)
+assert len(found.contacts) > 5 and found.contacts.wall.any()
+# what is left of the forces without those of all contacts is the weight
+slope = np.array([0.1, 0, -1]) / np.hypot(0.1, 1)
+assert np.abs(found.load[:, 0] - found.mass[:, None] * slope).max() < 1e-9
+assert np.abs(found.load[:, 1]).max() < 1e-9
+lmp.command("run 300")
+lmp.close()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.ranks
+def test_on_two_ranks(tmp_path):
+    """All contacts are in the snapshot, whichever rank has them, and LAMMPS runs on."""
+    import subprocess
+    import sys
+    from pathlib import Path
+
+    from reference_layer import BIN
+
+    (tmp_path / "look.py").write_text(RANKS)
+    paths = [Path(__file__).parent, Path(__file__).parents[1]]
+    words = [BIN / "mpiexec", "-n", "2", sys.executable, "look.py", *paths]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr

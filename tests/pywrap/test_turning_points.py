@@ -1,0 +1,102 @@
+"""Loads up, down and below zero: the way of F_x, a run that goes on along it, and what it leaves."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import RunFile
+from faultgouge.analysis.motion.hysteresis import hysteresis, layer_displacement, turning_points
+from faultgouge.pywrap import SceneError
+from faultgouge.pywrap.runs.path import all_loads, count_behind, loads
+from faultgouge.pywrap.scenes.sections import Ramp
+
+SCENE = """
+[packing]
+disks = 12
+width = 4.1
+seed = 3
+[law]
+kn = 2e5
+mu = {mu}
+[load]
+fy = 3.0
+[ramp]
+step = 0.1
+until = {until}
+"""
+
+
+def way(step, until):
+    return all_loads(Ramp(step=step, until=until)).tolist()
+
+
+@pytest.mark.parametrize(
+    ("until", "wanted"),
+    [
+        (0.3, [0, 1, 2, 3]),
+        (-0.2, [0, -1, -2]),
+        ((0.2, -0.1), [0, 1, 2, 1, 0, -1]),
+        ((0.1, 0.2, 0.0), [0, 1, 2, 1, 0]),
+        ((0.25, 0.05), [0, 1, 2, 2.5, 2, 1, 0.5]),
+    ],
+)
+def test_the_way_goes_through_multiples_of_the_step(until, wanted):
+    assert way(0.1, until) == pytest.approx([0.1 * each for each in wanted], rel=1e-15)
+    multiples = [each for each, k in zip(way(0.1, until), wanted, strict=True) if k == int(k)]
+    assert multiples == [int(k) * 0.1 for k in wanted if k == int(k)]  # to the bit, on each way
+
+
+def test_a_run_goes_on_where_it_was_on_the_way():
+    settings = Ramp(step=0.1, until=(0.2, -0.1, 0.0))
+    whole = all_loads(settings)
+    assert [count_behind(settings, whole[:k]) for k in range(len(whole) + 1)] == list(range(len(whole) + 1))
+    assert count_behind(settings, all_loads(Ramp(step=0.1, until=0.15))) == 2  # goes on to 0.2
+    assert count_behind(Ramp(step=0.1, until=0.15), whole[:4]) == 3  # has been there
+    with pytest.raises(SceneError, match=r"has gone to F_x = 0\.1 where ramp\.until leads to F_x = 0\.3"):
+        count_behind(Ramp(step=0.1, until=0.5), whole[:4])
+
+
+def test_an_onset_is_sought_on_the_way_to_the_first_turning_point():
+    assert loads(Ramp(step=0.1, until=(0.2, -0.1))).tolist() == [0.0, 0.1, 0.2]
+    with pytest.raises(SceneError, match="onsets are sought above 0"):
+        loads(Ramp(step=0.1, until=(-0.2, 0.1)))
+
+
+@pytest.mark.parametrize(
+    ("until", "says"), [([], "give a force, or a list"), (0.0, "leaves F_x at 0"), ([0.2, 0.2], "leaves F_x at 0.2")]
+)
+def test_turning_points_turn(until, says, refused_scene):
+    ramp = {"step": 0.1, "until": until}
+    assert says in refused_scene({"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": ramp})
+
+
+@pytest.mark.slow
+def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_in):
+    (tmp_path / "scene.toml").write_text(SCENE.format(mu=0.3, until=[0.5, -0.5, 0.5]))
+    done = faultgouge_in(tmp_path, "ramp", "scene.toml", "-o", "cycle.h5", "--json")
+    left = json.loads(done.stdout)["hysteresis"]
+    (tmp_path / "short.toml").write_text(SCENE.format(mu=0.3, until=[0.5, -0.2]))
+    faultgouge_in(tmp_path, "ramp", "short.toml", "-o", "parts.h5")
+    said = faultgouge_in(tmp_path, "ramp", "scene.toml", "-o", "parts.h5").stdout
+    assert "F_x is back at 0.5" in said
+    with RunFile(tmp_path / "cycle.h5") as one, RunFile(tmp_path / "parts.h5") as other:
+        packings = [one.packing(k) for k in range(len(one))]
+        assert packings == [other.packing(k) for k in range(len(other))]
+    assert turning_points(np.array([each.fx for each in packings])) == [5, 15]
+    found = hysteresis(packings)
+    assert left == {"fx": 0.5, "begin": 5, "remaining": found.remaining, "work": found.work}
+    # the work again, disk by disk
+    top = packings[0].top
+    work = sum(
+        0.5 * (here.fx + there.fx) * (there.position - here.position)[top, 0].sum()
+        - 3.0 * (there.position - here.position)[top, 1].sum()
+        for here, there in pairwise(packings[5:])
+    )
+    assert found.work == pytest.approx(work, rel=1e-9)
+    assert found.work > 0  # friction takes energy
+    moved = layer_displacement(packings)[:, 0]
+    assert found.remaining == moved[-1] - moved[5]
+    drawn = faultgouge_in(tmp_path, "draw", "cycle.h5", "-o", "cycle.svg").stderr
+    assert "rattlers" not in drawn  # said of a packing

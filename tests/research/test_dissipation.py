@@ -1,0 +1,106 @@
+"""What dissipation does to the onset, also in SI, and to the gain: README's packing, and the tables of the docs."""
+
+import json
+from pathlib import Path
+
+import pytest
+from reference_layer import SMALL, UNITS, toml
+
+from faultgouge.pywrap import Scene, SceneError
+from faultgouge.pywrap.onset.damped import damped_onset_run, ramped
+from faultgouge.pywrap.scenes.units import real_units
+from faultgouge.studies.packings import seeded
+from research.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
+
+TABLES = Path(__file__).parents[2] / "research" / "dissipation" / "tables"
+
+SCENE = Scene.from_mapping(
+    {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 1e-3, "until": 0.016}}
+)
+
+
+def table(name):
+    return [json.loads(line) for line in (TABLES / f"{name}.jsonl").read_text().splitlines()]
+
+
+@pytest.fixture(scope="module")
+def ramp():
+    with ramped(SCENE) as found:
+        yield found
+
+
+@pytest.mark.slow
+def test_weak_normal_dashpots_lower_the_onset_and_drag_raises_it_to_its_crossover(ramp):
+    """From 0.0150098 to between 0.0148 and 0.0149, for C_N = 0.1 and 1 alike, and to 0.0150163."""
+    weak, stronger = over_strength(ramp, "cn", [0.1, 1.0], start=0.0139)
+    assert weak["undamped"] == pytest.approx(0.0150098323, abs=1e-10)
+    assert 0.0148 < weak["onset"] < stronger["onset"] < 0.0149
+    assert stronger["onset"] == pytest.approx(0.0148553091558, abs=1e-9)
+    assert weak["onset"] == pytest.approx(weak["predicted"], rel=1e-6)
+    (dragged,) = over_strength(ramp, "drag", [1e-2], start=0.0149)
+    assert dragged["onset"] == pytest.approx(0.0150163, abs=1e-7)
+    assert dragged["onset"] == pytest.approx(dragged["predicted"], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_the_limit_of_weak_dashpots_is_predicted(ramp):
+    """One ratio of one packing anew, tangential dashpots alone, and it is that of the table."""
+    known = {(each["cn"], each["ct"]): each for each in table("weak") if each["seed"] == 1}
+    for case in weak_cases(ramp, [(0.0, 1.0)]):
+        assert case["predicted"] == pytest.approx(case["measured"], rel=1e-3)
+        assert case["predicted"] < case["undamped"]
+        assert case["measured"] == pytest.approx(known[case["cn"], case["ct"]]["measured"], rel=1e-8)
+
+
+@pytest.mark.slow
+def test_an_onset_just_before_the_last_load_is_found():
+    """The last load lies a millionth of F_x beyond the onset, which is less than small pencils know."""
+    scene = seeded(SCENE, 15)
+    assert (scene.packing.seed, scene.ramp) == (15, SCENE.ramp)
+    with ramped(scene) as found:
+        (case,) = weak_cases(found, [(0.0, 1.0)])
+    assert case["measured"] == pytest.approx(case["predicted"], rel=1e-9)
+
+
+def test_the_table_of_weak_dashpots():
+    """Five ratios of ten packings: predicted and measured among all modes."""
+    rows = [each for each in table("weak") if "cn" in each]
+    assert sorted((each["cn"], each["ct"]) for each in rows) == sorted(RATIOS * 10)
+    assert all(each["predicted"] <= each["undamped"] for each in rows)
+    assert max(abs(each["predicted"] / each["measured"] - 1) for each in rows) < 1e-3
+
+
+@pytest.mark.slow
+def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp):
+    far, dragged = over_distance(ramp, [1e-2], [(0.0, 0.0), (0.0, 0.1)])
+    near, damped = over_distance(ramp, [1e-3], [(0.0, 0.0), (1.0, 0.0)])
+    assert dragged["gain"] < 0.5 * far["gain"]
+    # the inverse of the distance, where one pair has most of it
+    assert 5 < near["gain"] / far["gain"] < 20
+    assert near["gain"] > 100
+    assert far["gain"] <= far["bound"]
+    assert damped["gain"] is None  # weak dashpots have lowered the onset to below this load: there is no largest gain
+
+
+def test_scenes_without_a_section():
+    with pytest.raises(SceneError, match=r"no section \[damping\]"):
+        damped_onset_run(SCENE, 1.0)
+    with pytest.raises(SceneError, match=r"no section \[ramp\]"), ramped(SCENE.model_copy(update={"ramp": None})):
+        pass
+
+
+@pytest.mark.parametrize("damping", ["", "[damping]\ncn = 1.0\n"])
+@pytest.mark.slow
+def test_onset_in_si(faultgouge_here, tmp_path, damping):
+    (tmp_path / "scene.toml").write_text(
+        toml(SMALL | {"packing": {"disks": 30, "seed": 4}, "ramp": {"step": 4e-3, "until": 0.012}}) + UNITS + damping
+    )
+    done = faultgouge_here("onset", "scene.toml", "--json")
+    found = json.loads(done.stdout)
+    real = real_units(Scene.from_toml(tmp_path / "scene.toml"))
+    window = found["windows"][0]
+    omega = window["frequency"] if damping else window["lambda"] ** 0.5
+    assert found["si"][0] == real.onset(found["fx_c"], omega)
+    assert found["si"][0]["shear_stress_Pa"] == pytest.approx(found["fx_c"] / 3.0 * real.overburden, rel=1e-12)
+    for number in found["si"][0].values():
+        assert f"{number:.4g}" in done.stderr
