@@ -3,11 +3,8 @@
 #include "atom.h"
 #include "comm.h"
 #include "error.h"
+#include "exact_accumulator.h"
 #include "update.h"
-
-#include <algorithm>
-#include <utility>
-#include <vector>
 
 using namespace LAMMPS_NS;
 
@@ -21,20 +18,15 @@ ComputeLayerVelocity::ComputeLayerVelocity(LAMMPS *lmp, int narg, char **arg) : 
 double ComputeLayerVelocity::compute_scalar()
 {
   invoked_scalar = update->ntimestep;
-  std::vector<std::pair<double, double>> mine;    // ID, velocity
-  for (int i = 0; i < atom->nlocal; i++)
-    if (atom->mask[i] & groupbit) mine.emplace_back(static_cast<double>(atom->tag[i]), atom->v[i][0]);
-
-  std::vector<int> counts(comm->nprocs), offsets(comm->nprocs, 0);
-  const int count = 2 * static_cast<int>(mine.size());
-  MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
-  for (int rank = 1; rank < comm->nprocs; rank++) offsets[rank] = offsets[rank - 1] + counts[rank - 1];
-  std::vector<std::pair<double, double>> all((offsets.back() + counts.back()) / 2);
-  MPI_Allgatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), offsets.data(), MPI_DOUBLE, world);
-
-  std::sort(all.begin(), all.end());
-  double sum = 0.0;
-  for (const auto &disk : all) sum += disk.second;
-  scalar = all.empty() ? 0.0 : sum / static_cast<double>(all.size());
+  scalar = mean_velocity(*atom, groupbit, world, comm->nprocs);
   return scalar;
+}
+
+double LAMMPS_NS::mean_velocity(const Atom &atom, int groupbit, MPI_Comm world, int ranks)
+{
+  faultgouge::ExactAccumulator all;
+  for (int i = 0; i < atom.nlocal; i++)
+    if (atom.mask[i] & groupbit) all.add(atom.v[i][0]);
+  if (ranks > 1) MPI_Allreduce(MPI_IN_PLACE, all.integers(), all.SIZE, MPI_INT64_T, MPI_SUM, world);
+  return all.mean();
 }

@@ -1,7 +1,7 @@
 // compute ID group layer/velocity
 //
-// Mean velocity along x of the disks of the group. They are added up in the order of their IDs, so that it is the
-// same to the bit for any number of ranks, and with it a friction that depends on it.
+// Mean velocity along x of the disks of the group. They are added up without a rounding (exact_accumulator.h), so that
+// the mean is the same to the bit for any number of ranks, and with it a friction that depends on it.
 
 #ifndef LMP_COMPUTE_LAYER_VELOCITY_H
 #define LMP_COMPUTE_LAYER_VELOCITY_H
@@ -16,6 +16,9 @@ public:
   void init() override {}
   double compute_scalar() override;
 };
+
+// of a group, by its bit; one reduction, and none on a single rank
+double mean_velocity(const class Atom &, int groupbit, MPI_Comm, int ranks);
 
 }    // namespace LAMMPS_NS
 

@@ -5,6 +5,7 @@
 #include "error.h"
 #include "fix_low_parts.h"
 #include "modify.h"
+#include "run_styles.h"
 #include "update.h"
 
 #include <algorithm>
@@ -56,6 +57,7 @@ int FixDiscIntegrator::setmask()
 
 void FixDiscIntegrator::init()
 {
+  refuse_respa(*this, *update, *error);
   if (domain->dimension != 2) error->all(FLERR, "fix {} is for disks in the plane: use dimension 2", style);
   for (int i = 0; i < atom->nlocal; i++)
     if ((atom->mask[i] & groupbit) && !(atom->radius[i] > 0.0 && atom->rmass[i] > 0.0))

@@ -6,9 +6,11 @@
 #include "error.h"
 #include "fix_dashpot_velocities.h"
 #include "fix_low_parts.h"
+#include "fix_weaken_friction.h"
 #include "force.h"
 #include "input.h"
 #include "modify.h"
+#include "run_styles.h"
 #include "update.h"
 #include "variable.h"
 
@@ -97,6 +99,7 @@ int FixWallMindlinSmooth::setmask()
 
 void FixWallMindlinSmooth::init()
 {
+  refuse_respa(*this, *update, *error);
   if (domain->dimension != 2) error->all(FLERR, "fix wall/mindlin/smooth is for disks in the plane: use dimension 2");
   if (domain->periodicity[1])
     error->all(FLERR, "fix wall/mindlin/smooth needs a box that is not periodic in y: use boundary p f p");
@@ -114,8 +117,11 @@ void FixWallMindlinSmooth::init()
       error->all(FLERR, "fix wall/mindlin/smooth: MU is v_{}, but there is no equal-style variable of that name",
                  mu_variable);
   }
-  // a variable may be zero now and not later
-  has_friction = mu_variable.empty() ? law.frictional() : law.kt > 0.0;
+  // friction that changes may be zero now and not later
+  has_friction = mu_variable.empty() && !friction_weakens(*modify) ? law.frictional() : law.kt > 0.0;
+  if (has_friction && reruns(*update))
+    error->all(FLERR, "fix wall/mindlin/smooth with friction cannot serve rerun, since snapshots have no slips: rerun "
+                      "with MU = 0");
   if (has_friction && update->whichflag == 2)
     error->all(FLERR, "fix wall/mindlin/smooth with friction cannot be minimized, since its forces depend on the path: "
                       "relax with fix overdamped/disc, or minimize with mu = 0");
@@ -171,6 +177,15 @@ int FixWallMindlinSmooth::modify_param(int narg, char **arg)
   set_mu(arg[1]);
   if (!law.valid()) error->all(FLERR, "fix_modify {} mu: must not be negative, but is {}", id, arg[1]);
   return 2;
+}
+
+void FixWallMindlinSmooth::change_mu(double mu)
+{
+  if (!mu_variable.empty())
+    error->all(FLERR,
+               "fix wall/mindlin/smooth: MU is v_{}, and fix weaken/friction sets it too: leave one of the two out",
+               mu_variable);
+  law.mu = mu;
 }
 
 void FixWallMindlinSmooth::update_mu()

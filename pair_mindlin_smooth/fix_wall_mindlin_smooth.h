@@ -29,6 +29,8 @@ public:
   int modify_param(int, char **) override;
   void *extract(const char *, int &) override;
 
+  void change_mu(double);    // within a run
+
 private:
   enum Column { NORMAL, TANGENTIAL, SLIP, SLIP_RATIO, NX, NY, OVERLAP, SLIP_LOW };
 

@@ -2,12 +2,13 @@
 // The wheel does not ship lammpsplugin.h, so that its interface, which is stable C, is declared here.
 
 #include "compute_layer_velocity.h"
-#include "compute_signal.h"
+#include "fix_addforce_signal.h"
 #include "fix_dashpot_velocities.h"
 #include "fix_disc_integrators.h"
 #include "fix_low_parts.h"
 #include "fix_slip_history.h"
 #include "fix_wall_mindlin_smooth.h"
+#include "fix_weaken_friction.h"
 #include "pair_mindlin_smooth.h"
 
 #include <cstdio>
@@ -109,11 +110,6 @@ void add_styles(void *lmp, void *handle, lammpsplugin_regfunc add)
   plugin.creator.with_arguments = &create_compute<ComputeLayerVelocity>;
   add(&plugin, lmp);
 
-  plugin.name = "signal";
-  plugin.info = "a signal of time from a table";
-  plugin.creator.with_arguments = &create_compute<ComputeSignal>;
-  add(&plugin, lmp);
-
   plugin.style = "fix";
   const auto add_fix = [&](const char *name, const char *info, void *(*creator)(void *, int, char **)) {
     plugin.name = name;
@@ -128,6 +124,8 @@ void add_styles(void *lmp, void *handle, lammpsplugin_regfunc add)
   add_fix("dashpot/velocities", "velocities that the dashpots of pair mindlin/smooth feel",
           &create_fix<FixDashpotVelocities>);
   add_fix("displace/disc", "moves disks by their velocities alone", &create_fix<FixDisplaceDisc>);
+  add_fix("addforce/signal", "force of a signal of time on disks", &create_fix<FixAddForceSignal>);
+  add_fix("weaken/friction", "friction that weakens with the velocity of a layer", &create_fix<FixWeakenFriction>);
   add_fix("overdamped/disc", "overdamped relaxation of disks in the plane", &create_fix<FixOverdampedDisc>);
 }
 

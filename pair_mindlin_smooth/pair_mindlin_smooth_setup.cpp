@@ -8,10 +8,12 @@
 #include "domain.h"
 #include "error.h"
 #include "fix_disc_integrators.h"
+#include "fix_weaken_friction.h"
 #include "force.h"
 #include "memory.h"
 #include "modify.h"
 #include "neighbor.h"
+#include "run_styles.h"
 #include "update.h"
 
 #include <algorithm>
@@ -133,7 +135,8 @@ void PairMindlinSmooth::coeff(int narg, char **arg)
 void PairMindlinSmooth::init_style()
 {
   check_disks();
-  has_friction = law.frictional();
+  // friction that weakens may be zero now and not later
+  has_friction = law.frictional() || (law.kt > 0.0 && friction_weakens(*modify));
   if (energy && !has_friction)
     error->all(FLERR, "pair mindlin/smooth: without friction there is no history to keep the energy of contacts in: "
                       "use energy no, or MU and KT above 0");
@@ -168,6 +171,19 @@ void PairMindlinSmooth::check_run() const
 {
   if (has_friction && !comm->ghost_velocity)
     error->all(FLERR, "pair mindlin/smooth needs the velocities of ghost disks: use comm_modify vel yes");
+  if (update->whichflag == 1 && runs_respa(*update))
+    error->all(FLERR,
+               "pair mindlin/smooth does not work under run_style respa, since slips advance by whole steps: use "
+               "run_style verlet");
+  if (has_friction && reruns(*update))
+    error->all(FLERR, "pair mindlin/smooth with friction cannot serve rerun, since snapshots have no slips: rerun with "
+                      "MU = 0");
+  for (const auto &fix : modify->get_fix_list())
+    if (fix->diam_flag)
+      error->all(FLERR,
+                 "pair mindlin/smooth: fix {} of style {} changes radii within a run, but contacts are sought by the "
+                 "radii at its begin: use the command set between runs",
+                 fix->id, fix->style);
   if (compensated && update->whichflag == 2)
     error->all(FLERR, "pair mindlin/smooth: a minimizer does not carry the low parts of coordinates: minimize without "
                       "the keyword compensated");

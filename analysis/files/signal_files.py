@@ -54,7 +54,7 @@ def read_signal(path: str | Path, channel: str | None = None) -> Signal:
 
 
 def write_table(signal: Signal, path: Path) -> None:
-    """Write two columns with all digits, for compute signal of LAMMPS."""
+    """Write two columns with all digits, for fix addforce/signal."""
     np.savetxt(path, np.column_stack([signal.time, signal.value]), fmt="%.17g")
 
 

@@ -121,8 +121,7 @@ class Dynamics:
 
     def begin(self) -> None:
         """Compute the forces at the start, for `advance`."""
-        if self._weakening is not None:
-            self._decks.include("weaken.in", **asdict(self._weakening))
+        self._weaken()
         self._decks.command("thermo 0")
         self._decks.command("run 0 post no")
 
@@ -135,7 +134,7 @@ class Dynamics:
         """Go on by so many steps."""
         self._decks.command(f"run {steps} pre no post no")
         law = self._packing.law
-        friction = law.mu if self._weakening is None else self._decks.number("friction")
+        friction = law.mu if self._weakening is None else self._decks.lammps.extract_fix("weaken", 0, 0)
         position, low, velocity = self._wire.motion()
         spin = velocity[:, 2] if law.frictional else np.zeros(len(velocity))
         return Motion(position, low, velocity[:, :2], spin, float(friction))
@@ -177,5 +176,10 @@ class Dynamics:
         state at the same steps.
         """
         self._wire.write_checkpoint(state)
+        self._weaken()  # anew: the fix would remember the friction that the last forces of this instance had
         self._decks.command(f"reset_timestep {step}")
         self._decks.command("run 0 post no")
+
+    def _weaken(self) -> None:
+        if self._weakening is not None:
+            self._decks.include("weaken.in", **asdict(self._weakening))

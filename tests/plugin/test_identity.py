@@ -88,19 +88,32 @@ def test_same_trajectory(trajectory, unchanged, changes):
 
 @pytest.mark.ranks
 @pytest.mark.parametrize(
-    ("ranks", "on"), [(1, None), pytest.param(2, None, marks=pytest.mark.long), (1, "layer"), (1, "floor")]
+    ("ranks", "acts"),
+    [
+        (1, None),
+        pytest.param(2, None, marks=pytest.mark.long),
+        (1, "layer"),
+        (1, "floor"),
+        (1, "weaken"),
+        (2, "weaken"),
+    ],
 )
 @pytest.mark.slow
-def test_restart_in_a_new_process(trajectory, unchanged, variables, lmp, tmp_path, ranks, on):
-    """Without a signal, and with one, which goes by the time of the run, which a restart file keeps."""
+def test_restart_in_a_new_process(trajectory, unchanged, variables, lmp, tmp_path, ranks, acts):
+    """Without more; with a signal, which goes by the time of the run, which a restart file keeps; and with friction
+    that has weakened, which the restart file keeps as the last forces had it."""
     rows = (f"{0.1 * k} {(-1) ** k * 0.3}" for k in range(41))
     (tmp_path / "wave.txt").write_text("\n".join(rows))
-    extra = f"variable signal index wave.txt\nvariable on index {on}\ninclude {DECKS}/signal.in" if on else ""
+    extra = ""
+    if acts == "weaken":
+        extra = f"variable v0 index 0.01\nvariable v_ss index 1.0\ninclude {DECKS}/weaken.in"
+    elif acts:
+        extra = f"variable signal index wave.txt\nvariable on index {acts}\ninclude {DECKS}/signal.in"
     straight = trajectory(ranks=ranks, extra=extra, middle=RESTART)
     (tmp_path / "end").unlink()
     lmp(START + extra + SECOND, ranks=3 - ranks, restart="middle.restart", **variables)
     assert (tmp_path / "end").read_text() == straight[1]
-    assert (straight == unchanged) == (on is None)
+    assert (straight == unchanged) == (acts is None)
 
 
 @pytest.mark.parametrize("variables", ["compensated", "harmonic, damped, compensated"], indirect=True)

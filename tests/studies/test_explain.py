@@ -26,11 +26,11 @@ BROUGHT = {
         "velocities of ghosts",
     },
     "periodicity": {"periodic x"},
-    "dynamic friction": {"part weaken.in", "fix weaken", "compute velocity"},
+    "dynamic friction": {"part weaken.in", "fix weaken"},
     "dashpots": {"part dashpots.in", "fix dashpots", "array f_dashpots (6 columns)"},
     "drag": {"part drag.in"},
     "perturbation": {"part push.in", "fix push"},
-    "signal": {"part signal.in", "fix force", "compute signal"},
+    "signal": {"part signal.in", "fix force"},
     "compensated coordinates": {"fix low", "array f_floor (8 columns)", "array f_low (5 columns)"},
     "dumps": {"part write.in", "file run.1.contacts", "file run.1.disks", "file run.1.params"},
     "per-contact output": {"compute contact", "dump contact"},
@@ -85,7 +85,9 @@ def test_what_both_compute_agrees_to_the_bit_and_has_its_cost(paper, frictionles
         assert part.cost.seconds.min() > 0
     # a history makes a step half as long again, or twice as long, on every machine
     costs = {part.name: part.cost.ratio[1] for part in paper.parts}
-    assert min(costs["tangential history"], costs["dynamic friction"]) > 1.2
+    assert costs["tangential history"] > 1.2
+    # 1.05 to 1.2 in fixes of the plugin; 2.4 to 3.5 with LAMMPS's variables
+    assert max(costs[name] for name in ("dynamic friction", "perturbation", "signal")) < 1.7
 
 
 def test_of_a_large_packing_a_strip_is_explained():

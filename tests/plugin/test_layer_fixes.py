@@ -1,0 +1,132 @@
+"""The force of a signal and friction that weakens: fixes against the same formulas in LAMMPS's variables."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faultgouge.pywrap import Engine
+from faultgouge.pywrap.lammps.instance import EngineError
+
+X = "(0.5*(3.0*step*dt-10.0))"
+TABLE = "0 0\n1.5, -0.25 # a comment\n\n2 1\n"
+SIGNALS = {
+    "cosine": ("cosine 0.3 2.0", "0.3*cos(2.0*step*dt)"),
+    "pulse": ("pulse 0.3 3.0", f"0.3*(1-2*{X}*{X})*exp(-{X}*{X})"),
+    "sweep": ("sweep 0.3 2.0 5.0 6.0", "0.3*sin(2.0*step*dt+0.5*3.0*(step*dt)^2/6.0)"),
+    "record": (
+        "record v_name scale 3 stretch 2",
+        "3*ternary(step*dt<3,-0.25*step*dt/3,ternary(step*dt<=4,-0.25+1.25*(step*dt-3),0))",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", SIGNALS)
+@pytest.mark.parametrize("on", ["layer", "floor"])
+def test_force_of_a_signal_is_that_of_a_variable(reference_packing, tmp_path, kind, on):
+    (tmp_path / "a table").write_text(TABLE)
+    arguments, formula = SIGNALS[kind]
+    packing = reference_packing(0.0)
+    with Engine(packing) as engine:
+        do = engine.lammps.command
+        do("timestep 0.25")
+        do("fix still all displace/disc rotation no")
+        do("set type 2 mass 1.7")
+        do(f"variable formula equal {formula}")
+        do(f'variable name index "{tmp_path / "a table"}"')
+        at_rest, factor = force_at(engine, 0), 1.0 if on == "layer" else -np.where(packing.top, 1.7, 1.0)
+        do(f"fix force {'top' if on == 'layer' else 'all'} addforce/signal {arguments} on {on}")
+        seen = []
+        for step in (0, 1, 7, 12, 13, 16, 17, 24):
+            forced = force_at(engine, step) - at_rest
+            value = engine.lammps.extract_variable("formula")
+            expected = factor * value * (packing.top if on == "layer" else 1.0)
+            # rounding of the packing's own forces of order 3, and of a number of 15 digits
+            np.testing.assert_allclose(forced[: len(packing)], expected, rtol=0, atol=1e-14)
+            assert not forced[len(packing) :].any()
+            assert engine.lammps.extract_fix("force", 0, 0) == pytest.approx(value, rel=1e-14, abs=1e-15)
+            seen.append(value)
+    assert len(set(seen)) > 4
+
+
+def force_at(engine, step):
+    engine.lammps.command(f"reset_timestep {step}")
+    engine.lammps.command("run 0 post no")
+    return engine.net_force
+
+
+VARIABLES = """
+compute velocity top layer/velocity
+variable friction equal 1.0*ternary(abs(c_velocity)>0.01,0.2*exp(-0.4*(abs(c_velocity)-0.01)/0.3)+0.7,1)
+fix weaken all adapt 1 pair mindlin/smooth mu * * v_friction
+fix_modify floor mu v_friction
+"""
+
+
+@pytest.mark.parametrize("precision", ["double", "compensated"])
+def test_friction_weakens_as_by_variables(reference_packing, precision):
+    """A layer that is torn off: it slides on its contacts, and so does what lies below."""
+    packing = replace(reference_packing(1.0), fx=3.0)
+    if precision == "compensated":
+        packing = replace(packing, position_low=np.zeros_like(packing.position))
+    ends = []
+    for commands in (VARIABLES, "fix weaken top weaken/friction 1.0 0.2 0.4 0.7 0.01 0.3", ""):
+        with Engine(packing) as engine, engine.undamped(2e-3) as dynamics:
+            for command in commands.strip().splitlines():
+                engine.lammps.command(command)
+            engine.lammps.command("run 0 post no")
+            motion = dynamics.advance(300)
+            speed = abs(motion.velocity[packing.top, 0].mean())
+            if not commands.startswith("fix"):
+                ends.append(motion.velocity)
+                continue
+            ends.append(motion.velocity)
+            friction = 0.2 * np.exp(-0.4 * (speed - 0.01) / 0.3) + 0.7
+            assert engine.lammps.extract_fix("weaken", 0, 0) == pytest.approx(friction, rel=1e-14)
+            assert engine.lammps.extract_fix("weaken", 0, 1, 0) == pytest.approx(speed, rel=1e-14)
+    by_variables, by_fix, constant = ends
+    assert speed > 0.1
+    # a variable in a formula is rounded to 15 digits, and the motion multiplies that
+    assert np.abs(by_fix - by_variables).max() < 1e-11
+    assert np.abs(by_fix - constant).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        ("addforce/signal", "knows cosine, pulse, sweep and record, not nothing"),
+        ("addforce/signal square 1 1", "knows cosine, pulse, sweep and record, not square"),
+        ("addforce/signal cosine 1", "cosine takes A OMEGA"),
+        ("addforce/signal pulse 1 0", "OMEGA = 0 must be above 0"),
+        ("addforce/signal sweep 1 1 2 0", "TIME = 0 must be above 0"),
+        ("addforce/signal cosine 1 1 scale 2", "knows the keyword on, not scale"),
+        ("addforce/signal cosine 1 1 on roof", "on is layer or floor, not roof"),
+        ("addforce/signal record nothing.txt", "nothing.txt cannot be read"),
+        ("addforce/signal record v_nothing", "there is no variable nothing"),
+        ("weaken/friction 1 1 1", "takes six numbers"),
+        ("weaken/friction 1 0.2 0.4 -1 0 1", "must be finite and not negative, but one is -1"),
+        ("weaken/friction 1 0.2 0.4 0.8 0 0", "MU and V_SS must be above 0"),
+    ],
+)
+def test_arguments_that_make_no_sense_are_refused(reference_packing, command, says):
+    with Engine(reference_packing(1.0)) as engine, pytest.raises(EngineError, match=says):
+        engine._decks.command(f"fix new top {command}")
+
+
+def test_friction_falls_to_zero_and_comes_back(reference_packing):
+    """The second run begins with mu = 0 in the pair style, and has friction and slips nevertheless."""
+    torn = replace(reference_packing(1.0), fx=3.0)
+    with Engine(torn) as engine, engine.undamped(2e-3) as dynamics:
+        do = engine.lammps.command
+        do("fix weaken top weaken/friction 1.0 0 1.0 0 0.5 1e-9")
+        do("velocity top set 1.0 0.0 0.0")
+        do("run 1 post no")
+        assert engine.lammps.extract_fix("weaken", 0, 0) == 0.0
+        do("velocity all set 0.0 0.0 0.0")
+        do("run 0 post no")
+        assert engine.lammps.extract_fix("weaken", 0, 0) == 1.0
+        assert not engine.packing.contacts.slip.any()
+        dynamics.advance(20)
+        contacts = engine.packing.contacts
+        assert contacts.slip[contacts.floor].any()
+        assert contacts.slip[~contacts.floor].any()
