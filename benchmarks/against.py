@@ -64,7 +64,7 @@ def onset(packing: dict, ramp: dict) -> float:
     from faultgouge.pywrap import Engine, Scene, settle
 
     try:
-        from faultgouge.pywrap.runs.path import EquilibriumPath, loads
+        from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath, loads
     except ModuleNotFoundError:  # version 0.1.0
         from faultgouge.pywrap.stages import EquilibriumPath, loads
 

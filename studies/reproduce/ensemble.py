@@ -12,20 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.digits import with_uncertainty
-from ...analysis.files.wholefile import write_json
+from ...analysis.files.atomic_write import write_json
+from ...analysis.uncertain_digits import with_uncertainty
 from ...figures.pages import lines
 from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.packing_section import GeneratedPacking
-from ...pywrap.scenes.refusals import needed
-from ..frame import draw_all
-from ..hands import Progress, Say
+from ...pywrap.scenes.validation import require_section
+from ..executors import Progress, Say
 from ..statistics import quartiles, share
-from ..sweep.compute import run_sweep
-from ..sweep.points import Sweep
+from ..study import draw_all
+from ..sweep.run_sweep import run_sweep
+from ..sweep.sweep_plan import Sweep
 from ..sweep.table import Row
 from ..sweep.tasks import TASKS
-from ..sweep.triggering import economical, frictions, grows, rise
+from ..sweep.triggering import economical, frictions, grows, rise_in_decades
 from .ensemble_figure import ensemble_figure
 
 RISES = (5, 10)
@@ -68,7 +68,7 @@ def ensemble(
     """
     if not isinstance(scene.packing, GeneratedPacking):
         raise SceneError("an ensemble needs packings of several seeds, and the scene has a stored one: give a seed")
-    needed(scene.ramp, "ramp")
+    require_section(scene.ramp, "ramp")
     first, scene = scene.packing.seed, economical(scene)
     mapping = {"task": "triggering", "sweep": {"packing.seed": f"{first}:{first + members - 1}"}}
     sweep = Sweep.from_mapping(mapping | {"scene": scene.resolved()}, TASKS)
@@ -103,7 +103,7 @@ def summary(scene: Scene, rows: list[Row]) -> dict[str, Any]:
     count = len(frictions(scene))
     ramped = [row["result"] for row in rows if len(row["result"].get("ramps", ())) == count]
     eruptions = [each["eruption"] for each in ramped if each["eruption"]]
-    rises, controls = ([rise(each, of) for each in eruptions] for of in ("weakening", "control"))
+    rises, controls = ([rise_in_decades(each, of) for each in eruptions] for of in ("weakening", "control"))
     decided = [each["lowered"] for each in ramped if each["lowered"] is not None]
 
     def at_least(values: list[float]) -> dict[str, Any]:
@@ -152,7 +152,8 @@ def sentence(row: Row) -> str:
     found = row["result"].get("eruption")
     if found:
         parts.append(
-            f"D rises {rise(found):.1f} decades at {found['fx']:.6g} (control: {rise(found, 'control'):.1f}): "
+            f"D rises {rise_in_decades(found):.1f} decades at {found['fx']:.6g} "
+            f"(control: {rise_in_decades(found, 'control'):.1f}): "
             f"{VERDICTS[found['verdict']]}"
             + ("" if found["perturbation_shows"] else ", and the perturbation drowns in rounding")
         )

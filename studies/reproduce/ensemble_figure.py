@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from ...figures.style import styled
 from ..statistics import course
 from ..sweep.draw import draw_pairs
-from ..sweep.triggering import Row, grows, rise
+from ..sweep.triggering import Row, grows, rise_in_decades
 
 
 @styled
@@ -40,7 +40,7 @@ def ensemble_figure(found: Sequence[Row]) -> Figure:
     _draw_pairs(pairs, [each for each in found if len(each.get("ramps", ())) > 1])
     eruptions = [each["eruption"] for each in found if each.get("eruption")]
     if eruptions:
-        decades = [[rise(each, of) for each in eruptions] for of in ("weakening", "control")]
+        decades = [[rise_in_decades(each, of) for each in eruptions] for of in ("weakening", "control")]
         edges = np.arange(np.floor(np.min(decades)), np.max(decades) + 0.5, 0.5)
         # outlines over each other: bars side by side would stand off their values
         for values, label, color in zip(decades, ("in the window", "control"), ("C0", "C1"), strict=True):
