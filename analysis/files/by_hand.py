@@ -12,7 +12,7 @@ from ..errors import PackingFileError
 from ..packing.geometry import touching
 from ..packing.law import MindlinLaw
 from ..packing.packing import Packing
-from .text_files import open_text
+from .plain_file import open_text
 
 
 def read_packing(

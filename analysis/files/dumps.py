@@ -31,7 +31,7 @@ from ..packing.geometry import nearest_image
 from ..packing.law import MindlinLaw
 from ..packing.packing import Floats, Indices, Packing
 from .by_hand import PackingFileError
-from .text_files import open_text
+from .plain_file import open_text, read_plain_text
 
 DISK = {
     "id": ("id",),
@@ -299,7 +299,8 @@ def _sidecar(path: Path) -> dict[str, float]:
         return {}
     try:
         return {
-            key: float(value) for key, value in (line.split() for line in path.read_text().splitlines() if line.strip())
+            key: float(value)
+            for key, value in (line.split() for line in read_plain_text(path).splitlines() if line.strip())
         }
     except ValueError as error:
         raise PackingFileError(f"{path} must have one key and one number a line.") from error

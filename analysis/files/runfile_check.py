@@ -3,6 +3,8 @@
 `runfile` describes the format. A file is checked whole when it is opened, and nothing is appended to one that fails.
 """
 
+import math
+import os
 from pathlib import Path
 
 import h5py
@@ -15,7 +17,10 @@ BEST_COMPRESSION = 1100
 reading it would take all memory."""
 
 BLOCK = 1 << 20
-"""Bytes that are read at a time."""
+"""Bytes that are read at a time, or one chunk, where that is larger: a chunk is unpacked as a whole."""
+
+LARGEST_CHUNK = 1 << 30
+"""Bytes of a chunk, unpacked: a frame of ten million disks has a quarter of it."""
 
 
 class _UnsoundError(Exception):
@@ -49,6 +54,7 @@ def check(file: h5py.File, path: Path, size: int) -> None:
         creator = file.get("h5md/creator")
         if creator is None or creator.attrs.get("name") != "faultgouge":
             raise PackingFileError(f"{path} is an HDF5 file, but not a run of faultgouge.")
+        _check_places(file)
         disks, frames = _check_position(file, size)
         _check_parameters(file, disks)
         _check_observables(file, disks, frames, size)
@@ -107,8 +113,34 @@ def _check_finite(item: h5py.Dataset, rows: int | None = None) -> None:
     else:
         end = len(item) if rows is None else rows
         block = max(1, BLOCK * len(item) // max(item.nbytes, 1))
+        if item.chunks:
+            block = -(-block // item.chunks[0]) * item.chunks[0]
         finite = all(np.isfinite(item[k : min(k + block, end)]).all() for k in range(0, end, block))
     _expect(finite, f"{item.name} has numbers that are not finite")
+
+
+def _check_places(file: h5py.File) -> None:
+    """Every number lies in the file itself, whose checksum covers it, and unpacks into the memory that there is."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    unpacked, seen, groups = 0, set[int](), [file]
+    while groups:
+        here = groups.pop()
+        for name in here:
+            link = here.get(name, getlink=True)
+            _expect(not isinstance(link, h5py.ExternalLink), f"{here.name}/{name} is a link to another file")
+            item = here[name]
+            address = h5py.h5o.get_info(item.id).addr
+            if address in seen:
+                continue
+            seen.add(address)
+            if isinstance(item, h5py.Group):
+                groups.append(item)
+            elif isinstance(item, h5py.Dataset):
+                _expect(not item.external and not item.is_virtual, f"{item.name} has its numbers in another file")
+                chunk = math.prod(item.chunks or ()) * item.dtype.itemsize
+                _expect(chunk <= LARGEST_CHUNK, f"{item.name} has chunks of {chunk} bytes")
+                unpacked += item.id.get_num_chunks() * chunk if item.chunks else 0
+    _expect(unpacked <= memory, f"its datasets unpack to {unpacked} bytes, more than this machine has memory")
 
 
 def _check_position(file: h5py.File, size: int) -> tuple[int, int]:

@@ -16,6 +16,7 @@ import h5py
 from numpy.typing import NDArray
 
 from ..errors import PackingFileError
+from .plain_file import read_plain
 from .runfile_check import check
 from .wholefile import HEADER_SIZE, is_sealed, seal, write_whole
 
@@ -166,5 +167,5 @@ def opened(path: Path) -> h5py.File:
 
 def _image(path: Path) -> h5py.File:
     """The content of a sealed file in memory, for changes."""
-    image = path.read_bytes()[HEADER_SIZE:]
+    image = read_plain(path)[HEADER_SIZE:]
     return h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..motion.signals import Signal, SignalError
+from .plain_file import open_plain, read_plain_text
 
 TEXT = 4096
 """Bytes at the beginning of a file that tell a table of numbers from a record."""
@@ -38,7 +39,7 @@ def read_signal(path: str | Path, channel: str | None = None) -> Signal:
     """
     path = Path(path)
     try:
-        with path.open("rb") as stream:
+        with open_plain(path) as stream:
             head = stream.read(TEXT)
     except OSError as error:
         raise SignalError(f"{path} cannot be read ({error.strerror}): correct its name") from None
@@ -71,7 +72,7 @@ def _is_table(head: bytes) -> bool:
 
 def _table(path: Path) -> Signal:
     rows = []
-    for number, line in enumerate(path.read_text().splitlines(), start=1):
+    for number, line in enumerate(read_plain_text(path).splitlines(), start=1):
         words = line.split("#")[0].replace(",", " ").split()
         if not words:
             continue

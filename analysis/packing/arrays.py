@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..errors import BadInputError
+
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
@@ -66,10 +68,19 @@ def number(name: str, value: float, *, positive: bool = False) -> float:
     return found
 
 
+SMALLEST, LARGEST = 1e-100, 1e100
+"""Between these a number of a disk may be: products of three stay finite, and LAMMPS reads no subnormal ones."""
+
+
 def positive_each(name: str, array: Floats) -> Floats:
-    """The array; a ValueError if one of its values, each of which is a disk's, is not positive."""
+    """The array; an error if one of its values, each of which is a disk's, is not positive, tiny or huge."""
     if np.any(array <= 0):
-        raise ValueError(f"Every {name} must be positive; disk {np.argmin(array)} has another.")
+        raise BadInputError(f"Every {name} must be positive; disk {np.argmin(array)} has another.")
+    odd = np.flatnonzero((array < SMALLEST) | (array > LARGEST))
+    if len(odd):
+        raise BadInputError(
+            f"The {name} of disk {odd[0]} is {array[odd[0]]:g}: give one between {SMALLEST:g} and {LARGEST:g}."
+        )
     return array
 
 

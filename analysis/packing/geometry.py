@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from ..errors import BadInputError
 from .arrays import Floats, floats
 from .compensated import Pair, exact_sum, overlap_and_distance, separation
 from .contacts import FLOOR, Contacts
@@ -44,7 +45,7 @@ def measured(
 
     Raises
     ------
-    ValueError
+    BadInputError
         If two disks in contact have the same centre.
     """
     i, j, floor = contacts.i, contacts.j, contacts.floor
@@ -60,7 +61,9 @@ def measured(
     overlap[0][floor], overlap[1][floor] = exact_sum(height[0], height[1] - branch[1][floor, 1])
     if np.any(distance[~floor] == 0):
         k = np.flatnonzero(~floor & (distance == 0))[0]
-        raise ValueError(f"Disks {i[k]} and {j[k]} have the same centre, so that their contact has no direction.")
+        raise BadInputError(
+            f"Disks {i[k]} and {j[k]} have the same centre, so that their contact has no direction: separate them."
+        )
     normal = np.empty_like(branch[0])
     normal[~floor] = branch[0][~floor] / distance[~floor, None]
     normal[floor] = (0.0, 1.0)

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -28,6 +27,7 @@ from ...analysis import Packing, RunFile
 from ...analysis.spectrum.spectrum import dynamical_matrix
 from ...pywrap import Engine, Equilibrium, Record, Scene
 from ...pywrap.lammps.dynamics import Dynamics, Weakening
+from ...pywrap.lammps.names_of_files import temporary_folder
 from ...pywrap.runs.path import next_equilibrium, step_of
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.sections import Ramp
@@ -101,7 +101,7 @@ def explain(scene: Scene) -> Explanation:
     scene, remark = _affordable(scene)
     start = settle(scene, communicator=MPI.COMM_SELF)
     run = _run_of(scene, start.packing)
-    with tempfile.TemporaryDirectory(prefix="faultgouge-") as name:
+    with temporary_folder() as name:
         folder = Path(name)
         with run.started(MPI.COMM_SELF, folder / "scene.log") as (engine, _):
             loaded = Loaded.of(engine, folder / "scene.log")

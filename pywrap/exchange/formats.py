@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...analysis import BadInputError, OutputError, Packing, PackingFileError
-from ...analysis.files.text_files import open_text
+from ...analysis.files.plain_file import open_plain, open_text
 from ...analysis.files.wholefile import BEGINNINGS
 from .disks import Disks
 from .quantities import Frame, ModeVectors
@@ -90,14 +90,12 @@ FILMS = {each.suffixes[0]: each for each in FORMATS if each.film}
 def known_formats() -> str:
     """All formats that are read, in words."""
     listed = [f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS if each.reader]
-    return ", ".join(
-        [*listed, "each text also as .gz", "run.h5", f"and {OTHER.words} (pip install 'faultgouge[export]')"]
-    )
+    return ", ".join([*listed, "each text also as .gz", "run.h5", f"and {OTHER.words}"])
 
 
 def is_hdf5(path: Path) -> bool:
     """Whether a file begins as HDF5 does, or as a run.h5."""
-    with path.open("rb") as stream:
+    with open_plain(path) as stream:
         return stream.read(64).startswith(BEGINNINGS)
 
 

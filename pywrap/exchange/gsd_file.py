@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis import Packing, PackingFileError
+from ...analysis.files.plain_file import check_plain
 from . import quantities
 from .disks import Disks, of_columns
 from .needs import needed_library
@@ -29,6 +30,7 @@ def read_gsd(path: Path, frame: int | None = None) -> Disks:
     """A frame of a GSD file; the last one by default, if all are of as many disks."""
     hoomd = needed_library("gsd.hoomd", path)
     try:
+        check_plain(path)
         with hoomd.open(str(path), "r") as file:
             counts = [file[k].particles.N for k in (range(len(file)) if frame is None else ())]
             return _disks(path, file[chosen_frame(path, counts or [0] * len(file), frame)])

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import operator
 import re
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import BadInputError
+from ...analysis.files.plain_file import read_plain_text
 from .disks import Disks
 
 WAYS = '12 (the highest), type:2, ids:1,4,7-9, ids:@FILE, group:NAME (of a restart), or a region such as "y>10"'
@@ -79,7 +79,7 @@ def _highest(disks: Disks, count: int) -> NDArray[np.bool_]:
 def _listed(disks: Disks, says: str, value: str) -> NDArray[np.bool_]:
     if value.startswith("@"):
         try:
-            value = Path(value[1:]).read_text()
+            value = read_plain_text(value[1:])
         except (OSError, UnicodeDecodeError) as error:
             raise BadInputError(f"--top {says}: the file cannot be read ({error}).") from None
     wanted: set[int] = set()

@@ -30,7 +30,7 @@ try:
     from MDAnalysis.topology.base import TopologyReaderBase
 except ImportError:
     raise ImportError(
-        "faultgouge.pywrap.exchange.mdanalysis needs the library MDAnalysis: pip install 'faultgouge[export]'"
+        "faultgouge.pywrap.exchange.mdanalysis needs the library MDAnalysis: pip install MDAnalysis"
     ) from None
 
 FORMAT = "H5"

@@ -8,7 +8,7 @@ from ...analysis import BadInputError
 
 
 def needed_library(module: str, path: Path) -> Any:
-    """A module of the extra `export`.
+    """A module of a dependency, or of the extra `export`.
 
     Raises
     ------

@@ -15,7 +15,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ...analysis import PackingFileError
+from ...analysis.files.plain_file import open_plain
 from ..lammps.instance import lammps_instance
+from ..lammps.names_of_files import plain_name
 from .disks import Disks, of_columns
 
 MAGIC = b"LammpS RestartT"
@@ -26,7 +28,7 @@ MOST_GROUPS = 32
 def is_restart(path: Path) -> bool:
     """Whether a file begins as LAMMPS restarts do."""
     try:
-        with path.open("rb") as stream:
+        with open_plain(path) as stream:
             return stream.read(len(MAGIC)) == MAGIC
     except OSError:
         return False
@@ -39,7 +41,8 @@ def read_restart(path: Path) -> Disks:
     lammps = lammps_instance(MPI.COMM_SELF, None)
     try:
         lammps.command("atom_modify map yes")
-        lammps.command(f'read_restart "{path}"')
+        with plain_name(path) as name:
+            lammps.command(f"read_restart {name}")
     except Exception as error:  # the LAMMPS module raises plain Exception
         says = str(error).splitlines()[0].removeprefix("ERROR: ")
         lammps.close()

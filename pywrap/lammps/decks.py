@@ -3,16 +3,15 @@
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .instance import EngineError
+from .names_of_files import DECKS, decks_folder, is_plain
 
-DECKS = Path(str(files("faultgouge.lammps_inputs")))
+__all__ = ["DECKS", "Decks"]
 
 DECORATION = re.compile(r"^'?ERROR( on proc \d+)?: | \([^ ()]+:\d+\)'?$")
 """What surrounds the sentence of an error of LAMMPS: who says it, and where in the source."""
@@ -44,12 +43,14 @@ class Decks:
     def include(self, deck: str, **variables: object) -> None:
         """Run a deck part with these variables."""
         self.variables(**variables)
-        self.command(f'include "{DECKS / deck}"')
+        self.command(f"include {decks_folder() / deck}")
 
     def variables(self, **values: object) -> None:
-        """Set variables of style index, doubles in full precision."""
+        """Set variables of style index, doubles in full precision; a text is one word that means itself."""
         for name, value in values.items():
             text = repr(float(value)) if isinstance(value, float) else str(value)
+            if not is_plain(text):
+                raise EngineError(f"LAMMPS would not read {name} = {text!r} as one word: give it another name.")
             self.command(f"variable {name} delete")
             self.command(f'variable {name} index "{text}"')
 

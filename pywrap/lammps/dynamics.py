@@ -19,7 +19,7 @@ from ...analysis.files.signal_files import write_table
 from ...analysis.motion.signals import Signal
 from ...analysis.packing.arrays import Floats
 from .decks import Decks
-from .shared_folder import shared_folder
+from .names_of_files import shared_folder
 from .wire import Wire
 
 

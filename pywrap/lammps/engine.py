@@ -22,11 +22,11 @@ from ...analysis import Packing
 from ...analysis.motion.signals import Signal
 from ...analysis.packing.arrays import Floats
 from .data_file import box_heights, data_file, sort_contacts
-from .decks import DECKS, Decks
+from .decks import Decks
 from .displacing import Displacing
 from .dynamics import Dynamics, Weakening
 from .instance import lammps_instance
-from .shared_folder import shared_folder
+from .names_of_files import decks_folder, move_files, shared_folder
 from .trial import Trial
 from .wire import Wire
 
@@ -233,10 +233,12 @@ class Engine:
         self._displacing.end()
         self._decks.command(f"change_box all y final {bottom!r} {top!r} units box")
         self._decks.command("reset_timestep 0")
-        self._decks.include("write.in", name=stem, fx=self._displacing.fx)
-        if self.communicator.rank == 0:
-            sort_contacts(Path(f"{stem}.contacts"))
-        self.communicator.barrier()
+        with shared_folder(self.communicator) as folder:
+            self._decks.include("write.in", name=folder / "dump", fx=self._displacing.fx)
+            self.communicator.barrier()
+            if self.communicator.rank == 0:
+                sort_contacts(folder / "dump.contacts")
+                move_files(folder, stem)
 
     @contextmanager
     def undamped(
@@ -296,7 +298,7 @@ class Engine:
                 data.write_text(data_file(packing))
             self.communicator.barrier()
             self._decks.variables(
-                decks=DECKS,
+                decks=decks_folder(),
                 data=data,
                 sides="f" if packing.box_length is None else "p",
                 kn=law.kn,

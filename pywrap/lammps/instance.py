@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 from ...analysis import FaultgougeError
 from ...plugin import directory
+from .names_of_files import plain_name
 
 
 class EngineError(FaultgougeError):
@@ -39,7 +40,8 @@ def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:
         )
     plugin = Path(directory()) / "mindlinsmoothplugin.so"
     if not instance.has_style("pair", "mindlin/smooth") and plugin.is_file():
-        instance.command(f'plugin load "{plugin}"')  # older wheels and LAMMPSes of one's own do not look for plugins
+        with plain_name(plugin) as name:
+            instance.command(f"plugin load {name}")  # older wheels and LAMMPSes of one's own do not look for plugins
     if not instance.has_style("pair", "mindlin/smooth"):
         trouble = (
             f"does not take the plugin {plugin}, which was built for another release, MPI or size of atom IDs"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -12,10 +13,11 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import RunFile, solid_fraction
-from ...analysis.files.wholefile import check_folder
+from ...analysis.files.wholefile import alone_with, check_output
 from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Motion, Weakening
+from ..scenes.commands import COMMANDS
 from ..scenes.refusals import SceneError
 from ..scenes.scene import SECTIONS, Scene
 from .undamped import Checkpoint, Sample, perturb, sampling
@@ -38,7 +40,7 @@ class Record:
     task : {"ramp", "perturb"}
         What the file is for: a settled packing and its ramp, or an undamped run. A file for the other is refused.
     saved : callable, optional
-        Told in words what the file holds, whenever it has been saved.
+        Told in words what the file holds, and its path, whenever it has been saved.
 
     Attributes
     ----------
@@ -50,7 +52,7 @@ class Record:
     SceneError
         If the file holds another scene, or is for another task.
     OutputError
-        If the file cannot be written.
+        If the file cannot be written, or another run is writing it.
     """
 
     def __init__(
@@ -59,21 +61,27 @@ class Record:
         scene: Scene,
         communicator: MPI.Comm | None = None,
         task: Task = "ramp",
-        saved: Callable[[str], None] = lambda words: None,
+        saved: Callable[[str, Path], object] = lambda words, path: None,
     ) -> None:
         self.path, self.scene, self.task = path, scene, task
         self.communicator = communicator or MPI.COMM_WORLD
         self._file: RunFile | None = None
         self._said = saved
-        self.last: Equilibrium | None = from_root(self.communicator, self._resume)
+        self._alone = ExitStack()
+        try:
+            self.last: Equilibrium | None = from_root(self.communicator, self._resume)
+        except BaseException:
+            self._alone.close()
+            raise
 
     def _resume(self) -> Equilibrium | None:
+        check_output(self.path)
+        self._alone.enter_context(alone_with(self.path))
         if not self.path.exists():
-            check_folder(self.path)
             return None
         file = RunFile(self.path, "a")
         stored = json.loads(file.attributes.get("scene", "{}"))
-        difference = _difference(stored, self.scene.resolved())
+        difference = _difference(stored, self.scene.resolved(), self.task)
         if difference:
             raise SceneError(
                 f"{self.path} holds a run of another scene ({difference}): give another name with -o, or delete it"
@@ -117,6 +125,9 @@ class Record:
             file = self._file
             with file.change():
                 file.complete = False
+                scene = json.dumps(json.loads(file.attributes.get("scene", "{}")) | self.scene.resolved())
+                if scene != file.attributes.get("scene"):  # a ramp goes on from a file of `settle`, or further
+                    file.put_attribute("scene", scene)
                 file.append(equilibrium.packing, floor=equilibrium.floor, evaluations=equilibrium.evaluations)
                 if equilibrium.way is not None:
                     file.put_attribute("ways", json.dumps(ways_of(file) | {len(file) - 1: equilibrium.way}))
@@ -213,7 +224,7 @@ class Record:
             return
         goes_on = "is complete" if file.complete else "the same command goes on from there"
         count = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}{more}"
-        self._said(f"{self.path} holds {count}; {goes_on}")
+        self._said(f"{self.path} holds {count}; {goes_on}", self.path)
 
     def _attributes(self) -> dict[str, str | int | float]:
         return {
@@ -232,6 +243,7 @@ class Record:
             self._file.save()
             self._say_saved()
             self._file.close()
+        self._alone.close()
 
 
 def ways_of(file: RunFile) -> dict[int, str]:
@@ -253,9 +265,17 @@ def from_root(communicator: MPI.Comm, work: Callable[[], T]) -> T:
     return value
 
 
-def _difference(stored: dict[str, Any], wanted: dict[str, Any]) -> str:
-    """The first key in which two resolved scenes differ, ramp.until left aside: a ramp may be prolonged."""
+def _difference(stored: dict[str, Any], wanted: dict[str, Any], task: Task) -> str:
+    """The first key in which two resolved scenes differ, ramp.until left aside: a ramp may be prolonged.
+
+    Sections that the command of the file does not read are left aside, too, and those that a settled packing does not
+    need and one of the two does not have, since a ramp goes on from a file of `settle`.
+    """
+    stored, wanted = COMMANDS[task].part(stored), COMMANDS[task].part(wanted)
+    may_lack = set() if task == "perturb" else {"relax", "ramp", "output"}
     for section in sorted(stored.keys() | wanted.keys()):
+        if section in may_lack - (stored.keys() & wanted.keys()):
+            continue
         here, there = stored.get(section), wanted.get(section)
         if isinstance(here, dict) and isinstance(there, dict):
             for key in sorted(here.keys() | there.keys()):

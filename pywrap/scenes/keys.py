@@ -1,13 +1,13 @@
 """All keys of a scene, section by section, each section checked by itself."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Tag, ValidationInfo, field_validator
+from pydantic import Discriminator, PrivateAttr, Tag, ValidationInfo, field_validator
 
 from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
 from .refusals import Section
-from .sections import Damping, Friction, Law, Load, Output, Perturb, Ramp, Relax
+from .sections import Damping, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax
 from .study_sections import Eruptions, Modes, Trigger
 from .units_section import Units
 
@@ -54,7 +54,13 @@ class Keys(Section):
             return {**ramp, "step": info.data["load"].fy / STEPS}
         return ramp
 
+    _inertia: Inertia = PrivateAttr(Inertia())
+
+    def model_post_init(self, context: Any) -> None:
+        """Keep the key of [perturb] that is read where the section is not."""
+        self._inertia = (context or {}).get("inertia", self._inertia)
+
     @property
     def inertia_factor(self) -> float:
         """I_0 in I = I_0 m R^2 of dynamics, spectrum and onset alike: that of [perturb], or the paper's 1."""
-        return self.perturb.inertia_factor if self.perturb else 1.0
+        return (self.perturb or self._inertia).inertia_factor

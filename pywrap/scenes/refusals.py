@@ -14,6 +14,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ...analysis import BadInputError
+from ...analysis.files.plain_file import read_plain_text
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -36,7 +37,13 @@ NotNegative: TypeAlias = Annotated[float, Field(ge=0, allow_inf_nan=False), Afte
 
 T = TypeVar("T")
 
-KEYS = {"ramp": "step and until", "perturb": "fx and time", "damping": "cn, ct or tau"}
+KEYS = {
+    "ramp": "step and until",
+    "perturb": "fx and time",
+    "damping": "cn, ct or tau",
+    "friction": "v0, the velocity at which friction weakens",
+    "eruptions": "load, a list of F_x",
+}
 """What a section needs at least."""
 
 
@@ -51,11 +58,13 @@ class SceneError(BadInputError):
 def read_toml(path: Path, what: str) -> dict[str, Any]:
     """What the TOML file of a scene or of a sweep holds; SceneError if it cannot be read, or is no TOML."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(read_plain_text(path))
     except OSError as error:
         raise SceneError(f"{path}: the {what} cannot be read ({error.strerror}): correct its path.") from None
     except ValueError as error:  # bytes that are not UTF-8, or text that is not TOML
         raise SceneError(f"{path}: the {what} is not valid TOML: {error}.") from None
+    except RecursionError:
+        raise SceneError(f"{path}: the {what} is nested too deeply: give sections, keys, numbers and lists.") from None
 
 
 class Section(BaseModel):

@@ -15,7 +15,8 @@
     [units]     what the numbers are in SI
     [output]    what is written beside the result
 
-packing, law and load are needed; of the others, one that is absent is a feature that is not in the run. The
+packing, law and load are needed; of the others, one that is absent is a feature that is not in the run. A command
+takes the sections that it reads, and needs some of them (:mod:`faultgouge.pywrap.scenes.commands`). The
 units are the user's own: k_n and k_t are force / length^law.exponent, 3/2 by default, and the paper's numbers take
 the mass of a disk and the diameter of a small disk as units. Defaults are the paper's values where it gives one; the
 docstrings say where it does not.
@@ -26,11 +27,13 @@ from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import ValidationError, model_validator
+from pydantic_core import InitErrorDetails
 
+from .commands import COMMANDS, Command
 from .estimate import impossible
 from .keys import Keys
-from .packing_section import GeneratedPacking
-from .refusals import SceneError, Section, read_toml, refusal, sentence
+from .refusals import SceneError, Section, needed, read_toml, refusal, sentence
+from .sections import Inertia
 from .units import real_units
 
 
@@ -43,11 +46,11 @@ class Scene(Keys):
         if perturb and ramp and perturb.fx > max(0.0, ramp.first):
             says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
             raise refusal("perturb.fx", says)
-        if perturb and isinstance(perturb.target, tuple) and isinstance(self.packing, GeneratedPacking):
-            beyond = [disk for disk in perturb.target if disk >= self.packing.disks]
+        if perturb and isinstance(perturb.target, tuple):
+            disks = self.packing.disks
+            beyond = [disk for disk in perturb.target if disk >= disks]
             if beyond:
-                says = f"names disk {beyond[0]}: name disks from 0 to {self.packing.disks - 1}"
-                raise refusal("perturb.target", says)
+                raise refusal("perturb.target", f"names disk {beyond[0]}: name disks from 0 to {disks - 1}")
         cannot = impossible(self)
         if cannot is not None:
             raise refusal(*cannot)
@@ -65,7 +68,9 @@ class Scene(Keys):
         return self
 
     @classmethod
-    def from_toml(cls, path: str | Path, packing: Mapping[str, Any] | None = None) -> "Scene":
+    def from_toml(
+        cls, path: str | Path, packing: Mapping[str, Any] | None = None, command: str | None = None
+    ) -> "Scene":
         """Read a scene.
 
         Parameters
@@ -74,6 +79,9 @@ class Scene(Keys):
             A TOML file. A relative packing.file in it counts from its folder.
         packing : mapping, optional
             A section [packing] in place of the file's, whose own may name a file that is not there yet.
+        command : str, optional
+            The command, or the task of a sweep, that the scene is for: it gets the sections that it reads
+            (:mod:`faultgouge.pywrap.scenes.commands`). By default all.
 
         Returns
         -------
@@ -86,10 +94,11 @@ class Scene(Keys):
         """
         path = Path(path)
         mapping = read_toml(path, "scene")
-        return cls._checked(mapping if packing is None else mapping | {"packing": packing}, path.parent, str(path))
+        whole = mapping if packing is None else mapping | {"packing": packing}
+        return cls._checked(whole, path.parent, str(path), command)
 
     @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any], folder: str | Path = ".") -> "Scene":
+    def from_mapping(cls, mapping: Mapping[str, Any], folder: str | Path = ".", command: str | None = None) -> "Scene":
         """Make a scene from what a TOML file would hold.
 
         Parameters
@@ -98,6 +107,8 @@ class Scene(Keys):
             Sections by name, keys and values in them as in TOML; `resolved` gives such a mapping.
         folder : str or Path
             The folder from which a relative packing.file counts.
+        command : str, optional
+            As in `from_toml`.
 
         Returns
         -------
@@ -108,12 +119,22 @@ class Scene(Keys):
         SceneError
             If the mapping does not describe a scene that can be run.
         """
-        return cls._checked(mapping, Path(folder), "scene")
+        return cls._checked(mapping, Path(folder), "scene", command)
 
     @classmethod
-    def _checked(cls, mapping: Mapping[str, Any], folder: Path, name: str) -> "Scene":
+    def _checked(cls, mapping: Mapping[str, Any], folder: Path, name: str, command: str | None) -> "Scene":
+        wanted = COMMANDS.get(command or "", ALL)
+        context: dict[str, Any] = {"folder": folder}
         try:
-            return cls.model_validate(mapping, context={"folder": folder})
+            if wanted is not ALL and isinstance(mapping, Mapping):
+                _check_keys(mapping)
+                mapping = wanted.part(mapping)
+                if "perturb" not in wanted.reads:
+                    context["inertia"] = _Part.model_validate({"perturb": mapping.pop("perturb", {})}).perturb
+            scene = cls.model_validate(mapping, context=context)
+            for section in wanted.needs:
+                needed(getattr(scene, section), section)
+            return scene
         except ValidationError as error:
             # A misspelled name makes the right one missing, too: the misspelling is the cause.
             errors = sorted(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
@@ -125,7 +146,31 @@ class Scene(Keys):
         k_t is a number and packing.file an absolute path. What is None is left out, so that
         `Scene.from_mapping(scene.resolved())` equals the scene.
         """
-        return self.model_dump(mode="json", exclude_none=True)
+        sections: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
+        inertia = self._inertia.model_dump(exclude_defaults=True)
+        return {**({"perturb": inertia} if inertia else {}), **sections}
+
+
+class _Part(Section):
+    """What is read of a section [perturb] by a command that does not read the section."""
+
+    perturb: Inertia
+
+
+def _check_keys(mapping: Mapping[str, Any]) -> None:
+    """Refuse unknown sections and keys, whatever their values and whichever of them are read."""
+    errors: list[InitErrorDetails] = []
+    for name, section in mapping.items():
+        keys = section if isinstance(section, Mapping) else {}
+        known = {key for model in SECTIONS.get(name, ()) for key in model.model_fields}
+        if name not in Keys.model_fields:
+            errors.append({"type": "extra_forbidden", "loc": (name,), "input": section})
+        elif name in SECTIONS and keys is not section:
+            errors.append({"type": "dict_type", "loc": (name,), "input": section})
+        else:
+            errors += [{"type": "extra_forbidden", "loc": (name, key), "input": section} for key in keys.keys() - known]
+    if errors:
+        raise ValidationError.from_exception_data("Scene", errors)
 
 
 def _models(annotation: Any) -> tuple[type[Section], ...]:
@@ -136,3 +181,6 @@ def _models(annotation: Any) -> tuple[type[Section], ...]:
 
 
 SECTIONS = {name: models for name, field in Keys.model_fields.items() if (models := _models(field.annotation))}
+
+ALL = Command(tuple(Keys.model_fields))
+"""Every section."""

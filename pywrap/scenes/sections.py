@@ -207,8 +207,23 @@ class Ramp(Section):
         return sum(abs(there - here) for here, there in pairwise((0.0, *self.turning_points)))
 
 
-class Perturb(SignalKeys):
-    """[perturb] an undamped run from an equilibrium, and the forcing in it: keys of `SignalKeys`, and these.
+class Inertia(Section):
+    """The key of [perturb] that spectra and onsets read, too.
+
+    Attributes
+    ----------
+    inertia_factor : float
+        I_0 in I = I_0 m R^2: 1 in the paper, 1/2 for a uniform disk. `Scene.inertia_factor` hands it to
+        spectra and onsets as well.
+    """
+
+    inertia_factor: Positive = 1.0
+
+
+class Perturb(SignalKeys, Inertia):
+    """[perturb] an undamped run from an equilibrium, and the forcing in it.
+
+    Its keys are those of `SignalKeys`, that of `Inertia`, and these.
 
     Attributes
     ----------
@@ -219,15 +234,11 @@ class Perturb(SignalKeys):
         which.
     time_step : float or None
         Step of velocity Verlet, time. None: from the largest eigenvalue of K.
-    inertia_factor : float
-        I_0 in I = I_0 m R^2: 1 in the paper, 1/2 for a uniform disk. `Scene.inertia_factor` hands it to
-        spectra and onsets as well.
     """
 
     fx: NotNegative
     target: Literal["top", "all"] | tuple[int, ...] = "top"
     time_step: Positive | None = None
-    inertia_factor: Positive = 1.0
 
     @field_validator("target", mode="before")
     @classmethod

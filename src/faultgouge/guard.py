@@ -3,11 +3,12 @@
 Python runs a signal's handler between two of its own instructions, and LAMMPS or LAPACK may be minutes away from the
 next one; SciPy's `eig` does not even let another thread run. So the process that the shell or mpiexec has started
 forks before anything heavy is imported. Its child does the work. The guard waits for the child and for signals, hands
-SIGINT (Ctrl-C) and SIGTERM on, and gives the child `GRACE` to close files and to end other processes. Nothing is lost
-by that, as files of results are whole at any moment (:mod:`faultgouge.analysis.files.wholefile`). Then the guard says
-what is kept, in the words that the child has left in memory that both share (`keeps`), and exits with 130 or 143.
+SIGINT (Ctrl-C), SIGTERM and SIGHUP on, and gives the child `GRACE` to close files and to end other processes. Nothing
+is lost by that, as files of results are whole at any moment (:mod:`faultgouge.analysis.files.wholefile`). Then the
+guard says what is kept, in the words that the child has left in memory that both share (`keeps`), and exits with 128
+and the number of the signal: 130, 143 or 129.
 When the guard ends, in whatever way, the kernel kills the child. A child that a library has ended (SIGSEGV, SIGABRT,
-or SIGKILL for want of memory) ends in a sentence as well.
+or SIGKILL for want of memory), or a limit of CPU time (SIGXCPU), ends in a sentence as well.
 
 Under mpiexec every rank has its guard. mpiexec hands a signal to all ranks and kills the others once the work of one is
 gone, so the guards end `TOGETHER`, and the work after them. Rank 0 alone speaks.
@@ -22,6 +23,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
@@ -36,10 +38,13 @@ TOGETHER, LAST = 1.2, 1.7
 work is there: mpiexec kills all ranks as soon as the work of one is gone, and then reports the kill."""
 
 SIGNALS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # `nohup` has a command go on without its terminal
+    SIGNALS[signal.SIGHUP] = "the terminal or the connection was closed"
 
 NOTHING = "nothing was written, and the same command begins anew"
 _shared = mmap.mmap(-1, 4096)
-"""Shared by guard and work: what an interrupt leaves, as UTF-8 that ends with a zero, and `CLOSED`."""
+"""Shared by guard and work: what an interrupt leaves, as UTF-8, a place and words that each end with a zero, and
+`CLOSED`."""
 
 CLOSED = 4095
 """The byte of the shared memory that is not zero once the work has closed its files after a signal."""
@@ -58,9 +63,10 @@ def raise_interrupt_in(error: BaseException) -> None:
         cause = cause.__cause__ or cause.__context__
 
 
-def keeps(words: str) -> None:
-    """Set what is said at an interrupt: what is kept, and how to go on."""
-    _shared[:CLOSED] = words.encode()[: CLOSED - 1].ljust(CLOSED, b"\0")
+def keeps(words: str, path: str | os.PathLike[str] = "") -> None:
+    """Set what is said at an interrupt: what is kept, and how to go on; and the file or folder that must be there."""
+    place = os.path.abspath(path) if path else ""
+    _shared[:CLOSED] = f"{place}\0{words}".encode()[: CLOSED - 1].ljust(CLOSED, b"\0")
 
 
 def guarded(work: Callable[[], None]) -> NoReturn:
@@ -161,6 +167,9 @@ def _end(status: int, now: float) -> NoReturn:
     if code == -signal.SIGKILL:
         _say(f"killed from outside, for want of memory perhaps: {_kept()}")
         os._exit(128 + signal.SIGKILL)
+    if code == -signal.SIGXCPU:
+        _say(f"the limit of CPU time (ulimit -t) is reached: {_kept()}")
+        os._exit(128 + signal.SIGXCPU)
     if code < 0:
         _say(f"a library has ended the command ({signal.Signals(-code).name}); please report it: {_kept()}")
         os._exit(1)
@@ -168,8 +177,12 @@ def _end(status: int, now: float) -> NoReturn:
 
 
 def _kept() -> str:
-    return _shared[: _shared.find(b"\0")].decode(errors="replace")
+    place, words, *_ = _shared[:CLOSED].decode(errors="replace").split("\0")
+    if place and not os.path.exists(place):
+        return f"{place} is not there, and the same command begins anew"
+    return words
 
 
 def _say(sentence: str) -> None:
-    print(f"Error: {sentence}.", file=sys.stderr, flush=True)
+    with suppress(OSError):  # nobody may be there to read it
+        print(f"Error: {sentence}.", file=sys.stderr, flush=True)

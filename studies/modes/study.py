@@ -44,7 +44,7 @@ def wanted_of(path: Path) -> Sweep:
         has_task = False  # the reader of scenes says what is wrong
     if has_task:
         return Sweep.from_toml(path, {"modes": TASKS["modes"]})
-    return Sweep.from_mapping({"task": "modes", "scene": Scene.from_toml(path).resolved()}, TASKS)
+    return Sweep.from_mapping({"task": "modes", "scene": Scene.from_toml(path, command="modes").resolved()}, TASKS)
 
 
 def modes(

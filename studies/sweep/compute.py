@@ -21,6 +21,7 @@ from typing import Any
 
 from mpi4py import MPI
 
+from ...analysis.files.plain_file import read_plain_text
 from ...analysis.files.wholefile import make_folder, write_json, write_text
 from ...pywrap import SceneError
 from .. import rows
@@ -148,7 +149,7 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> list[Row]:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        value = json.loads(path.read_text(encoding="utf-8"))
+        value = json.loads(read_plain_text(path))
     except OSError as error:
         raise SceneError(f"{path} cannot be read ({error.strerror}): correct its path") from None
     except ValueError as error:

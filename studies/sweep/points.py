@@ -168,7 +168,7 @@ class Sweep:
             section, _, key = name.rpartition(".")
             (mapping.setdefault(section, {}) if section else mapping)[key] = value
         try:
-            scene = Scene.from_mapping(mapping)
+            scene = Scene.from_mapping(mapping, command=self.task)
         except SceneError as error:
             return Point(number, values, None, str(error).removeprefix("scene: "), digest([self._known_as, mapping]))
         return Point(number, values, scene, None, digest([self._known_as, scene.resolved()]))

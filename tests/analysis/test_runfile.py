@@ -274,3 +274,51 @@ def test_broken_missing_and_foreign_files(sound, content):
 def test_a_file_that_cannot_be_written(tmp_path, states):
     with pytest.raises(OutputError, match="nowhere"):
         RunFile.create(tmp_path / "nowhere" / "run.h5", states[0])
+
+
+def linked(file):
+    file["other"] = h5py.ExternalLink("other.h5", "/data")
+
+
+def stored_elsewhere(file):
+    file.create_dataset("faultgouge/more/msd", (4,), "f8", external=[("raw", 0, 32)])
+
+
+def virtual(file):
+    layout = h5py.VirtualLayout((4,), "f8")
+    layout[:] = h5py.VirtualSource("other.h5", "data", (4,))
+    file.create_virtual_dataset("faultgouge/more/msd", layout)
+
+
+def packed(file):
+    chunk = 1 << 24
+    item = file.create_dataset("faultgouge/more/msd", (1 << 40,), "f8", chunks=(chunk,), compression="gzip")
+    for k in range(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // (8 * chunk) + 1):
+        item.id.write_direct_chunk((k * chunk,), b"\0")
+
+
+@pytest.mark.parametrize(
+    ("add", "says"),
+    [
+        (linked, "is a link to another file"),
+        (stored_elsewhere, "has its numbers in another file"),
+        (virtual, "has its numbers in another file"),
+        (packed, "more than this machine has memory"),
+    ],
+)
+def test_what_is_not_in_the_file_or_not_for_this_machine_is_refused(sound, add, says):
+    with RunFile(sound, "a") as run, run.change():
+        add(run._file)
+    with pytest.raises(PackingFileError, match=says):
+        RunFile(sound)
+
+
+def test_a_chunk_is_unpacked_once(sound, monkeypatch):
+    with RunFile(sound, "a") as run, run.change():
+        zeros = np.zeros(1 << 21)
+        run._file.create_dataset("faultgouge/more/msd", data=zeros, chunks=(1 << 20,), compression="gzip")
+    read = []
+    inner = h5py.Dataset.__getitem__
+    monkeypatch.setattr(h5py.Dataset, "__getitem__", lambda self, key: read.append(self.name) or inner(self, key))
+    with RunFile(sound):
+        assert read.count("/faultgouge/more/msd") == 2

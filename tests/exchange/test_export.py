@@ -311,7 +311,7 @@ def test_positions_are_an_observable_too_and_a_file_without_that_link_is_continu
 def test_without_mdanalysis_the_import_says_the_one_command(monkeypatch):
     monkeypatch.delitem(sys.modules, "faultgouge.pywrap.exchange.mdanalysis", raising=False)
     monkeypatch.setitem(sys.modules, "MDAnalysis.analysis.base", None)
-    with pytest.raises(ImportError, match=r"pip install 'faultgouge\[export\]'"):
+    with pytest.raises(ImportError, match=r"pip install MDAnalysis"):
         import_module("faultgouge.pywrap.exchange.mdanalysis")
 
 

@@ -139,7 +139,6 @@ def test_lammps_reads_its_data_and_a_restart_has_all_of_it_and_groups(lmp, tmp_p
 
 
 def test_what_mdanalysis_reads_with_radii(tmp_path, sheared):
-    pytest.importorskip("MDAnalysis", reason="needs the extra export: pip install 'faultgouge[export]'")
     rows = zip(sheared.position.tolist(), sheared.radius.tolist(), strict=True)
     line = "ATOM {n:6d}  C   DSK A{n:4d}    {x:9.4f} {y:9.4f}   0.000  0.0000 {r:.4f}"
     text = "\n".join(line.format(n=n, x=x, y=y, r=r) for n, ((x, y), r) in enumerate(rows, 1))

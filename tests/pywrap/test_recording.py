@@ -14,7 +14,7 @@ from reference_layer import REFERENCE
 
 from faultgouge.analysis import RunFile
 from faultgouge.analysis.files import sealedfile
-from faultgouge.pywrap import Equilibrium, Record, Scene, SceneError, perturb, reach
+from faultgouge.pywrap import Equilibrium, Record, Scene, SceneError, perturb, reach, settle
 from faultgouge.pywrap.runs.undamped import sampling, weakening_of
 
 SCENE = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
@@ -147,3 +147,18 @@ def test_a_file_of_another_task_is_not_continued(tmp_path):
         record.append(start)
     with pytest.raises(SceneError, match="is a file of the command ramp"):
         Record(tmp_path / "run.h5", wanted, task="perturb")
+
+
+def test_a_ramp_goes_on_from_a_settled_packing_and_its_file_then_has_the_ramp(tmp_path):
+    mapping = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+    ramped = Scene.from_mapping(mapping | {"ramp": {"step": 1e-3, "until": 2e-3}}, command="ramp")
+    finer = Scene.from_mapping(mapping | {"ramp": {"step": 5e-4, "until": 2e-3}}, command="ramp")
+    path = tmp_path / "run.h5"
+    with Record(path, Scene.from_mapping(mapping, command="settle")) as record:
+        record.append(settle(record.scene))
+    with Record(path, ramped) as record:
+        record.append(record.last)
+    with Record(path, Scene.from_mapping(mapping, command="settle")) as record:
+        assert record.last is not None
+    with pytest.raises(SceneError, match=r"ramp\.step is 0\.001 there and 0\.0005 here"):
+        Record(path, finer)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from reference_layer import REFERENCE
 
+from faultgouge.pywrap.scenes.commands import COMMANDS
 from faultgouge.pywrap.scenes.estimate import estimated, foreseen
 from faultgouge.pywrap.scenes.scene import Scene, SceneError
 
@@ -57,7 +58,7 @@ def merged(changes: dict) -> dict:
         elif value is None:
             del scene[section]
         else:
-            scene[section] = value
+            scene[section] = deepcopy(value)
     return scene
 
 
@@ -302,7 +303,7 @@ def test_time_of_a_search(disks, fy, step, until, cn, measured):
     packing = {"disks": disks, "width": 1.192 * disks**0.5, "seed": 1}
     scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": fy}, "ramp": {"step": step, "until": until}}
     scene |= {} if cn is None else {"damping": {"cn": cn}}
-    search, settling = (estimated(Scene.from_mapping(scene), command).seconds for command in ("onset", "settle"))
+    search, settling = (estimated(Scene.from_mapping(scene), command).seconds for command in ("onset --all", "settle"))
     assert measured / 3 < search - settling < 3 * measured
 
 
@@ -312,3 +313,46 @@ def test_memory_of_a_search_in_slices(disks, measured):
     scene = SHORT | {"packing": {"disks": disks, "width": 1.2 * disks**0.5, "seed": 3}}
     memory = estimated(Scene.from_mapping(scene), "onset").memory
     assert measured / 2 < memory < 2 * measured
+
+
+WRONG = {
+    "relax": {"damping": -1.0},
+    "ramp": {"step": 1.0, "until": 0.5},
+    "perturb": {"fx": 7.0, "time": "long", "inertia_factor": 0.5},
+    "friction": {"B": 0.3},
+    "trigger": {"distance": []},
+    "eruptions": {"load": -1.0},
+    "modes": {"fx_over_fy": "all"},
+    "output": {"dumps": 3},
+}
+"""Sections in which every one is refused by what its keys say."""
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_what_a_command_does_not_read_is_checked_for_its_keys_alone(command):
+    reads, needs = COMMANDS[command].reads, COMMANDS[command].needs
+    unread = {name: section for name, section in WRONG.items() if name not in reads}
+    perturb = {"fx": 0.01, "time": 1.0, "inertia_factor": 0.5}
+    enough = FULL | {"eruptions": {"load": [0.01]}, "ramp": {"until": 0.02}, "perturb": perturb}
+    read = {name: enough[name] for name in needs}
+    scene = Scene.from_mapping(merged(read | unread), command=command)
+    assert all(getattr(scene, name) is None for name in unread.keys() - {"relax"})
+    assert scene.inertia_factor == (1.0 if command in ("reproduce", "triggering") else 0.5)
+    assert Scene.from_mapping(scene.resolved(), command=command) == scene
+    for name in unread:
+        with pytest.raises(SceneError, match=rf"{name}\.wrong is no key of \[{name}\]"):
+            Scene.from_mapping(merged(read | unread | {f"{name}.wrong": 1}), command=command)
+    for name in needs:
+        with pytest.raises(SceneError, match=rf"has no section \[{name}\]"):
+            Scene.from_mapping(merged({each: read[each] for each in needs if each != name}), command=command)
+
+
+def test_a_key_that_a_command_reads_of_a_section_that_it_does_not_read_is_checked():
+    with pytest.raises(SceneError, match=r"perturb\.inertia_factor = -1"):
+        Scene.from_mapping(merged({"perturb": {"inertia_factor": -1.0}}), command="settle")
+
+
+def test_a_target_beyond_the_disks_of_a_file_is_refused_with_the_scene(tmp_path):
+    section = {"fx": 0.0, "time": 1.0, "target": [100]}
+    with pytest.raises(SceneError, match="names disk 100: name disks from 0 to 99"):
+        Scene.from_mapping(merged({"packing": {"file": str(REFERENCE)}, "perturb": section}), command="perturb")

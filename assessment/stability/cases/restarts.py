@@ -16,7 +16,7 @@ from mpi4py import MPI
 from ....analysis import spectrum, stable_timestep
 from ....pywrap import Engine
 from ....pywrap.lammps.decks import DECKS
-from ....pywrap.lammps.shared_folder import shared_folder
+from ....pywrap.lammps.names_of_files import shared_folder
 from .case import Case, Outcome, measured
 from .loads import Make
 from .packings import arches, bed, crystal, law, with_low_parts

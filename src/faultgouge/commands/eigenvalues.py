@@ -17,12 +17,14 @@ from .terminal import (
     Frame,
     PackingFile,
     ScenePath,
+    check_output,
     print_json,
     print_line,
     read_scene,
     say,
     say_way,
     status,
+    stored_files,
     stored_packing,
     stored_snapshot,
     table_of,
@@ -218,14 +220,14 @@ def onset(
     grows from F_x^c on in spite of the dissipation, or because of it; the
     undamped onset stands beside. --all gives all windows up to the ramp's end.
     """
-    from faultgouge.analysis.files.wholefile import check_folder
     from faultgouge.pywrap.settling.bed import shared_bed
 
-    wanted, part = read_scene(scene, "onset --all" if every else "onset"), None if modes is None else _modes(modes)
+    wanted = read_scene(scene, "onset", "onset --all" if every else "onset")
+    part = None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if output:
-        check_folder(output)
+        check_output(output, scene, *stored_files(wanted))
     folder = _search_folder(slices, output)
     tell = say if as_json else print_line
     with status("settling") as show:
@@ -325,7 +327,10 @@ def _damped_onset(
     def known(so_far: DampedOnset, fx: float) -> None:
         if output is not None:
             _written(output, [*before, {"mu": mu, "searched_to": fx} | so_far.as_dict()])
-            keeps(f"{output} has the windows with dissipation up to F_x = {fx:.6g}, without the errors of the path")
+            keeps(
+                f"{output} has the windows with dissipation up to F_x = {fx:.6g}, without the errors of the path",
+                output,
+            )
 
     with status(f"mu = {mu:g}") as show:
         watch = partial(_under_way, show, f"mu = {mu:g}", folder=folder, tells=output is None)
@@ -412,7 +417,7 @@ def _under_way(
     """Say what is under way; at an interrupt, what a folder has, or how far the search had come if it `tells`."""
     show(f"{what}: {now}")
     if folder is not None and folder.is_dir():
-        keeps(f"{folder} has what was found so far; the same command goes on from there")
+        keeps(f"{folder} has what was found so far; the same command goes on from there", folder)
     if tells:
         keeps(f"no file was written. {what}: {now}")
 

@@ -10,7 +10,7 @@ import typer
 from ..guard import keeps
 from ..ranks import is_root
 from .pictures import modes_of
-from .terminal import Frame, PackingFile, progress, say, status, stored_packing, stored_snapshot
+from .terminal import Frame, PackingFile, check_output, progress, say, status, stored_packing, stored_snapshot
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -80,11 +80,9 @@ def import_(
     A LAMMPS deck (NAME.in, in.NAME) is run in its own folder, and its last state is
     kept as it stands, with LAMMPS's own granular styles, disks or spheres.
     """
-    from faultgouge.analysis.files.wholefile import check_folder
-
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
-    check_folder(output)
+    check_output(output)
     if file.suffix == ".in" or file.name.startswith("in."):
         given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame, relax or None]
         if floor or any(each is not None for each in given):
@@ -155,6 +153,7 @@ def export(
     from faultgouge.pywrap.exchange import ModeVectors
     from faultgouge.pywrap.exchange.formats import check_writer, write_packing
 
+    check_output(output, file)
     if frames is not None:
         if mode is not None or frame != -1:
             raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")
@@ -268,7 +267,7 @@ def _scene(scene: Path | None, values: dict[str, Any], smallest: float) -> Scene
 
     packing = {"radii": [smallest], "width": 20 * smallest}
     if scene is not None:
-        return Scene.from_toml(scene, packing=packing)
+        return Scene.from_toml(scene, packing=packing, command="settle")
     damping = {key: values[key] for key in ("cn", "ct", "tau") if key in values}
     law: dict[str, Any] = {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values}
     law["history"] = next((name for name in ("rescaled", "coulomb") if values.get(name)), "total")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..ranks import is_root
-from .terminal import Frame, PackingFile, progress, refuse_snapshot, say, stored_packing, stored_series
+from .terminal import Frame, PackingFile, check_output, progress, refuse_snapshot, say, stored_packing, stored_series
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -66,6 +66,7 @@ def draw(
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
+    check_output(output, file)
     refuse_snapshot(file)
     packing, series, cycle = stored_packing(file, -1 if frame is None else frame), None, []
     if frame is None and mode is None:
@@ -123,6 +124,7 @@ def movie(
 
     check_name(output)
     refuse_snapshot(file)
+    check_output(output, file)
     count = max(2, round(seconds * rate))
     if not is_root():
         return
@@ -163,13 +165,12 @@ def view(
     if output.suffix.lower() != ".html":
         raise typer.BadParameter(f"-o {output}: a page is an .html")
     from faultgouge.analysis import RunFile
-    from faultgouge.analysis.files.wholefile import check_folder
     from faultgouge.figures.view import check_library, equally_spaced, loads_shown, write_view
     from faultgouge.figures.view_pair import seconds
 
     check_library()
-    check_folder(output)
     refuse_snapshot(file)
+    check_output(output, file)
     if not is_root():
         return
     with RunFile(file) as run:

@@ -12,7 +12,20 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import AsJson, Out, ScenePath, print_json, progress, read_scene, say, say_way, status, tell
+from .terminal import (
+    AsJson,
+    Out,
+    ScenePath,
+    check_output,
+    print_json,
+    progress,
+    read_scene,
+    say,
+    say_way,
+    status,
+    stored_files,
+    tell,
+)
 
 if TYPE_CHECKING:
     from faultgouge.analysis.motion.hysteresis import Hysteresis
@@ -40,7 +53,8 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
 
-    wanted = read_scene(scene, "settle")
+    wanted = read_scene(scene, "settle", "settle")
+    check_output(output, scene, *stored_files(wanted))
     with Record(output, wanted, saved=keeps) as record:
         last = _settled(wanted, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
@@ -65,7 +79,8 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     from faultgouge.pywrap.runs.path import all_loads, count_behind
     from faultgouge.pywrap.scenes.refusals import needed
 
-    wanted = read_scene(scene, "ramp")
+    wanted = read_scene(scene, "ramp", "ramp")
+    check_output(output, scene, *stored_files(wanted))
     settings = needed(wanted.ramp, "ramp")
     with Record(output, wanted, saved=keeps) as record:
         start = _settled(wanted, record)
@@ -105,7 +120,8 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     from faultgouge.pywrap.runs.undamped import sampling
     from faultgouge.pywrap.scenes.refusals import needed
 
-    wanted = read_scene(scene, "perturb")
+    wanted = read_scene(scene, "perturb", "perturb")
+    check_output(output, scene, *stored_files(wanted))
     settings = needed(wanted.perturb, "perturb")
     mus = wanted.law.mus
     if len(mus) > 1:

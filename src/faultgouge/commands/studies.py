@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -10,7 +11,19 @@ import typer
 
 from ..guard import keeps
 from ..ranks import is_root
-from .terminal import AsJson, Folder, NewFolder, ScenePath, Workers, print_json, progress, read_scene, say, status
+from .terminal import (
+    AsJson,
+    Folder,
+    NewFolder,
+    ScenePath,
+    Workers,
+    alone_in,
+    print_json,
+    progress,
+    read_scene,
+    say,
+    status,
+)
 
 T = TypeVar("T")
 
@@ -27,7 +40,7 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     """
     from faultgouge.assessment.left_out.explain import explain as explain_scene
 
-    wanted = read_scene(scene, "settle")
+    wanted = read_scene(scene, "explain", "settle")
     with status("switching features off and on"):
         explanation = explain_scene(wanted)
     if as_json:
@@ -65,16 +78,16 @@ def reproduce(
     from importlib.resources import files
 
     shipped = Path(str(files("faultgouge") / "scenes"))
-    wanted = read_scene(scene or shipped / "paper.toml", "reproduce", max(ensemble, 1))
+    wanted = read_scene(scene or shipped / "paper.toml", "reproduce", "reproduce", max(ensemble, 1))
     if ensemble:
         from faultgouge.studies.reproduce.ensemble import ensemble as examine_packings
 
-        keeps(f"what {output}/results.jsonl has is kept, and the same command goes on from there")
+        keeps(f"what {output}/results.jsonl has is kept, and the same command goes on from there", output)
 
         def bar(members: Iterable[T], count: int) -> Iterator[T]:
             for number, member in enumerate(progress(members, "packings", count), 1):
                 yield member
-                keeps(f"{output}/results.jsonl has {number} more packings; the same command goes on from there")
+                keeps(f"{output}/results.jsonl has {number} more packings; the same command goes on from there", output)
 
         examine_packings(wanted, ensemble, output, say, bar, workers)
         say(f"written: {output}/ensemble.json")
@@ -82,9 +95,10 @@ def reproduce(
 
     from faultgouge.studies.reproduce import reproduce as run_protocol
 
-    keeps(f"what is in {output} so far is kept; the same command begins anew and replaces it")
-    triggered = read_scene(shipped / "triggered.toml") if scene is None else None
-    run_protocol(wanted, output, say, triggered)
+    keeps(f"what is in {output} so far is kept; the same command begins anew and replaces it", output)
+    triggered = read_scene(shipped / "triggered.toml", "reproduce") if scene is None else None
+    with alone_in(output):
+        run_protocol(wanted, output, say, triggered)
     say(f"written: {output}/report.md")
 
 
@@ -96,8 +110,9 @@ def report(
     """Error against run time: which method to take when, for six tasks, with figures and numbers."""
     from faultgouge.assessment.error_and_time import report as run_studies
 
-    keeps(f"{output} has the studies that were finished; the same command begins anew and replaces them")
-    run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
+    keeps(f"{output} has the studies that were finished; the same command begins anew and replaces them", output)
+    with alone_in(output):
+        run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
     say(f"written: {output}/report.md")
 
 
@@ -111,9 +126,14 @@ def stability(
     from faultgouge.assessment.stability import check
     from faultgouge.assessment.stability import stability as try_cases
 
-    keeps(f"{output} has the cases that were finished; the same command begins anew and replaces them")
-    result = try_cases(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
-    say(f"{len(result['cases'])} cases tried; written: {output}/stability.md")
+    keeps(f"{output} has the cases that were finished; the same command begins anew and replaces them", output)
+    with alone_in(output):
+        result = try_cases(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
+    counts = Counter(case["status"] for case in result.get("cases", ()))
+    say(
+        f"{counts.total()} cases: {counts['holds']} hold, {counts['refused']} are refused in a sentence, "
+        f"{counts['fails']} fail; written: {output}/stability.md"
+    )
     if as_json:
         print_json(result)
     check(result)
@@ -147,9 +167,10 @@ def _into_folder(
     study: Callable[..., dict[str, Any]], scene: Path, output: Path, name: str, what: str, kept: str, as_json: bool
 ) -> None:
     """Run a study of a scene that goes on in its folder; `what` is counted, and `kept` is what an interrupt leaves."""
-    wanted = read_scene(scene)
-    keeps(f"{output}/{name}.jsonl has {kept}; the same command goes on from there")
-    result = study(wanted, output, say, lambda results, count: progress(results, what, count))
+    wanted = read_scene(scene, name)
+    keeps(f"{output}/{name}.jsonl has {kept}; the same command goes on from there", output)
+    with alone_in(output):
+        result = study(wanted, output, say, lambda results, count: progress(results, what, count))
     say(f"written: {output}/{name}.md")
     if as_json:
         print_json(result)

@@ -45,12 +45,12 @@ Frame = Annotated[int, typer.Option(help="Which equilibrium; negative ones count
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
-def read_scene(path: Path, task: Task | None = None, packings: int = 1) -> Scene:
-    """The scene of a TOML file; if its task is long, what is to be done and how long it takes is said."""
+def read_scene(path: Path, command: str, task: Task | None = None, packings: int = 1) -> Scene:
+    """What a command reads of a scene, a TOML file; if its task is long, what is to be done and how long is said."""
     from faultgouge.pywrap.scenes.estimate import foreseen
     from faultgouge.pywrap.scenes.scene import Scene
 
-    scene = Scene.from_toml(path)
+    scene = Scene.from_toml(path, command=command)
     ahead = foreseen(scene, task, packings) if task is not None else ""
     if ahead:
         say(ahead)
@@ -77,6 +77,12 @@ def refuse_snapshot(file: Path) -> None:
         )
 
 
+def stored_files(scene: Scene) -> list[Path]:
+    """The files that a scene names: of its packing, and of the signal that forces it."""
+    file, signal = getattr(scene.packing, "file", None), scene.perturb.signal if scene.perturb else None
+    return [Path(each) for each in (file, signal) if each is not None]
+
+
 def stored_packing(file: Path, frame: int = -1) -> Packing:
     """A packing of a run.h5, or of the dumps that decks write."""
     from faultgouge.analysis import RunFile, read_dump
@@ -99,6 +105,26 @@ def stored_series(file: Path) -> dict[str, Any] | None:
         series = run.series("undamped") if "undamped" in run.names_of_series else None
         is_run = run.attributes.get("task") == "perturb"
     return series if is_run and series is not None and len(series["time"]) > 1 else None
+
+
+def check_output(output: Path, *inputs: Path) -> None:
+    """Refuse a file that cannot be written, or is one of the inputs, before any work."""
+    from faultgouge.analysis.files.wholefile import check_output as check
+
+    check(output, *inputs)
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Make a folder for results, and keep other runs out of it, on rank 0."""
+    from faultgouge.analysis.files.wholefile import alone_with, make_folder
+
+    if not is_root():
+        yield
+        return
+    make_folder(folder)
+    with alone_with(folder):
+        yield
 
 
 def print_json(value: dict[str, Any]) -> None:

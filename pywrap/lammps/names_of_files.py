@@ -1,0 +1,96 @@
+"""Names of files as LAMMPS's commands take them.
+
+In a line of input LAMMPS parts words at blanks and reads quotes, ``$``, ``#`` and ``&`` as its own, in names of files
+``*`` and ``%`` as well, and no quoting protects a name that reaches the line through a variable. So LAMMPS is never
+given a name of a user's. Files that it reads are linked, and files that it writes are made, under plain names in a
+temporary folder of a plain name.
+"""
+
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from mpi4py import MPI
+
+from ...analysis import FaultgougeError
+
+DECKS = Path(str(files("faultgouge.lammps_inputs")))
+
+PLAIN = re.compile(r"[A-Za-z0-9_./+:@=~-]*")
+"""Characters that mean themselves in every command of LAMMPS."""
+
+ELSEWHERE = "/tmp", "/var/tmp", "/dev/shm"
+"""Where temporary files lie if the name of Python's own place is not plain."""
+
+
+def is_plain(text: str) -> bool:
+    """Whether LAMMPS reads a text as one word that means itself."""
+    return PLAIN.fullmatch(text) is not None
+
+
+def temporary_folder() -> tempfile.TemporaryDirectory[str]:
+    """A new folder of a plain name, which goes when it is left.
+
+    Raises
+    ------
+    FaultgougeError
+        If there is no place for one.
+    """
+    for place in (tempfile.gettempdir(), *ELSEWHERE):
+        if is_plain(place) and os.access(place, os.W_OK | os.X_OK):
+            return tempfile.TemporaryDirectory(prefix="faultgouge-", dir=place)
+    raise FaultgougeError(
+        f"temporary files cannot lie in {tempfile.gettempdir()!r}, a name that LAMMPS would not read as one word: set "
+        "TMPDIR to a folder whose name has letters, digits and _ . / + : @ = ~ - alone."
+    )
+
+
+@contextmanager
+def shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
+    """A temporary folder of rank 0, of a plain name, that all ranks know."""
+    keeper = temporary_folder() if communicator.rank == 0 else None
+    try:
+        yield Path(communicator.bcast(keeper.name if keeper else None))
+        communicator.barrier()  # not after an error, which one rank may be alone with
+    finally:
+        if keeper:
+            keeper.cleanup()
+
+
+@contextmanager
+def plain_name(path: Path) -> Iterator[Path]:
+    """A plain name of a file that is there: its own, or that of a link to it."""
+    whole = Path(os.path.realpath(path))
+    if is_plain(str(whole)):
+        yield whole
+        return
+    with temporary_folder() as folder:
+        link = Path(folder) / f"file{whole.suffix if is_plain(whole.suffix) else ''}"
+        link.symlink_to(whole)
+        yield link
+
+
+@cache
+def decks_folder() -> Path:
+    """The folder of the deck parts, or a link to it that lasts as long as this process."""
+    if is_plain(str(DECKS)):
+        return DECKS
+    _KEPT.append(temporary_folder())
+    link = Path(_KEPT[-1].name) / "decks"
+    link.symlink_to(DECKS)
+    return link
+
+
+_KEPT: list[tempfile.TemporaryDirectory[str]] = []
+
+
+def move_files(folder: Path, stem: Path) -> None:
+    """Move the files of a folder, KIND each by its suffix, to STEM.KIND."""
+    for file in sorted(folder.iterdir()):
+        shutil.move(file, f"{stem}{file.suffix}")

@@ -1,0 +1,56 @@
+"""Which sections of a scene a command reads.
+
+A command meets a scene with the sections that it reads, and no other: what it does not read cannot refuse it, and is
+no part of what it stores. Of the other sections the keys alone are checked, since a misspelled key is a mistake
+wherever it stands. A section that a command needs is asked for before any work is done.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+BED = ("precision", "packing", "law", "load", "damping", "units", "perturb.inertia_factor")
+"""What decides the settled packing and its masses, read by every command. Of [perturb] that is one key."""
+PATH = (*BED, "relax", "ramp")
+"""What decides the equilibria along F_x."""
+RUN = (*PATH, "perturb", "friction")
+"""What decides undamped runs."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """What a command takes from a scene.
+
+    Attributes
+    ----------
+    reads : tuple of str
+        Sections, or a single key of a section as in "perturb.inertia_factor".
+    needs : tuple of str
+        Those that it cannot do without.
+    """
+
+    reads: tuple[str, ...]
+    needs: tuple[str, ...] = ()
+
+    def part(self, scene: Mapping[str, Any]) -> dict[str, Any]:
+        """The sections that are read, of a scene as TOML holds it; of a section with single keys, these."""
+        read = {name: value for name, value in scene.items() if name in self.reads}
+        for section, key in (name.split(".") for name in self.reads if "." in name):
+            value = scene.get(section)
+            if section not in read and isinstance(value, Mapping) and key in value:
+                read[section] = {key: value[key]}
+        return read
+
+
+COMMANDS: Mapping[str, Command] = {
+    "settle": Command(BED),
+    "ramp": Command((*PATH, "output"), ("ramp",)),
+    "perturb": Command((*RUN, "output"), ("perturb",)),
+    "onset": Command(PATH, ("ramp",)),
+    "reproduce": Command(RUN, ("ramp",)),
+    "triggering": Command(RUN, ("ramp",)),
+    "trigger": Command((*PATH, "friction", "trigger"), ("ramp", "friction")),
+    "eruptions": Command((*PATH, "eruptions"), ("ramp", "eruptions")),
+    "modes": Command((*PATH, "modes"), ("ramp",)),
+}
+"""Commands, and tasks of sweeps, by name. One that is not here reads every section."""
