@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // Sums of two doubles, and coordinates on a fixed grid. No LAMMPS types.
 //
 // A coordinate of order 10 is known to 1e-15, an overlap of 4e-4 that is the difference of two such numbers

@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // The forces of all neighbour pairs, in double or compensated arithmetic. No LAMMPS types.
 //
 // Pairs are told apart from contacts by their distance first. Contacts are then worked on in batches, with loops

@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // The loop over the pairs, for one kind of numbers and all variants of the law. No LAMMPS types. Included by the files
 // that compile it for doubles and in compensated arithmetic: each takes half of the time that the plugin takes to
 // compile.

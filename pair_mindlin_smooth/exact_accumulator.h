@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // Sums of doubles without a rounding, which do not depend on the order of what is added: integers of 64 bits, each for
 // 32 bits of a fixed-point number that spans all doubles. Integers of several ranks are added by one reduction.
 //

@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // The velocities that dashpots feel: fix dashpot/velocities, made by pair mindlin/smooth with the keyword damping.
 //
 // LAMMPS asks for the forces of step n + 1 while velocities are those of the half step. Dashpots take

@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // Integrators of disks in the plane, with moment of inertia I = I0 m R^2.
 //
 //   fix ID group nve/disc I0 [drag TAU]      velocity Verlet, undamped, or with the drag -(m/TAU) v and -(I/TAU) omega

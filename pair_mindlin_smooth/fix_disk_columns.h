@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // A fix with a row of numbers for each disk, of one length for all: the per-atom array moves with the disks between
 // ranks and goes through restart files.
 

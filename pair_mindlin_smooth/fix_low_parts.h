@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // Low parts of coordinates and forces: fix low/parts, made by pair mindlin/smooth with the keyword compensated.
 //
 // Columns of the per-atom array: x, y (what the coordinates in x lack, see compensated.h), f_x, f_y, torque (what

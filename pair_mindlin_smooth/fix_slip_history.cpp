@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 #include "fix_slip_history.h"
 
 #include "atom.h"
@@ -51,6 +56,19 @@ void FixSlipHistory::init()
   int widest;
   MPI_Allreduce(&capacity, &widest, 1, MPI_INT, MPI_MAX, world);
   set_capacity(widest);
+  check_ids();
+}
+
+// rows hold the IDs of partners as doubles, in which whole numbers are exact up to 2^53
+void FixSlipHistory::check_ids() const
+{
+  constexpr bigint LARGEST = bigint(1) << 53;
+  bigint mine = 0, largest = 0;
+  for (int i = 0; i < atom->nlocal; i++) mine = std::max(mine, static_cast<bigint>(atom->tag[i]));
+  MPI_Allreduce(&mine, &largest, 1, MPI_LMP_BIGINT, MPI_MAX, world);
+  if (largest > LARGEST)
+    error->all(FLERR, "The slip history takes atom IDs up to 9007199254740992, and there is {}: number the disks anew",
+               largest);
 }
 
 void FixSlipHistory::post_run()

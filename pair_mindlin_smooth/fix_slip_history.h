@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // The slips of the contacts, kept with the disks: fix slip/history, made by pair mindlin/smooth.
 //
 // Row i of the per-atom array is [own ID, partner ID, slip, partner ID, slip, ..., 0, 0]: the contacts of
@@ -37,6 +42,7 @@ public:
 
   void set_source(SlipSource *s) { source = s; }
   void check_owners() const;
+  void check_ids() const;
   void clear(int i);
   bool compensated() const { return has_low; }
   bool energy() const { return has_energy; }

@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // fix ID group weaken/friction MU B W MU_SS V0 V_SS
 //
 // Friction of pair mindlin/smooth and of all floors that weakens with the mean velocity v of the group along x,

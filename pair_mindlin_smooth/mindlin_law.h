@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // The contact law of two disks, and of a disk on the floor. No LAMMPS types.
 //
 // n points from j to i and tau = z x n; overlap delta > 0; slip s along tau; the exponent p is 3/2 or 1.

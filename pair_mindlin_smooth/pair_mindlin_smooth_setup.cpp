@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // What comes before a run and between runs: keywords, checks, fixes, restarts.
 
 #include "pair_mindlin_smooth.h"
@@ -324,25 +329,48 @@ void PairMindlinSmooth::read_restart(FILE *fp)
     for (int j = i; j <= atom->ntypes; j++) setflag[i][j] = 1;
 }
 
+namespace {
+
+// What begins the settings in a restart file, and how they are laid out: five doubles, then four integers.
+constexpr int RESTART_MARK = 0x4d444c53, RESTART_LAYOUT = 1;
+
+}    // namespace
+
 void PairMindlinSmooth::write_restart_settings(FILE *fp)
 {
-  fwrite(&law, sizeof(MindlinLaw), 1, fp);
-  fwrite(&compensated, sizeof(bool), 1, fp);
-  const unsigned char keywords = (damping ? 1 : 0) + (energy ? 2 : 0);
-  fwrite(&keywords, sizeof(keywords), 1, fp);
+  const int head[2] = {RESTART_MARK, RESTART_LAYOUT};
+  const double numbers[5] = {law.kn, law.kt, law.mu, law.cn, law.ct};
+  const int words[4] = {static_cast<int>(law.exponent), static_cast<int>(law.history), compensated ? 1 : 0,
+                        (damping ? 1 : 0) + (energy ? 2 : 0)};
+  fwrite(head, sizeof(int), 2, fp);
+  fwrite(numbers, sizeof(double), 5, fp);
+  fwrite(words, sizeof(int), 4, fp);
 }
 
 void PairMindlinSmooth::read_restart_settings(FILE *fp)
 {
-  unsigned char keywords = 0;
+  int head[2] = {0, 0}, words[4] = {0, 0, 0, 0};
+  double numbers[5] = {0.0, 0.0, 0.0, 0.0, 0.0};
+  if (comm->me == 0) utils::sfread(FLERR, head, sizeof(int), 2, fp, nullptr, error);
+  MPI_Bcast(head, 2, MPI_INT, 0, world);
+  if (head[0] != RESTART_MARK || head[1] != RESTART_LAYOUT)
+    error->all(FLERR,
+               "The restart file has the settings of pair_style mindlin/smooth of another version: read the file with "
+               "the version that wrote it, write_data there, and read the data file here");
   if (comm->me == 0) {
-    utils::sfread(FLERR, &law, sizeof(MindlinLaw), 1, fp, nullptr, error);
-    utils::sfread(FLERR, &compensated, sizeof(bool), 1, fp, nullptr, error);
-    utils::sfread(FLERR, &keywords, sizeof(keywords), 1, fp, nullptr, error);
+    utils::sfread(FLERR, numbers, sizeof(double), 5, fp, nullptr, error);
+    utils::sfread(FLERR, words, sizeof(int), 4, fp, nullptr, error);
   }
-  MPI_Bcast(&law, sizeof(MindlinLaw), MPI_BYTE, 0, world);
-  MPI_Bcast(&compensated, sizeof(bool), MPI_BYTE, 0, world);
-  MPI_Bcast(&keywords, sizeof(keywords), MPI_BYTE, 0, world);
-  damping = keywords & 1;
-  energy = keywords & 2;
+  MPI_Bcast(numbers, 5, MPI_DOUBLE, 0, world);
+  MPI_Bcast(words, 4, MPI_INT, 0, world);
+  law.kn = numbers[0];
+  law.kt = numbers[1];
+  law.mu = numbers[2];
+  law.cn = numbers[3];
+  law.ct = numbers[4];
+  law.exponent = static_cast<decltype(law.exponent)>(words[0]);
+  law.history = static_cast<decltype(law.history)>(words[1]);
+  compensated = words[2] != 0;
+  damping = words[3] & 1;
+  energy = words[3] & 2;
 }

@@ -1,3 +1,8 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
 // Factors L D L^T of a sparse symmetric matrix without pivoting, and solutions with them, see ldlt.py.
 //
 // No fused multiply-add (-ffp-contract=off): results are then the same to the bit on every machine.

@@ -8,7 +8,7 @@ do not swap names. (:math:`|y_a^H x_b|`, the obvious weight, vanishes at an exce
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -38,7 +38,9 @@ def force_bearing(packing: Configuration, limits: Limits = LIMITS) -> Configurat
     and shut windows at random.
     """
     largest = packing.normal_force.max(initial=0.0)
-    return packing.loaded(min(limits.unknown_force * packing.residual, limits.small_force * largest))
+    return cast(
+        Configuration, packing.loaded(min(limits.unknown_force * packing.residual, limits.small_force * largest))
+    )
 
 
 def contact_states(packing: Packing | Snapshot, limits: Limits = LIMITS) -> bytes:

@@ -26,7 +26,8 @@ class SnapshotMode:
 
     def fields(self, snapshot: Snapshot) -> dict[str, Floats]:
         """Translations and rotations R theta, shape (N, 3), by the names that they have in a file."""
-        found, d = {}, snapshot.dimension
+        d = snapshot.dimension
+        found: dict[str, Floats] = {}
         parts = self.vector.reshape(snapshot.axes, -1)
         for part, moved in (("", parts.real), ("_imag", parts.imag)):
             if not part or np.any(moved):

@@ -16,6 +16,7 @@ contact's plane by 1e-10 of Coulomb's bound, so that an amplitude below that lea
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -94,9 +95,7 @@ def compare_motion(
     root = np.sqrt(snapshot.coordinate_mass)
     start = np.zeros(snapshot.coordinates)
     start[active] = amplitude * np.random.Generator(np.random.PCG64(seed)).standard_normal(len(active))
-    there, back = (
-        forked_look.in_a_copy(lambda v=sign * start: _run(lmp, snapshot, v, step, steps)) for sign in (1, -1)
-    )
+    there, back = (forked_look.in_a_copy(partial(_run, lmp, snapshot, sign * start, step, steps)) for sign in (1, -1))
     measured = (0.5 * (there - back) * root)[active]
     a = stiffness[active][:, active]
     g = mass_weighted(damping_matrix(snapshot), snapshot)[active][:, active]

@@ -177,7 +177,8 @@ def at_rest(lmp: Any, groups: dict[str, str], walls: tuple[str, ...], columns: s
         found[key] = np.zeros((0, 1)) if local is None else np.array(local)
     count = len(found["id"])
     for name in groups:
-        found[name] = np.array(lmp.numpy.extract_variable(f"faultgouge_{name}", "all", 1))[:count] > 0
+        members = np.array(lmp.numpy.extract_variable(f"faultgouge_{name}", "all", 1))[:count]
+        found[name] = members > 0
     for wall in walls:
         rows = lmp.numpy.extract_fix(wall, 1, 2)
         found[f"wall {wall}"] = np.zeros((0, 8)) if count == 0 else np.array(rows)[:count]

@@ -340,13 +340,15 @@ class _Contacts:
 
     def _own_law(self, words: list[str]) -> MindlinLaw:
         """The smooth law of a line, whose first three words are kn, kt and mu."""
-        values = [float(word) for word in words[:3]]
+        kn, kt, mu = map(float, words[:3])
         rest = words[3:]
         at = rest.index("damping") if "damping" in rest else None
         cn, ct = (0.0, 0.0) if at is None else (float(word) for word in rest[at + 1 : at + 3])
         exponent = float(rest[rest.index("exponent") + 1]) if "exponent" in rest else 1.5
-        rescaled = "history" in rest and rest[rest.index("history") + 1] == "rescaled"
-        return MindlinLaw(*values, exponent=exponent, cn=cn, ct=ct, rescaled=rescaled)
+        history = rest[rest.index("history") + 1] if "history" in rest else "total"
+        return MindlinLaw(
+            kn, kt, mu, exponent=exponent, cn=cn, ct=ct, rescaled=history == "rescaled", coulomb=history == "coulomb"
+        )
 
     def _own_pairs(self) -> LinearisedContacts:
         i, j, normal, distance, overlap, rows = self._pairs()

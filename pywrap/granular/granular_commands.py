@@ -63,7 +63,9 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
     SnapshotError
         If no line is a pair_style, or a line that a user gives has a variable in it.
     """
-    style, coefficients, fixes = "", [], {}
+    style = ""
+    coefficients: list[str] = []
+    fixes: dict[str, str] = {}
     for line in _whole(lines):
         words = line.split("#")[0].split()
         if not words:

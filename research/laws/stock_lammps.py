@@ -113,7 +113,7 @@ def grow(seed: int, law: str, share: float) -> dict:
         (folder / "packing.data").write_text(data_file(packing))
         deck = DECK.format(top=top, law=LAWS[law](np.unique(packing.radius)), fx=share * FY, fy=FY, noise=NOISE)
         (folder / "deck.in").write_text(deck)
-        command = [Path(sys.executable).parent / "lmp", "-in", "deck.in", "-log", "none"]
+        command = [str(Path(sys.executable).parent / "lmp"), "-in", "deck.in", "-log", "none"]
         run = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         if run.returncode:
             return {

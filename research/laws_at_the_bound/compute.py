@@ -66,7 +66,7 @@ def both_laws(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
             del each["modes"]
         return counts | {"smooth": smooth, "standard": standard}
 
-    return along_ramp(scene, lambda mu: rest, look)
+    return along_ramp(scene, rest, look)
 
 
 def smooth_derivatives(packing: Packing) -> Derivatives:
