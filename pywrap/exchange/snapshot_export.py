@@ -91,7 +91,7 @@ def _of_particles(snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> dict[str
         np.bincount(c.i, weight, len(snapshot)) + np.bincount(c.j[pair], weight[pair], len(snapshot))
         for weight in (np.ones(len(c)), c.normal_force)
     )
-    values = {
+    values: dict[str, Floats] = {
         "radius": snapshot.radius,
         "mass": snapshot.mass,
         "id": snapshot.ids.astype(np.float64),

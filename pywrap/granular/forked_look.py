@@ -171,7 +171,9 @@ def at_rest(lmp: Any, groups: dict[str, str], walls: tuple[str, ...], columns: s
     for name, group in groups.items():
         lmp.command(f"variable faultgouge_{name} atom gmask({group})")
     lmp.command("run 0 post no")
-    found = {name: np.array(_owned_array(lmp, name)) for name in ("id", "type", "x", "f", "torque", "radius", "rmass")}
+    found: dict[str, np.ndarray] = {
+        name: np.array(_owned_array(lmp, name)) for name in ("id", "type", "x", "f", "torque", "radius", "rmass")
+    }
     for name, key in (("c", "contacts"), ("i", "partners")):
         local = lmp.numpy.extract_compute(f"faultgouge_{name}", 2, 2)
         found[key] = np.zeros((0, 1)) if local is None else np.array(local)
