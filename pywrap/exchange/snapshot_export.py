@@ -100,8 +100,8 @@ def _of_particles(snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> dict[str
         "load": snapshot.load[:, 0],
         "net_force": snapshot.net_force[:, 0],
         "net_torque": snapshot.net_force[:, 1],
-        "normal_force": pressure,
-        "coordination": count,
+        "normal_force": pressure.astype(np.float64),
+        "coordination": count.astype(np.float64),
     }
     for mode in modes:
         values |= mode.fields(snapshot)
