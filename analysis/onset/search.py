@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from ..errors import FaultgougeError, TurningPointError
 from ..packing.packing import Floats, Packing
 from ..spectrum.buckling import negative_eigenvalues
-from ..spectrum.spectrum import spectrum
+from ..spectrum.spectrum import Spectrum, spectrum
 from ..table_display import Tabled
 from ..uncertain_digits import with_uncertainty
 from .all_windows import all_windows
@@ -71,7 +71,11 @@ class Unstable:
     @classmethod
     def of(cls, packing: Packing) -> "Unstable":
         """Count what all eigenvalues of a packing show, without contacts whose force is unknown."""
-        found = spectrum(force_bearing(packing))
+        return cls.counted(spectrum(force_bearing(packing)))
+
+    @classmethod
+    def counted(cls, found: Spectrum) -> "Unstable":
+        """The same of a spectrum that is known."""
         return cls(len(found.pairs), len(found.negative), found.growth_rate())
 
     def __str__(self) -> str:
@@ -246,19 +250,49 @@ def find_onset(
         return full_operator(packing, limits)
 
     doubtful: Increments = ()
+    all_modes: Spectrum | None = None
     if takes_all:
         narrowest = _narrowest(loads, limits) if narrowest is None else narrowest
-        windows = all_windows(Family(operator, narrowest, limits, states.__getitem__), loads, first=first)
+        try:
+            windows = all_windows(Family(operator, narrowest, limits, states.__getitem__), loads, first=first)
+        except TurningPointError:
+            all_modes = _complex_at_start(start, limits)  # then the branch ends within the first increment
+            if all_modes is None:
+                raise
+            windows = (_fastest(start, all_modes),)
         windows = windows[:1] if first else windows
+    elif modes is None and (all_modes := _complex_at_start(start, limits)):
+        windows = (_fastest(start, all_modes),)
+        unbalanced[start.fx] = load_error(start)
     else:
         one, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks, folder)
         windows = (one,) if one else ()
     if not windows:
         raise OnsetError.among(modes, float(loads[-1]), doubtful)
     windows = tuple(_with_imbalance(window, unbalanced) for window in windows)
-    at_start = Unstable.of(start) if takes_all and windows[0].kind == "start" else None
+    unstable = None
+    if windows[0].kind == "start" and (all_modes or takes_all):
+        unstable = Unstable.counted(all_modes) if all_modes else Unstable.of(start)
     complete = takes_all and not first
-    return Onset(windows, complete, doubtful, modes, at_start, float(ends) if ends < np.inf else None)
+    return Onset(windows, complete, doubtful, modes, unstable, float(ends) if ends < np.inf else None)
+
+
+def _complex_at_start(start: Packing, limits: Limits) -> Spectrum | None:
+    """The spectrum of a packing at the smallest load, if it has a complex pair.
+
+    None if it has none, or if the packing is too large for all eigenvalues to be asked for. Without tangential forces
+    the operator is symmetric, and nothing is computed.
+    """
+    if start.coordinates > limits.lapack or not start.contacts.slip.any():
+        return None
+    found = spectrum(force_bearing(start, limits))
+    return found if found.pairs else None
+
+
+def _fastest(start: Packing, found: Spectrum) -> Window:
+    """The window of the complex pair that grows fastest at the smallest load."""
+    pair = max(found.pairs, key=lambda each: each.growth_rate)
+    return Window(start.fx, None, pair.eigenvalue.real, 0.0, None, pair.overlap, "start")
 
 
 def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:

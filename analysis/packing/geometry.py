@@ -1,15 +1,19 @@
 """Where contacts are and how they stand, in a box that may be periodic; definitions as of `packing`."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from ..errors import BadInputError
 from .arrays import Floats, floats
 from .compensated import Pair, exact_sum, overlap_and_distance, separation
 from .contacts import FLOOR, Contacts
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 
 class ContactGeometry(NamedTuple):
@@ -120,6 +124,8 @@ def touching(position: ArrayLike, radius: ArrayLike, box_length: float | None = 
 
 def neighbour_tree(position: Floats, box_length: float | None) -> cKDTree:
     """The tree that finds near centres, shape (N, 2), also across the periodic sides."""
+    from scipy.spatial import cKDTree
+
     wrapped = position.copy()
     if box_length is not None:
         wrapped[:, 0] %= box_length

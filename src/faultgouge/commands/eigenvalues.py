@@ -290,7 +290,11 @@ def _undamped_onset(
     si, opening = real.get("si", []), onset.windows[0]
     among = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
     if opening.kind == "start":
-        why = f"an eigenvalue is {opening.eigenvalue:.6g}" if onset.at_start is None else str(onset.at_start)
+        about = f"{opening.eigenvalue:.6g}"
+        known = (
+            f"an eigenvalue is {about}" if opening.eigenvalue < 0 else f"a pair of eigenvalues is complex about {about}"
+        )
+        why = known if onset.at_start is None else str(onset.at_start)
         tell(f"mu = {mu:g}: unstable at F_x = {opening.fx_onset:g}{among}, before any shear is added: {why}")
     else:
         tell(f"mu = {mu:g}: F_x^c = {with_uncertainty(onset.fx_c, onset.error)}{among}")
