@@ -142,7 +142,7 @@ def test_rows_of_a_function_are_known_by_its_code_and_shards_merge_without_it(tm
     user_function.cache_clear()
     assert not set(before) & {point.key for point in function_sweep(tmp_path, "contacts").points}
     file.unlink()
-    assert [row["key"] for row in merge(parts, tmp_path / "whole", id)] == before
+    assert [row["key"] for row in merge(parts, tmp_path / "whole", id)[1]] == before
 
 
 @pytest.mark.parametrize(
@@ -222,7 +222,7 @@ def test_failures_are_rows_and_merge_refuses_what_does_not_belong_together(tmp_p
 def test_the_dry_run_counts_and_computes_nothing(faultgouge, tmp_path):
     (tmp_path / "sweep.toml").write_text(TOML)
     done = faultgouge("sweep", "sweep.toml", "-o", "out", "--dry-run")
-    assert "8 scenes to compute, 4 packings to settle" in done.stderr
+    assert "8 scenes to compute, 4 packings to settle" in done.stdout
     assert "4 points make no scene" in done.stderr
     assert not (tmp_path / "out").exists()
 
