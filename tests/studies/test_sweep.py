@@ -17,7 +17,7 @@ from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.studies.hands import Processes, hands
 from faultgouge.studies.sweep import workers
 from faultgouge.studies.sweep.compute import merge, run_sweep, stored
-from faultgouge.studies.sweep.draw import draw_sweep
+from faultgouge.studies.sweep.draw import draw_sweep, onsets_figure, reach_of
 from faultgouge.studies.sweep.points import Sweep
 from faultgouge.studies.sweep.tasks import TASKS, estimate
 from faultgouge.studies.sweep.user_function import user_function
@@ -216,6 +216,13 @@ def test_failures_are_rows_and_merge_refuses_what_does_not_belong_together(tmp_p
     merge([tmp_path / "a"], tmp_path / "c", said.append)
     assert said[0].startswith("1 of 2 scenes")
     assert [row["says"] for row in table(tmp_path / "c")] == [failed["says"]]
+
+
+def test_the_picture_counts_the_scenes_without_an_onset():
+    rows = [{"values": {"law.mu": mu}, "result": {"fx_c": mu / 50, "ends": "onset"}} for mu in (0.5, 1.0)]
+    rows.append({"values": {"law.mu": 0.2}, "result": {"reach": 0.03, "ends": "until"}})
+    share = onsets_figure([(row, reach_of(row)) for row in rows]).axes[0]
+    assert share.get_title() == "3 scenes: 2 with an onset, 1 without"
 
 
 @pytest.mark.slow

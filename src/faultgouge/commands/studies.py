@@ -46,8 +46,9 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     elif is_root():
         from rich.console import Console
 
-        from faultgouge.assessment.left_out.explanation_table import explanation_table
+        from faultgouge.assessment.left_out.explanation_table import explanation_table, in_words
 
+        print_line(f"{in_words(explanation)}\n")
         console = Console(highlight=False)
         # a file or a pipe has no width, and a table of 80 columns is hard to read
         Console(highlight=False, width=max(console.width, 150)).print(explanation_table(explanation))
