@@ -9,8 +9,8 @@ write packings.
 
 from .damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows
 from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
-from .files.by_hand import read_packing
 from .files.dumps import read_dump
+from .files.json_packing import read_packing
 from .files.runfile import RunFile
 from .motion.growth import Growth, fit_growth, growth_of_run, mean_square_displacement
 from .motion.response import layer_force, linear_response

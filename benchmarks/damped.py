@@ -43,14 +43,14 @@ import numpy as np
 from scipy.linalg import eigvals
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
-from faultgouge.analysis.damped_onset.edge import DampedWindow
-from faultgouge.analysis.damped_onset.growing import Growing
+from faultgouge.analysis.damped_onset.all_windows import Growing
+from faultgouge.analysis.damped_onset.first_window import first_growing
 from faultgouge.analysis.damped_onset.modes import Pencil
-from faultgouge.analysis.damped_onset.sliced import first_growing
-from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating, walked
+from faultgouge.analysis.damped_onset.window_edges import DampedWindow
+from faultgouge.analysis.damped_onset.windows import damped_windows, march_along_ramp, without_dissipation
 from faultgouge.analysis.onset.limits import LIMITS
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset.damped import Ramped, inside, ramped
+from faultgouge.pywrap.onset.damped import Ramped, loads_inside, ramp_scene
 
 KINDS = ({"cn": 1.0}, {"cn": 10.0, "ct": 5.0}, {"ct": 0.1}, {"cn": 0.1, "drag_time": 300.0})
 """Dissipation, in turn."""
@@ -80,21 +80,21 @@ Case = tuple[int, Ramped, dict[str, float]]
 """The seed, the ramp and the dissipation of a packing."""
 
 
-def compared(ramp: Ramped, kind: dict[str, float]) -> tuple[Row, bool]:
+def compare_searches(ramp: Ramped, kind: dict[str, float]) -> tuple[Row, bool]:
     """Both searches on a ramp, and whether they agree."""
     times = [time.process_time()]
     try:
-        complex_pairs = find_onset(dissipating(ramp.path), ramp.forces).windows
+        complex_pairs = find_onset(without_dissipation(ramp.path), ramp.forces).windows
     except OnsetError:
         complex_pairs = ()
-    look = inside(complex_pairs)
+    look = loads_inside(complex_pairs)
     times.append(time.process_time())
-    path = dissipating(ramp.path, **kind)
+    path = without_dissipation(ramp.path, **kind)
     few = damped_windows(path, ramp.forces, look=look)
     times.append(time.process_time())
     loads = np.unique(np.concatenate([ramp.forces, [fx for fx in look if fx < ramp.forces[-1]]]))
     narrowest = LIMITS.narrowest * float(ramp.forces[-1])
-    every = walked(Growing(lambda fx: Pencil.of(path(fx)), narrowest, None), loads)
+    every = march_along_ramp(Growing(lambda fx: Pencil.of(path(fx)), narrowest, None), loads)
     times.append(time.process_time())
     undamped, seconds, whole = np.diff(times)
     differences, stated = edges(few, every)
@@ -119,7 +119,7 @@ def edges(few: tuple[DampedWindow, ...], every: tuple[DampedWindow, ...]) -> tup
 
 def against_all_eigenvalues(ramp: Ramped, kind: dict[str, float]) -> tuple[Row, bool]:
     """The first window from slices, and whether all eigenvalues of the companion matrix agree with it."""
-    path = dissipating(ramp.path, **kind)
+    path = without_dissipation(ramp.path, **kind)
     begin = time.process_time()
     window, doubtful = first_growing(lambda fx: Pencil.of(path(fx)), ramp.forces)
     row: Row = {"seconds": f"{time.process_time() - begin:.2f}"}
@@ -147,7 +147,7 @@ def cases(disks: int, seeds: Iterator[int], packings: int, until: float, kinds: 
         steps = {"step": until / 20, "until": until}
         scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": steps}
         try:
-            with ramped(Scene.from_mapping(scene)) as ramp:
+            with ramp_scene(Scene.from_mapping(scene)) as ramp:
                 if not ramp.whole:  # the ramp of a large packing goes no farther than the onset
                     ramp.path(float(ramp.forces[1]))
                 yield seed, ramp, kinds[seed % len(kinds)]
@@ -192,7 +192,7 @@ def main() -> None:
     if options.large:
         large(options.disks[0], options.ranks, options.step, options.folder)
         return
-    compare, kinds = (against_all_eigenvalues, FIRST_KINDS) if options.first else (compared, KINDS)
+    compare, kinds = (against_all_eigenvalues, FIRST_KINDS) if options.first else (compare_searches, KINDS)
     wrong, total, rows = 0, options.packings * len(options.disks), []
     with options.table.open("w", newline="") as file:
         table = csv.DictWriter(file, FIRST_COLUMNS if options.first else COLUMNS, lineterminator="\n")

@@ -16,8 +16,8 @@ from typing import Any
 import dask
 from distributed import Client, LocalCluster, SpecCluster
 
-from faultgouge.studies.sweep.compute import run_sweep
-from faultgouge.studies.sweep.points import Sweep
+from faultgouge.studies.sweep.run_sweep import run_sweep
+from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
 
 SCENE = {

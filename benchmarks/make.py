@@ -40,7 +40,9 @@ BENCHMARKS = {
     ),
     "parts": Benchmark("faultgouge explain scenes/paper.toml --json", "faultgouge explain scenes/paper.toml --json"),
     "increment": Benchmark("python benchmarks/increment.py", "python benchmarks/increment.py"),
-    "size": Benchmark("python benchmarks/scale.py", "python benchmarks/scale.py --disks 300 1000 --crystals 1000 10000"),
+    "size": Benchmark(
+        "python benchmarks/scale.py", "python benchmarks/scale.py --disks 300 1000 --crystals 1000 10000"
+    ),
 }
 """By their names in the template."""
 

@@ -41,9 +41,9 @@ import numpy as np
 from faultgouge.analysis import OnsetError, Packing, RunFile, find_onset, stiffness_matrix
 from faultgouge.assessment.stability.cases.packings import crystal
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate, settle
-from faultgouge.pywrap.equilibria.newton_matrix import factored
+from faultgouge.pywrap.equilibria.newton_matrix import factor_stiffness
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
-from faultgouge.pywrap.runs.path import EquilibriumPath
+from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
 from faultgouge.pywrap.runs.undamped import time_step
 
 Row = dict[str, float | int | None]
@@ -115,7 +115,7 @@ def increments(engine: Engine, start: Equilibrium) -> Row:
     begin = time.perf_counter()
     stiffness_matrix(packing)
     assembled = time.perf_counter()
-    factors = factored(trial, trial.floor)
+    factors = factor_stiffness(trial, trial.floor)
     if factors is not None:
         factors.solve(trial.force)
     return {

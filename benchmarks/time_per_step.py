@@ -82,7 +82,7 @@ def hexagonal(disks: int) -> str:
     return HEXAGONAL.format(density=2 / 3**0.5 / SPACING**2, nx=nx, ny=round(disks / 2 / nx))
 
 
-def settled(folder: Path) -> Path:
+def settle_data_file(folder: Path) -> Path:
     """A LAMMPS data file of 1,000 disks at rest."""
     scene = Scene.from_mapping(
         {"packing": {"disks": 1000, "top": 32, "width": 37.7, "seed": 2}, "law": {"kn": KN}, "load": {"fy": 3.0}}
@@ -149,7 +149,7 @@ def main() -> None:
 
     print(f"{platform.processor() or platform.machine()}; microseconds per step, median of {options.turns} [extremes]")
     with tempfile.TemporaryDirectory() as folder:
-        data = settled(Path(folder)) if "disordered" in options.packing else None
+        data = settle_data_file(Path(folder)) if "disordered" in options.packing else None
         for packing, disks in itertools.product(options.packing, options.disks):
             if packing == "disordered" and disks < 1000:
                 continue

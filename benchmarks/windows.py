@@ -73,7 +73,7 @@ def law(mu: float) -> Row:
     return {"kn": 2e5, "mu": mu}
 
 
-def searched(scene: Scene, mu: float, first: bool) -> Row:
+def search_windows(scene: Scene, mu: float, first: bool) -> Row:
     """The windows of one ramp, or the first alone, and how the search for them ends."""
     begin = time.process_time()
     row: Row = {"ends": "onset", "windows": [], "doubtful": []}
@@ -145,7 +145,7 @@ def main() -> None:
         windows = 0
         for name, scene, mu in scenes(group):
             key = f"{name} mu={mu:g}"
-            row = searched(scene, mu, options.first)
+            row = search_windows(scene, mu, options.first)
             rows, windows = rows + 1, windows + len(row["windows"])
             print(
                 f"{group:10s}{key:20s}{row['ends']:6s}{len(row['windows']):3d} windows{row['seconds']:8.2f} s", end=""

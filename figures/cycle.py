@@ -49,7 +49,9 @@ def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
     axes.legend(title="$F_x$", fontsize=7, title_fontsize=7)
     left = hysteresis(packings)
     if left is not None:
-        words = [f"{name} {_signed(value)}" for name, value in (("remains:", left.remaining), ("work:", left.work))]
+        words = [
+            f"{name} {_format_signed(value)}" for name, value in (("remains:", left.remaining), ("work:", left.work))
+        ]
         axes.set_title(f"back at $F_x = {left.fx:.4g}$: " + ", ".join(words), fontsize=7)
     return figure_of(axes)
 
@@ -61,5 +63,5 @@ def in_powers_of_ten(moved: Floats) -> tuple[Floats, str]:
     return moved / 10.0**power, f"displacement of the upper layer{unit}"
 
 
-def _signed(value: float) -> str:
+def _format_signed(value: float) -> str:
     return "0" if value == 0 else f"${'-' if value < 0 else ''}{scientific(abs(value))}$"

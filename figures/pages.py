@@ -9,7 +9,7 @@ from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-from ..analysis.digits import with_uncertainty
+from ..analysis.uncertain_digits import with_uncertainty
 
 WIDTH = 118
 """Characters of a line of prose."""
@@ -38,7 +38,7 @@ def render(package: str, name: str, **numbers: Any) -> str:
     **numbers
         What the template names; a name that is missing is an error.
     """
-    return filled(_text(package, name, numbers))
+    return fill_paragraphs(_text(package, name, numbers))
 
 
 def lines(package: str, name: str, **numbers: Any) -> list[str]:
@@ -61,14 +61,14 @@ def _text(package: str, name: str, numbers: dict[str, Any]) -> str:
     return environment.get_template(name).render(**numbers)
 
 
-def filled(text: str) -> str:
+def fill_paragraphs(text: str) -> str:
     """A page whose paragraphs are as wide as a screen at the most; blocks of code and formulas stay as they are."""
     parts = re.split(r"^((?:```|\$\$).*?^(?:```|\$\$)$)", text, flags=re.MULTILINE | re.DOTALL)
-    parts[::2] = map(_folded, parts[::2])
+    parts[::2] = map(_fold_paragraphs, parts[::2])
     return "".join(parts)
 
 
-def _folded(text: str) -> str:
+def _fold_paragraphs(text: str) -> str:
     """Paragraphs and items of lists folded anew; an item's lines are indented."""
     done: list[str] = []
     open_paragraph = False
@@ -79,10 +79,10 @@ def _folded(text: str) -> str:
         else:
             done.append(line)
         open_paragraph = prose
-    return "\n".join(line if LAID_OUT.match(line) else _wrapped(line) for line in done)
+    return "\n".join(line if LAID_OUT.match(line) else _wrap_lines(line) for line in done)
 
 
-def _wrapped(line: str) -> str:
+def _wrap_lines(line: str) -> str:
     item = ITEM.match(line)
     mark = item.end() if item else 0
     bound, indent = line[:mark].replace(" ", "\0") + NO_BEGINNING.sub("\0", line[mark:]), " " * mark

@@ -32,7 +32,7 @@ def figure_of(axes: Axes) -> Figure:
 
 
 @contextmanager
-def spared(what: str, say: Callable[[str], None]) -> Iterator[None]:
+def report_failure(what: str, say: Callable[[str], None]) -> Iterator[None]:
     """Pictures whose failure is told in one sentence, and costs nothing of what was computed.
 
     Parameters

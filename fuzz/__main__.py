@@ -18,7 +18,7 @@ KINDS = {"scenes": 1000, "files": 300, "kills": 60}
 """Modules of this folder, each with ``run(count, folder, seed)``, and how many tries each makes by default."""
 
 
-def tried(kind: str, count: int, seed: int) -> int:
+def try_kind(kind: str, count: int, seed: int) -> int:
     """Try one kind and say what goes wrong; the number of faults."""
     run: Callable[[int, Path, int], Iterator[tuple[str, str]]] = import_module(f".{kind}", __package__).run
     faults, tries, begin = 0, 0, time.monotonic()
@@ -43,7 +43,7 @@ def main() -> int:
     chosen = vars(parser.parse_args())
     for library in ("OMP", "OPENBLAS"):  # a process with threads of BLAS is none to fork
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-    return int(sum([tried(kind, chosen[kind], chosen["seed"]) for kind in KINDS if chosen[kind]]) > 0)
+    return int(sum([try_kind(kind, chosen[kind], chosen["seed"]) for kind in KINDS if chosen[kind]]) > 0)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, PackingFileError, RunFile
-from faultgouge.analysis.files.wholefile import HEADER_SIZE
+from faultgouge.analysis.files.atomic_write import HEADER_SIZE
 
 LONGEST = 20.0
 """Seconds that opening a file may take."""
@@ -81,7 +81,7 @@ def run(count: int, folder: Path, seed: int = 0) -> Iterator[tuple[str, str]]:
 def _outcome(path: Path, expected: list[bytes] | None) -> str:
     """What is wrong with how a file is opened, in a process of its own; empty if nothing is."""
     receiver, sender = FORKED.Pipe(duplex=False)
-    child = FORKED.Process(target=lambda: sender.send(_opened(path, expected)[:4000]))
+    child = FORKED.Process(target=lambda: sender.send(_open_file(path, expected)[:4000]))
     child.start()
     child.join(LONGEST)
     if child.is_alive():
@@ -91,7 +91,7 @@ def _outcome(path: Path, expected: list[bytes] | None) -> str:
     return f"ends with status {child.exitcode}" if child.exitcode else str(receiver.recv())
 
 
-def _opened(path: Path, expected: list[bytes] | None) -> str:
+def _open_file(path: Path, expected: list[bytes] | None) -> str:
     before = path.read_bytes()
     modes: tuple[Literal["r", "a"], ...] = ("r", "a")
     for mode in modes:
@@ -111,7 +111,7 @@ def _opened(path: Path, expected: list[bytes] | None) -> str:
     return ""
 
 
-def _flipped(data: bytes, chance: random.Random, damaged: Path) -> str:
+def _flip_bits(data: bytes, chance: random.Random, damaged: Path) -> str:
     places = [chance.randrange(len(data)) for _ in range(chance.choice([1, 1, 1, 20]))]
     changed = bytearray(data)
     for place in places:
@@ -120,23 +120,23 @@ def _flipped(data: bytes, chance: random.Random, damaged: Path) -> str:
     return f"bits flipped in the bytes {places}"
 
 
-def _truncated(data: bytes, chance: random.Random, damaged: Path) -> str:
+def _truncate(data: bytes, chance: random.Random, damaged: Path) -> str:
     size = chance.randrange(len(data))
     damaged.write_bytes(data[:size])
     return f"cut to {size} bytes"
 
 
-def _zeroed(data: bytes, chance: random.Random, damaged: Path) -> str:
+def _zero_bytes(data: bytes, chance: random.Random, damaged: Path) -> str:
     place, size = chance.randrange(len(data)), chance.choice([16, 512, 4096])
     damaged.write_bytes(data[:place] + bytes(len(data[place : place + size])) + data[place + size :])
     return f"{size} bytes zeroed from {place}"
 
 
 def _edited_without_checksum(data: bytes, chance: random.Random, damaged: Path) -> str:
-    return "without checksum, " + _edited(data[HEADER_SIZE:], chance, damaged)
+    return "without checksum, " + _edit(data[HEADER_SIZE:], chance, damaged)
 
 
-def _edited(data: bytes, chance: random.Random, damaged: Path) -> str:
+def _edit(data: bytes, chance: random.Random, damaged: Path) -> str:
     damaged.write_bytes(data)
     with h5py.File(damaged, "r+") as file:
         names: list[str] = []
@@ -216,10 +216,10 @@ EDITS: dict[str, Edit] = {
 }
 
 DAMAGES: tuple[Callable[[bytes, random.Random, Path], str], ...] = (
-    _flipped,
-    _flipped,
-    _truncated,
-    _zeroed,
-    _edited,
+    _flip_bits,
+    _flip_bits,
+    _truncate,
+    _zero_bytes,
+    _edit,
     _edited_without_checksum,
 )

@@ -88,7 +88,7 @@ WORKS = {
 """By their names in the report; each leaves its results in the folder out."""
 
 
-def started(work: Work, folder: Path) -> subprocess.Popen[str]:
+def start_command(work: Work, folder: Path) -> subprocess.Popen[str]:
     """The command, under way in a folder."""
     (folder / "out").mkdir(parents=True, exist_ok=True)
     (folder / "scene.toml").write_text(work.scene)
@@ -100,18 +100,18 @@ def started(work: Work, folder: Path) -> subprocess.Popen[str]:
     )
 
 
-def finished(work: Work, folder: Path, timeout: float = 600.0) -> tuple[float, str]:
+def finish_command(work: Work, folder: Path, timeout: float = 600.0) -> tuple[float, str]:
     """Run the command to its end; the seconds, and what is wrong, if something is."""
     begin = time.monotonic()
-    running = started(work, folder)
+    running = start_command(work, folder)
     _, errors = running.communicate(timeout=timeout)
     says = "" if running.returncode == 0 else f"exit code {running.returncode}: {errors.strip()[-300:]}"
     return time.monotonic() - begin, says
 
 
-def killed(work: Work, folder: Path, number: int, after: float) -> str:
+def kill_command(work: Work, folder: Path, number: int, after: float) -> str:
     """Kill the command after so many seconds; what is wrong with how it ends."""
-    running = started(work, folder)
+    running = start_command(work, folder)
     try:
         running.communicate(timeout=after)
         return ""  # it was faster
@@ -168,16 +168,16 @@ def run(kills: int, folder: Path, seed: int = 0, only: str = "") -> Iterator[tup
     works = {name: work for name, work in WORKS.items() if only in ("", name)}
     for place, (name, work) in enumerate(works.items()):
         whole = folder / f"{place}" / "whole"
-        seconds, says = finished(work, whole)
+        seconds, says = finish_command(work, whole)
         yield f"{name}, undisturbed, {seconds:.1f} s", says
         expected = results(whole / "out")
         for turn in range(-(-kills // len(works))):
             number = random_moment.choice(list(SIGNALS))
             after = random_moment.uniform(0.2, 1.0) * seconds
             again = folder / f"{place}" / f"{turn}"
-            says = killed(work, again, number, after)
+            says = kill_command(work, again, number, after)
             if not says:
-                _, says = finished(work, again)
+                _, says = finish_command(work, again)
             if not says:
                 says = difference(expected, results(again / "out"))
             yield f"{name}, signal {int(number)} after {after:.1f} s", says

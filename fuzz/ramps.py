@@ -31,12 +31,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from faultgouge.analysis import NoEquilibriumError, Packing, nearest_image
-from faultgouge.analysis.files.wholefile import write_text
+from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.style import INK, STYLE, save
 from faultgouge.pywrap import Equilibrium, Scene, ramp, settle
 from faultgouge.pywrap.onset.path_error import bearing_contacts
-from faultgouge.pywrap.scenes.refusals import needed
-from faultgouge.studies.rows import append, stored
+from faultgouge.pywrap.scenes.validation import require_section
+from faultgouge.studies.result_rows import append_row, read_keyed_rows
 
 FY = 3.0
 END = 0.1 * FY
@@ -53,7 +53,7 @@ NEAR = 1e-3
 Row = dict[str, Any]
 
 
-def drawn(number: int) -> tuple[dict[str, Any], list[float]]:
+def draw_scene(number: int) -> tuple[dict[str, Any], list[float]]:
     """The scene of a packing, without its ramp, and the increments to be tried."""
     chance = np.random.default_rng(number)
     disks = int(chance.choice([100, 100, 100, 100, 50, 30]))
@@ -112,7 +112,7 @@ class Climb:
     @property
     def step(self) -> float:
         """The increment, force."""
-        return needed(self.scene.ramp, "ramp").step
+        return require_section(self.scene.ramp, "ramp").step
 
     def agrees(self, other: "Climb") -> bool:
         """Whether both reach the end, or end at nearly the same load."""
@@ -145,17 +145,17 @@ def apart(one: Packing, other: Packing) -> float:
 
 def packing_row(number: int) -> Row:
     """All ramps of a packing, and what is found of them."""
-    mapping, increments = drawn(number)
+    mapping, increments = draw_scene(number)
     climbs = []
     for precision, step in product(ARITHMETICS, increments):
         scene = Scene.from_mapping(mapping | {"precision": precision, "ramp": {"step": step, "until": END}})
         climbs.append(Climb.of(scene, settle(scene)))
     reference = climbs[len(increments)]  # compensated, with the smallest increments
-    ramps = [_found(climb, reference) for climb in climbs]
+    ramps = [_compare_ramps(climb, reference) for climb in climbs]
     return {"draw": number} | mapping["packing"] | mapping["law"] | {"ramps": ramps}
 
 
-def _found(climb: Climb, reference: Climb) -> Row:
+def _compare_ramps(climb: Climb, reference: Climb) -> Row:
     """What is found of a ramp; of one that does not agree, where its own equilibria end with other increments."""
     found = {
         "step": climb.step,
@@ -176,12 +176,12 @@ def _found(climb: Climb, reference: Climb) -> Row:
 
 def rows_of(path: Path, packings: int, workers: int) -> Iterator[Row]:
     """The rows of packings as they are known; those that are not in the file are computed, and written."""
-    known = {row["draw"]: row for row in stored(path, "draw", "python -m fuzz.ramps")}
+    known = {row["draw"]: row for row in read_keyed_rows(path, "draw", "python -m fuzz.ramps")}
     yield from known.values()
     missing = [number for number in range(packings) if number not in known]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         for future in as_completed([pool.submit(packing_row, number) for number in missing]):
-            append(path, future.result())
+            append_row(path, future.result())
             yield future.result()
 
 

@@ -102,7 +102,7 @@ def run(count: int, folder: Path, seed: int, longest: int = LONGEST) -> Iterator
         except Exception as error:  # whatever the check lets through is a fault of its own
             says = f"{type(error).__name__}: {error}"
         else:
-            what, says = f"{task}, {what}", _tried(task, toml(scene), folder / str(number), longest)
+            what, says = f"{task}, {what}", _try_command(task, toml(scene), folder / str(number), longest)
         yield what, says
 
 
@@ -122,7 +122,7 @@ def _literal(value: object) -> str:
     return json.dumps(value) if isinstance(value, (bool, str)) else repr(value)
 
 
-def _tried(task: str, scene: str, folder: Path, longest: int) -> str:
+def _try_command(task: str, scene: str, folder: Path, longest: int) -> str:
     """What goes wrong in one run of a command."""
     folder.mkdir()
     (folder / "scene.toml").write_text(scene)

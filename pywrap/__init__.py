@@ -6,24 +6,24 @@ LAMMPS with one packing in it, and `quasistatic` takes it from equilibrium to eq
 over `equilibrate`.
 """
 
-from .lammps.private_mpi import prepare
+from .lammps.two_mpi_libraries import load_own_mpi
 
-prepare()  # before mpi4py.MPI is imported
+load_own_mpi()  # before mpi4py.MPI is imported
 
 # ruff: noqa: E402 - the imports below need it
 from ..analysis import NoEquilibriumError
 from .equilibria.quasistatic import Equilibrium, equilibrate
-from .granular.commands import SnapshotError
 from .granular.compare_motion import MotionComparison, compare_motion
 from .granular.from_lammps import from_lammps
+from .granular.granular_commands import SnapshotError
 from .lammps.engine import Engine
 from .lammps.instance import EngineError
-from .runs.path import ramp, reach
-from .runs.recording import Record
+from .runs.equilibrium_path import ramp, reach
+from .runs.run_recorder import Record
 from .runs.undamped import Sample, perturb
-from .scenes.refusals import SceneError
 from .scenes.scene import Scene
-from .settling.bed import settle
+from .scenes.validation import SceneError
+from .settling.settle import settle
 
 __all__ = [
     "Engine",

@@ -37,13 +37,13 @@ def interval(value: Sequence[float | None] | None, digits: str = ".2g", beyond: 
     return f"{middle} ({low} to {high})"
 
 
-def resampled(groups: Sequence[Values], draws: int) -> Iterator[list[Values]]:
+def resample(groups: Sequence[Values], draws: int) -> Iterator[list[Values]]:
     """Each group drawn again, with replacement, so many times."""
     generator = np.random.default_rng(0)
     return ([generator.choice(group, len(group)) for group in groups] for _ in range(draws))
 
 
-def between(value: float, draws: Sequence[float] | Floats) -> dict[str, float]:
+def bootstrap_interval(value: float, draws: Sequence[float] | Floats) -> dict[str, float]:
     """A number with the 95 % interval of what resampled packings give in its place: {"value", "low", "high"}."""
     low, high = np.quantile(draws, [0.025, 0.975])
     return {"value": float(value), "low": float(low), "high": float(high)}
@@ -52,13 +52,13 @@ def between(value: float, draws: Sequence[float] | Floats) -> dict[str, float]:
 def exponent(
     sizes: Sequence[float] | Floats, samples: Sequence[Floats], middle: Callable[[Floats], float], draws: int
 ) -> dict[str, float]:
-    """The exponent of a power law over the size, as `between` has it; of each sample `middle` gives the logarithm."""
+    """The exponent of a power law over the size, with its interval; of each sample `middle` gives the logarithm."""
     logs = np.log(sizes)
 
     def fitted(groups: Sequence[Floats]) -> float:
         return float(np.polyfit(logs, [middle(each) for each in groups], 1)[0])
 
-    return between(fitted(samples), [fitted(each) for each in resampled(samples, draws)])
+    return bootstrap_interval(fitted(samples), [fitted(each) for each in resample(samples, draws)])
 
 
 def median(values: Sequence[float] | Floats, draws: int = 2000) -> list[float]:
@@ -73,7 +73,7 @@ def median(values: Sequence[float] | Floats, draws: int = 2000) -> list[float]:
     ]
 
 
-def lowers(strong: Mapping[str, Any], weak: Mapping[str, Any]) -> bool | None:
+def sign_test(strong: Mapping[str, Any], weak: Mapping[str, Any]) -> bool | None:
     """Whether the second of two ramps, "ends" and "reach", has the lower onset; None if either may have it."""
     if weak["ends"] == "onset" and weak["reach"] < strong["reach"]:
         return True

@@ -122,7 +122,7 @@ def faultgouge_here(
 
     def run(*words: object, code: int = 0) -> subprocess.CompletedProcess:
         from faultgouge.commands import program
-        from faultgouge.ending import fail
+        from faultgouge.exit_status import fail
 
         monkeypatch.chdir(tmp_path)
         capsys.readouterr()

@@ -20,17 +20,17 @@ ROOT = Path(faultgouge.__file__).parent
 
 FLOORS = {
     "faultgouge": (
-        ("lammps_inputs", "parent", "plugin", "ranks"),
+        ("lammps_inputs", "parent_death", "plugin", "ranks"),
         ("analysis",),
         ("figures", "pywrap"),
         ("assessment", "studies"),
-        ("guard", "notebook"),
-        ("commands", "ending"),
+        ("signal_guard", "notebook"),
+        ("commands", "exit_status"),
         ("cli",),
         ("__main__",),
     ),
     "faultgouge.analysis": (
-        ("digits", "errors", "tabled"),
+        ("uncertain_digits", "errors", "table_display"),
         ("packing",),
         ("operators",),
         ("factors",),
@@ -50,7 +50,7 @@ FLOORS = {
     ),
     "faultgouge.assessment": (
         ("timing",),
-        ("error_and_time", "left_out", "stability"),
+        ("explain", "stability", "work_precision"),
     ),
 }
 """Rooms from the ground up. A room knows those below its floor, and none beside it."""

@@ -31,8 +31,8 @@ from scipy.sparse.linalg import LinearOperator, SuperLU, eigs, splu
 
 from ..motion.state_space import StateSpace
 from ..onset import force_bearing
-from ..onset.edge import load_error
-from ..onset.modes import matched
+from ..onset.modes import assign_columns
+from ..onset.window_edges import load_error
 from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
@@ -159,7 +159,7 @@ class DampedMode:
         guess : complex, optional
             Where to begin; the first-order change by default.
         """
-        found = solved_mode(pencil, self.right, self.left, self.rate + self.change(pencil) if guess is None else guess)
+        found = refine_mode(pencil, self.right, self.left, self.rate + self.change(pencil) if guess is None else guess)
         if found is None:
             return None
         alike = abs(np.vdot(self.right, found.right)), abs(np.vdot(self.left, found.left))
@@ -202,8 +202,8 @@ class DampedModes:
         kept = kept[np.lexsort((values[kept].real, values[kept].imag))]
         overlap = np.abs(np.sum(left[:, kept].conj() * right[:, kept], axis=0))
         x, y = np.zeros((2, pencil.stiffness.shape[0], len(kept)), complex)
-        x[system.active] = _unit(system.unweight @ right[:size, kept])
-        y[system.active] = _unit(left[size:, kept])
+        x[system.active] = _normalise(system.unweight @ right[:size, kept])
+        y[system.active] = _normalise(left[size:, kept])
         with np.errstate(divide="ignore"):
             uncertainty = SAFETY * pencil.rounding / overlap
         return cls(pencil, np.asarray(values[kept], complex), x, y, uncertainty)
@@ -239,7 +239,7 @@ class DampedModes:
         """
         weight = np.abs(self.right.conj().T @ other.right) * np.abs(self.left.conj().T @ other.left)
         a, b = self.rates[:, None], other.rates[None]
-        return matched(weight * (1 - np.abs(a - b) / (np.abs(a) + np.abs(b) + np.finfo(float).tiny)))
+        return assign_columns(weight * (1 - np.abs(a - b) / (np.abs(a) + np.abs(b) + np.finfo(float).tiny)))
 
 
 def nearest_mode(pencil: Pencil, frequency: float) -> DampedMode | None:
@@ -258,11 +258,11 @@ def nearest_mode(pencil: Pencil, frequency: float) -> DampedMode | None:
     x, y = np.zeros((2, size), complex)
     x[active] = y[active] = np.random.default_rng(0).standard_normal(len(active))
     for _ in range(NEARER):
-        x, y = _unit(factors.solve(x)), _unit(factors.solve(y, trans="H"))
-    return solved_mode(pencil, x, y, shift)
+        x, y = _normalise(factors.solve(x)), _normalise(factors.solve(y, trans="H"))
+    return refine_mode(pencil, x, y, shift)
 
 
-def growing_near(pencil: Pencil, point: complex, count: int) -> list[DampedMode]:
+def find_growing_near(pencil: Pencil, point: complex, count: int) -> list[DampedMode]:
     """Those of the modes nearest to a point of the complex plane that grow, by shift and invert with ARPACK.
 
     Parameters
@@ -294,7 +294,7 @@ def growing_near(pencil: Pencil, point: complex, count: int) -> list[DampedMode]
     found: list[DampedMode] = []
     for s, x in zip(shift + 1 / values, states[:size].T, strict=True):
         if s.real > -1e-6 * abs(s):  # else it surely loses energy
-            mode = solved_mode(pencil, _unit(x), _unit(x.conj()), s)
+            mode = refine_mode(pencil, _normalise(x), _normalise(x.conj()), s)
             if mode is not None and mode.growing and mode.rate.imag >= 0:
                 found.append(mode)
     return found
@@ -310,21 +310,21 @@ def fastest_growing(pencil: Pencil) -> DampedMode | None:
     """
     values = np.linalg.eigvals(pencil.system.matrix)
     for s in sorted(values[(values.real > 1e-6 * abs(values)) & (values.imag >= 0)], key=lambda each: -each.real):
-        found = growing_near(pencil, complex(s), 1)
+        found = find_growing_near(pencil, complex(s), 1)
         if found:
             return found[0]
     return None
 
 
-def solved_mode(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> DampedMode | None:
+def refine_mode(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> DampedMode | None:
     """The mode nearest to some vectors and an eigenvalue, by the two-sided iteration; None if it does not converge."""
     a, g, unit = pencil.stiffness, pencil.damping, eye_array(len(x))
     mirror = a.T, g.T
     floor = pencil.rounding / np.finfo(float).eps * STEADY  # of a steady mode s is zero
     for _ in range(STEPS):
         factors = _factors(csc_array(a + s * g + s * s * unit))
-        x = _unit(factors.solve(2 * s * x + g @ x))
-        y = _unit(factors.solve(2 * np.conj(s) * y + g @ y, trans="H"))
+        x = _normalise(factors.solve(2 * s * x + g @ x))
+        y = _normalise(factors.solve(2 * np.conj(s) * y + g @ y, trans="H"))
         last = np.inf
         for _ in range(CORRECTIONS):
             forces = a @ x, g @ x
@@ -337,9 +337,9 @@ def solved_mode(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> Dampe
             if step > 0.1 * last:
                 break
             last = step
-            x = _unit(x - factors.solve(forces[0] + s * forces[1] + s * s * x))
+            x = _normalise(x - factors.solve(forces[0] + s * forces[1] + s * s * x))
             z = np.conj(s)
-            y = _unit(y - factors.solve(mirror[0] @ y + z * (mirror[1] @ y) + z * z * y, trans="H"))
+            y = _normalise(y - factors.solve(mirror[0] @ y + z * (mirror[1] @ y) + z * z * y, trans="H"))
     return None
 
 
@@ -359,5 +359,5 @@ def _factors(matrix: csc_array) -> SuperLU:
         return splu(csc_array(matrix + rounding * eye_array(matrix.shape[0])))
 
 
-def _unit(vectors: NDArray) -> Complexes:
+def _normalise(vectors: NDArray) -> Complexes:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=0))

@@ -5,18 +5,19 @@ the packing is stable. It becomes unstable where one of them crosses the axis: a
 where Re s goes through zero along a straight line, at a steady one otherwise. No two eigenvalues meet there, and the
 crossing is the simple root of a smooth function of the load. **Dashpots may destabilise**: the load of the crossing is
 in general below the undamped onset, however weak the dashpots are (Ziegler, Ing.-Arch. 20, 49 (1952); Bottema, Indag.
-Math. 18, 403 (1956); Kirillov and Verhulst, arXiv:0906.1650; :mod:`~faultgouge.analysis.damped_onset.weak`).
+Math. 18, 403 (1956); Kirillov and Verhulst, arXiv:0906.1650;
+:mod:`~faultgouge.analysis.damped_onset.weak_dissipation`).
 
-**Most increments** are done with the few modes that may grow (:mod:`~faultgouge.analysis.damped_onset.growing`). Where
-these leave doubt, all modes tell.
+**Most increments** are done with the few modes that may grow (:mod:`~faultgouge.analysis.damped_onset.all_windows`).
+Where these leave doubt, all modes tell.
 
 **Between two loads** every mode is known at both ends with its slope. A mode whose Re s has another sign at the other
 end has an edge in between: the mode is followed to it by itself (:mod:`~faultgouge.analysis.damped_onset.modes`), and
-solved for as the edges of complex pairs are (:func:`~faultgouge.analysis.onset.edge.sign_change`).
+solved for as the edges of complex pairs are (:func:`~faultgouge.analysis.onset.window_edges.sign_change`).
 
 **Windows narrower than the increment** are where two modes nearly meet. What both may do in between is told from the
-ends (:mod:`~faultgouge.analysis.damped_onset.step`). Where that has another number of growing modes than the ends, an
-operator is computed at that load and both halves are examined again, until no window wider than a stated width can
+ends (:mod:`~faultgouge.analysis.damped_onset.load_step`). Where that has another number of growing modes than the ends,
+an operator is computed at that load and both halves are examined again, until no window wider than a stated width can
 hide. Undamped windows are looked into besides: between their edges the growth without dissipation is largest.
 """
 
@@ -28,14 +29,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import FaultgougeError, NoEquilibriumError
-from ..onset.edge import LostTrackError
 from ..onset.limits import LIMITS
-from ..onset.walk import increasing, walk
+from ..onset.march import check_increasing, march
+from ..onset.window_edges import LostTrackError
 from ..packing.packing import Floats, Packing
-from .edge import DampedWindow
-from .growing import Growing
+from .all_windows import Growing
 from .modes import Pencil
-from .screening import Screen
+from .perturbation_screening import Screen
+from .window_edges import DampedWindow
 
 Known = Callable[[tuple[DampedWindow, ...], float], None]
 """Takes the windows so far, and the load up to which they are all."""
@@ -85,7 +86,7 @@ def damped_windows(
     ValueError
         If the loads are not at least two increasing numbers, or the packing has no dissipation.
     """
-    loads = increasing(forces)
+    loads = check_increasing(forces)
     start = equilibrium(float(loads[0]))
     if not start.damped:
         raise ValueError("The packing has no dissipation: find_onset is what it needs.")
@@ -119,15 +120,15 @@ def growing_windows(
     look : callable, optional
         Two neighbouring loads -> further loads between them that are to be looked at.
     """
-    loads = increasing(forces)
+    loads = check_increasing(forces)
     narrowest = LIMITS.narrowest * float(np.abs(loads).max())
     try:
-        return walked(Growing(pencil, narrowest, Screen()), loads, look, first, watch, known)
+        return march_along_ramp(Growing(pencil, narrowest, Screen()), loads, look, first, watch, known)
     except LostTrackError:
-        return walked(Growing(pencil, narrowest, None), loads, look, first, watch, known)
+        return march_along_ramp(Growing(pencil, narrowest, None), loads, look, first, watch, known)
 
 
-def walked(
+def march_along_ramp(
     oracle: Growing,
     loads: Floats,
     look: Look = lambda below, above: (),
@@ -148,7 +149,7 @@ def walked(
                 if load == above:
                     raise
                 continue
-            walk(oracle, [here, there])
+            march(oracle, [here, there])
             here, windows = there, oracle.windows()
             known(windows, here.fx)
             if first and windows:
@@ -156,7 +157,7 @@ def walked(
     return windows
 
 
-def dissipative(packing: Packing, cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None) -> Packing:
+def with_dissipation(packing: Packing, cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None) -> Packing:
     """The same equilibrium with dashpots and drag: dissipation has no part in where a packing rests.
 
     Parameters
@@ -171,8 +172,8 @@ def dissipative(packing: Packing, cn: float = 0.0, ct: float = 0.0, drag_time: f
     return replace(packing, law=replace(packing.law, cn=cn, ct=ct), drag_time=drag_time)
 
 
-def dissipating(
+def without_dissipation(
     equilibrium: Callable[[float], Packing], cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None
 ) -> Callable[[float], Packing]:
-    """`dissipative` of every equilibrium of a ramp."""
-    return lambda fx: dissipative(equilibrium(fx), cn, ct, drag_time)
+    """`with_dissipation` of every equilibrium of a ramp."""
+    return lambda fx: with_dissipation(equilibrium(fx), cn, ct, drag_time)

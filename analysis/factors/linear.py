@@ -199,22 +199,22 @@ class SparseSolver:
 
     def solve(self, force: Floats) -> Floats | None:
         """The solution of K dq = F, shape (3N,); None if K is singular."""
-        step = self._solved(force)
+        step = self._solve_with_factors(force)
         while step is None and self._left:
             self._factors = None  # before the memory for others is taken
-            self._factors, self.own = self._factored(symmetric=self._left.pop()), True
-            step = self._solved(force)
+            self._factors, self.own = self._factor(symmetric=self._left.pop()), True
+            step = self._solve_with_factors(force)
         return step
 
-    def _solved(self, force: Floats) -> Floats | None:
+    def _solve_with_factors(self, force: Floats) -> Floats | None:
         """The solution with the factors at hand; None without any, and if they are of no use."""
         if self._factors is None:
             return None
         exact = self.own and self._factors.exact
-        step = self._factors.solve(force) if exact else self._iterated(self._factors, force)
+        step = self._factors.solve(force) if exact else self._solve_iteratively(self._factors, force)
         return step if step is not None and np.all(np.isfinite(step)) else None
 
-    def _factored(self, symmetric: bool) -> SparseFactors | None:
+    def _factor(self, symmetric: bool) -> SparseFactors | None:
         order = elimination_order(*self._pairs, len(self._stiffness) // 3, self._active)
         matrix = 0.5 * (self._matrix + self._matrix.T) if symmetric else self._matrix
         inside = csc_array(matrix[order][:, order])
@@ -225,7 +225,7 @@ class SparseSolver:
             return None
         return SparseFactors(self._active[order], factors, exact=not symmetric)
 
-    def _iterated(self, nearby: SparseFactors, force: Floats) -> Floats | None:
+    def _solve_iteratively(self, nearby: SparseFactors, force: Floats) -> Floats | None:
         """The solution by GMRES; None if that takes too long."""
         active, shape = self._active, self._matrix.shape
         known = np.zeros(len(force), dtype=bool)

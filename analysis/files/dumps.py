@@ -30,7 +30,7 @@ from ..packing.contacts import FLOOR, Contacts
 from ..packing.geometry import nearest_image
 from ..packing.law import MindlinLaw
 from ..packing.packing import Floats, Indices, Packing
-from .by_hand import PackingFileError
+from .json_packing import PackingFileError
 from .plain_file import open_text, read_plain_text
 
 DISK = {
@@ -143,7 +143,7 @@ def read_dump(
             inertia_factor=given.get("inertia_factor", 1.0) if inertia_factor is None else inertia_factor,
             box_length=box_length,
             top=disk["type"] == TOP_TYPE,
-            contacts=_touching(position, i, j, disk, pair, box_length),
+            contacts=_find_contacts(position, i, j, disk, pair, box_length),
             law=law,
             fx=given.get("fx", 0.0) if fx is None else fx,
             fy=given.get("fy", 0.0) if fy is None else fy,
@@ -182,7 +182,7 @@ def _numbers(ids: Floats, partners: Floats, disks: Path, contacts: Path) -> Indi
     return where
 
 
-def _touching(
+def _find_contacts(
     position: Floats,
     i: Indices,
     j: Indices,

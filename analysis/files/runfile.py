@@ -45,9 +45,9 @@ from ..errors import PackingFileError
 from ..packing.contacts import Contacts
 from ..packing.law import MindlinLaw
 from ..packing.packing import Floats, Packing
-from .runfile_check import equilibria
+from .checksummed_file import SealedFile, new_file, write
 from .runfile_header import CHECKED, COMPACT, LAW_DEFAULTS, parameters_of, write_header
-from .sealedfile import SealedFile, new_file, write
+from .runfile_validation import equilibria
 
 
 class RunFile(SealedFile):

@@ -26,7 +26,7 @@ COMPACT = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHEC
 few milliseconds for a thousand disks. Slower ones gain 3 % more."""
 
 
-def unusual(law: MindlinLaw) -> dict[str, float]:
+def differing_parameters(law: MindlinLaw) -> dict[str, float]:
     """Parameters of the law that are others than `LAW_DEFAULTS`."""
     return {name: float(getattr(law, name)) for name, other in LAW_DEFAULTS.items() if getattr(law, name) != other}
 
@@ -43,7 +43,7 @@ def parameters_of(packing: Packing) -> dict[str, Any]:
         "mu": law.mu,
         "inertia_factor": packing.inertia_factor,
     }
-    values |= unusual(law)
+    values |= differing_parameters(law)
     if packing.drag_time is not None:
         values["drag_time"] = packing.drag_time
     if packing.box_length is not None:

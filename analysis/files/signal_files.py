@@ -99,7 +99,7 @@ def _record(path: Path, channel: str | None) -> Signal:
         raise SignalError(
             f"it is no table of two columns, and ObsPy cannot read it ({reason}): give another file"
         ) from None
-    return of_trace(_chosen(list(stream), channel))
+    return of_trace(_choose_component(list(stream), channel))
 
 
 def of_trace(trace: Any) -> Signal:
@@ -109,7 +109,7 @@ def of_trace(trace: Any) -> Signal:
     return Signal(trace.times(), np.asarray(trace.data, dtype=np.float64))
 
 
-def _chosen(traces: list[Any], channel: str | None) -> Any:
+def _choose_component(traces: list[Any], channel: str | None) -> Any:
     names = ", ".join(dict.fromkeys(trace.id for trace in traces))
     if channel is None:
         if len(traces) != 1:

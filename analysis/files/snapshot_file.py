@@ -17,9 +17,9 @@ import numpy as np
 
 from ..errors import PackingFileError
 from ..packing.snapshot import PER_CONTACT, LinearisedContacts, Snapshot
+from .atomic_write import has_checksum
+from .checksummed_file import new_file, open_checksummed, write
 from .runfile_header import CHECKED, CREATOR, program_version
-from .sealedfile import new_file, opened, write
-from .wholefile import is_sealed
 
 SCALARS = ("dimension", "fx", "load_error")
 ARRAYS = ("position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind")
@@ -90,8 +90,8 @@ def read_snapshot(path: Path) -> Snapshot:
     """
     if not path.is_file():
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
-    is_sealed(path)  # refuses what has changed
-    with opened(path) as file:
+    has_checksum(path)  # refuses what has changed
+    with open_checksummed(path) as file:
         try:
             group = file["snapshot"]
             contacts = LinearisedContacts(**{name: group["contacts"][name][()] for name in PER_CONTACT})

@@ -220,7 +220,7 @@ class GrowthOfRun:
     def says(self) -> str:
         """What happened, in sentences."""
         with_friction = "" if self.weakened is None else f" with the friction weakened to mu = {self.weakened:.6g}"
-        unstable = f"{_counted(self.pairs, self.negative)}{with_friction}"
+        unstable = f"{_take_samples(self.pairs, self.negative)}{with_friction}"
         if self.measured is None:
             return f"{self.why[:1].upper()}{self.why[1:]}."
         fit = self.measured
@@ -322,7 +322,7 @@ def _why_not(
         return (
             f"nothing grows: {now} the packing is linearly stable ({found}){loss}, and {bounded}, however long the run"
         )
-    unstable = f"{now} the packing is unstable ({_counted(pairs, negative)}, rate {rate:.6g})"
+    unstable = f"{now} the packing is unstable ({_take_samples(pairs, negative)}, rate {rate:.6g})"
     if length < needed:
         return (
             f"{unstable}, but the run was too short to see it: {length * rate:.1f} e-foldings in t = {length:.4g}; D "
@@ -334,7 +334,7 @@ def _why_not(
     )
 
 
-def _counted(pairs: int, negative: int) -> str:
+def _take_samples(pairs: int, negative: int) -> str:
     found = [(pairs, "complex pair"), (negative, "negative eigenvalue")]
     return " and ".join(f"{count} {what}{'s' if count > 1 else ''}" for count, what in found if count) or "no motion"
 

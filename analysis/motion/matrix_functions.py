@@ -110,7 +110,7 @@ class Modes:
             parallel = np.abs(right[:, worst].conj() @ right)
             parallel[worst] = 0.0
             pair = [worst, int(np.argmax(parallel))]
-            parts = _split(rest, found, pair) if overlap[worst] < WELL_CONDITIONED else None
+            parts = _split_off_pair(rest, found, pair) if overlap[worst] < WELL_CONDITIONED else None
             if parts is None:
                 if overlap[worst] < TOLERABLE:
                     raise np.linalg.LinAlgError(f"more than two eigenvalues coalesce near {found[worst]:.6g}")
@@ -221,7 +221,7 @@ def _root(block: Complexes) -> Complexes:
     return np.array([[first, block[0, 1] / (first + second)], [0.0, second]])
 
 
-def _split(
+def _split_off_pair(
     rest: NDArray, values: Complexes, pair: list[int]
 ) -> tuple[Complexes, Complexes, Complexes, Complexes] | None:
     """Block of a pair, the rest, and the transformation to both with its inverse; None if the rest comes too close."""

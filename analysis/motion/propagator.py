@@ -14,7 +14,7 @@ from ..spectrum.spectrum import Complexes
 from .matrix_functions import WELL_CONDITIONED, Function, Modes, second_order
 from .oscillator import Oscillator
 from .response import LinearMotion
-from .state_space import released
+from .state_space import released_motion
 
 Norm = Literal["displacement", "energy"]
 
@@ -98,12 +98,12 @@ class Propagator:
             modes = modes.oscillating()
             outward = np.concatenate([system.weight @ modes.basis[:size], modes.basis[size:]])
             inward = np.concatenate([modes.inverse[:, :size] @ system.unweight, modes.inverse[:, size:]], axis=1)
-            return cls(modes, outward, inward, released, mirrored=True)
+            return cls(modes, outward, inward, released_motion, mirrored=True)
         outward, inward = modes.basis, modes.inverse
         if norm == "displacement":
             outward = (system.unweight / root[:, None]) @ outward[:size]
             inward = inward[:, :size] @ (system.weight * root)
-        return cls(modes, outward, inward, released, norm == "displacement")
+        return cls(modes, outward, inward, released_motion, norm == "displacement")
 
     @property
     def frequency(self) -> Floats:

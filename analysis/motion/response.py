@@ -29,7 +29,7 @@ from ..packing.packing import Floats, Packing
 from ..packing.snapshot import Snapshot
 from .matrix_functions import Modes, first_order
 from .oscillator import Oscillator
-from .state_space import StateSpace, driven, released
+from .state_space import StateSpace, driven_motion, released_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,7 @@ class LinearMotion:
         system, rest, size = self.system, np.zeros_like(vector), len(observed)
         start = system.state(rest, vector) if forced else system.state(vector, rest)
         rows = np.block([[observed @ system.unweight, 0 * observed], [0 * observed, observed]])
-        first = partial(driven, oscillator.omega) if forced else released
+        first = partial(driven_motion, oscillator.omega) if forced else released_motion
         (value,) = self.modes.apply(first, time, start, rows)
         return value[:, :size].real, value[:, size:].real
 

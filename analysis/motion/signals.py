@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import BadInputError
-from ..packing.arrays import Floats, settle
+from ..packing.arrays import Floats, set_frozen
 
 ONSET_OF_PULSE = 10.0
 """omega t_0 of a pulse: x = 5 at t = 0, where the pulse is 1e-9 of its peak."""
@@ -54,7 +54,7 @@ class Signal:
     value: Floats
 
     def __post_init__(self) -> None:
-        settle(self, time=np.array(self.time, dtype=np.float64), value=np.array(self.value, dtype=np.float64))
+        set_frozen(self, time=np.array(self.time, dtype=np.float64), value=np.array(self.value, dtype=np.float64))
         if self.time.ndim != 1 or self.time.shape != self.value.shape or len(self.time) < 2:
             raise SignalError(
                 f"a signal has two columns of one length with two rows or more, and not the shapes {self.time.shape} "

@@ -100,12 +100,12 @@ class StateSpace:
         return np.concatenate([self.weight @ displacement, velocity])
 
 
-def released(rate: Complexes, time: Floats) -> tuple[Complexes]:
+def released_motion(rate: Complexes, time: Floats) -> tuple[Complexes]:
     """x' = s x from x = 1."""
     return (np.exp(rate * time),)
 
 
-def driven(omega: float, rate: Complexes, time: Floats) -> tuple[Complexes]:
+def driven_motion(omega: float, rate: Complexes, time: Floats) -> tuple[Complexes]:
     """x' = s x + cos(omega t) from x = 0: the mean of (exp(i omega t) - exp(s t)) / (i omega - s) and its mirror."""
     rate = np.asarray(rate, dtype=np.complex128)
     return (0.5 * (_quotient(rate, 1j * omega, time) + _quotient(rate, -1j * omega, time)),)

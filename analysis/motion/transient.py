@@ -151,11 +151,11 @@ def _gain(motion: LinearMotion, norm: Norm) -> TransientGain:
     propagator = Propagator.of(motion, norm)
     bound, columns = propagator.bound(), propagator.kept()
     if bound < 1 + SYMMETRIC:
-        return _nothing(packing, norm, 0.0, bound)
+        return _zero_gain(packing, norm, 0.0, bound)
     length = min(propagator.window(columns), propagator.end(bound))
-    time, size, start = _refined(propagator, propagator.candidates(columns, length))
+    time, size, start = _refine_maxima(propagator, propagator.candidates(columns, length))
     if size <= 1:
-        return _nothing(packing, norm, length, bound)
+        return _zero_gain(packing, norm, length, bound)
     displacement, velocity = np.zeros((2, packing.coordinates))
     root, count = system.root_mass, len(system.active)
     if norm == "displacement":
@@ -166,14 +166,14 @@ def _gain(motion: LinearMotion, norm: Norm) -> TransientGain:
     return TransientGain(size**2, time, displacement, velocity, norm, length, bound, packing.dimension)
 
 
-def _nothing(packing: Packing | Snapshot, norm: Norm, window: float, bound: float) -> TransientGain:
+def _zero_gain(packing: Packing | Snapshot, norm: Norm, window: float, bound: float) -> TransientGain:
     """No start grows: K is symmetric, or what it feeds is less than the dissipation takes."""
     rest, start = np.zeros((2, packing.coordinates))
     start[0] = 1.0
     return TransientGain(1.0, 0.0, start, rest, norm, window, bound, packing.dimension)
 
 
-def _refined(propagator: Propagator, brackets: list[tuple[float, float]]) -> tuple[float, float, Floats]:
+def _refine_maxima(propagator: Propagator, brackets: list[tuple[float, float]]) -> tuple[float, float, Floats]:
     """Time, norm and start of the largest norm of the whole propagator about some maxima."""
     grid = np.array([np.linspace(a, b, GRID) for a, b in brackets])
     _, left, right = (

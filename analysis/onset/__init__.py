@@ -9,13 +9,13 @@
 - `walk`: the walk along the ramp; its oracles are `dense` and `sliced`
 """
 
-from .edge import Family, LostPairError, Window
+from .eigenvalue_pair import Pair
+from .first_window import Increments
 from .limits import LIMITS, Limits
 from .modes import Modes, force_bearing, full_operator
-from .pair import Pair
 from .ranks import Ranks
 from .search import Onset, OnsetError, complex_windows, find_onset, takes_all_modes
-from .sliced import Increments
+from .window_edges import Family, LostPairError, Window
 
 __all__ = [
     "LIMITS",

@@ -16,9 +16,9 @@ from scipy.sparse import csr_array
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
 from ..packing.snapshot import Configuration, Snapshot
-from ..spectrum.spectrum import Complexes, all_modes, believable, mass_weighted, unit_rounding
+from ..spectrum.spectrum import Complexes, all_modes, exceeds_rounding, mass_weighted, unit_rounding
+from .eigenvalue_pair import Pair
 from .limits import LIMITS, Limits
-from .pair import Pair
 
 Members = tuple[int, int]  # the numbers of the two modes of a pair
 Operator: TypeAlias = Floats | csr_array
@@ -77,7 +77,7 @@ class Modes:
         rounding, partner = unit_rounding(sparse.data), np.full(len(values), -1)
         for k in (int(each) for each in np.flatnonzero(values.imag > 0)):
             conjugate = int(np.argmin(np.abs(values - values[k].conj())))
-            if believable(values[k], abs(np.vdot(left[:, k], right[:, k])), rounding):
+            if exceeds_rounding(values[k], abs(np.vdot(left[:, k], right[:, k])), rounding):
                 partner[k], partner[conjugate] = conjugate, k
             else:
                 values[[k, conjugate]] = values[k].real
@@ -139,12 +139,12 @@ class Place:
         return Modes.of(self.fx, self.matrix)
 
 
-def assign(here: Modes, there: Modes) -> Indices:
+def assign_modes(here: Modes, there: Modes) -> Indices:
     """Which mode there each mode here has become, shape (E,); -1 where there are fewer modes there.
 
     The assignment maximises the sum of |x^H x'| |y^H y'|.
     """
-    partner = matched(products(here.right, there.right) * products(here.left, there.left))
+    partner = assign_columns(products(here.right, there.right) * products(here.left, there.left))
     # Members of one pair have the same weights: let the one above the axis stay above.
     for up, down in here.complex_pairs:
         if partner[up] >= 0 and there.partner[partner[up]] == partner[down] and there.values[partner[up]].imag < 0:
@@ -152,7 +152,7 @@ def assign(here: Modes, there: Modes) -> Indices:
     return partner
 
 
-def matched(weight: Floats) -> Indices:
+def assign_columns(weight: Floats) -> Indices:
     """A column for each row, none twice, with the largest sum of weights; -1 where columns are too few."""
     from scipy.optimize import linear_sum_assignment
 

@@ -16,8 +16,8 @@ import numpy as np
 from ..packing.packing import Floats, Packing
 from ..spectrum.normal_form import ORTHOGONAL, NormalForm
 from ..spectrum.spectrum import Complexes
+from .eigenvalue_pair import Pair
 from .modes import Modes, full_operator
-from .pair import Pair
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ def pair_forms(packings: Sequence[Packing], eigenvalue: float) -> list[PairForm]
     list of PairForm
         In the order of the packings.
     """
-    return [PairForm.of(pair) for pair in _followed(packings, eigenvalue)]
+    return [PairForm.of(pair) for pair in _follow_pair(packings, eigenvalue)]
 
 
 def pair_eigenvalues(packings: Sequence[Packing], eigenvalue: float) -> Complexes:
@@ -119,7 +119,7 @@ def pair_eigenvalues(packings: Sequence[Packing], eigenvalue: float) -> Complexe
     """
     values = np.full((len(packings), 2), np.nan, dtype=np.complex128)
     before: Pair | None = None
-    for row, pair in zip(values, _followed(packings, eigenvalue), strict=True):
+    for row, pair in zip(values, _follow_pair(packings, eigenvalue), strict=True):
         if before is not None and not before.same_planes(pair):
             break
         root = 0.5 * np.emath.sqrt(pair.discriminant)
@@ -128,7 +128,7 @@ def pair_eigenvalues(packings: Sequence[Packing], eigenvalue: float) -> Complexe
     return values
 
 
-def _followed(packings: Sequence[Packing], eigenvalue: float) -> Iterator[Pair]:
+def _follow_pair(packings: Sequence[Packing], eigenvalue: float) -> Iterator[Pair]:
     """The pair at each load."""
     pair: Pair | None = None
     for packing in packings:

@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
-from ..digits import with_uncertainty
 from ..errors import FaultgougeError, TurningPointError
 from ..packing.packing import Floats, Packing
 from ..spectrum.buckling import negative_eigenvalues
 from ..spectrum.spectrum import spectrum
-from ..tabled import Tabled
-from .dense import all_windows
-from .edge import Family, Window, load_error
+from ..table_display import Tabled
+from ..uncertain_digits import with_uncertainty
+from .all_windows import all_windows
+from .first_window import Increments, Watch, first_window
 from .limits import LIMITS, Limits
+from .march import check_increasing
 from .modes import Operator, contact_states, force_bearing, full_operator
 from .ranks import ALONE, Ranks
-from .sliced import Increments, Watch, first_window
-from .walk import increasing
+from .window_edges import Family, Window, load_error
 
 
 class OnsetError(FaultgougeError):
@@ -156,7 +156,7 @@ def complex_windows(
     The operator is fx -> ndarray or sparse array, shape (n, n), in coordinates that do not depend on fx. Zero rows are
     left out. All else is as in :func:`find_onset`.
     """
-    loads = increasing(forces)
+    loads = check_increasing(forces)
     return all_windows(Family(operator, _narrowest(loads, limits) if narrowest is None else narrowest, limits), loads)
 
 
@@ -221,7 +221,7 @@ def find_onset(
     ValueError
         If the loads are not at least two increasing numbers, or the packing has none of the modes.
     """
-    loads = increasing(forces)
+    loads = check_increasing(forces)
     start = equilibrium(float(loads[0]))
     takes_all = takes_all_modes(start, modes, limits)
     negative = negative_eigenvalues(force_bearing(start, limits))

@@ -29,7 +29,7 @@ from ..packing.law import Derivatives
 from ..packing.packing import Floats, Packing
 from ..packing.snapshot import Snapshot
 from .linearised_contacts import assembled_damping
-from .stiffness import assembled, contact_terms
+from .stiffness import assemble_stiffness, contact_terms
 
 
 def damping_matrix(packing: Packing | Snapshot, sliding: ArrayLike = False) -> csr_array:
@@ -58,7 +58,7 @@ def damping_matrix(packing: Packing | Snapshot, sliding: ArrayLike = False) -> c
     zero = np.zeros_like(along)
     # N N^T and T T^T are what the normal and the tangential stiffness multiply in K
     terms = contact_terms(Derivatives(zero, zero, along, -across, zero), normal.T, distance, pairs)
-    matrix = assembled(terms, contacts.i, contacts.j[:pairs], len(packing))
+    matrix = assemble_stiffness(terms, contacts.i, contacts.j[:pairs], len(packing))
     if packing.drag_time is None:
         return matrix
     return csr_array(matrix + diags_array(coordinate_mass(packing) / packing.drag_time))

@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
-from ..packing.arrays import Floats, Indices, derived
+from ..packing.arrays import Floats, Indices, derive_frozen
 from ..packing.snapshot import LinearisedContacts, Snapshot
 
 
@@ -73,7 +73,7 @@ def assembled_damping(snapshot: Snapshot) -> csr_array:
     none, still = np.zeros(len(c)), np.zeros((len(c), 3))
     # the direction in which a contact slides is that of its tangential force, which has no part in C but for this
     sliding = np.divide(c.tangential_force, 1.0, out=still.copy(), where=c.sliding[:, None])
-    dashpots = derived(
+    dashpots = derive_frozen(
         c, normal_force=none, tangential_force=sliding, closing=still, parting=still, distance=np.full(len(c), np.inf),
         normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot, lever_slope=none,
     )  # fmt: skip

@@ -109,10 +109,12 @@ def stiffness_matrix(
     law = packing.law.derivatives(overlap, contacts.slip, parting, sliding)
     if coupled is not None:
         law = law._replace(overlap_derivative=np.where(coupled, law.overlap_derivative, 0.0))
-    return assembled(contact_terms(law, normal.T, distance, pairs, form), contacts.i, contacts.j[:pairs], len(packing))
+    return assemble_stiffness(
+        contact_terms(law, normal.T, distance, pairs, form), contacts.i, contacts.j[:pairs], len(packing)
+    )
 
 
-def assembled(terms: Floats, i: Indices, j: Indices, disks: int) -> csr_array:
+def assemble_stiffness(terms: Floats, i: Indices, j: Indices, disks: int) -> csr_array:
     """K from the numbers of each contact.
 
     Parameters

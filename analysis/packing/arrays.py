@@ -1,8 +1,9 @@
 """Values as packings and other frozen data keep them: checked, converted, copied and read-only.
 
 A frozen dataclass whose fields are not what its constructor takes (arrays for lists, ones for None) has a constructor
-of its own, which converts with the functions here and hands the result to `settle`. `derived` makes one of another,
-without checking again what has been checked. Nothing else sets a field, and neither does so of data that anybody has.
+of its own, which converts with the functions here and hands the result to `set_frozen`. `derive_frozen` makes one of
+another, without checking again what has been checked. Nothing else sets a field, and neither does so of data that
+anybody has.
 """
 
 from collections.abc import Iterable
@@ -41,13 +42,13 @@ def frozen(array: NDArray) -> NDArray:
     return array
 
 
-def settle(data: object, **values: object) -> None:
+def set_frozen(data: object, **values: object) -> None:
     """Give a frozen dataclass that is being made its values, once; arrays are read-only from now on."""
     for name, value in values.items():
         object.__setattr__(data, name, frozen(value) if isinstance(value, np.ndarray) else value)
 
 
-def derived(data: Data, **changes: object) -> Data:
+def derive_frozen(data: Data, **changes: object) -> Data:
     """A frozen dataclass like another, but for values that the caller has checked: `replace` would check all anew.
 
     Newton's method makes a packing every millisecond, of disks that stay what they are.
@@ -56,7 +57,7 @@ def derived(data: Data, **changes: object) -> Data:
     for name in data.__dataclass_fields__:
         if name not in changes:
             object.__setattr__(made, name, getattr(data, name))
-    settle(made, **changes)
+    set_frozen(made, **changes)
     return made
 
 

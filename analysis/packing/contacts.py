@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Floats, Indices, derived, floats, integers, same_bits, settle
+from .arrays import Floats, Indices, derive_frozen, floats, integers, same_bits, set_frozen
 
 FLOOR = -1
 """The index that stands for the floor as the second partner of a contact."""
@@ -52,9 +52,9 @@ class Contacts:
         slips = floats("slip", slip, first.shape)
         low = None if slip_low is None else floats("slip_low", slip_low, first.shape)
         if not _canonical(first, second):
-            first, second, order = _ordered(first, second)
+            first, second, order = _sort_contacts(first, second)
             slips, low = slips[order], None if low is None else low[order]
-        settle(self, i=first, j=second, slip=slips, slip_low=low)
+        set_frozen(self, i=first, j=second, slip=slips, slip_low=low)
 
     def __len__(self) -> int:
         return len(self.i)
@@ -77,7 +77,7 @@ class Contacts:
     def slipped(self, slip: ArrayLike, slip_low: ArrayLike | None = None) -> "Contacts":
         """The same contacts with other slips, whose order is the one here; length, shape (C,)."""
         low = None if slip_low is None else floats("slip_low", slip_low, self.i.shape)
-        return derived(self, slip=floats("slip", slip, self.i.shape), slip_low=low)
+        return derive_frozen(self, slip=floats("slip", slip, self.i.shape), slip_low=low)
 
 
 def _canonical(i: Indices, j: Indices) -> bool:
@@ -87,7 +87,7 @@ def _canonical(i: Indices, j: Indices) -> bool:
     return bool(np.all((i < j) | floor) and np.all(place[1:] > place[:-1]))
 
 
-def _ordered(i: Indices, j: Indices) -> tuple[Indices, Indices, Indices]:
+def _sort_contacts(i: Indices, j: Indices) -> tuple[Indices, Indices, Indices]:
     """Contacts in the order in which they are kept, and where each was."""
     floor = j == FLOOR
     first = np.where(floor, i, np.minimum(i, j))

@@ -33,7 +33,7 @@ class ContactGeometry(NamedTuple):
     overlap: Floats
 
 
-def measured(
+def contact_geometry(
     position: Floats, low: Floats | None, radius: Floats, contacts: Contacts, box_length: float | None
 ) -> tuple[ContactGeometry, Pair, Pair]:
     """The geometry of contacts, and the branch vectors and overlaps with their low parts.

@@ -114,7 +114,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Floats, settle
+from .arrays import Floats, set_frozen
 
 AT_THE_BOUND = 1 - 1e-8
 """Share of its limit from which on a slip is at Coulomb's bound. A slip that LAMMPS has clamped differs from the limit
@@ -184,13 +184,13 @@ class MindlinLaw:
     def __post_init__(self) -> None:
         for name in ("kn", "kt", "mu", "exponent", "cn", "ct"):
             value = float(getattr(self, name))
-            settle(self, **{name: value})
+            set_frozen(self, **{name: value})
             if not isfinite(value) or value < 0 or (name == "kn" and value == 0):
                 sign = "positive" if name == "kn" else "not negative"
                 raise ValueError(f"{name} = {value} must be finite and {sign}.")
         if self.exponent not in EXPONENTS:
             raise ValueError(f"exponent = {self.exponent:g} must be 1.5 (Hertz) or 1 (harmonic).")
-        settle(self, rescaled=bool(self.rescaled), coulomb=bool(self.coulomb))
+        set_frozen(self, rescaled=bool(self.rescaled), coulomb=bool(self.coulomb))
         if self.rescaled and self.coulomb:
             raise ValueError("rescaled and coulomb are two histories: a law has one of them.")
         if self.rescaled and self.exponent != 1.5:
@@ -229,7 +229,7 @@ class MindlinLaw:
         ndarray
             t* = mu kn overlap / kt, length; zero for a law without friction.
         """
-        overlap = _closed(overlap)
+        overlap = _closed_overlap(overlap)
         return overlap * self.mu * self.kn / self.kt if self.frictional else np.zeros_like(overlap)
 
     def at_bound(self, overlap: ArrayLike, slip: ArrayLike) -> NDArray[np.bool_]:
@@ -259,12 +259,12 @@ class MindlinLaw:
 
     def normal_force(self, overlap: ArrayLike) -> Floats:
         """Repulsion f_n = kn overlap^p, force."""
-        overlap = _closed(overlap)
+        overlap = _closed_overlap(overlap)
         return self.kn * overlap * self._powers(overlap)[0]
 
     def normal_stiffness(self, overlap: ArrayLike) -> Floats:
         """d f_n / d overlap = p kn overlap^(p-1), force / length."""
-        return self.exponent * self.kn * self._powers(_closed(overlap))[0]
+        return self.exponent * self.kn * self._powers(_closed_overlap(overlap))[0]
 
     def normal_curvature(self, overlap: ArrayLike, order: int = 2) -> Floats:
         """Derivative of f_n of some order, 2 by default: force / length^order, of positive overlaps."""
@@ -294,7 +294,7 @@ class MindlinLaw:
             f_t = -kt overlap^(p-1) (1 + x - x^2) slip, or without the bracket behind Coulomb's slider: it opposes the
             slip.
         """
-        overlap = _closed(overlap)
+        overlap = _closed_overlap(overlap)
         slip = self.clamped(overlap, slip)
         spring = -self.kt * self._powers(overlap)[0]
         if self.coulomb:
@@ -369,7 +369,7 @@ class MindlinLaw:
             cn overlap^(p-1) and ct overlap^(p-1); the tangential one is zero without friction, and where a contact is
             at Coulomb's bound, unless Coulomb's slider sticks there.
         """
-        overlap = _closed(overlap)
+        overlap = _closed_overlap(overlap)
         power = self._powers(overlap)[0]
         slides = self.at_bound(overlap, slip)
         if self.coulomb:
@@ -386,7 +386,7 @@ class MindlinLaw:
         return growth, overlap if self.exponent == 1 else growth
 
 
-def _closed(overlap: ArrayLike) -> Floats:
+def _closed_overlap(overlap: ArrayLike) -> Floats:
     """Overlaps, those of open contacts set to zero; long doubles stay so."""
     return np.maximum(np.asarray(overlap, dtype=np.result_type(overlap, np.float64)), 0.0)
 

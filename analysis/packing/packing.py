@@ -23,10 +23,21 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Floats, Indices, booleans, derived, floats, frozen, number, positive_each, same_bits, settle
+from .arrays import (
+    Floats,
+    Indices,
+    booleans,
+    derive_frozen,
+    floats,
+    frozen,
+    number,
+    positive_each,
+    same_bits,
+    set_frozen,
+)
 from .compensated import Pair
 from .contacts import Contacts
-from .geometry import ContactGeometry, check_box, measured
+from .geometry import ContactGeometry, check_box, contact_geometry
 from .law import MindlinLaw
 
 
@@ -102,7 +113,7 @@ class Packing:
         n = len(np.atleast_1d(np.asarray(radius)))
         if n == 0:
             raise ValueError("A packing needs at least one disk.")
-        settle(
+        set_frozen(
             self,
             position=floats("position", position, (n, 2)),
             radius=positive_each("radius", floats("radius", radius, (n,))),
@@ -199,7 +210,7 @@ class Packing:
     @cached_property
     def _measured(self) -> tuple[ContactGeometry, Pair, Pair]:
         """The geometry, and the branch vectors and overlaps with their low parts."""
-        return measured(self.position, self.position_low, self.radius, self.contacts, self.box_length)
+        return contact_geometry(self.position, self.position_low, self.radius, self.contacts, self.box_length)
 
     @property
     def normal_force(self) -> Floats:
@@ -279,7 +290,7 @@ class Packing:
         """
         n = len(self)
         _check_partners(contacts, n)
-        return derived(
+        return derive_frozen(
             self,
             position=floats("position", position, (n, 2)),
             angle=floats("angle", angle, (n,)),

@@ -25,14 +25,14 @@ from .arrays import (
     Floats,
     Indices,
     booleans,
-    derived,
+    derive_frozen,
     floats,
     frozen,
     integers,
     number,
     positive_each,
     same_bits,
-    settle,
+    set_frozen,
 )
 from .law import MindlinLaw
 from .packing import Packing
@@ -127,7 +127,7 @@ class LinearisedContacts:
             values[name] = floats(name, given[name], (count, *PER_CONTACT[name]))
         if len(values["i"]) != len(values["j"]) or np.any(values["i"] == values["j"]):
             raise ValueError("Every contact has two different partners, i and j.")
-        settle(self, **{name: values[name] for name in PER_CONTACT})
+        set_frozen(self, **{name: values[name] for name in PER_CONTACT})
 
     def __len__(self) -> int:
         return len(self.i)
@@ -163,10 +163,10 @@ class LinearisedContacts:
 
     def chosen(self, which: NDArray) -> "LinearisedContacts":
         """Some of the contacts, by a mask or by numbers."""
-        return derived(self, **{name: np.array(getattr(self, name)[which]) for name in PER_CONTACT})
+        return derive_frozen(self, **{name: np.array(getattr(self, name)[which]) for name in PER_CONTACT})
 
 
-def linearised(
+def linearise_contacts(
     law: MindlinLaw, overlap: Floats, slip: Floats, tangent: Floats, **where: ArrayLike
 ) -> LinearisedContacts:
     """Contacts of the smooth law of this package, along a tangent, shape (C, 3); `where` has all other fields.
@@ -271,7 +271,7 @@ class Snapshot:
         if dimension not in (2, 3) or n == 0:
             raise ValueError(f"A snapshot has particles in two or three dimensions, not {n} in {dimension}.")
         sizes = {"radius": radius, "mass": mass, "inertia": inertia}
-        settle(
+        set_frozen(
             self,
             dimension=int(dimension),
             position=floats("position", position, (n, dimension)),
@@ -316,7 +316,7 @@ class Snapshot:
         g, c, n = packing.geometry, packing.contacts, len(packing)
         flat = np.zeros(len(c))
         arms = np.column_stack([packing.radius[c.i], np.where(c.floor, 0.0, packing.radius[c.j])])
-        contacts = linearised(
+        contacts = linearise_contacts(
             packing.law, g.overlap, c.slip, np.column_stack([g.tangent, flat]), i=c.i, j=c.j, slip_arm=arms,
             lever_arm=arms, normal=np.column_stack([g.normal, flat]), distance=np.where(c.floor, np.inf, g.distance),
         )  # fmt: skip
@@ -401,17 +401,17 @@ class Snapshot:
     def loaded(self, least: float) -> "Snapshot":
         """The snapshot without the contacts that carry no more than a given normal force."""
         kept = self.contacts.normal_force > least
-        return self if np.all(kept) else derived(self, contacts=self.contacts.chosen(kept))
+        return self if np.all(kept) else derive_frozen(self, contacts=self.contacts.chosen(kept))
 
     def loaded_by(self, load: ArrayLike) -> "Snapshot":
         """The snapshot with other forces and torques besides those of contacts, shape (N, 2, 3)."""
-        return derived(self, load=floats("load", load, self.load.shape))
+        return derive_frozen(self, load=floats("load", load, self.load.shape))
 
     def with_sliding(self, sliding: ArrayLike | None = None) -> "Snapshot":
         """The snapshot with other contacts that slide, by a mask, shape (C,); those at Coulomb's bound by default."""
         c = self.contacts
         which = np.array(c.at_bound) if sliding is None else booleans("sliding", sliding, len(c))
-        return derived(self, contacts=derived(c, sliding=which))
+        return derive_frozen(self, contacts=derive_frozen(c, sliding=which))
 
 
 Configuration = TypeVar("Configuration", bound=Packing | Snapshot)

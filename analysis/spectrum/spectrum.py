@@ -49,7 +49,7 @@ from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
 from ..packing.snapshot import Snapshot
-from ..tabled import Tabled
+from ..table_display import Tabled
 
 Complexes = NDArray[np.complex128]
 
@@ -309,10 +309,12 @@ def eigenvalues(packing: Packing | Snapshot, form: Form = "consistent") -> Compl
         Sorted by real part, then imaginary part, 1 / time^2. Coordinates that feel no force are left out.
     """
     matrix = dynamical_matrix(packing, form)[0].toarray()
-    return _sorted(eigvals(matrix.T, overwrite_a=True, check_finite=False) if len(matrix) else np.zeros(0, complex))
+    return _sort_eigenvalues(
+        eigvals(matrix.T, overwrite_a=True, check_finite=False) if len(matrix) else np.zeros(0, complex)
+    )
 
 
-def _sorted(values: Complexes) -> Complexes:
+def _sort_eigenvalues(values: Complexes) -> Complexes:
     return np.asarray(values[np.lexsort((values.imag, values.real))], dtype=np.complex128)
 
 
@@ -350,13 +352,13 @@ def spectrum(packing: Packing | Snapshot, form: Form = "consistent") -> Spectrum
                 float(rotation_share(vector, packing.axes)[0]),
             )
             pair = ComplexPair(complex(values[k]), float(overlap[k]), participation, rotation)
-            if believable(pair.eigenvalue, pair.overlap, rounding):
+            if exceeds_rounding(pair.eigenvalue, pair.overlap, rounding):
                 pairs.append(pair)
             else:
                 noise += 1
     pairs.sort(key=lambda pair: -pair.growth_rate)
     return Spectrum(
-        eigenvalues=_sorted(values),
+        eigenvalues=_sort_eigenvalues(values),
         pairs=tuple(pairs),
         negative=negative,
         noise_pairs=noise,
@@ -502,7 +504,7 @@ def is_negative(values: Complexes, overlap: Floats, rounding: float) -> NDArray[
     return (values.imag == 0) & (-values.real * overlap > SAFETY * rounding)
 
 
-def believable(eigenvalue: complex, overlap: float | np.floating, rounding: float) -> bool:
+def exceeds_rounding(eigenvalue: complex, overlap: float | np.floating, rounding: float) -> bool:
     """Whether an imaginary part exceeds SAFETY kappa u |A|, its own rounding uncertainty.
 
     Parameters

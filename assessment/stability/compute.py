@@ -17,9 +17,9 @@ from typing import Any
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError
-from ...analysis.files.wholefile import make_folder, write_text
+from ...analysis.files.atomic_write import make_folder, write_text
 from ...figures.pages import render
-from ...figures.style import save, spared
+from ...figures.style import report_failure, save
 from .cases import dynamics, eigenvalues, geometry, loads, restarts
 from .cases.case import Case, Outcome
 from .draw import stability_figure
@@ -75,7 +75,7 @@ def stability(
         if root:
             _write(done, output)
     if root:
-        with spared(f"{output}/stability.png", say):
+        with report_failure(f"{output}/stability.png", say):
             save(stability_figure(done), output / "stability")
     return _as_dict(done)
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from faultgouge.analysis import complex_windows
 from faultgouge.analysis.onset import Modes
-from faultgouge.analysis.onset.pair import dip_between
+from faultgouge.analysis.onset.eigenvalue_pair import dip_between
 from faultgouge.figures.style import INK, STYLE
 
 Operator = Callable[[float], np.ndarray]

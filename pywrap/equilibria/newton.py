@@ -30,8 +30,8 @@ import numpy as np
 
 from ...analysis import Packing, nearest_image, touching
 from ...analysis.packing.arrays import Floats, Indices
-from ..lammps.trial import EPSILON, Trial
-from .newton_matrix import IDLE, Factors, factored
+from ..lammps.trial_state import EPSILON, Trial
+from .newton_matrix import IDLE, Factors, factor_stiffness
 from .rattlers import middle_of_cage
 
 ITERATIONS = 40
@@ -97,7 +97,7 @@ class Guess(NamedTuple):
     answers: float = np.inf
 
 
-def iterated(
+def iterate_newton(
     displaced: Callable[[Packing, Floats], Trial],
     start: Trial,
     force_tolerance: float | None = None,
@@ -132,7 +132,7 @@ def iterated(
     course = _Course(start.floor, answers, force_tolerance, gain)
     evaluations = 0
     for iteration in range(iterations):
-        if _beyond_reach(displacement, base):
+        if _lammps_refuses(displacement, base):
             return None, evaluations
         trial, evaluations = displaced(base, displacement), evaluations + 1
         # What a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved.
@@ -144,7 +144,7 @@ def iterated(
             if len(hit):
                 displacement = _out_of_the_way(trial.packing, hit, displacement)
                 trial, evaluations = displaced(base, displacement), evaluations + 1
-            factors = factored(trial, course.floor, since, factors)
+            factors = factor_stiffness(trial, course.floor, since, factors)
         course.goes_on(trial.residual)
         step = None if factors is None else factors.solve(trial.force)
         if factors is None or step is None or too_long(step, base):
@@ -262,7 +262,7 @@ def _out_of_the_way(trial: Packing, disks: Indices, displacement: Floats) -> Flo
     return changed
 
 
-def _beyond_reach(displacement: Floats, packing: Packing) -> bool:
+def _lammps_refuses(displacement: Floats, packing: Packing) -> bool:
     """Whether LAMMPS would refuse to go there: a disk moves by its radius, or the centre of another comes to lie in it.
 
     No iteration that converges goes there.

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...analysis.factors.linear import Band, BandSolver, Booleans, Solver, SparseSolver
-from ...analysis.operators.stiffness import assembled, contact_terms
+from ...analysis.operators.stiffness import assemble_stiffness, contact_terms
 from ...analysis.packing.arrays import Floats, Indices
 from ..lammps.contact_graph import ContactGraph
-from ..lammps.trial import Trial
+from ..lammps.trial_state import Trial
 
 IDLE = 1e-7
 """Share of the largest contact force up to which a contact carries nothing that matters."""
@@ -56,7 +56,7 @@ class Factors(NamedTuple):
         return self.solver.solve(force)
 
 
-def factored(
+def factor_stiffness(
     trial: Trial, floor: float, since: ContactGraph | None = None, nearby: Factors | None = None
 ) -> Factors | None:
     """Factor K; None if nothing is held.
@@ -87,14 +87,14 @@ def factored(
         return None
     matters = loaded & (law.normal_force > IDLE * law.normal_force.max(initial=0.0))
     idle = graph.count(matters) == 0  # disks with none but contacts that carry nothing that matters
-    expelled = _expelled(graph, loaded, old) & ~trial.still.top
+    expelled = _find_expelled(graph, loaded, old) & ~trial.still.top
     if unknowns <= BANDED:
-        return Factors(_banded(graph.band(active), terms, idle), expelled)
+        return Factors(_band_matrix(graph.band(active), terms, idle), expelled)
     near = nearby.solver if nearby is not None and isinstance(nearby.solver, SparseSolver) else None
     return Factors(_sparse(graph, loaded, terms, idle, near), expelled)
 
 
-def _expelled(graph: ContactGraph, loaded: Booleans, old: Booleans | None) -> Booleans:
+def _find_expelled(graph: ContactGraph, loaded: Booleans, old: Booleans | None) -> Booleans:
     """Disks with one loaded contact, or with two that are both new, shape (N,)."""
     count = graph.count(loaded)
     if old is None:
@@ -102,14 +102,14 @@ def _expelled(graph: ContactGraph, loaded: Booleans, old: Booleans | None) -> Bo
     return (count == 1) | ((count == 2) & (graph.per_disk(loaded & old) == 0))
 
 
-def _banded(band: Band, terms: Floats, idle: Booleans) -> BandSolver:
+def _band_matrix(band: Band, terms: Floats, idle: Booleans) -> BandSolver:
     """K in a band."""
     matrix = band.matrix(terms)
-    matrix[2 * band.width] = _held(matrix[2 * band.width], band.disks, idle)
+    matrix[2 * band.width] = _stiffen_idle(matrix[2 * band.width], band.disks, idle)
     return BandSolver(band, matrix)
 
 
-def _held(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:
+def _stiffen_idle(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:
     """The diagonal of K with a little more stiffness for idle disks, and next to nothing more for all others."""
     held = (1 + AFLOAT) * diagonal
     creeping = idle[disk]
@@ -125,8 +125,8 @@ def _sparse(
 ) -> SparseSolver:
     """K as a sparse matrix."""
     i, j, disks = graph.i, graph.j[: graph.pairs], len(graph.radius)
-    matrix = assembled(terms, i, j, disks)
-    matrix.setdiag(_held(matrix.diagonal(), np.tile(np.arange(disks), 3), idle))
+    matrix = assemble_stiffness(terms, i, j, disks)
+    matrix.setdiag(_stiffen_idle(matrix.diagonal(), np.tile(np.arange(disks), 3), idle))
     matrix.eliminate_zeros()
     coupled = np.flatnonzero(loaded[: graph.pairs])
     return SparseSolver(matrix, i[coupled], j[coupled], nearby)

@@ -18,9 +18,9 @@ import numpy as np
 from ...analysis import NoEquilibriumError, Packing, nearest_image
 from ..lammps.contact_graph import ContactGraph
 from ..lammps.engine import Engine
-from ..lammps.trial import rounding
-from .newton import Guess, iterated, too_long
-from .newton_matrix import factored
+from ..lammps.trial_state import rounding
+from .newton import Guess, iterate_newton, too_long
+from .newton_matrix import factor_stiffness
 
 SMOOTH = "; without friction (mu = 0) nothing holds a layer back on a smooth floor, so give law.mu a value above 0"
 
@@ -217,7 +217,7 @@ def _response(engine: Engine, last: Equilibrium, fx: float) -> Guess | None:
     push = np.zeros(3 * len(packing))
     push[: len(packing)][packing.top] = fx - packing.fx
     trial = engine.kept(packing)
-    factors = factored(trial, trial.floor)
+    factors = factor_stiffness(trial, trial.floor)
     step = None if factors is None else factors.solve(push)
     return None if step is None or too_long(step, packing) else Guess(step, factors, abs(fx - packing.fx))
 
@@ -234,7 +234,7 @@ def _newton(
     engine: Engine, base: Packing, force_tolerance: float | None, guess: Guess | None, patient: bool = False
 ) -> tuple[Equilibrium | None, int]:
     """Newton's method from one base at the engine's fx; None where it does not converge."""
-    best, evaluations = iterated(engine.displaced, engine.kept(base), force_tolerance, guess, patient)
+    best, evaluations = iterate_newton(engine.displaced, engine.kept(base), force_tolerance, guess, patient)
     if best is None:
         return None, evaluations
     return Equilibrium(engine.keep(best), best.residual, best.floor, evaluations), evaluations

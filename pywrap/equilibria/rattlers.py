@@ -51,10 +51,10 @@ def clear_rattlers(packing: Packing, least: float) -> Packing:
     idle = packing.loaded(least).rattlers
     position = packing.position.copy()
     position[idle] = middle_of_cage(packing, idle)
-    return placed(packing, position)
+    return place_disks(packing, position)
 
 
-def placed(packing: Packing, position: Floats) -> Packing:
+def place_disks(packing: Packing, position: Floats) -> Packing:
     """The packing with its disks elsewhere, shape (N, 2); all that touches there is in contact, without slip."""
     return replace(packing, position=position, contacts=touching(position, packing.radius, packing.box_length))
 

@@ -5,17 +5,17 @@ packing of them, `upper_layer` finds the layer that carries the load, `resting` 
 """
 
 from .disks import Disks, Slips, packing_of
+from .export_quantities import Frame, ModeVectors
 from .formats import format_of, is_hdf5, read_disks, write_frames, write_packing
-from .frames import chosen_frames, frames_of
-from .layer import upper_layer
-from .quantities import Frame, ModeVectors
+from .frames import choose_frames, frames_of
+from .upper_layer import upper_layer
 
 __all__ = [
     "Disks",
     "Frame",
     "ModeVectors",
     "Slips",
-    "chosen_frames",
+    "choose_frames",
     "format_of",
     "frames_of",
     "is_hdf5",

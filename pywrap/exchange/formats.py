@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...analysis import BadInputError, OutputError, Packing, PackingFileError
+from ...analysis.files.atomic_write import BEGINNINGS
 from ...analysis.files.plain_file import open_plain, open_text
-from ...analysis.files.wholefile import BEGINNINGS
 from .disks import Disks
-from .quantities import Frame, ModeVectors
+from .export_quantities import Frame, ModeVectors
 
 NUMBER = re.compile(r"[-+.\deE]+")
 
@@ -57,22 +57,22 @@ class Format(NamedTuple):
     modes: bool = True
 
 
-DATA = Format("LAMMPS data (atom style sphere)", "data", (".data",), "read_data", "write_data", modes=False)
-DUMP = Format("LAMMPS dump", "dump", (".dump", ".lammpstrj"), "read_custom_dump", frames=True)
-RESTART = Format("LAMMPS restart", "restart", (".restart",), "read_restart", text=False)
-YADE = Format("YADE's text", "grains", ("line 1 is #format x_y_z_r",), "read_yade")
-MERCURY = Format("MercuryDPM's data", "grains", (".data, line 1 is N time bounds",), "read_mercury", frames=True)
-OTHER = Format("what MDAnalysis reads with radii", "universe", (), "read_universe", frames=True)
+DATA = Format("LAMMPS data (atom style sphere)", "lammps_data", (".data",), "read_data", "write_data", modes=False)
+DUMP = Format("LAMMPS dump", "lammps_dump", (".dump", ".lammpstrj"), "read_custom_dump", frames=True)
+RESTART = Format("LAMMPS restart", "lammps_restart", (".restart",), "read_restart", text=False)
+YADE = Format("YADE's text", "yade_mercury", ("line 1 is #format x_y_z_r",), "read_yade")
+MERCURY = Format("MercuryDPM's data", "yade_mercury", (".data, line 1 is N time bounds",), "read_mercury", frames=True)
+OTHER = Format("what MDAnalysis reads with radii", "mdanalysis_reader", (), "read_universe", frames=True)
 
 FORMATS = (
     Format("VTK", "vtp", (".vtp",), writer="write_vtp"),
-    Format("dumps of the decks", "dump", (".disks",), "read_deck_dump", frames=True, text=False),
+    Format("dumps of the decks", "lammps_dump", (".disks",), "read_deck_dump", frames=True, text=False),
     Format("extended XYZ", "xyz", (".xyz", ".extxyz"), "read_xyz", "write_xyz", frames=True, film=True),
     DATA,
     DUMP,
     RESTART,
-    Format("CSV", "table", (".csv",), "read_table"),
-    Format("packing.json", "table", (".json",), "read_json"),
+    Format("CSV", "csv_json", (".csv",), "read_table"),
+    Format("packing.json", "csv_json", (".json",), "read_json"),
     Format("GSD", "gsd_file", (".gsd",), "read_gsd", "write_gsd", frames=True, text=False, film=True),
     Format("ParaView's list of frames", "vtp", (".pvd",), writer="write_pvd", alone=False, film=True),
     YADE,
@@ -87,7 +87,7 @@ FILMS = {each.suffixes[0]: each for each in FORMATS if each.film}
 """Formats by suffix, for reading, for writing, and for writing several frames."""
 
 
-def known_formats() -> str:
+def list_formats() -> str:
     """All formats that are read, in words."""
     listed = [f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS if each.reader]
     return ", ".join([*listed, "each text also as .gz", "run.h5", f"and {OTHER.words}"])
@@ -107,7 +107,7 @@ def format_of(path: Path) -> Format:
     PackingFileError
         If no reader takes it.
     """
-    from .restart import is_restart
+    from .lammps_restart import is_restart
 
     begun = _by_beginning(path)
     if begun is not None:
@@ -123,12 +123,12 @@ def format_of(path: Path) -> Format:
         return DATA if begin == "data" else DUMP
     if is_hdf5(path):
         raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
-    from .universe import known
+    from .mdanalysis_reader import has_parser
 
     own = path.suffix.lower() == ".h5"  # MDAnalysis has a parser of it once `mdanalysis` is imported
-    if path.suffix and not own and known(path):
+    if path.suffix and not own and has_parser(path):
         return OTHER
-    raise PackingFileError(f"{path} is of no format that is read: give {known_formats()}.")
+    raise PackingFileError(f"{path} is of no format that is read: give {list_formats()}.")
 
 
 def _by_beginning(path: Path) -> Format | None:
@@ -150,7 +150,7 @@ def read_disks(path: Path, frame: int | None = None) -> Disks:
     Parameters
     ----------
     path : Path
-        The file; see `known_formats`.
+        The file; see `list_formats`.
     frame : int, optional
         Which of several frames; negative ones count from the last.
 
@@ -164,11 +164,11 @@ def read_disks(path: Path, frame: int | None = None) -> Disks:
     found = format_of(path)
     if not found.frames and frame not in (None, 0, -1):
         raise PackingFileError(f"{path} has one frame; there is no --frame {frame}.")
-    disks: Disks = _imported(found, found.reader)(path, *([frame] if found.frames else []))
+    disks: Disks = _import_module(found, found.reader)(path, *([frame] if found.frames else []))
     return disks
 
 
-def _imported(format_: Format, function: str) -> Any:
+def _import_module(format_: Format, function: str) -> Any:
     return getattr(import_module(f".{format_.module}", __package__), function)
 
 
@@ -239,6 +239,6 @@ def write_packing(path: Path, packing: Packing, modes: Sequence[ModeVectors] = (
 
 def _write(format_: Format, path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
     try:
-        return str(_imported(format_, format_.writer)(path, frames, modes))
+        return str(_import_module(format_, format_.writer)(path, frames, modes))
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror}.") from error

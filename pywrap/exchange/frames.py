@@ -9,10 +9,10 @@ import numpy as np
 
 from ...analysis import BadInputError, Packing, RunFile, nearest_image, touching
 from ...analysis.motion.hysteresis import turning_points
-from .quantities import Frame
+from .export_quantities import Frame
 
 
-def chosen_frames(run: RunFile, says: str) -> range:
+def choose_frames(run: RunFile, says: str) -> range:
     """The numbers of the frames that are meant.
 
     Parameters
@@ -52,7 +52,7 @@ def frames_of(run: RunFile, numbers: range) -> Iterator[Frame]:
         The file, open until the last frame has been taken. Frame 0 of an undamped run is the equilibrium where it
         began.
     numbers : range
-        Of :func:`chosen_frames`.
+        Of :func:`choose_frames`.
     """
     if "trajectory" in run.names_of_series:
         yield from _of_run(run, numbers)

@@ -15,11 +15,11 @@ import numpy as np
 
 from ...analysis import Packing, PackingFileError
 from ...analysis.files.plain_file import check_plain
-from . import quantities
+from . import export_quantities
 from .disks import Disks, of_columns
-from .needs import needed_library
-from .quantities import Frame, ModeVectors
-from .text import chosen_frame
+from .export_quantities import Frame, ModeVectors
+from .optional_library import needed_library
+from .text_columns import choose_frame
 
 OWN = "particles/faultgouge/"
 CONTACTS = "faultgouge/contacts"
@@ -33,7 +33,7 @@ def read_gsd(path: Path, frame: int | None = None) -> Disks:
         check_plain(path)
         with hoomd.open(str(path), "r") as file:
             counts = [file[k].particles.N for k in (range(len(file)) if frame is None else ())]
-            return _disks(path, file[chosen_frame(path, counts or [0] * len(file), frame)])
+            return _disks(path, file[choose_frame(path, counts or [0] * len(file), frame)])
     except (OSError, RuntimeError) as error:
         raise PackingFileError(f"{path} is no readable GSD file: {error}.") from error
 
@@ -50,8 +50,8 @@ def _disks(path: Path, frame: Any) -> Disks:
             str(path),
             columns,
             box_length=None if period is None else float(period),
-            given=quantities.given(values),
-            slips=None if rows is None else quantities.slips_of(rows[rows[:, 0] > 0], "x_low" in columns),
+            given=export_quantities.pick_numbers(values),
+            slips=None if rows is None else export_quantities.slips_of(rows[rows[:, 0] > 0], "x_low" in columns),
         )
     if particles.diameter is None or not particles.N:
         raise PackingFileError(f"{path} has no disks with diameters.")
@@ -74,8 +74,8 @@ def write_gsd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
             frame = _frame(hoomd, each.packing)
             frame.configuration.step = number
             if each.displacement is not None:
-                frame.log["particles/displacement"] = quantities.in_space(each.displacement)
-                frame.log["particles/normal_force"] = quantities.disk_pressure(each.packing)
+                frame.log["particles/displacement"] = export_quantities.in_space(each.displacement)
+                frame.log["particles/normal_force"] = export_quantities.disk_pressure(each.packing)
             frame.log |= {f"faultgouge/{key}": np.array([value]) for key, value in each.number.items()}
             if each.whole:
                 frame.log |= _forces(each.packing)
@@ -89,12 +89,12 @@ def write_gsd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
 def _forces(packing: Packing) -> dict[str, np.ndarray]:
     """What follows from slips, and these."""
     # gsd has no empty arrays: a row of zeros stands for no contact
-    rows = quantities.contact_rows(packing)
+    rows = export_quantities.contact_rows(packing)
     return {
         CONTACTS: rows if len(rows) else np.zeros((1, 4 if packing.compensated else 3)),
-        "particles/net_force": quantities.in_space(quantities.disk_force(packing)[:, :2]),
-        "particles/normal_force": quantities.disk_pressure(packing),
-        "particles/mobilised": quantities.disk_mobilised(packing),
+        "particles/net_force": export_quantities.in_space(export_quantities.disk_force(packing)[:, :2]),
+        "particles/normal_force": export_quantities.disk_pressure(packing),
+        "particles/mobilised": export_quantities.disk_mobilised(packing),
     }
 
 
@@ -123,6 +123,6 @@ def _frame(hoomd: Any, packing: Packing) -> Any:
     if packing.position_low is not None:
         columns |= {"x_low": packing.position_low[:, 0], "y_low": packing.position_low[:, 1]}
     frame.log = {OWN + name: np.ascontiguousarray(column, dtype=np.float64) for name, column in columns.items()}
-    numbers = quantities.scalars(packing) | ({} if box is None else {"box_length": box})
+    numbers = export_quantities.scalars(packing) | ({} if box is None else {"box_length": box})
     frame.log |= {f"faultgouge/{key}": np.array([value], dtype=np.float64) for key, value in numbers.items()}
     return frame

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing
-from . import quantities
-from .quantities import Frame, ModeVectors
+from . import export_quantities
+from .export_quantities import Frame, ModeVectors
 
 Element = ElementTree.Element
 
@@ -52,18 +52,20 @@ def write_pvd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
 
 def _tree(frame: Frame, modes: list[ModeVectors]) -> ElementTree.ElementTree:
     packing = frame.packing
-    numbers = quantities.scalars(packing) | ({} if packing.box_length is None else {"box_length": packing.box_length})
+    numbers = export_quantities.scalars(packing) | (
+        {} if packing.box_length is None else {"box_length": packing.box_length}
+    )
     numbers |= frame.number
     numbers |= {f"{mode.name}_eigenvalue": mode.eigenvalue.real for mode in modes}
     numbers |= {f"{mode.name}_eigenvalue_imag": mode.eigenvalue.imag for mode in modes}
     on_disks, unknown = _of_disks(packing, modes), () if frame.whole else FORCES + SLIPS
     if frame.displacement is not None:
-        on_disks["displacement"] = quantities.in_space(frame.displacement)
+        on_disks["displacement"] = export_quantities.in_space(frame.displacement)
     on_disks, on_contacts = (
         {name: values for name, values in each.items() if name not in unknown}
         for each in (on_disks, _of_contacts(packing))
     )
-    centres = quantities.in_space(packing.position)
+    centres = export_quantities.in_space(packing.position)
     return ElementTree.ElementTree(write_poly_data(centres, _ends(packing), numbers, on_disks, on_contacts))
 
 
@@ -83,10 +85,10 @@ def write_poly_data(
     piece = ElementTree.SubElement(data, "Piece", {key: str(value) for key, value in (sizes | none).items()})
     on_points = ElementTree.SubElement(piece, "PointData")
     for name, values in on_particles.items():
-        _array(on_points, name, _padded(values, 2 * count, 0.0 if name == "radius" else np.nan, behind=True))
+        _array(on_points, name, _pad(values, 2 * count, 0.0 if name == "radius" else np.nan, behind=True))
     on_cells = ElementTree.SubElement(piece, "CellData")
     for name, values in on_contacts.items():
-        _array(on_cells, name, _padded(values, n, np.nan, behind=False))
+        _array(on_cells, name, _pad(values, n, np.nan, behind=False))
     _array(ElementTree.SubElement(piece, "Points"), "Points", np.concatenate([centres, ends]))
     _cells(piece, "Verts", np.arange(n), 1)
     _cells(piece, "Lines", n + np.arange(2 * count), 2)
@@ -94,16 +96,16 @@ def write_poly_data(
 
 
 def _of_disks(packing: Packing, modes: list[ModeVectors]) -> dict[str, NDArray]:
-    force = quantities.disk_force(packing)
+    force = export_quantities.disk_force(packing)
     values = {
         "radius": packing.radius,
         "mass": packing.mass,
         "angle": packing.angle,
         "top": packing.top.astype(np.float64),
-        "net_force": quantities.in_space(force[:, :2]),
+        "net_force": export_quantities.in_space(force[:, :2]),
         "torque_over_radius": force[:, 2],
-        "normal_force": quantities.disk_pressure(packing),
-        "mobilised": quantities.disk_mobilised(packing),
+        "normal_force": export_quantities.disk_pressure(packing),
+        "mobilised": export_quantities.disk_mobilised(packing),
     }
     for mode in modes:
         values |= mode.fields
@@ -115,7 +117,7 @@ def _of_contacts(packing: Packing) -> dict[str, NDArray]:
     return {
         "contact_i": contacts.i.astype(np.float64),
         "contact_j": contacts.j.astype(np.float64),
-        "contact_force": quantities.in_space(quantities.contact_force(packing)),
+        "contact_force": export_quantities.in_space(export_quantities.contact_force(packing)),
         "contact_normal_force": packing.normal_force,
         "contact_tangential_force": packing.tangential_force,
         "contact_slip": contacts.slip,
@@ -128,10 +130,10 @@ def _ends(packing: Packing) -> NDArray:
     geometry, i = packing.geometry, packing.contacts.i
     first = packing.position[i]
     second = first - geometry.distance[:, None] * geometry.normal
-    return quantities.in_space(np.stack([first, second], axis=1).reshape(-1, 2))
+    return export_quantities.in_space(np.stack([first, second], axis=1).reshape(-1, 2))
 
 
-def _padded(values: NDArray, missing: int, fill: float, *, behind: bool) -> NDArray:
+def _pad(values: NDArray, missing: int, fill: float, *, behind: bool) -> NDArray:
     rows = np.full((missing, *values.shape[1:]), fill)
     return np.concatenate([values, rows] if behind else [rows, values])
 

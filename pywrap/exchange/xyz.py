@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis import PackingFileError
-from . import quantities
+from . import export_quantities
 from .disks import Disks, of_columns
-from .quantities import Frame, ModeVectors
-from .text import block_of_frame, columns_of, lines_of, numbers_in
+from .export_quantities import Frame, ModeVectors
+from .text_columns import block_of_frame, columns_of, lines_of, numbers_in
 
 PAIR = re.compile(r'([\w./-]+)=(?:"([^"]*)"|(\S+))')
 VECTORS = {"pos": ("x", "y", "z"), "position": ("x", "y", "z")}
@@ -43,9 +43,9 @@ def read_xyz(path: Path, frame: int | None = None) -> Disks:
     lattice = numbers_in(values.get("Lattice", ""), path)
     periodic = len(lattice) == 9 and values.get("pbc", "T T T").split()[0] in ("T", "1", "True")
     listed = values.get("contacts")
-    slips = None if listed is None else quantities.slips_of(numbers_in(listed, path), "x_low" in columns)
+    slips = None if listed is None else export_quantities.slips_of(numbers_in(listed, path), "x_low" in columns)
     period = lattice[0] if periodic else None
-    return of_columns(str(path), columns, box_length=period, given=quantities.given(values), slips=slips)
+    return of_columns(str(path), columns, box_length=period, given=export_quantities.pick_numbers(values), slips=slips)
 
 
 def _columns(properties: str) -> list[str | None]:
@@ -59,28 +59,28 @@ def _columns(properties: str) -> list[str | None]:
     return names
 
 
-def _written(frame: Frame, modes: list[ModeVectors]) -> list[tuple[str, str, np.ndarray]]:
+def _write_columns(frame: Frame, modes: list[ModeVectors]) -> list[tuple[str, str, np.ndarray]]:
     """Names, kinds and numbers of what stands in a row for each disk."""
     packing = frame.packing
-    n, force = len(packing), quantities.disk_force(packing)
+    n, force = len(packing), export_quantities.disk_force(packing)
     columns: list[tuple[str, str, np.ndarray]] = [
         # first, for readers of plain XYZ
-        ("pos", "R", quantities.in_space(packing.position)),
+        ("pos", "R", export_quantities.in_space(packing.position)),
         ("id", "I", np.arange(1, n + 1)),
         ("radius", "R", packing.radius),
         ("mass", "R", packing.mass),
         ("top", "I", packing.top.astype(int)),
-        ("normal_force", "R", quantities.disk_pressure(packing)),
+        ("normal_force", "R", export_quantities.disk_pressure(packing)),
     ]
     if frame.whole:
         columns += [
             ("angle", "R", packing.angle),
-            ("forces", "R", quantities.in_space(force[:, :2])),
+            ("forces", "R", export_quantities.in_space(force[:, :2])),
             ("torque_over_radius", "R", force[:, 2]),
-            ("mobilised", "R", quantities.disk_mobilised(packing)),
+            ("mobilised", "R", export_quantities.disk_mobilised(packing)),
         ]
     if frame.displacement is not None:
-        columns.append(("displacement", "R", quantities.in_space(frame.displacement)))
+        columns.append(("displacement", "R", export_quantities.in_space(frame.displacement)))
     if packing.position_low is not None:
         columns += [("x_low", "R", packing.position_low[:, 0]), ("y_low", "R", packing.position_low[:, 1])]
     columns += [(name, "R", values) for mode in modes for name, values in mode.fields.items()]
@@ -95,7 +95,7 @@ def write_xyz(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
 
 
 def _text(frame: Frame, modes: list[ModeVectors]) -> str:
-    packing, columns = frame.packing, _written(frame, modes)
+    packing, columns = frame.packing, _write_columns(frame, modes)
     rows = np.column_stack([array if array.ndim == 2 else array[:, None] for *_, array in columns])
     whole = np.concatenate([[kind == "I"] * (1 if a.ndim == 1 else a.shape[1]) for _, kind, a in columns])
     species = np.where(packing.top, "T", "B").tolist()
@@ -117,9 +117,9 @@ def _head(frame: Frame, columns: list[tuple[str, str, np.ndarray]]) -> str:
         f'Lattice="{float(width)!r} 0.0 0.0 0.0 {float(height)!r} 0.0 0.0 0.0 {2 * float(packing.radius.max())!r}"',
         f'pbc="{"F" if box is None else "T"} F F"',
         f"Properties=species:S:1:{properties}",
-        *(f"{key}={float(value)!r}" for key, value in (quantities.scalars(packing) | frame.number).items()),
+        *(f"{key}={float(value)!r}" for key, value in (export_quantities.scalars(packing) | frame.number).items()),
     ]
     if frame.whole:
-        numbers = " ".join(repr(value) for value in quantities.contact_rows(packing).ravel().tolist())
+        numbers = " ".join(repr(value) for value in export_quantities.contact_rows(packing).ravel().tolist())
         says.append(f'contacts="{numbers}"')
     return " ".join(says)

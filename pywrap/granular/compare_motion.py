@@ -25,8 +25,8 @@ from scipy.sparse.linalg import expm_multiply
 from ...analysis import Snapshot, damping_matrix, stiffness_matrix
 from ...analysis.packing.arrays import Floats
 from ...analysis.spectrum.spectrum import active_coordinates, mass_weighted
-from . import reading
-from .commands import SnapshotError
+from . import forked_look
+from .granular_commands import SnapshotError
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def compare_motion(
     SnapshotError
         If the instance has several ranks or threads, or other particles than the snapshot.
     """
-    if not reading.can_copy(lmp):
+    if not forked_look.can_copy(lmp):
         raise SnapshotError("compare_motion runs LAMMPS in copies of the process: use one rank and one thread.")
     step = float(lmp.extract_global("dt")) if timestep is None else float(timestep)
     steps = max(1, round(time / step))
@@ -94,7 +94,9 @@ def compare_motion(
     root = np.sqrt(snapshot.coordinate_mass)
     start = np.zeros(snapshot.coordinates)
     start[active] = amplitude * np.random.Generator(np.random.PCG64(seed)).standard_normal(len(active))
-    there, back = (reading.in_a_copy(lambda v=sign * start: _run(lmp, snapshot, v, step, steps)) for sign in (1, -1))
+    there, back = (
+        forked_look.in_a_copy(lambda v=sign * start: _run(lmp, snapshot, v, step, steps)) for sign in (1, -1)
+    )
     measured = (0.5 * (there - back) * root)[active]
     a = stiffness[active][:, active]
     g = mass_weighted(damping_matrix(snapshot), snapshot)[active][:, active]
@@ -114,7 +116,7 @@ def _velocity(a: csr_array, g: csr_array, start: Floats, time: float) -> Floats:
 def _run(lmp: Any, snapshot: Snapshot, velocity: Floats, step: float, steps: int) -> Floats:
     """Velocities of the coordinates after some steps of LAMMPS."""
     lmp.command("log none")
-    reading.quieten(lmp, drag=True)
+    forked_look.quieten(lmp, drag=True)
     d, parts = snapshot.dimension, velocity.reshape(snapshot.axes, -1)
     spin = parts[d:] / snapshot.radius
 

@@ -26,7 +26,7 @@ from mpi4py import MPI
 
 from ...analysis.packing.arrays import Floats
 from ..lammps.instance import lammps_instance
-from .commands import Commands, SnapshotError, wall_plane
+from .granular_commands import Commands, SnapshotError, wall_plane
 
 EXACT = 1e-6
 """Distance of a measured exponent from a multiple of 1/4: rounding of forces and overlaps leaves 1e-9 or less."""
@@ -273,10 +273,10 @@ def _measure(bench: Bench, wanted: State, types: tuple[int, int]) -> tuple[State
     if mu == 0:
         return state, _Values(fn / delta, 0.0, normal_dashpot, 0.0, 0.0, 0.0, 0.0, 0.0)
     slip = 0.01 * min(mu, 1.0) * delta
-    ft = _pushed(bench, wanted, types, slip / step)[1]
+    ft = _push_contact(bench, wanted, types, slip / step)[1]
     if ft > 0.1 * mu * fn:  # a stiff spring: once more, with less
         slip *= 0.1 * mu * fn / ft / 10
-        ft = _pushed(bench, wanted, types, slip / step)[1]
+        ft = _push_contact(bench, wanted, types, slip / step)[1]
     if ft == 0:
         raise SnapshotError("A contact law has friction without a tangential stiffness: use one with a history.")
     lever = (state.radii[0] - bench.lever()) / delta
@@ -299,7 +299,7 @@ def _measure(bench: Bench, wanted: State, types: tuple[int, int]) -> tuple[State
     return state, _Values(fn / delta, ft / slip, normal_dashpot, tangential_dashpot, closing, parting, mu, lever)
 
 
-def _pushed(bench: Bench, state: State, types: tuple[int, int], speed: float) -> tuple[float, float]:
+def _push_contact(bench: Bench, state: State, types: tuple[int, int], speed: float) -> tuple[float, float]:
     """Forces at rest of a fresh contact that has slipped at a speed for one step."""
     bench.place_at(state, types)
     bench.move((0.0, speed))

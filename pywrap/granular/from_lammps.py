@@ -1,7 +1,7 @@
 r"""A Snapshot of a live LAMMPS with its own granular styles, or ours: any packing, as it stands.
 
 What LAMMPS says of each contact (compute pair/local, fix wall/gran ... contacts) is its normal, its overlap and both
-forces, without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.reading`). The laws are
+forces, without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.forked_look`). The laws are
 measured (:mod:`~faultgouge.pywrap.granular.contact_law`), with which
 
 .. math::
@@ -32,10 +32,10 @@ import numpy as np
 
 from ...analysis import LinearisedContacts, MindlinLaw, Snapshot
 from ...analysis.packing.arrays import Floats, Indices
-from ...analysis.packing.snapshot import PER_CONTACT, WALL, linearised
-from . import reading
-from .commands import OWN, Commands, SnapshotError, check_fixes, check_pair, read_commands, without_suffix
+from ...analysis.packing.snapshot import PER_CONTACT, WALL, linearise_contacts
+from . import forked_look
 from .contact_law import MeasuredLaw, State, measure_laws
+from .granular_commands import OWN, Commands, SnapshotError, check_fixes, check_pair, read_commands, without_suffix
 
 BALANCE = 1e-4
 """Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
@@ -81,8 +81,8 @@ def from_lammps(
         without contacts, moving or curved walls, or bodies; or the commands are not those of the instance.
     """
     given = None if commands is None else read_commands(commands)
-    if reading.can_copy(lmp):
-        styles, read, found = reading.in_a_copy(lambda: _look(lmp, given, copied=True))
+    if forked_look.can_copy(lmp):
+        styles, read, found = forked_look.in_a_copy(lambda: _look(lmp, given, copied=True))
     else:
         styles, read, found = _look(lmp, given, copied=False)
     snapshot = _snapshot(lmp, styles, read, found)
@@ -98,11 +98,15 @@ def from_lammps(
 Styles = tuple[str, dict[str, str], str, str]
 
 
-def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Styles, Commands, reading.Arrays]:
+def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Styles, Commands, forked_look.Arrays]:
     """Styles, commands, and the arrays of all ranks."""
-    world = reading.communicator(lmp)
+    world = forked_look.communicator(lmp)
     if given is None:
-        lines = reading.log_of(lmp) if copied else world.bcast(reading.only_log() if world.rank == 0 else None, root=0)
+        lines = (
+            forked_look.log_of(lmp)
+            if copied
+            else world.bcast(forked_look.only_log() if world.rank == 0 else None, root=0)
+        )
         if lines is None:
             raise SnapshotError(
                 "This LAMMPS has no log to read its commands from: give the lines pair_style, pair_coeff, fix "
@@ -111,10 +115,10 @@ def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Styles, Co
         given = read_commands(lines, log=True)
     elif copied:
         lmp.command("log none")
-    styles = reading.styles_of(lmp)
+    styles = forked_look.styles_of(lmp)
     _check(lmp, styles, given)
     if copied:
-        reading.quieten(lmp)
+        forked_look.quieten(lmp)
     groups = _groups(styles[1], given)
     walls = tuple(
         name for name, style in styles[1].items() if without_suffix(style) in ("wall/gran", "wall/mindlin/smooth")
@@ -122,15 +126,15 @@ def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Styles, Co
     own = given.style == OWN
     columns = "dx dy dz force p1 p2 p3" if not own else "dx dy dz force p1 p3"
 
-    def work() -> reading.Arrays:
-        return reading.at_rest(lmp, groups, walls, columns)
+    def work() -> forked_look.Arrays:
+        return forked_look.at_rest(lmp, groups, walls, columns)
 
-    mine = work() if copied else reading.in_place(lmp, work, groups)
+    mine = work() if copied else forked_look.in_place(lmp, work, groups)
     every = world.allgather(mine)
-    return styles, given, {name: _joined([each[name] for each in every]) for name in mine}
+    return styles, given, {name: _join_ranks([each[name] for each in every]) for name in mine}
 
 
-def _joined(parts: list[Floats]) -> Floats:
+def _join_ranks(parts: list[Floats]) -> Floats:
     """Rows of all ranks; those of a rank that has none may have another number of columns."""
     kept = [part for part in parts if len(part)] or parts[:1]
     return np.concatenate(kept)
@@ -172,7 +176,7 @@ def _groups(fixes: dict[str, str], commands: Commands) -> dict[str, str]:
     return found
 
 
-def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: reading.Arrays) -> Snapshot:
+def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: forked_look.Arrays) -> Snapshot:
     order = np.argsort(found["id"], kind="stable")
     per_atom = [name for name in found if name not in ("contacts", "partners")]
     found = found | {name: found[name][order] for name in per_atom}
@@ -225,7 +229,9 @@ def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: reading.Array
 class _Contacts:
     """The contacts of a look, with the laws that LAMMPS has for them."""
 
-    def __init__(self, found: reading.Arrays, commands: Commands, styles: Styles, types: int, frozen: Indices) -> None:
+    def __init__(
+        self, found: forked_look.Arrays, commands: Commands, styles: Styles, types: int, frozen: Indices
+    ) -> None:
         self.found, self.commands, self.types, self.units = found, commands, types, styles[2]
         self.radius, self.mass = found["radius"], np.where(frozen, np.inf, found["rmass"])
         self.kind = found["type"].astype(np.int64)
@@ -383,7 +389,7 @@ def _smooth(
 ) -> LinearisedContacts:
     """Contacts of mindlin/smooth, along z x n."""
     tangent = np.column_stack([-normal[:, 1], normal[:, 0], np.zeros(len(normal))])
-    made = linearised(law, overlap, slip, tangent, normal=normal, **where)
+    made = linearise_contacts(law, overlap, slip, tangent, normal=normal, **where)
     _agree(made.normal_force, said, "contacts of mindlin/smooth")
     return made
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .instance import EngineError
-from .names_of_files import DECKS, decks_folder, is_plain
+from .plain_file_names import DECKS, decks_folder, is_plain
 
 __all__ = ["DECKS", "Decks"]
 

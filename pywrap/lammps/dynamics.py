@@ -19,8 +19,8 @@ from ...analysis.files.signal_files import write_table
 from ...analysis.motion.signals import Signal
 from ...analysis.packing.arrays import Floats
 from .decks import Decks
-from .names_of_files import shared_folder
-from .wire import Wire
+from .plain_file_names import shared_folder
+from .state_transfer import Wire
 
 
 class Motion(NamedTuple):

@@ -2,8 +2,8 @@
 
 The instance is set up by the deck part ``system.in``, the same file that ``lmp -in`` runs, and driven by its
 companions (:mod:`~faultgouge.pywrap.lammps.decks`). A `Packing` goes in and a `Packing` comes out, bit for bit
-(:mod:`~faultgouge.pywrap.lammps.wire`). All methods are collective over the ranks of the communicator, and every rank
-sees the whole packing.
+(:mod:`~faultgouge.pywrap.lammps.state_transfer`). All methods are collective over the ranks of the communicator, and
+every rank sees the whole packing.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from ...analysis.motion.signals import Signal
 from ...analysis.packing.arrays import Floats
 from .data_file import box_heights, data_file, sort_contacts
 from .decks import Decks
-from .displacing import Displacing
+from .displacement import Displacing
 from .dynamics import Dynamics, Weakening
 from .instance import lammps_instance
-from .names_of_files import decks_folder, move_files, shared_folder
-from .trial import Trial
-from .wire import Wire
+from .plain_file_names import decks_folder, move_files, shared_folder
+from .state_transfer import Wire
+from .trial_state import Trial
 
 LOOK = 1000
 """Time steps between two looks at the forces."""

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from ...analysis import FaultgougeError
 from ...plugin import directory
-from .names_of_files import plain_name
+from .plain_file_names import plain_name
 
 
 class EngineError(FaultgougeError):

@@ -13,29 +13,29 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, find_onset
+from ...analysis.damped_onset.first_window import first_growing
 from ...analysis.damped_onset.modes import Pencil
-from ...analysis.damped_onset.sliced import first_growing
 from ...analysis.damped_onset.windows import (
     DampedOnsetError,
     DampedWindow,
     damped_windows,
-    dissipating,
-    dissipative,
     growing_windows,
+    with_dissipation,
+    without_dissipation,
 )
 from ...analysis.onset import LIMITS, Family, Increments, full_operator, takes_all_modes
-from ...analysis.onset.dense import windows_along
+from ...analysis.onset.all_windows import windows_along
 from ...analysis.onset.modes import contact_states
 from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
-from ..runs.path import EquilibriumPath, loads
-from ..scenes.refusals import needed
+from ..runs.equilibrium_path import EquilibriumPath, loads
 from ..scenes.scene import Scene
-from ..settling.bed import settle
-from ..settling.settling import Watch
+from ..scenes.validation import require_section
+from ..settling.minimize_energy import Watch
+from ..settling.settle import settle
 from .path_error import with_damped_path_error, with_path_error
-from .sharing import searching
+from .search_ranks import search_ranks
 
 FEW = 3
 """Increments that are searched at once where the first window alone is asked for."""
@@ -118,9 +118,9 @@ class Ramped:
 
     def undamped(self, watch: Watch = lambda says: None, folder: Path | None = None) -> Onset | None:
         """All windows without dissipation, or the first one of a ramp that is not whole; None if there is none."""
-        path, first = dissipating(self.path), not self.whole
+        path, first = without_dissipation(self.path), not self.whole
         try:
-            return find_onset(path, self.forces, first=first, watch=watch, ranks=searching(), folder=folder)
+            return find_onset(path, self.forces, first=first, watch=watch, ranks=search_ranks(), folder=folder)
         except (OnsetError, NoEquilibriumError):
             return None
 
@@ -128,14 +128,14 @@ class Ramped:
         """The first window without dissipation, as far as a few increments show it; None if there is none."""
         for k in range(0, len(self.forces) - 1, FEW):
             try:
-                return find_onset(dissipating(self.path), self.forces[k : k + FEW + 1]).windows[0]
+                return find_onset(without_dissipation(self.path), self.forces[k : k + FEW + 1]).windows[0]
             except OnsetError:
                 continue
         return None
 
 
 @contextmanager
-def ramped(
+def ramp_scene(
     scene: Scene,
     mu: float | None = None,
     watch: Watch = lambda says: None,
@@ -154,7 +154,7 @@ def ramped(
     NoEquilibriumError
         If the packing flows from the first increment on.
     """
-    wanted = loads(needed(scene.ramp, "ramp"))
+    wanted = loads(require_section(scene.ramp, "ramp"))
     scene = scene.model_copy(update={"damping": None})
     start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"), bed=bed)
     with Engine(start.packing) as engine:
@@ -212,13 +212,13 @@ def damped_onset_run(
     Raises
     ------
     SceneError, NoEquilibriumError
-        As of `ramped`; the latter also if the packing flows before an onset.
+        As of `ramp_scene`; the latter also if the packing flows before an onset.
     DampedOnsetError
         If no motion grows up to the ramp's end.
     """
-    damping = needed(scene.damping, "damping")
-    dissipation = partial(dissipative, cn=damping.cn, ct=damping.ct, drag_time=damping.tau)
-    with ramped(scene, mu, watch, first, bed) as ramp:
+    damping = require_section(scene.damping, "damping")
+    dissipation = partial(with_dissipation, cn=damping.cn, ct=damping.ct, drag_time=damping.tau)
+    with ramp_scene(scene, mu, watch, first, bed) as ramp:
         if ramp.whole:
             found = _all_windows(ramp, mu, dissipation, watch, known)
         elif ramp.all_modes:
@@ -241,7 +241,7 @@ def _all_windows(ramp: Ramped, mu: float, dissipation: Dissipation, watch: Watch
         if windows:
             known(DampedOnset(mu, windows, undamped, None), fx)
 
-    look = () if undamped is None else inside(undamped.windows)
+    look = () if undamped is None else loads_inside(undamped.windows)
     found = damped_windows(lambda fx: dissipation(ramp.path(fx)), ramp.forces, look=look, watch=watch, known=so_far)
     last = float(ramp.forces[-1])
     if not found:
@@ -320,7 +320,7 @@ def _first_in_slices(
         watch(f"with dissipation, {says}")
 
     try:
-        first, doubtful = first_growing(pencil, ramp.forces, growing, searching(), folder)
+        first, doubtful = first_growing(pencil, ramp.forces, growing, search_ranks(), folder)
     except NoEquilibriumError as error:
         raise _nothing_grows(ramp.path.kept[-1].fx, True) from error
     if first is None:
@@ -340,7 +340,7 @@ def _nothing_grows(last: float, flows: bool) -> DampedOnsetError | NoEquilibrium
     return DampedOnsetError(f"No motion grows up to F_x = {last:.10g}: raise ramp.until.")
 
 
-def inside(windows: Iterable[Window]) -> list[float]:
+def loads_inside(windows: Iterable[Window]) -> list[float]:
     """The onsets of undamped windows, and the middles of those that end: growth is largest there."""
     ends = [0.5 * (each.fx_onset + each.fx_end) for each in windows if each.fx_end is not None]
     return [each.fx_onset for each in windows] + ends

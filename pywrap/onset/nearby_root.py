@@ -51,12 +51,12 @@ def nearby_root(
         return fx - at(fx) / slope, slope
     found = _secant(at, fx, rounding, reach)
     if np.isnan(found):
-        return _bracketed(at, fx, rounding, reach), None
+        return _bracket_root(at, fx, rounding, reach), None
     step = _first_step(fx, rounding)
     return found, (at(fx + step) - at(fx)) / step
 
 
-def _bracketed(function: Callable[[float], float], fx: float, rounding: float, reach: float) -> float:
+def _bracket_root(function: Callable[[float], float], fx: float, rounding: float, reach: float) -> float:
     """Steps to either side of fx grow until the sign changes; the last is halved."""
     sign, near, far = np.sign(function(fx)), 0.0, max(NOISY * rounding, reach * 2.0**-WIDENINGS)
     while far <= reach:

@@ -48,7 +48,7 @@ from ...analysis.damped_onset.windows import DampedWindow
 from ...analysis.onset import force_bearing
 from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
-from ..runs.path import EquilibriumPath
+from ..runs.equilibrium_path import EquilibriumPath
 from .nearby_root import nearby_root
 
 Vanishes = Callable[[Packing], float]
@@ -142,7 +142,9 @@ def with_path_error(onset: Onset, path: EquilibriumPath) -> Onset:
         None, where the ramp has no equilibrium at the onset that the search has found there.
     """
     others = OtherPaths(path)
-    return replace(onset, windows=tuple(_whole(window, meeting(window.eigenvalue), others) for window in onset.windows))
+    return replace(
+        onset, windows=tuple(_whole_error(window, meeting(window.eigenvalue), others) for window in onset.windows)
+    )
 
 
 def with_damped_path_error(
@@ -160,13 +162,13 @@ def with_damped_path_error(
         As in `with_path_error`.
     """
     others = OtherPaths(path)
-    return tuple(_whole(window, crossing(window.frequency, dissipation), others) for window in windows)
+    return tuple(_whole_error(window, crossing(window.frequency, dissipation), others) for window in windows)
 
 
 W = TypeVar("W", Window, DampedWindow)
 
 
-def _whole(window: W, vanishes: Vanishes, others: OtherPaths) -> W:
+def _whole_error(window: W, vanishes: Vanishes, others: OtherPaths) -> W:
     """The window as the exact path has it; as it is where the ramp itself has no equilibrium at its onset."""
     if not window.fx_onset > others.path.kept[0].fx:
         return window
@@ -216,7 +218,7 @@ class OtherPaths:
         changed = self.changes(fx)
         ramp = np.array([*(each.fx for each in self.path.kept if each.fx < fx), fx])
         few = len(changed) < FEWEST
-        other = _halved(ramp) if few else _thinned(ramp, changed)
+        other = _halve_loads(ramp) if few else _thin_loads(ramp, changed)
         increment = float(np.diff(ramp).max())
 
         slope = None
@@ -234,8 +236,8 @@ class OtherPaths:
         weight = _cubes(other) / _cubes(ramp) - 1
         if not changed.any():
             return PathError(shift, 0.0, (), weight, False, rounding, increment)
-        finer = 0.0 if few else shifted(_halved(ramp), self._finer)
-        moved = (shifted(_moved(ramp, share), known) for share, known in zip(MOVED, self._moved, strict=True))
+        finer = 0.0 if few else shifted(_halve_loads(ramp), self._finer)
+        moved = (shifted(_shift_loads(ramp, share), known) for share, known in zip(MOVED, self._moved, strict=True))
         return PathError(shift, finer, tuple(moved), weight, True, rounding, increment)
 
     def changes(self, fx: float) -> NDArray[np.bool_]:
@@ -273,7 +275,7 @@ def bearing_contacts(packing: Packing) -> frozenset[tuple[int, int, bool]]:
     return frozenset(zip(contacts.i.tolist(), contacts.j.tolist(), slides.tolist(), strict=True))
 
 
-def _thinned(loads: Floats, changed: NDArray[np.bool_]) -> Floats:
+def _thin_loads(loads: Floats, changed: NDArray[np.bool_]) -> Floats:
     """Every second load; after an increment with a change the load is left out, before one it is kept."""
     kept, run = [True], 0
     for k in range(1, len(loads) - 1):
@@ -284,11 +286,11 @@ def _thinned(loads: Floats, changed: NDArray[np.bool_]) -> Floats:
     return loads[[*kept, True]]
 
 
-def _halved(loads: Floats) -> Floats:
+def _halve_loads(loads: Floats) -> Floats:
     return np.sort(np.concatenate([loads, 0.5 * (loads[1:] + loads[:-1])]))
 
 
-def _moved(loads: Floats, share: float) -> Floats:
+def _shift_loads(loads: Floats, share: float) -> Floats:
     """The loads moved up by a share of their increments; the first and the last stay besides."""
     return np.concatenate([loads[:1], loads[:-1] + share * np.diff(loads), loads[-1:]])
 

@@ -9,22 +9,22 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
-from ...analysis.digits import with_uncertainty
 from ...analysis.errors import TurningPointError
 from ...analysis.onset import full_operator, takes_all_modes
 from ...analysis.onset.search import windows_rows
 from ...analysis.packing.arrays import Floats
 from ...analysis.spectrum.spectrum import active_coordinates
-from ...analysis.tabled import Tabled
+from ...analysis.table_display import Tabled
+from ...analysis.uncertain_digits import with_uncertainty
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
-from ..runs.path import EquilibriumPath, loads
-from ..scenes.refusals import SceneError, needed
+from ..runs.equilibrium_path import EquilibriumPath, loads
 from ..scenes.scene import Scene
-from ..settling.bed import settle
-from ..settling.settling import Watch
+from ..scenes.validation import SceneError, require_section
+from ..settling.minimize_energy import Watch
+from ..settling.settle import settle
 from .path_error import with_path_error
-from .sharing import searching
+from .search_ranks import search_ranks
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ def onset_run(
         If the packing flows from the first increment on, or before an onset; a TurningPointError if an eigenvalue is
         negative before any is complex.
     """
-    wanted = loads(needed(scene.ramp, "ramp"))
+    wanted = loads(require_section(scene.ramp, "ramp"))
     start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"), bed=bed)
     _check_modes(start.packing, modes)
     whole = reached is not None or (takes_all_modes(start.packing, modes) and not first)
@@ -127,7 +127,7 @@ def onset_run(
             forces = np.array([each.fx for each in path.kept])
         flows = len(forces) < len(wanted)
         try:
-            onset = find_onset(path, forces, modes=modes, first=first, watch=watch, ranks=searching(), folder=folder)
+            onset = find_onset(path, forces, modes=modes, first=first, watch=watch, ranks=search_ranks(), folder=folder)
         except TurningPointError:
             raise
         except (OnsetError, NoEquilibriumError) as error:

@@ -17,9 +17,9 @@ from ...analysis.packing.arrays import Floats, Indices
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Dynamics, Motion, Weakening
 from ..lammps.engine import Engine
-from ..scenes.refusals import SceneError, needed
 from ..scenes.scene import Scene
 from ..scenes.sections import Friction, Perturb
+from ..scenes.validation import SceneError, require_section
 
 ACCURATE_SHARE = 0.05
 """Time step of undamped runs in units of the stability limit 2/omega_max: the fastest mode is then resolved
@@ -147,8 +147,8 @@ def perturb(
         At once, if the scene has no section [perturb], its time step is over the limit, or its time shorter than one
         step.
     """
-    settings, packing = needed(scene.perturb, "perturb"), start.packing
-    dt, steps = sampling(settings, packing, samples, early)
+    settings, packing = require_section(scene.perturb, "perturb"), start.packing
+    dt, steps = sample_steps(settings, packing, samples, early)
     everyone = range(len(packing)) if settings.target == "all" else settings.target
     target = None if everyone == "top" else [int(disk) for disk in everyone]
     forces = *settings.cosine, target, weakening, settings.forcing(), settings.on or "layer"
@@ -168,14 +168,14 @@ def perturb(
                 motion, last = dynamics.advance(step - last), step
                 if watch is not None:
                     watch(step * dt, motion)
-                yield _sampled(step * dt, motion, packing)
+                yield _sample_run(step * dt, motion, packing)
                 if step in ends and step < steps[-1]:
                     _end_part(dynamics, step, keep)
 
     return run()
 
 
-def sampling(settings: Perturb, packing: Packing, samples: int = 2000, early: int = 200) -> tuple[float, Indices]:
+def sample_steps(settings: Perturb, packing: Packing, samples: int = 2000, early: int = 200) -> tuple[float, Indices]:
     """Time step of an undamped run, and the steps at which it is sampled; parameters and errors as of `perturb`."""
     dt = time_step(packing, settings.time_step)
     settings.check_samples(dt)
@@ -188,9 +188,9 @@ def sampling(settings: Perturb, packing: Packing, samples: int = 2000, early: in
     return dt, steps
 
 
-def unforced(scene: Scene) -> Scene:
+def without_perturbation(scene: Scene) -> Scene:
     """The scene without its perturbation: the run that calibrates v_0."""
-    settings = needed(scene.perturb, "perturb")
+    settings = require_section(scene.perturb, "perturb")
     return scene.model_copy(update={"perturb": settings.model_copy(update={"amplitude": 0.0, "signal": None})})
 
 
@@ -199,7 +199,7 @@ def weakening_of(friction: Friction, v0: float) -> Weakening:
     return Weakening(B=friction.B, w=friction.w, mu_ss=friction.mu_ss, v0=v0, v_ss=friction.velocity_scale(v0))
 
 
-def _sampled(time: float, motion: Motion, packing: Packing) -> Sample:
+def _sample_run(time: float, motion: Motion, packing: Packing) -> Sample:
     displaced = mean_square_displacement(
         motion.position, packing.position, packing.box_length, motion.position_low, packing.position_low
     )

@@ -1,9 +1,9 @@
 r"""What a scene asks for, before any of it is done: steps, increments, memory, size of files, time.
 
-Two questions. *Can it be at all?* `impossible` finds in the numbers of a scene what no packing bears: overlaps beyond
-the contact law, forces that drown in the rounding of the coordinates, a settling that never ends. *How long does it
-take?* `estimated` counts the work of a command, and `foreseen` refuses what nobody can want. Times are those of one
-core of 2020, within a factor of three or so, and say whether to wait or to come back tomorrow.
+Two questions. *Can it be at all?* `refuse_impossible` finds in the numbers of a scene what no packing bears: overlaps
+beyond the contact law, forces that drown in the rounding of the coordinates, a settling that never ends. *How long does
+it take?* `estimate_work` counts the work of a command, and `describe_work` refuses what nobody can want. Times are
+those of one core of 2020, within a factor of three or so, and say whether to wait or to come back tomorrow.
 
 A contact that carries the force f has :math:`\delta = (f/k_n)^{1/p}` and the stiffness
 :math:`k = p\, k_n \delta^{p-1}`, with p = 3/2 for Hertz. A time step is a share of :math:`(m/k)^{1/2}`, a disk falls
@@ -19,9 +19,9 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from ...analysis import MindlinLaw
-from .keys import Keys
 from .packing_section import GeneratedPacking
-from .refusals import SceneError
+from .scene_keys import Keys
+from .validation import SceneError
 
 Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "onset --all", "reproduce"]
 
@@ -131,7 +131,7 @@ class Estimate:
         return f"about {_duration(self.seconds)}: {', '.join(parts)}"
 
 
-def estimated(scene: Keys, task: Task) -> Estimate:
+def estimate_work(scene: Keys, task: Task) -> Estimate:
     """What a command does for a scene.
 
     Parameters
@@ -183,7 +183,7 @@ def estimated(scene: Keys, task: Task) -> Estimate:
     return Estimate(disks, steps, increments, memory, written, seconds)
 
 
-def foreseen(scene: Keys, task: Task) -> str:
+def describe_work(scene: Keys, task: Task) -> str:
     """What a command will do and how long that takes, in a line; empty where it takes no time.
 
     Parameters
@@ -191,14 +191,14 @@ def foreseen(scene: Keys, task: Task) -> str:
     scene : Scene
         What is wanted.
     task : {"settle", "ramp", "perturb", "onset", "onset --all", "reproduce"}
-        As in `estimated`.
+        As in `estimate_work`.
 
     Raises
     ------
     SceneError
         If it takes a year, more memory than there is, or a file of more than `LARGEST_FILE`.
     """
-    work = estimated(scene, task)
+    work = estimate_work(scene, task)
     if not work.seconds < LONGEST:
         what = "a year and more"
     elif work.memory > _installed_memory():
@@ -210,7 +210,7 @@ def foreseen(scene: Keys, task: Task) -> str:
     raise SceneError(f"the scene asks {task} for {what} ({work}): {_remedy(scene, task)}")
 
 
-def impossible(scene: Keys) -> tuple[str, str] | None:
+def refuse_impossible(scene: Keys) -> tuple[str, str] | None:
     """What in the numbers of a scene no packing can bear: the key, and the rest of the sentence; None if nothing is."""
     packing, law, fy = scene.packing, scene.law, scene.load.fy
     if not isinstance(packing, GeneratedPacking):

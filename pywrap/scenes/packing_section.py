@@ -12,8 +12,8 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from ...analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
 from ...analysis.packing.arrays import Floats
 from ..exchange import Disks, format_of, is_hdf5, packing_of, read_disks, upper_layer
-from .loose import layer_size, loose_start
-from .refusals import Positive, Section, refusal
+from .random_start import layer_size, random_start
+from .validation import Positive, Section, refusal_sentence
 
 SPARSEST = 10.0
 """Width of the box, in lengths of all disks in one row, beyond which nothing would ever touch."""
@@ -70,17 +70,17 @@ class GeneratedPacking(Section):
     @model_validator(mode="after")
     def _fits(self) -> "GeneratedPacking":
         if self.top > self.disks:
-            raise refusal("top", f"= {self.top} is more than the {self.disks} disks of the packing: lower it")
+            raise refusal_sentence("top", f"= {self.top} is more than the {self.disks} disks of the packing: lower it")
         cutoff = 2 * max(self.radii)
         if self.periodic and self.width < 2 * cutoff:
             says = f"= {self.width} is under two cutoffs of one largest diameter, {2 * cutoff}: widen the box"
-            raise refusal("width", says)
+            raise refusal_sentence("width", says)
         row = 2 * self.disks * max(self.radii)
         if self.width > SPARSEST * row:
             says = f"= {self.width:g} is {self.width / row:.2g} times the length of all disks in a row: narrow the box"
-            raise refusal("width", says)
+            raise refusal_sentence("width", says)
         if not self.periodic and (self.top < self.disks or row > self.width):
-            raise refusal(
+            raise refusal_sentence(
                 "periodic",
                 "= false leaves the sides open, where the upper layer spreads the disks below until they are lost: "
                 "leave it out, or give a pile that stands by itself as packing.file",
@@ -88,12 +88,12 @@ class GeneratedPacking(Section):
         try:
             self.start()
         except ValueError as error:
-            raise refusal("", f"is refused because {error}: widen the box, or take fewer disks") from None
+            raise refusal_sentence("", f"is refused because {error}: widen the box, or take fewer disks") from None
         return self
 
     def start(self, draw: int = 0) -> Disks:
         """The loose start that this section describes, or a later one of its seed."""
-        return loose_start(self.disks, self.radii, self.top, self.width, self.seed, periodic=self.periodic, draw=draw)
+        return random_start(self.disks, self.radii, self.top, self.width, self.seed, periodic=self.periodic, draw=draw)
 
     def mass_of(self, radius: Floats) -> Floats:
         """Masses of disks, shape (N,)."""
@@ -130,9 +130,9 @@ class StoredPacking(Section):
                 format_of(path)
         except OSError as error:
             says = f"cannot be read at {path} ({error.strerror}): correct the name"
-            raise refusal("", f'= "{file}" {says}') from None
+            raise refusal_sentence("", f'= "{file}" {says}') from None
         except PackingFileError as error:
-            raise refusal("", f'= "{file}" is refused: {str(error).rstrip(".")}') from None
+            raise refusal_sentence("", f'= "{file}" is refused: {str(error).rstrip(".")}') from None
         return path
 
     @model_validator(mode="after")
@@ -140,14 +140,14 @@ class StoredPacking(Section):
         if is_hdf5(self.file):
             for key in ("top", "frame"):
                 if getattr(self, key) is not None:
-                    raise refusal(
+                    raise refusal_sentence(
                         key, "cannot stand beside a run.h5, whose first frame is taken as it is: leave it out"
                     )
             return self
         try:
             upper_layer(read_disks(self.file, self.frame), self.top)
         except BadInputError as error:
-            raise refusal("file", f'= "{self.file.name}" is refused: {str(error).rstrip(".")}') from None
+            raise refusal_sentence("file", f'= "{self.file.name}" is refused: {str(error).rstrip(".")}') from None
         return self
 
     def packing(self, law: MindlinLaw, **more: Any) -> Packing:

@@ -16,7 +16,7 @@
     [output]    what is written beside the result
 
 packing, law and load are needed; of the others, one that is absent is a feature that is not in the run. A command
-takes the sections that it reads, and needs some of them (:mod:`faultgouge.pywrap.scenes.commands`). The
+takes the sections that it reads, and needs some of them (:mod:`faultgouge.pywrap.scenes.command_sections`). The
 units are the user's own: k_n and k_t are force / length^law.exponent, 3/2 by default, and the paper's numbers take
 the mass of a disk and the diameter of a small disk as units. Defaults are the paper's values where it gives one; the
 docstrings say where it does not.
@@ -29,12 +29,12 @@ from typing import Any, get_args
 from pydantic import ValidationError, model_validator
 from pydantic_core import InitErrorDetails
 
-from .commands import COMMANDS, Command
-from .estimate import impossible
-from .keys import Keys
-from .refusals import SceneError, Section, needed, read_toml, refusal, sentence
+from .command_sections import COMMANDS, Command
+from .estimate import refuse_impossible
+from .scene_keys import Keys
 from .sections import Inertia
 from .units import real_units
+from .validation import SceneError, Section, read_toml, refusal_sentence, require_section, sentence
 
 
 class Scene(Keys):
@@ -45,25 +45,25 @@ class Scene(Keys):
         perturb, ramp = self.perturb, self.ramp
         if perturb and ramp and perturb.fx > max(0.0, ramp.first):
             says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
-            raise refusal("perturb.fx", says)
+            raise refusal_sentence("perturb.fx", says)
         if perturb and isinstance(perturb.target, tuple):
             disks = self.packing.disks
             beyond = [disk for disk in perturb.target if disk >= disks]
             if beyond:
-                raise refusal("perturb.target", f"names disk {beyond[0]}: name disks from 0 to {disks - 1}")
-        cannot = impossible(self)
+                raise refusal_sentence("perturb.target", f"names disk {beyond[0]}: name disks from 0 to {disks - 1}")
+        cannot = refuse_impossible(self)
         if cannot is not None:
-            raise refusal(*cannot)
+            raise refusal_sentence(*cannot)
         if self.friction and self.law.mus[0] == 0:
-            raise refusal("friction", "has no mu to weaken: leave it out or give law.mu a value above 0")
+            raise refusal_sentence("friction", "has no mu to weaken: leave it out or give law.mu a value above 0")
         if self.damping and ramp and ramp.method == "overdamped":
             says = (
                 "acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no use "
             )
-            raise refusal("damping", says + 'for it: set ramp.method = "newton", or leave [damping] out')
+            raise refusal_sentence("damping", says + 'for it: set ramp.method = "newton", or leave [damping] out')
         if self.damping and self.damping.ct > 0 and self.law.mus[0] == 0:
             says = f"= {self.damping.ct:g} has no friction to damp: leave it out or give law.mu a value above 0"
-            raise refusal("damping.ct", says)
+            raise refusal_sentence("damping.ct", says)
         real_units(self)
         return self
 
@@ -81,7 +81,7 @@ class Scene(Keys):
             A section [packing] in place of the file's, whose own may name a file that is not there yet.
         command : str, optional
             The command, or the task of a sweep, that the scene is for: it gets the sections that it reads
-            (:mod:`faultgouge.pywrap.scenes.commands`). By default all.
+            (:mod:`faultgouge.pywrap.scenes.command_sections`). By default all.
 
         Returns
         -------
@@ -133,7 +133,7 @@ class Scene(Keys):
                     context["inertia"] = _Part.model_validate({"perturb": mapping.pop("perturb", {})}).perturb
             scene = cls.model_validate(mapping, context=context)
             for section in wanted.needs:
-                needed(getattr(scene, section), section)
+                require_section(getattr(scene, section), section)
             return scene
         except ValidationError as error:
             # A misspelled name makes the right one missing, too: the misspelling is the cause.

@@ -11,8 +11,8 @@ from typing import Any, Literal
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis.packing.law import EXPONENTS
-from .refusals import NotNegative, Positive, Section, is_number, refusal
 from .signal_keys import SignalKeys
+from .validation import NotNegative, Positive, Section, is_number, refusal_sentence
 
 NUMBER = r"\d+(?:\.\d*)?(?:[eE][-+]?\d+)?"
 """A number without a sign, in text."""
@@ -53,7 +53,7 @@ class Law(Section):
     @classmethod
     def _kt_has_kn(cls, section: Any) -> Any:
         if isinstance(section, Mapping) and "kt" in section and "kn" not in section:
-            raise refusal("kt", "stands without kn: give kn, in force / length^exponent, as well")
+            raise refusal_sentence("kt", "stands without kn: give kn, in force / length^exponent, as well")
         return section
 
     @field_validator("kt", mode="before")
@@ -66,7 +66,7 @@ class Law(Section):
         match = re.fullmatch(rf"(?:({NUMBER})(?:/({NUMBER}))? )?kn", kt.strip())
         numerator, denominator = (float(number or 1) for number in match.groups()) if match else (0.0, 0.0)
         if denominator == 0:
-            raise refusal("", f'= "{kt}" is no share of kn: give a number, or a share such as "2/7 kn"')
+            raise refusal_sentence("", f'= "{kt}" is no share of kn: give a number, or a share such as "2/7 kn"')
         return numerator * info.data["kn"] / denominator
 
     @field_validator("mu", mode="before")
@@ -74,22 +74,24 @@ class Law(Section):
     def _one_or_several(cls, mu: object) -> object:
         several = tuple(mu) if isinstance(mu, (list, tuple)) else (mu,)
         if not several or not all(is_number(value) and value >= 0 for value in several):
-            raise refusal("", f"= {mu!r} is refused: give a number of at least 0, or a list of such numbers")
+            raise refusal_sentence("", f"= {mu!r} is refused: give a number of at least 0, or a list of such numbers")
         if len(set(several)) < len(several):
-            raise refusal("", f"= {mu!r} names one value twice: give each once")
+            raise refusal_sentence("", f"= {mu!r} names one value twice: give each once")
         return several if isinstance(mu, (list, tuple)) else mu
 
     @field_validator("exponent")
     @classmethod
     def _known_exponent(cls, exponent: float) -> float:
         if exponent not in EXPONENTS:
-            raise refusal("", f"= {exponent:g} is refused: give 1.5 (Hertz) or 1 (harmonic disks)")
+            raise refusal_sentence("", f"= {exponent:g} is refused: give 1.5 (Hertz) or 1 (harmonic disks)")
         return exponent
 
     @model_validator(mode="after")
     def _something_to_rescale(self) -> "Law":
         if self.history == "rescaled" and self.exponent != 1.5:
-            raise refusal("history", '= "rescaled" needs law.exponent = 1.5: harmonic disks have one stiffness')
+            raise refusal_sentence(
+                "history", '= "rescaled" needs law.exponent = 1.5: harmonic disks have one stiffness'
+            )
         return self
 
     @property
@@ -116,7 +118,7 @@ class Damping(Section):
     @model_validator(mode="after")
     def _not_empty(self) -> "Damping":
         if not self.model_fields_set:
-            raise refusal("", "has nothing in it: give cn, ct or tau, or leave the section out")
+            raise refusal_sentence("", "has nothing in it: give cn, ct or tau, or leave the section out")
         return self
 
 
@@ -175,20 +177,22 @@ class Ramp(Section):
     def _turning_points(cls, until: object) -> object:
         points = tuple(until) if isinstance(until, (list, tuple)) else (until,)
         if not points or not all(is_number(point) for point in points):
-            raise refusal("", f"= {until!r} is refused: give a force, or a list of forces between which F_x goes")
+            raise refusal_sentence(
+                "", f"= {until!r} is refused: give a force, or a list of forces between which F_x goes"
+            )
         for here, there in pairwise((0.0, *points)):
             if here == there:
-                raise refusal("", f"= {until!r} leaves F_x at {here:g}: give a force at which F_x turns round")
+                raise refusal_sentence("", f"= {until!r} leaves F_x at {here:g}: give a force at which F_x turns round")
         return tuple(map(float, points)) if len(points) > 1 else float(points[0])
 
     @model_validator(mode="after")
     def _one_step_at_least(self) -> "Ramp":
         if self.step > abs(self.first):
-            raise refusal("step", f"= {self.step} is larger than until = {self.first}: take a smaller step")
+            raise refusal_sentence("step", f"= {self.step} is larger than until = {self.first}: take a smaller step")
         count = self.length / self.step
         if not count < EQUILIBRIA:
             says = f"= {self.step:g} makes {count:.2g} equilibria up to until = {self.turning_points[-1]:g}"
-            raise refusal("step", f"{says}, and {EQUILIBRIA:.0e} are the most: take a larger step")
+            raise refusal_sentence("step", f"{says}, and {EQUILIBRIA:.0e} are the most: take a larger step")
         return self
 
     @property
@@ -248,13 +252,13 @@ class Perturb(SignalKeys, Inertia):
         disks = tuple(target) if isinstance(target, (list, tuple)) else ()
         if not disks or not all(type(disk) is int and disk >= 0 for disk in disks):
             rule = 'give "top", "all" or a list of disks, counted from 0'
-            raise refusal("", f"= {target!r} is refused: {rule}")
+            raise refusal_sentence("", f"= {target!r} is refused: {rule}")
         return disks
 
     @model_validator(mode="after")
     def _complete(self) -> "Perturb":
         if self.time_step is not None and self.time < self.time_step:
-            raise refusal("time", f"= {self.time} is shorter than one step, {self.time_step}: run longer")
+            raise refusal_sentence("time", f"= {self.time} is shorter than one step, {self.time_step}: run longer")
         return self
 
 
@@ -283,7 +287,7 @@ class Friction(Section):
     @classmethod
     def _threshold(cls, v0: object) -> object:
         if v0 != "calibrated" and not (is_number(v0) and v0 >= 0):
-            raise refusal("", f'= {v0!r} is refused: give a velocity of at least 0, or "calibrated"')
+            raise refusal_sentence("", f'= {v0!r} is refused: give a velocity of at least 0, or "calibrated"')
         return v0
 
     @field_validator("v_ss", mode="before")
@@ -291,9 +295,9 @@ class Friction(Section):
     def _scale(cls, v_ss: object, info: ValidationInfo) -> object:
         if not (_multiple_of_v0(v_ss) if isinstance(v_ss, str) else is_number(v_ss) and v_ss > 0):
             rule = 'give a velocity above 0, or a multiple of v0 such as "10 v0"'
-            raise refusal("", f"= {v_ss!r} is refused: {rule}")
+            raise refusal_sentence("", f"= {v_ss!r} is refused: {rule}")
         if isinstance(v_ss, str) and info.data.get("v0") == 0:
-            raise refusal("", f'= "{v_ss}" is no velocity because v0 = 0: give a velocity above 0')
+            raise refusal_sentence("", f'= "{v_ss}" is no velocity because v0 = 0: give a velocity above 0')
         return v_ss
 
     def velocity_scale(self, v0: float) -> float:

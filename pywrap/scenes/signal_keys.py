@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis.files.signal_files import read_signal
 from ...analysis.motion.signals import Signal, SignalError, pulse, sweep
-from .refusals import NotNegative, Positive, Section, refusal
+from .validation import NotNegative, Positive, Section, refusal_sentence
 
 KINDS = ("pulse", "sweep")
 OF_FILES = ("channel", "scale", "stretch")
@@ -67,11 +67,11 @@ class SignalKeys(Section):
     def _forcing(self) -> SignalKeys:
         wrong = self._unfit() or self._missing()
         if wrong:
-            raise refusal(*wrong)
+            raise refusal_sentence(*wrong)
         try:
             self.forcing()
         except SignalError as error:
-            raise refusal("signal", f"is refused: {str(error).rstrip('.')}") from None
+            raise refusal_sentence("signal", f"is refused: {str(error).rstrip('.')}") from None
         return self
 
     @property

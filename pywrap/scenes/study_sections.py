@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .refusals import Positive, Section
+from .validation import Positive, Section
 
 Share = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
 

@@ -35,9 +35,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...analysis import MindlinLaw, PackingFileError
-from .keys import Keys
 from .packing_section import GeneratedPacking
-from .refusals import refusal
+from .scene_keys import Keys
+from .validation import refusal_sentence
 
 HERTZ = 1.5
 """Exponent of Hertz's contact."""
@@ -139,12 +139,12 @@ def real_units(scene: Keys) -> RealUnits | None:
     if units is None:
         return None
     if scene.law.exponent != HERTZ:
-        raise refusal(
+        raise refusal_sentence(
             "units", f"takes k_n from Hertz's contact, and law.exponent = {scene.law.exponent:g}: leave one out"
         )
     smallest, its_mass, width, top = _layer(scene)
     if width is None:
-        raise refusal("units", "has no stress without the width of the layer: take a periodic packing")
+        raise refusal_sentence("units", "has no stress without the width of the layer: take a periodic packing")
     diameter, density, modulus = (units.si(key) for key in ("grain_diameter", "density", "youngs_modulus"))
     length = diameter / smallest
     volume = np.pi * diameter**3 / 6 if units.thickness is None else np.pi * diameter**2 / 4 * units.si("thickness")
@@ -158,7 +158,7 @@ def real_units(scene: Keys) -> RealUnits | None:
     if units.overburden is not None:
         wanted = units.si("overburden")
         if abs(real.overburden / wanted - 1) > MISMATCH:
-            raise refusal(
+            raise refusal_sentence(
                 "units.overburden",
                 f"= {units.overburden} is not the load of the scene, which presses with "
                 f"{real.overburden:.4g} Pa: set load.fy = {scene.load.fy * wanted / real.overburden:.6g}, or leave "
@@ -175,7 +175,9 @@ def _layer(scene: Keys) -> tuple[float, float, float | None, int]:
     try:
         packing = section.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
     except PackingFileError as error:
-        raise refusal("packing.file", f'= "{section.file.name}" is refused: {str(error).rstrip(".")}') from None
+        raise refusal_sentence(
+            "packing.file", f'= "{section.file.name}" is refused: {str(error).rstrip(".")}'
+        ) from None
     k = packing.radius.argmin()
     return 2 * float(packing.radius[k]), float(packing.mass[k]), packing.box_length, int(packing.top.sum())
 

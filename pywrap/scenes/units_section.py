@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from .refusals import Section, refusal
+from .validation import Section, refusal_sentence
 
 DIMENSIONS = {
     "grain_diameter": "m",
@@ -86,16 +86,18 @@ class Units(Section):
         try:
             number = to_si(text, unit)
         except ValueError as error:
-            raise refusal("", f'= "{text}" {error}: give a number with a unit of that kind') from None
+            raise refusal_sentence("", f'= "{text}" {error}: give a number with a unit of that kind') from None
         if not 0 < number < np.inf:
-            raise refusal("", f'= "{text}" is refused: give a quantity above 0')
+            raise refusal_sentence("", f'= "{text}" is refused: give a quantity above 0')
         return text
 
     @model_validator(mode="after")
     def _complete(self) -> Units:
         if (self.restitution is None) != (self.impact_velocity is None):
             key = "impact_velocity" if self.impact_velocity is None else "restitution"
-            raise refusal(key, "is missing: the restitution of such contacts depends on the velocity, so give both")
+            raise refusal_sentence(
+                key, "is missing: the restitution of such contacts depends on the velocity, so give both"
+            )
         return self
 
     def si(self, key: str) -> float:

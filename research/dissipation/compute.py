@@ -1,9 +1,9 @@
 r"""What dissipation does to the onset of packings, and to the transient gain below it.
 
 As :math:`C \to 0` with a fixed ratio :math:`C_N : C_T` the damped onset tends to a load below the undamped one
-(:mod:`~faultgouge.analysis.damped_onset.weak`), and as the dashpots get stronger it rises, in the end beyond. Drag
-alone raises it from the beginning. Below the onset the transient gain (:mod:`~faultgouge.analysis.motion.transient`)
-grows as a power of the distance, and dissipation limits it.
+(:mod:`~faultgouge.analysis.damped_onset.weak_dissipation`), and as the dashpots get stronger it rises, in the end
+beyond. Drag alone raises it from the beginning. Below the onset the transient gain
+(:mod:`~faultgouge.analysis.motion.transient`) grows as a power of the distance, and dissipation limits it.
 
 Every function yields its records one by one, so that a long study is kept as it goes.
 """
@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from faultgouge.analysis import OnsetError, Packing, Window
-from faultgouge.analysis.damped_onset.weak import drag_onset, weak_limit
-from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating
+from faultgouge.analysis.damped_onset.weak_dissipation import drag_onset, weak_limit
+from faultgouge.analysis.damped_onset.windows import damped_windows, without_dissipation
 from faultgouge.analysis.motion.transient import NoGainError, transient_gain
 from faultgouge.pywrap.onset.damped import Ramped
 
@@ -49,10 +49,10 @@ def weak_cases(ramp: Ramped, ratios: Iterable[tuple[float, float]] = RATIOS) -> 
     if window is None:
         return
     for cn, ct in ratios:
-        predicted = weak_limit(dissipating(ramp.path, cn, ct), ramp.forces, window)
+        predicted = weak_limit(without_dissipation(ramp.path, cn, ct), ramp.forces, window)
         if predicted is None:
             continue
-        weak = dissipating(ramp.path, WEAK * cn, WEAK * ct)
+        weak = without_dissipation(ramp.path, WEAK * cn, WEAK * ct)
         found = damped_windows(weak, _around(ramp.forces, predicted.fx, window))
         onsets = {"undamped": window.fx_onset, "predicted": predicted.fx}
         yield {"cn": cn, "ct": ct, **onsets, "measured": found[0].fx_onset if found else None}
@@ -90,13 +90,13 @@ def over_strength(ramp: Ramped, kind: str, strengths: Iterable[float], start: fl
     """
     window = _first_window(ramp)
     forces = ramp.forces[ramp.forces >= start]
-    limit = weak_limit(dissipating(ramp.path, cn=1.0), ramp.forces, window) if kind == "cn" else None
+    limit = weak_limit(without_dissipation(ramp.path, cn=1.0), ramp.forces, window) if kind == "cn" else None
     for strength in strengths:
         if kind == "cn":
-            path, predicted = dissipating(ramp.path, cn=strength), None if limit is None else limit.fx
+            path, predicted = without_dissipation(ramp.path, cn=strength), None if limit is None else limit.fx
         else:
-            path = dissipating(ramp.path, drag_time=1 / strength)
-            predicted = drag_onset(dissipating(ramp.path), ramp.forces, window, 1 / strength)
+            path = without_dissipation(ramp.path, drag_time=1 / strength)
+            predicted = drag_onset(without_dissipation(ramp.path), ramp.forces, window, 1 / strength)
         found = damped_windows(path, forces, look=[window.fx_onset], first=True)
         onset, frequency = (found[0].fx_onset, found[0].frequency) if found else (None, None)
         row = {"kind": kind, "strength": strength, "onset": onset, "frequency": frequency}
@@ -122,7 +122,7 @@ def over_distance(
 
 
 def _gain(packing: Packing, cn: float, drag: float) -> Row:
-    damped = dissipating(lambda fx: packing, cn=cn, drag_time=1 / drag if drag else None)
+    damped = without_dissipation(lambda fx: packing, cn=cn, drag_time=1 / drag if drag else None)
     try:
         found = transient_gain(damped(packing.fx))
     except NoGainError:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from faultgouge.figures.style import INK, styled
-from faultgouge.studies.rows import columns
+from faultgouge.studies.result_rows import row_columns
 from research.dissipation.compute import Row
 
 REACH = 4
@@ -42,7 +42,7 @@ def _draw_dashpot_onset(found: Sequence[Row], axes: Axes) -> None:
 
     Onsets far above both are written at the upper edge.
     """
-    strengths, onsets, predicted = columns(found, "strength", "onset", "predicted")
+    strengths, onsets, predicted = row_columns(found, "strength", "onset", "predicted")
     undamped = found[0]["undamped"]
     axes.axhline(undamped, color=INK, linewidth=0.8, linestyle=":", label="without dissipation")
     axes.plot(strengths, predicted, color="C1", label="limit, from the undamped pair")
@@ -66,7 +66,7 @@ def _draw_dashpot_onset(found: Sequence[Row], axes: Axes) -> None:
 
 def _draw_drag_shift(found: Sequence[Row], axes: Axes) -> None:
     """How far drag raises the onset, over 1/tau; the line is where 2 |Im omega| of the undamped pair is 1/tau."""
-    strengths, onsets, predicted = columns(found, "strength", "onset", "predicted")
+    strengths, onsets, predicted = row_columns(found, "strength", "onset", "predicted")
     undamped = found[0]["undamped"]
     axes.plot(strengths, predicted - undamped, color="C1", label=r"$2\,|\mathrm{Im}\,\omega| = 1/\tau$")
     axes.plot(strengths, onsets - undamped, "o", color="C0", markersize=4, label="damped onset")
@@ -77,7 +77,7 @@ def _draw_drag_shift(found: Sequence[Row], axes: Axes) -> None:
 def _draw_gain(curves: Mapping[str, Sequence[Row]], axes: Axes) -> None:
     """The transient gain over the distance from the undamped onset; a gap where some motion grows for ever."""
     for number, (label, found) in enumerate(curves.items()):
-        axes.plot(*columns(found, "distance", "gain"), "o-", color=f"C{number}", markersize=3.5, label=label)
+        axes.plot(*row_columns(found, "distance", "gain"), "o-", color=f"C{number}", markersize=3.5, label=label)
     axes.set(xscale="log", yscale="log", xlabel="$(F_x^c - F_x)\\,/\\,F_x^c$", ylabel=r"gain of $|q|^2$")
     highest = max(each["gain"] or 0.0 for found in curves.values() for each in found)
     axes.set_ylim(top=30 * highest)  # room for the legend

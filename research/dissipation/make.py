@@ -12,9 +12,9 @@ import numpy as np
 
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset.damped import ramped
-from faultgouge.studies.packings import seeded
-from faultgouge.studies.rows import kept, read_rows
+from faultgouge.pywrap.onset.damped import ramp_scene
+from faultgouge.studies.packing_tools import with_seed
+from faultgouge.studies.result_rows import keep_rows, read_rows
 from research.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
 
 HERE = Path(__file__).parent
@@ -49,7 +49,7 @@ def weak(done: list[dict[str, Any]], only: list[int]) -> Iterator[dict[str, Any]
         if (None, None) in known or len(known) == len(RATIOS):
             continue
         try:
-            with ramped(seeded(SCENE, seed)) as ramp:
+            with ramp_scene(with_seed(SCENE, seed)) as ramp:
                 seeds[seed] = len(known)
                 for case in weak_cases(ramp, [ratio for ratio in RATIOS if ratio not in known]):
                     seeds[seed] += 1
@@ -63,14 +63,14 @@ def weak(done: list[dict[str, Any]], only: list[int]) -> Iterator[dict[str, Any]
 def strength(kind: str, done: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """One packing."""
     known = [each["strength"] for each in done]
-    with ramped(SCENE) as ramp:
+    with ramp_scene(SCENE) as ramp:
         wanted = [float(each) for each in STRENGTHS[kind] if not np.any(np.isclose(each, known, atol=0))]
         yield from over_strength(ramp, kind, wanted, START)
 
 
 def gain(done: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """One packing, a kind of dissipation after the other."""
-    with ramped(SCENE) as ramp:
+    with ramp_scene(SCENE) as ramp:
         for kind in DISSIPATIONS:
             known = [each["distance"] for each in done if (each["cn"], each["drag"]) == kind]
             wanted = [float(each) for each in DISTANCES if not np.any(np.isclose(each, known, atol=0))]
@@ -82,7 +82,7 @@ def main(what: str, seeds: list[int]) -> None:
     path = HERE / "tables" / f"{what}.jsonl"
     done = read_rows(path) if path.exists() else []
     records = weak(done, seeds) if what == "weak" else gain(done) if what == "gain" else strength(what, done)
-    for record in kept(path, records):
+    for record in keep_rows(path, records):
         print(record, flush=True)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from faultgouge.analysis.motion.power_law import fit_power_law
 from faultgouge.figures.style import save_as
-from faultgouge.studies.rows import read_rows
+from faultgouge.studies.result_rows import read_rows
 from research.dissipation.draw import dissipation_figure
 
 TABLES = Path(__file__).parent / "tables"

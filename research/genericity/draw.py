@@ -11,7 +11,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from faultgouge.analysis.packing.packing import Floats
 from faultgouge.figures.style import INK, styled
-from faultgouge.studies.rows import columns
+from faultgouge.studies.result_rows import row_columns
 from faultgouge.studies.statistics import course
 from faultgouge.studies.sweep.draw import draw_pairs
 from research.genericity.numbers import STEPS
@@ -81,19 +81,19 @@ def size_figure(numbers: dict[str, Any]) -> Figure:
         rows = [row for row in found["rows"] if row["median"][0] is not None]
         if not rows:
             continue
-        disks = columns(rows, "disks")[0] * (1.0 if marker == "o" else 1.04)
+        disks = row_columns(rows, "disks")[0] * (1.0 if marker == "o" else 1.04)
         middle, low, high = np.array([row["median"] for row in rows], dtype=float).T
         left.errorbar(disks, middle, [middle - low, np.nan_to_num(high - middle)], fmt=marker, ms=3.5, label=name)
     levels = numbers["levels"]["rows"]
     if levels:
         medians = [row["median"]["value"] for row in levels]
-        left.plot(*columns(levels, "disks"), medians, ":", color=INK, label="two levels")
+        left.plot(*row_columns(levels, "disks"), medians, ":", color=INK, label="two levels")
     left.set(xscale="log", yscale="log", xlabel="disks", ylabel="median of $F_x^c / F_y$")
     if levels or left.containers:
         left.legend()
     for number, each in enumerate(numbers["growth"]):
         points = [point for point in each["points"] if point["median"] > 0]
-        loads, middle, low, high = columns(points, "load", "median", "low", "high")
+        loads, middle, low, high = row_columns(points, "load", "median", "low", "high")
         right.plot(loads, middle, "o-", ms=2.5, color=f"C{number}", label=f"{each['disks']}")
         right.fill_between(loads, low, high, color=f"C{number}", alpha=0.2, linewidth=0)
     right.set(xlabel="$F_x / F_y$", ylabel="largest growth rate of $D$")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from faultgouge.analysis.packing.packing import Floats
-from faultgouge.studies.statistics import Bools, between, resampled
+from faultgouge.studies.statistics import Bools, bootstrap_interval, resample
 
 DRAWS = 300
 """Fits to resampled packings: the ends of an interval are then known to a tenth of its width."""
@@ -23,14 +23,14 @@ DRAWS = 300
 def size_law(disks: Floats, reach: Floats, found: Bools) -> dict[str, Any]:
     """The exponent p of F_0 = c N^-p and the shape k, each with its interval; N of each packing is in `disks`, (M,)."""
     (_, slope, log_shape), draws = _fits(np.log(disks), reach, found)
-    exponent, k = between(-slope, -draws[:, 1]), between(np.exp(log_shape), np.exp(draws[:, 2]))
+    exponent, k = bootstrap_interval(-slope, -draws[:, 1]), bootstrap_interval(np.exp(log_shape), np.exp(draws[:, 2]))
     return {"exponent": exponent, "shape": k, "packings": len(reach)}
 
 
 def shape(reach: Floats, found: Bools) -> dict[str, Any]:
     """F_0 and k of one size, each with its interval."""
     best, draws = _fits(np.zeros(len(reach)), reach, found)
-    f0, k = (between(np.exp(best[column]), np.exp(draws[:, column])) for column in (0, 2))
+    f0, k = (bootstrap_interval(np.exp(best[column]), np.exp(draws[:, column])) for column in (0, 2))
     return {"f0": f0, "shape": k, "packings": len(reach)}
 
 
@@ -38,7 +38,7 @@ def _fits(logs: Floats, reach: Floats, found: Bools) -> tuple[Floats, Floats]:
     """The parameters of `_fit`, shape (3,), and those of resampled packings, shape (draws, 3)."""
     best = _fit(logs, reach, found)
     groups = [np.flatnonzero(logs == value) for value in np.unique(logs)]
-    chosen = map(np.concatenate, resampled(groups, DRAWS))
+    chosen = map(np.concatenate, resample(groups, DRAWS))
     return best, np.array([_fit(logs[c], reach[c], found[c], best) for c in chosen if found[c].sum() > len(groups)])
 
 

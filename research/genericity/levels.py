@@ -48,9 +48,9 @@ from faultgouge.analysis.onset import force_bearing, full_operator
 from faultgouge.analysis.packing.packing import Floats, Indices
 from faultgouge.analysis.spectrum.spectrum import active_coordinates
 from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.pywrap.runs.path import loads
-from faultgouge.pywrap.scenes.refusals import needed
-from faultgouge.studies.packings import path_from
+from faultgouge.pywrap.runs.equilibrium_path import loads
+from faultgouge.pywrap.scenes.validation import require_section
+from faultgouge.studies.packing_tools import path_from
 
 AVERAGED = 21
 """Levels over which local densities and couplings are averaged: some 5 % of the level's statistics in error, and few
@@ -99,7 +99,7 @@ class Pencil:
 
 def pencil_of(scene: Scene, rest: Equilibrium) -> Pencil:
     """The operator of a scene's packing about rest, from a small load."""
-    settings = needed(scene.ramp, "ramp")
+    settings = require_section(scene.ramp, "ramp")
     with path_from(rest, scene) as path:
         there = path(SMALL * settings.step)
     return Pencil.between(full_operator(rest.packing), full_operator(there), there.fx)
@@ -166,7 +166,7 @@ def growth(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
         fx, pairs, rate : lists, one entry an equilibrium; rate in 1 / time, 0 where all eigenvalues are real. They end
         where the packing flows.
     """
-    settings = needed(scene.ramp, "ramp")
+    settings = require_section(scene.ramp, "ramp")
     row: dict[str, Any] = {"fx": [], "pairs": [], "rate": []}
     with path_from(rest, scene) as path:
         for equilibrium in path.climb(loads(settings)[1:]):

@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.files.wholefile import write_json, write_text
+from faultgouge.analysis.files.atomic_write import write_json, write_text
 from faultgouge.figures.pages import render
-from faultgouge.studies.frame import draw_all, save_png
 from faultgouge.studies.statistics import interval
-from faultgouge.studies.sweep.compute import LINES, run_sweep, stored
+from faultgouge.studies.study import draw_all, save_png
+from faultgouge.studies.sweep.run_sweep import LINES, read_results, run_sweep
 from research.genericity.draw import mechanism_figure, modes_figure, onsets_figure, size_figure
 from research.genericity.numbers import LOADS, numbers, read_tables
 from research.genericity.sets import PACKINGS, SHARES, SIZES, sets
@@ -43,7 +43,7 @@ def compute(folder: Path, share: float = 1.0) -> None:
 
 def record_cost(folder: Path) -> None:
     """made.json: with which version and at which commits the tables were made, and what they cost."""
-    rows = [row for path in folder.glob(f"*/{LINES}") for row in stored(path).values()]
+    rows = [row for path in folder.glob(f"*/{LINES}") for row in read_results(path).values()]
     path = folder / "made.json"
     before = json.loads(path.read_text()) if path.exists() else {}
     if len(rows) == before.get("rows"):
@@ -78,7 +78,7 @@ def write_page(folder: Path = HERE, tables: Path = TABLES) -> Path:
         "planned_sizes": SIZES,
         "predicted_share": [float(np.mean(1 - np.exp(-((load / predicted) ** 2)))) for load in LOADS],
     }
-    formats = {"percent": percent, "median": median, "between": between, "mean": mean}
+    formats = {"percent": percent, "median": median, "between": format_interval, "mean": mean}
     write_json(folder / "genericity.json", found)
     (folder / "pictures").mkdir(exist_ok=True)
     draw_all(figures, folder / "pictures", print, save_png)
@@ -125,7 +125,7 @@ def median(value: list[float | None], digits: str = ".3g") -> str:
     return interval(value, digits, "beyond reach")
 
 
-def between(value: dict[str, float] | None) -> str:
+def format_interval(value: dict[str, float] | None) -> str:
     """A fitted number with its interval."""
     return "not known" if value is None else interval([*value.values()], ".2f")
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from faultgouge.analysis.packing.packing import Floats
-from faultgouge.studies.statistics import exponent, lowers, median_interval, quartiles, share
+from faultgouge.studies.statistics import exponent, median_interval, quartiles, share, sign_test
 from research.genericity.fits import shape, size_law
 from research.genericity.sets import FRICTION
 from research.genericity.table import Table
@@ -37,12 +37,12 @@ def numbers(tables: dict[str, Table]) -> dict[str, Any]:
     reference = onsets.where(law_mu=1.0)
     return {
         "onsets": [of_friction(onsets.where(law_mu=mu)) | {"mu": mu} for mu in FRICTION],
-        "lowered": [lowered(onsets, *pair) | {"from": pair[0], "to": pair[1]} for pair in STEPS],
+        "lowered": [compare_friction(onsets, *pair) | {"from": pair[0], "to": pair[1]} for pair in STEPS],
         "kinds": [kinds(onsets.where(law_mu=mu)) | {"mu": mu} for mu in FRICTION],
         "modes": [modes(onsets.where(law_mu=mu)) | {"mu": mu} for mu in FRICTION],
         "shape": shape(reference.settled.reach, reference.settled.found),
         "settled": settled_with_friction(tables.get("settled with friction", empty)),
-        "halved": halved(onsets, tables.get("halved increments", empty)),
+        "halved": compare_halved(onsets, tables.get("halved increments", empty)),
         "harmonic": harmonic(onsets, tables.get("harmonic", empty)),
         "sizes": {name: sizes(tables.get(name, empty), reference) for name in ("fixed force", "fixed pressure")},
         "levels": levels(tables.get("levels", empty)),
@@ -72,11 +72,11 @@ def of_friction(table: Table) -> dict[str, Any]:
     }
 
 
-def lowered(onsets: Table, strong: float, weak: float) -> dict[str, Any]:
+def compare_friction(onsets: Table, strong: float, weak: float) -> dict[str, Any]:
     """Whether a smaller friction coefficient lowers the onset, and what is different where it does not."""
     first, second = (onsets.where(law_mu=mu).settled for mu in (strong, weak))
     both = first.beside(second, "packing.seed")
-    decided = [(lower, a, b) for a, b in both if (lower := lowers(a, b)) is not None]
+    decided = [(lower, a, b) for a, b in both if (lower := sign_test(a, b)) is not None]
     pairs = [each for each in decided if each[1]["ends"] == each[2]["ends"]]
     same = [(lower, a, b) for lower, a, b in pairs if a["ancestors"] and a["ancestors"] == b["ancestors"]]
     ends = [lower for lower, a, b in decided if a["ends"] != b["ends"]]
@@ -87,7 +87,7 @@ def lowered(onsets: Table, strong: float, weak: float) -> dict[str, Any]:
         "same": share(len(same), len(pairs)),
         "lowered_same": share(of_same, len(same)),
         "lowered_other": share(of_all - of_same, len(pairs) - len(same)),
-        "ratio_same": _known(np.array([b["reach"] / a["reach"] for _, a, b in same])),
+        "ratio_same": _median_and_quartiles(np.array([b["reach"] / a["reach"] for _, a, b in same])),
         "appears": ends.count(False),
         "vanishes": ends.count(True),
     }
@@ -113,10 +113,10 @@ def modes(onsets: Table) -> dict[str, Any]:
         "onsets": len(found),
         "lowest": share(int(np.sum(place < 1 / 3)), len(found)),
         "neighbours": share(sum(neighbours), len(neighbours)),
-    } | {name: _known(values) for name, values in columns.items()}
+    } | {name: _median_and_quartiles(values) for name, values in columns.items()}
 
 
-def _known(values: Floats) -> dict[str, Any]:
+def _median_and_quartiles(values: Floats) -> dict[str, Any]:
     """Median with its interval, and quartiles, of numbers that are all known."""
     found = np.ones(len(values), dtype=bool)
     return {"median": median_interval(values, found), "quartiles": quartiles(values, found)}
@@ -132,7 +132,7 @@ def settled_with_friction(table: Table) -> dict[str, Any]:
     }
 
 
-def halved(onsets: Table, finer: Table) -> dict[str, Any]:
+def compare_halved(onsets: Table, finer: Table) -> dict[str, Any]:
     """Onsets with increments half as large."""
     both = onsets.settled.beside(finer.settled, "packing.seed", "law.mu")
     off = np.array([abs(b["reach"] / a["reach"] - 1) for a, b in both if a["ends"] == b["ends"] == "onset"])
@@ -192,11 +192,11 @@ def levels(table: Table) -> dict[str, Any]:
         "exponents": exponents,
         "f0": (good.numbers("f0") / load).tolist(),
         "disks": disks.tolist(),
-        "expected": expected(good.numbers("f0")[disks == 100]),
+        "expected": expected_onsets(good.numbers("f0")[disks == 100]),
     }
 
 
-def expected(f0: Floats, until: float = 0.03, draws: int = 10) -> dict[str, Any] | None:
+def expected_onsets(f0: Floats, until: float = 0.03, draws: int = 10) -> dict[str, Any] | None:
     """Onsets up to a load that packings with these F_0 have on average, and the Weibull shape that their spread gives.
 
     The shape is fitted to the quantiles of (F/F_0)^2, `draws` a packing, censored at `until`; None without packings.
@@ -261,7 +261,7 @@ def signs(pairs: Iterable[tuple[dict[str, Any], dict[str, Any]]]) -> dict[str, A
     from scipy.stats import binomtest  # half a second to import
 
     differ = [pair for pair in pairs if pair[0]["reach"] != pair[1]["reach"]]
-    decided = [verdict for pair in differ if (verdict := lowers(*pair)) is not None]
+    decided = [verdict for pair in differ if (verdict := sign_test(*pair)) is not None]
     lower = sum(decided)
     return {"lower": lower, "of": len(decided), "p": binomtest(lower, len(decided)).pvalue if decided else None}
 

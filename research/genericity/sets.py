@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from math import ceil
 from typing import Any
 
-from faultgouge.studies.sweep.points import Sweep
+from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
 
 FRICTION = [0.2, 0.4, 0.6, 0.8, 1.0]

@@ -33,8 +33,8 @@ from faultgouge.analysis.operators.stiffness import stiffness_matrix
 from faultgouge.analysis.packing.packing import Floats
 from faultgouge.analysis.spectrum.spectrum import mass_weighted
 from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.pywrap.runs.path import loads
-from faultgouge.studies.packings import path_from
+from faultgouge.pywrap.runs.equilibrium_path import loads
+from faultgouge.studies.packing_tools import path_from
 from research.genericity.levels import Pencil, pencil_of
 
 BLOCK = 20
@@ -46,7 +46,7 @@ def surrogates(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
     pencil = pencil_of(scene, rest)
     assert scene.ramp is not None
     seed = int(getattr(scene.packing, "seed", 0))
-    drawn = randomized(pencil, np.random.default_rng(seed))
+    drawn = randomise_pencil(pencil, np.random.default_rng(seed))
     steps, narrowest = loads(scene.ramp), 1e-7 * scene.ramp.first
     row = {
         "linear": _first(lambda fx: csr_array(pencil.at(fx)), steps, narrowest),
@@ -56,7 +56,7 @@ def surrogates(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
     order = np.random.default_rng(seed).permutation(len(names)).tolist()
     instead = {name: names[k] for name, k in zip(names, order, strict=True)}
     with path_from(rest, scene) as path:
-        return row | {"shuffled": _first(lambda fx: shuffled(path(fx), instead), steps, narrowest)}
+        return row | {"shuffled": _first(lambda fx: shuffle_contacts(path(fx), instead), steps, narrowest)}
 
 
 def _first(operator: Callable[[float], csr_array], steps: Floats, narrowest: float) -> dict[str, Any]:
@@ -71,21 +71,21 @@ def _first(operator: Callable[[float], csr_array], steps: Floats, narrowest: flo
     return {"ends": "until", "reach": float(steps[-1])}
 
 
-def randomized(pencil: Pencil, generator: np.random.Generator) -> Pencil:
+def randomise_pencil(pencil: Pencil, generator: np.random.Generator) -> Pencil:
     """A packing's pencil with spacings and couplings permuted among neighbouring levels, and random signs."""
     gaps = np.diff(pencil.values)
     for k in range(0, len(gaps), BLOCK):
         gaps[k : k + BLOCK] = generator.permutation(gaps[k : k + BLOCK])
     values = pencil.values[0] + np.concatenate([[0.0], np.cumsum(gaps)])
-    symmetric = _permuted(pencil.symmetric, generator)
-    antisymmetric = _permuted(pencil.antisymmetric, generator)
+    symmetric = _permute_elements(pencil.symmetric, generator)
+    antisymmetric = _permute_elements(pencil.antisymmetric, generator)
     diagonal = np.diag(pencil.symmetric).copy()
     for k in range(0, len(diagonal), BLOCK):
         diagonal[k : k + BLOCK] = generator.permutation(diagonal[k : k + BLOCK])
     return Pencil(values, symmetric + symmetric.T + np.diag(diagonal), antisymmetric - antisymmetric.T, pencil.basis)
 
 
-def _permuted(matrix: Floats, generator: np.random.Generator) -> Floats:
+def _permute_elements(matrix: Floats, generator: np.random.Generator) -> Floats:
     """The elements above the diagonal, permuted within blocks, with random signs."""
     upper, above = np.triu(matrix, 1), np.triu(np.ones(matrix.shape, dtype=bool), 1)
     for i in range(0, len(matrix), BLOCK):
@@ -96,7 +96,7 @@ def _permuted(matrix: Floats, generator: np.random.Generator) -> Floats:
     return upper
 
 
-def shuffled(packing: Packing, instead: Mapping[tuple[int, int], tuple[int, int]]) -> csr_array:
+def shuffle_contacts(packing: Packing, instead: Mapping[tuple[int, int], tuple[int, int]]) -> csr_array:
     """A of a packing, 1 / time^2, in which each contact has the antisymmetric part of another one of its own."""
     packing = force_bearing(packing)
     own = mass_weighted(stiffness_matrix(packing), packing)

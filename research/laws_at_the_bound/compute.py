@@ -29,14 +29,14 @@ from scipy.linalg import eigvals
 
 from faultgouge.analysis import Packing
 from faultgouge.analysis.onset import force_bearing
-from faultgouge.analysis.operators.stiffness import assembled, contact_terms
+from faultgouge.analysis.operators.stiffness import assemble_stiffness, contact_terms
 from faultgouge.analysis.packing.law import Derivatives
 from faultgouge.analysis.spectrum.spectrum import SAFETY, active_coordinates, mass_weighted, unit_rounding
 from faultgouge.pywrap import Equilibrium, Scene
 from faultgouge.pywrap.scenes.units import dashpot
-from faultgouge.studies.modes.compute import Counted, along_ramp
-from faultgouge.studies.modes.loss import TANGENTIAL, impact_velocity
-from faultgouge.studies.packings import sliding
+from faultgouge.studies.modes.count_pairs import Counted, along_ramp
+from faultgouge.studies.packing_tools import sliding_contacts
+from research.modes.loss import TANGENTIAL, impact_velocity
 
 RESTITUTIONS = (0.97, 0.9)
 
@@ -51,16 +51,16 @@ def both_laws(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
 
     def look(packing: Packing) -> dict[str, Any]:
         bearing = force_bearing(packing)
-        slides = sliding(bearing)
-        smooth = undamped(bearing, smooth_derivatives(bearing))
+        slides = sliding_contacts(bearing)
+        smooth = count_undamped(bearing, smooth_derivatives(bearing))
         standard = {
-            name: undamped(bearing, standard_derivatives(bearing, share, slides & on))
+            name: count_undamped(bearing, standard_derivatives(bearing, share, slides & on))
             for name, (share, on) in STANDARD.items()
         }
         everywhere = np.ones_like(slides)
-        smooth["damped"] = damped(bearing, smooth_derivatives(bearing), ~slides, dashpots)
+        smooth["damped"] = fastest_damped(bearing, smooth_derivatives(bearing), ~slides, dashpots)
         elastic = standard_derivatives(bearing, *STANDARD["shaken"])
-        standard["shaken"]["damped"] = damped(bearing, elastic, everywhere, dashpots)
+        standard["shaken"]["damped"] = fastest_damped(bearing, elastic, everywhere, dashpots)
         counts = {"contacts": len(slides), "at_bound": int(slides.sum()), "modes": smooth.pop("modes")}
         for each in standard.values():
             del each["modes"]
@@ -93,15 +93,17 @@ def standard_derivatives(packing: Packing, share: float, slides: NDArray[np.bool
     )
 
 
-def _assembled(packing: Packing, law: Derivatives) -> Any:
+def _assemble_stiffness(packing: Packing, law: Derivatives) -> Any:
     contacts, (normal, _, distance, _) = packing.contacts, packing.geometry
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
-    return assembled(contact_terms(law, normal.T, distance, pairs), contacts.i, contacts.j[:pairs], len(packing))
+    return assemble_stiffness(
+        contact_terms(law, normal.T, distance, pairs), contacts.i, contacts.j[:pairs], len(packing)
+    )
 
 
-def undamped(packing: Packing, law: Derivatives) -> dict[str, Any]:
+def count_undamped(packing: Packing, law: Derivatives) -> dict[str, Any]:
     """Pairs, share, growth rate, Q, and the drag 1/tau that stops all pairs; those within rounding count as real."""
-    weighted = mass_weighted(_assembled(packing, law), packing)
+    weighted = mass_weighted(_assemble_stiffness(packing, law), packing)
     active = active_coordinates(weighted)
     dense = weighted[active][:, active].toarray()
     values = np.asarray(eigvals(dense, check_finite=False), dtype=np.complex128)
@@ -113,19 +115,19 @@ def undamped(packing: Packing, law: Derivatives) -> dict[str, Any]:
     return counted.as_dict() | {"modes": len(values), "drag_rate": float(drag.max(initial=0.0))}
 
 
-def damped(
+def fastest_damped(
     packing: Packing, law: Derivatives, sticks: NDArray[np.bool_], dashpots: dict[float, float]
 ) -> list[list[float]]:
     """[restitution, largest Re s of s^2 M + s C + K, its Im s]; only contacts that stick have a tangential dashpot."""
     root, zero = np.sqrt(packing.geometry.overlap), np.zeros(len(packing.contacts))
-    weighted = mass_weighted(_assembled(packing, law), packing)
+    weighted = mass_weighted(_assemble_stiffness(packing, law), packing)
     active = active_coordinates(weighted)
     stiffness = weighted[active][:, active].toarray()
     size = len(stiffness)
     found = []
     for each, cn in dashpots.items():
         loss = Derivatives(zero, zero, cn * root, -TANGENTIAL * cn * root * sticks, zero)
-        damping = mass_weighted(_assembled(packing, loss), packing)[active][:, active].toarray()
+        damping = mass_weighted(_assemble_stiffness(packing, loss), packing)[active][:, active].toarray()
         companion = np.block([[np.zeros((size, size)), np.eye(size)], [-stiffness, -damping]])
         rates = eigvals(companion, check_finite=False)
         fastest = complex(rates[np.argmax(rates.real)])

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.files.wholefile import write_text
+from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.pages import render
 from faultgouge.studies.statistics import interval, median, share
-from faultgouge.studies.sweep.compute import run_sweep
+from faultgouge.studies.sweep.run_sweep import run_sweep
 from research.laws_at_the_bound.compute import RESTITUTIONS
 from research.laws_at_the_bound.sets import LOADS, sets
 
@@ -40,15 +40,15 @@ def _file(name: str) -> str:
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:
     plain = {"seed": row["values"]["packing.seed"], "says": row["says"], "cpu_seconds": row["cpu_seconds"]}
-    return plain | _shortened(row["result"] or {})
+    return plain | _shorten(row["result"] or {})
 
 
-def _shortened(value: Any) -> Any:
+def _shorten(value: Any) -> Any:
     if isinstance(value, float):
         return float(f"{value:.7g}")
     if isinstance(value, list):
-        return [_shortened(each) for each in value]
-    return {name: _shortened(each) for name, each in value.items()} if isinstance(value, dict) else value
+        return [_shorten(each) for each in value]
+    return {name: _shorten(each) for name, each in value.items()} if isinstance(value, dict) else value
 
 
 def write_page(folder: Path = HERE) -> Path:

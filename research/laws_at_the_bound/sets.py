@@ -7,9 +7,9 @@ load has no row of that load.
 
 from typing import Any
 
-from faultgouge.studies.modes.sets import STANDARD, WIDTH, quartz
-from faultgouge.studies.sweep.points import Sweep
+from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
+from research.modes.sets import STANDARD, WIDTH, quartz
 
 SEEDS = "1:20"
 LOADS = [0.2, 0.3]

@@ -12,8 +12,8 @@ import numpy as np
 
 from faultgouge.analysis import NoEquilibriumError, Packing, eigenvalues
 from faultgouge.pywrap import Engine, Scene, equilibrate, settle
-from faultgouge.studies.modes.compute import antisymmetric_norm
-from faultgouge.studies.rows import append
+from faultgouge.studies.modes.count_pairs import antisymmetric_norm
+from faultgouge.studies.result_rows import append_row
 
 PACKINGS = {50: 12, 100: 12, 200: 8, 400: 6, 1000: 3}
 LOADS = (0.03, 0.1, 0.2)
@@ -48,4 +48,4 @@ if __name__ == "__main__":
     for disks, count in PACKINGS.items():
         for seed in range(1, count + 1):
             for row in rows(disks, seed):
-                append(table, row)
+                append_row(table, row)

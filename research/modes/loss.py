@@ -28,7 +28,7 @@ from faultgouge.analysis.operators.damping import damping_matrix
 from faultgouge.analysis.spectrum.spectrum import mass_weighted
 from faultgouge.pywrap import Equilibrium, Scene
 from faultgouge.pywrap.scenes.units import dashpot, real_units, restitution
-from faultgouge.studies.modes.compute import along_ramp, counted
+from faultgouge.studies.modes.count_pairs import along_ramp, count_pairs
 
 RESTITUTIONS = (0.99, 0.97, 0.9, 0.8, 0.7, 0.5)
 """From weak loss to strong."""
@@ -56,7 +56,7 @@ def loss(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
     dashpots = {each: dashpot(kn, each, 1.0, velocity) for each in RESTITUTIONS}
 
     def look(packing: Packing) -> dict[str, Any]:
-        found = counted(packing)
+        found = count_pairs(packing)
         squares, told = found.omega**2, found.as_dict()
         drag = squares.imag / np.sqrt(np.maximum(squares.real, np.finfo(float).tiny))
         grown = damped_growth(packing, dashpots)

@@ -21,8 +21,8 @@ from faultgouge.analysis import Packing
 from faultgouge.pywrap import Engine, Equilibrium, Scene
 from faultgouge.pywrap.runs.undamped import time_step
 from faultgouge.pywrap.scenes.units import dashpot
-from faultgouge.studies.modes.compute import along_ramp
-from faultgouge.studies.packings import distance, shake, sliding
+from faultgouge.studies.modes.count_pairs import along_ramp
+from faultgouge.studies.packing_tools import distance_of_bearing_disks, shake_disks, sliding_contacts
 from research.modes.loss import TANGENTIAL, fastest, impact_velocity, with_dashpots
 
 RESTITUTIONS = (0.97, 0.9, 0.8)
@@ -59,13 +59,13 @@ def lossy_runs(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
                 rate = fastest(damped)
                 if rate.real >= LEAST:
                     run: dict[str, Any] = {"restitution": each, "ct_over_cn": ratio, "predicted": 2 * rate.real}
-                    runs.append(run | {"measured": grown(damped, rate)})
-        return {"runs": runs, "sliding": int(np.count_nonzero(sliding(packing)))}
+                    runs.append(run | {"measured": measure_growth(damped, rate)})
+        return {"runs": runs, "sliding": int(np.count_nonzero(sliding_contacts(packing)))}
 
     return along_ramp(scene, rest, look)
 
 
-def grown(packing: Packing, rate: complex) -> float | None:
+def measure_growth(packing: Packing, rate: complex) -> float | None:
     """Growth rate of D from a small random displacement, 1 / time; None if D does not come to `TO`.
 
     Looks that were a multiple of the period of D apart would all see it in the same phase, or drift through its phases
@@ -77,12 +77,12 @@ def grown(packing: Packing, rate: complex) -> float | None:
     steps = max(1, round(periods * period / dt))
     times, squares = [], []
     with Engine(packing, MPI.COMM_SELF) as engine:
-        shake(engine, packing, SEED, 0)
+        shake_disks(engine, packing, SEED, 0)
         with engine.undamped(dt) as dynamics:
             for _ in range(int(LONGEST / (2 * rate.real * steps * dt))):
                 dynamics.advance(steps)
                 times.append(dynamics.steps * dt)
-                squares.append(distance(packing, engine.packing))
+                squares.append(distance_of_bearing_disks(packing, engine.packing))
                 if squares[-1] > TO:
                     break
     if not squares or squares[-1] < TO:

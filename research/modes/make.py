@@ -12,10 +12,10 @@ from math import isclose
 from pathlib import Path
 from typing import Any
 
-from faultgouge.studies.sweep.compute import run_sweep
-from faultgouge.studies.sweep.points import Sweep
+from faultgouge.studies.sweep.run_sweep import run_sweep
+from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
-from research.modes.packing_rows import condense, known
+from research.modes.packing_rows import condense, read_known
 from research.modes.page import write_page
 from research.modes.sets import SHARES, sets
 
@@ -27,7 +27,7 @@ def compute(folder: Path, names: list[str], shares: tuple[float, ...] = SHARES, 
     """The sweeps of the study, round by round, but for the packings of the tables."""
     for share in shares:
         for name, sweep in sets(share).items():
-            rows = {} if tables is None else known(tables, name)
+            rows = {} if tables is None else read_known(tables, name)
             seeds = [point.values["packing.seed"] for point in sweep.points if point.values["packing.seed"] not in rows]
             if seeds and (not names or name in names):
                 print(f"{name}: {len(seeds)} packings", flush=True)
@@ -41,8 +41,8 @@ def check(folder: Path, names: list[str]) -> None:
     condense(folder, folder / "tables")
     compared, wrong = 0, []
     for path in sorted((folder / "tables").glob("*.jsonl")):
-        before = known(TABLES, path.stem)
-        for seed, row in known(folder / "tables", path.stem).items():
+        before = read_known(TABLES, path.stem)
+        for seed, row in read_known(folder / "tables", path.stem).items():
             for one, other in zip(row.get("loads", ()), before[seed].get("loads", ()), strict=True):
                 compared += 1
                 differ = different(one, other)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from faultgouge.analysis.packing.packing import Floats
-from faultgouge.studies.modes.table import QUANTITIES, Table, along
+from faultgouge.studies.modes.table import QUANTITIES, Table, medians_over_load
 from faultgouge.studies.statistics import exponent, median, share
 from research.modes.loss import GROWS, RESTITUTIONS
 
@@ -56,12 +56,12 @@ def numbers(tables: Mapping[str, Table]) -> dict[str, Any]:
         "powers": powers(by_size),
         "pressure_powers": powers(pressed),
         "thickness_powers": growth_powers(dict(sorted(layers.items()))),
-        "sets": {name: compared(counted[name]) for name in sorted(counted, key=_place)},
+        "sets": {name: compare_kinds(counted[name]) for name in sorted(counted, key=_place)},
         "random": {disks: against_random(table, by_size) for disks, table in randoms.items()},
         "loss": {disks: losses(table) for disks, table in lossy.items()},
         "structural": {disks: structural(table) for disks, table in by_size.items()},
         "quartz": {name: losses(quartz[name]) for name in sorted(quartz, key=_place)},
-        "runs": {disks: measured(table) for disks, table in runs.items()},
+        "runs": {disks: measured_runs(table) for disks, table in runs.items()},
         "switches": switches(by_size[100]) if 100 in by_size else {},
         "histories": histories(tables),
         "packings": sum(len(table.rows) for table in tables.values()),
@@ -82,7 +82,7 @@ def _place(name: str) -> tuple[str, int]:
 
 def to_the_end(table: Table) -> dict[str, Any]:
     """The same, and F_x/F_y at the last equilibrium with the share just before it."""
-    found = along(table, (*QUANTITIES, "omega"))
+    found = medians_over_load(table, (*QUANTITIES, "omega"))
     ended = [row for row in table.rows if row["ends"] != "until"]
     found["ended"] = len(ended)
     found["end"] = median(ends(table))
@@ -92,9 +92,9 @@ def to_the_end(table: Table) -> dict[str, Any]:
 
 def losses(table: Table) -> dict[str, Any]:
     """What stops the pairs: critical losses, and the share of packings in which motion grows for each restitution."""
-    found = along(table, ("critical_restitution", "least_q", "drag_rate", "growth_rate"))
+    found = medians_over_load(table, ("critical_restitution", "least_q", "drag_rate", "growth_rate"))
     if all("slowest" in load for row in table.rows for load in row["loads"]):
-        found |= {name: along(table, (name,))[name] for name in ("omega", "slowest")}
+        found |= {name: medians_over_load(table, (name,))[name] for name in ("omega", "slowest")}
     grows = {}
     for each in RESTITUTIONS:
         grows[f"{each:g}"] = [
@@ -115,7 +115,7 @@ def structural(table: Table) -> dict[str, Any]:
     return {f"{q}": [share(int(np.sum(each < q)), len(each)) for each in least.values()] for q in QUALITIES}
 
 
-def measured(table: Table) -> list[dict[str, Any]]:
+def measured_runs(table: Table) -> list[dict[str, Any]]:
     """The runs of a set, with seed, load and contacts at the bound."""
     return [
         {"seed": row["seed"], "fx_over_fy": load["fx_over_fy"], "sliding": load["sliding"]} | run
@@ -183,7 +183,7 @@ def growth_powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
     return found
 
 
-def compared(table: Table) -> dict[str, Any]:
+def compare_kinds(table: Table) -> dict[str, Any]:
     """Medians with intervals at a few loads."""
     found: dict[str, Any] = {"packings": len(table.rows), "end": median(ends(table)) if table.rows else None}
     for load in COMPARED:
@@ -223,7 +223,7 @@ def histories(tables: Mapping[str, Table]) -> dict[str, Any]:
     seeds = set.intersection(*({row["seed"] for row in tables[name].rows} for name in HISTORIES.values()))
     matched = {law: tables[name].of_seeds(seeds) for law, name in HISTORIES.items()}
     return {
-        law: along(table, ("share", "least_q"))
+        law: medians_over_load(table, ("share", "least_q"))
         | {"with_pairs": [int(np.sum(table.at(load, "pairs") > 0)) for load in table.loads]}
         for law, table in matched.items()
     }

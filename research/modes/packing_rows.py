@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from faultgouge.analysis.files.wholefile import write_text
+from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.studies.modes.table import Table
-from faultgouge.studies.rows import read_rows
-from faultgouge.studies.sweep.compute import LINES, stored
+from faultgouge.studies.result_rows import read_rows
+from faultgouge.studies.sweep.run_sweep import LINES, read_results
 
 ENDING = ".jsonl"
 
@@ -32,7 +32,9 @@ def condense(results: Path, tables: Path) -> None:
     """
     tables.mkdir(parents=True, exist_ok=True)
     for folder in sorted(path for path in results.iterdir() if (path / LINES).exists()):
-        rows = known(tables, folder.name) | {row["seed"]: row for row in map(_line, stored(folder / LINES).values())}
+        rows = read_known(tables, folder.name) | {
+            row["seed"]: row for row in map(_line, read_results(folder / LINES).values())
+        }
         write_text(table_of(tables, folder.name), "".join(json.dumps(rows[seed]) + "\n" for seed in sorted(rows)))
 
 
@@ -41,7 +43,7 @@ def table_of(tables: Path, name: str) -> Path:
     return tables / f"{name.replace(' ', '_')}{ENDING}"
 
 
-def known(tables: Path, name: str) -> dict[int, dict[str, Any]]:
+def read_known(tables: Path, name: str) -> dict[int, dict[str, Any]]:
     """The rows of a set's table by seed; none where there is no table."""
     path = table_of(tables, name)
     return {row["seed"]: row for row in read_rows(path)} if path.exists() else {}
@@ -49,17 +51,17 @@ def known(tables: Path, name: str) -> dict[int, dict[str, Any]]:
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:
     result = row["result"]
-    loads = [_rounded({k: v for k, v in load.items() if k not in LEFT_OUT}) for load in result.get("loads", [])]
+    loads = [_round_numbers({k: v for k, v in load.items() if k not in LEFT_OUT}) for load in result.get("loads", [])]
     line = {"seed": row["values"]["packing.seed"], "says": row["says"], "cpu_seconds": row["cpu_seconds"]}
     return line | result | {"loads": loads}
 
 
-def _rounded(value: Any) -> Any:
+def _round_numbers(value: Any) -> Any:
     """Numbers to the digits that a table keeps."""
     if isinstance(value, dict):
-        return {key: _rounded(each) for key, each in value.items()}
+        return {key: _round_numbers(each) for key, each in value.items()}
     if isinstance(value, list):
-        return [_rounded(each) for each in value]
+        return [_round_numbers(each) for each in value]
     return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 

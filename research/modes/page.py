@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.files.wholefile import write_json, write_text
+from faultgouge.analysis.files.atomic_write import write_json, write_text
 from faultgouge.figures.pages import render
-from faultgouge.studies.frame import draw_all, save_png
 from faultgouge.studies.modes.draw import over_load
 from faultgouge.studies.statistics import interval
+from faultgouge.studies.study import draw_all, save_png
 from research.modes.draw import collapse
 from research.modes.loss import EVERY, RESTITUTIONS
 from research.modes.numbers import COMPARED, QUALITIES, numbers
@@ -55,7 +55,7 @@ def write_page(tables: Path, folder: Path) -> Path:
         "planned": SIZES,
         "compared": COMPARED,
         "qualities": QUALITIES,
-        **told(found),
+        **describe_loss(found),
     }
     formats = {"middle": interval, "exponent": partial(interval, digits=".2f"), "plain": plain, "part": part}
     page = found | names | formats | {"critical": critical}
@@ -67,7 +67,7 @@ def write_page(tables: Path, folder: Path) -> Path:
     return folder / "README.md"
 
 
-def told(found: dict[str, Any]) -> dict[str, Any]:
+def describe_loss(found: dict[str, Any]) -> dict[str, Any]:
     """What the page says of loss in words: whether growth comes back, and how near LAMMPS is to the pencil."""
     runs = [run for each in found["runs"].values() for run in each if run["measured"] is not None]
     off = {

@@ -3,7 +3,7 @@ r"""Complex modes of random matrices with the levels and couplings of a packing:
 At a load the operator is :math:`K = S + A` in mass-weighted coordinates, S symmetric and A antisymmetric. In the
 eigenbasis of S, with the levels :math:`e_k`, A couples the levels k and l by :math:`A_{kl}`. Spacings are permuted
 among neighbouring levels, and elements of A within blocks of levels, with random signs
-(:func:`~research.genericity.surrogates.randomized`): the band of A stays as measured.
+(:func:`~research.genericity.surrogates.randomise_pencil`): the band of A stays as measured.
 
 **Weak non-symmetry.** To a large real symmetric random matrix with the local spacing :math:`\Delta` an antisymmetric
 one is added whose elements have the standard deviation :math:`\sigma`. The share of its eigenvalues that are real is
@@ -26,9 +26,9 @@ from scipy.special import erf
 from faultgouge.analysis import Packing, dynamical_matrix
 from faultgouge.analysis.packing.packing import Floats
 from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.studies.modes.compute import Counted, along_ramp
+from faultgouge.studies.modes.count_pairs import Counted, along_ramp
 from research.genericity.levels import Pencil, local_mean
-from research.genericity.surrogates import randomized
+from research.genericity.surrogates import randomise_pencil
 
 SEED = 35
 """Of the generator that draws the random matrices."""
@@ -43,7 +43,7 @@ def weak_share(coupling: Floats, spacing: Floats) -> Floats:
     return np.asarray(1 - np.sqrt(np.pi) * erf(y) / (2 * y))
 
 
-def predicted(packing: Packing) -> dict[str, Any]:
+def predict_shares(packing: Packing) -> dict[str, Any]:
     """What the levels and couplings of a packing make expect.
 
     Parameters
@@ -67,7 +67,7 @@ def predicted(packing: Packing) -> dict[str, Any]:
     ratios = np.minimum(gaps[1:], gaps[:-1]) / np.maximum(gaps[1:], gaps[:-1])
     pencil = Pencil(values, np.zeros_like(couplings), couplings, basis)
     generator = np.random.default_rng(SEED)
-    drawn = [Counted.of(eigvals(randomized(pencil, generator).at(1.0))).as_dict() for _ in range(DRAWS)]
+    drawn = [Counted.of(eigvals(randomise_pencil(pencil, generator).at(1.0))).as_dict() for _ in range(DRAWS)]
     least = [each["least_q"] for each in drawn if each["least_q"] is not None]
     return {
         "ratio": float(np.mean(ratios)),
@@ -81,4 +81,4 @@ def predicted(packing: Packing) -> dict[str, Any]:
 
 def random_matrices(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
     """The task "random matrices": what levels and couplings make expect at each load of [modes]."""
-    return along_ramp(scene, rest, predicted)
+    return along_ramp(scene, rest, predict_shares)

@@ -16,8 +16,8 @@ from math import ceil, sqrt
 from pathlib import Path
 from typing import Any
 
-from faultgouge.pywrap.scenes.refusals import read_toml
-from faultgouge.studies.sweep.points import Sweep
+from faultgouge.pywrap.scenes.validation import read_toml
+from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
 
 SIZES = {50: 100, 100: 100, 200: 50, 400: 30, 1000: 15}
@@ -89,9 +89,9 @@ def sets(share: float = 1.0) -> dict[str, Sweep]:
         for disks, most in packings.items():
             found[f"{name} {disks}"] = _sweep(disks, _first(most, share), {"modes": {"fx_over_fy": loads}}, task)
     for depth, most in QUARTZ.items():
-        found[f"quartz {depth}"] = _shipped(depth, _first(most, share))
+        found[f"quartz {depth}"] = _shipped_scene(depth, _first(most, share))
     for disks, most in THICK.items():
-        found[f"thick {disks}"] = _shipped("10 MPa", _first(most, share), disks)
+        found[f"thick {disks}"] = _shipped_scene("10 MPa", _first(most, share), disks)
     for name, (seeds, changes) in CHECKS.items():
         found[name] = _sweep(100, seeds, changes)
     return found
@@ -108,7 +108,7 @@ def quartz(depth: str, disks: int = 100) -> dict[str, Any]:
     return scene
 
 
-def _shipped(depth: str, seeds: str, disks: int = 100) -> Sweep:
+def _shipped_scene(depth: str, seeds: str, disks: int = 100) -> Sweep:
     return Sweep.from_mapping(
         {"task": "research.modes.loss:loss", "sweep": {"packing.seed": seeds}, "scene": quartz(depth, disks)}, TASKS
     )

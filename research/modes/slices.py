@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from faultgouge.analysis import dynamical_matrix, eigenvalues
-from faultgouge.studies.modes.compute import ALL, Counted
-from faultgouge.studies.modes.sliced import sliced
-from faultgouge.studies.rows import append
+from faultgouge.studies.modes.count_in_slices import count_in_slices
+from faultgouge.studies.modes.count_pairs import ALL, Counted
+from faultgouge.studies.result_rows import append_row
 from research.modes.bounds import at_loads
 
 PACKINGS = {1000: 5, 3000: 5, 10_000: 1}
@@ -27,7 +27,7 @@ def rows(disks: int, seed: int) -> Iterator[dict[str, Any]]:
         if disks <= ALL:
             every = Counted.of(eigenvalues(packing))
             row |= {"pairs": len(every.omega)} | {key: every.as_dict()[key] for key in ("growth_rate", "least_q")}
-        values, error = sliced(packing)
+        values, error = count_in_slices(packing)
         found = Counted.of(values).as_dict()
         row |= {"modes": dynamical_matrix(packing)[0].shape[0], "sliced": found["pairs"], "error": error}
         yield row | {f"{key}_sliced": found[key] for key in ("growth_rate", "least_q")}
@@ -38,4 +38,4 @@ if __name__ == "__main__":
     seeds = [int(each) for each in sys.argv[3:]] or range(1, PACKINGS[disks] + 1)
     for seed in seeds:
         for row in rows(disks, seed):
-            append(Path(sys.argv[1]) / "slices.jsonl", row)
+            append_row(Path(sys.argv[1]) / "slices.jsonl", row)

@@ -31,7 +31,7 @@ from faultgouge.pywrap.lammps.dynamics import Dynamics
 from faultgouge.pywrap.runs.undamped import time_step
 from faultgouge.pywrap.scenes.units import dashpot
 from faultgouge.studies.eruptions.compute import growth_rate
-from faultgouge.studies.packings import distance, pairs, shake
+from faultgouge.studies.packing_tools import contact_pairs, distance_of_bearing_disks, shake_disks
 from research.modes.loss import impact_velocity, with_dashpots
 from research.yielding.static import Branch, FailedError, branch, layer_slip, rest
 
@@ -77,7 +77,8 @@ def yielding(scene: Scene, settled: Equilibrium) -> dict[str, Any]:
         "jumps": [[fx / fy, moved] for fx, moved in path.jumps],
         "dynamic": dynamic_runs(scene, path),
         "loading": [
-            {"rate": rate, "restitution": loss} | loaded(path, dashpots(scene, loss), rate) for rate, loss in LOADINGS
+            {"rate": rate, "restitution": loss} | raise_load(path, dashpots(scene, loss), rate)
+            for rate, loss in LOADINGS
         ],
     }
 
@@ -108,21 +109,21 @@ def dynamic(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
         return {"rate": rate, "ends": "stable", "largest_D": NOISE**2, "slip": 0.0, "D": NOISE**2}
     slip = largest = 0.0
     with Engine(packing) as engine:
-        shake(engine, packing, NOISE, seed)
+        shake_disks(engine, packing, NOISE, seed)
         before = engine.packing
         with engine.undamped(dt) as dynamics:
             for _ in range(LOOKS):
-                if not _advanced(dynamics, int(TIME / dt / LOOKS)):
+                if not _advance(dynamics, int(TIME / dt / LOOKS)):
                     return {"rate": rate, "ends": "bursts", "largest_D": largest, "slip": slip}
                 now = engine.packing
                 slip, before = slip + layer_slip(before, now), now
-                largest = max(largest, distance(packing, now))
+                largest = max(largest, distance_of_bearing_disks(packing, now))
                 if abs(slip) > 2 * packing.radius.max():
                     return {"rate": rate, "ends": "flows", "largest_D": largest, "slip": slip}
-        return {"rate": rate, "largest_D": largest} | _rested(engine, packing, slip, start.residual)
+        return {"rate": rate, "largest_D": largest} | _bring_to_rest(engine, packing, slip, start.residual)
 
 
-def _advanced(dynamics: Dynamics, steps: int) -> bool:
+def _advance(dynamics: Dynamics, steps: int) -> bool:
     """Go on by some steps; False if a disk leaves the box on the way, after which LAMMPS has no state."""
     try:
         dynamics.advance(steps)
@@ -133,23 +134,23 @@ def _advanced(dynamics: Dynamics, steps: int) -> bool:
     return True
 
 
-def _rested(engine: Engine, packing: Packing, slip: float, residual: float) -> dict[str, Any]:
+def _bring_to_rest(engine: Engine, packing: Packing, slip: float, residual: float) -> dict[str, Any]:
     """Where the disks come to rest after a run in which the layer has moved by `slip`."""
     try:
         found, moved = rest(engine)
     except FailedError:
         return {"ends": "fails at rest", "slip": slip}
-    first, last = (pairs(each.loaded(residual)) for each in (packing, found.packing))
+    first, last = (contact_pairs(each.loaded(residual)) for each in (packing, found.packing))
     return {
         "ends": "rests",
         "slip": slip + moved,
-        "D": distance(packing, found.packing),
+        "D": distance_of_bearing_disks(packing, found.packing),
         "lost": len(first - last),
         "gained": len(last - first),
     }
 
 
-def loaded(path: Branch, cn: float, rate: float) -> dict[str, Any]:
+def raise_load(path: Branch, cn: float, rate: float) -> dict[str, Any]:
     """The load rises at a rate up to the static yield: where the layer leaves the quasi-static path, where it flows."""
     before = packing = with_dashpots(path.kept[0].packing, cn)
     fy, last = packing.fy, path.kept[-1].fx
@@ -162,14 +163,14 @@ def loaded(path: Branch, cn: float, rate: float) -> dict[str, Any]:
     with Engine(packing) as engine, engine.undamped(dt, signal=signal) as dynamics:
         for look in range(1, looks + 1):
             steps = int(duration / dt * look / looks) - dynamics.steps
-            if not _advanced(dynamics, steps):
+            if not _advance(dynamics, steps):
                 flows = flows or last * look / looks / fy
                 break
             now, fx = engine.packing, dynamics.steps * dt * rate * fy
             slip, before = slip + layer_slip(before, now), now
             if flows is None and abs(slip) > 2 * packing.radius.max():
                 flows = fx / fy
-            off = _off(path, fx, now)
+            off = _distance_from_path(path, fx, now)
             largest = max(largest, off)
             for bound in BOUNDS:
                 if left[bound] is None and off > bound:
@@ -177,7 +178,7 @@ def loaded(path: Branch, cn: float, rate: float) -> dict[str, Any]:
     return {"left": [left[each] for each in BOUNDS], "largest": largest, "slip": slip, "flows": flows}
 
 
-def _off(path: Branch, fx: float, now: Packing) -> float:
+def _distance_from_path(path: Branch, fx: float, now: Packing) -> float:
     """Root of D from the equilibrium at fx, disks that carry nothing there left out."""
     place = max(1, next((k for k, each in enumerate(path.kept) if each.fx >= fx), len(path.kept) - 1))
     below, above = path.kept[place - 1].packing, path.kept[place].packing

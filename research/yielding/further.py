@@ -14,9 +14,9 @@ import numpy as np
 
 from faultgouge.pywrap import Engine, Equilibrium, Scene, settle
 from faultgouge.pywrap.runs.undamped import time_step
-from faultgouge.studies.packings import distance, shake
-from faultgouge.studies.rows import append
-from faultgouge.studies.sweep.points import read_toml
+from faultgouge.studies.packing_tools import distance_of_bearing_disks, shake_disks
+from faultgouge.studies.result_rows import append_row
+from faultgouge.studies.sweep.sweep_plan import read_toml
 from research.modes.loss import with_dashpots
 from research.yielding.compute import NOISE, dashpots, dynamic, dynamic_runs
 from research.yielding.static import branch, layer_slip
@@ -65,7 +65,7 @@ def left_alone(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
     packing = with_dashpots(start.packing, cn)
     dt, energies, slips = time_step(packing), [], [0.0]
     with Engine(packing) as engine:
-        shake(engine, packing, NOISE, seed)
+        shake_disks(engine, packing, NOISE, seed)
         before = engine.packing
         with engine.undamped(dt) as dynamics:
             for time in range(1, TIME + 1):
@@ -76,7 +76,7 @@ def left_alone(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
                 each = 0.5 * packing.mass * np.sum(motion.velocity**2, axis=1)
                 energies.append(float(each.sum()))
     early, late = (float(np.mean(energies[first : first + WINDOW])) for first in (WINDOW, TIME - WINDOW))
-    last = {"D": distance(packing, now), "slip": slips[-1], "fastest": float(each.max() / each.sum())}
+    last = {"D": distance_of_bearing_disks(packing, now), "slip": slips[-1], "fastest": float(each.max() / each.sum())}
     return {"time": TIME, "early": early, "late": late, "moves": float(np.ptp(slips[WINDOW + 1 :]))} | last
 
 
@@ -93,4 +93,4 @@ if __name__ == "__main__":
     compute, name = {"rest": (lasting, "lasting"), "large": (large, "quartz_400")}[kind]
     for seed in map(int, seeds or range(1, 21)):
         for row in compute(seed):
-            append(Path(folder) / f"{name}.jsonl", row)
+            append_row(Path(folder) / f"{name}.jsonl", row)

@@ -16,7 +16,7 @@ from scipy.stats import binomtest
 from faultgouge.analysis.packing.packing import Floats
 from faultgouge.figures.pages import render
 from faultgouge.figures.style import INK, save, styled
-from faultgouge.studies.rows import columns, read_rows
+from faultgouge.studies.result_rows import read_rows, row_columns
 from faultgouge.studies.statistics import interval, median, share
 from research.yielding.compute import CONTROLLED, LOADINGS, LOSSES, SHARES
 
@@ -166,10 +166,12 @@ def figure(found: dict[str, Any]) -> Figure:
     left.legend(loc="lower right")
     for k, loss in enumerate(LOSSES):
         rows = [row for row in found["dynamic"] if row["restitution"] == loss and row["unrest"]["of"]]
-        middle, low, high = columns([row["unrest"] for row in rows], "share", "low", "high")
+        middle, low, high = row_columns([row["unrest"] for row in rows], "share", "low", "high")
         bars = np.clip([middle - low, high - middle], 0, 1)
         label = "undamped" if loss == 1 else f"restitution {loss}"
-        axes.errorbar(columns(rows, "share")[0] + 0.01 * (k - 1), middle, yerr=bars, fmt="o-", capsize=3, label=label)
+        axes.errorbar(
+            row_columns(rows, "share")[0] + 0.01 * (k - 1), middle, yerr=bars, fmt="o-", capsize=3, label=label
+        )
     axes.axvline(1.0, color="black", linestyle="--", label="static yield")
     axes.set(xlabel="$F_x$ over static yield", ylabel="share of packings that do not rest", ylim=(-0.02, 1.02))
     axes.legend(loc="upper left")

@@ -1,9 +1,9 @@
-"""The command ``faultgouge``: :mod:`faultgouge.commands` has its parts, :mod:`faultgouge.ending` its errors."""
+"""The command ``faultgouge``: :mod:`faultgouge.commands` has its parts, :mod:`faultgouge.exit_status` its errors."""
 
 import os
 from typing import NoReturn
 
-from .guard import guarded, raise_interrupt_in
+from .signal_guard import guarded, raise_interrupt_in
 
 
 def main() -> NoReturn:
@@ -18,7 +18,7 @@ def main() -> NoReturn:
 
 def _command() -> None:
     from .commands import program
-    from .ending import fail
+    from .exit_status import fail
 
     try:
         program()(standalone_mode=False)

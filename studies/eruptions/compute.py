@@ -38,7 +38,7 @@ from ...analysis.packing.packing import Floats
 from ...pywrap import Engine
 from ...pywrap.lammps.dynamics import Dynamics, Motion
 from ...pywrap.runs.undamped import time_step
-from ..packings import pairs, sliding
+from ..packing_tools import contact_pairs, sliding_contacts
 
 DECADES = 24.0
 """Decades of D between its noise, 1e-27 in the first steps, and the square of a tenth of an overlap."""
@@ -176,7 +176,7 @@ class _Watch:
         self._start, self._position = start, start.packing.position
         self._moved = np.zeros_like(start.packing.position)
         carrying = start.packing.loaded(start.residual)
-        self._contacts = pairs(carrying)
+        self._contacts = contact_pairs(carrying)
         self._slid = _sliding(carrying)
 
     def look(self, time: float, motion: Motion, now: Packing) -> Look:
@@ -189,7 +189,7 @@ class _Watch:
         step = motion.position - self._position
         step[:, 0] = nearest_image(step[:, 0], first.box_length)
         self._moved, self._position = self._moved + step, motion.position
-        there = pairs(now)
+        there = contact_pairs(now)
         # from step to step, disks move less than half a box; for small D, the difference itself has more digits
         msd = np.mean(np.sum(self._moved**2, axis=1))
         if abs(self._moved).max() < 0.25 * (first.box_length or np.inf):
@@ -201,13 +201,13 @@ class _Watch:
             "slip": float(self._moved[first.top, 0].mean()),
             "kinetic_energy": _kinetic_energy(first, motion),
             "lost": len(self._contacts - there),
-            "gained": len(there - pairs(first)),
+            "gained": len(there - contact_pairs(first)),
             "sliding": len((_sliding(now) - self._slid) & self._contacts),
         }
 
 
 def _sliding(packing: Packing) -> set[tuple[int, int]]:
-    return pairs(packing, sliding(packing)) if packing.law.frictional else set()
+    return contact_pairs(packing, sliding_contacts(packing)) if packing.law.frictional else set()
 
 
 def _kinetic_energy(packing: Packing, motion: Motion) -> float:

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ...figures.series import few_decades, positive
 from ...figures.style import INK, styled
-from ..rows import columns
+from ..result_rows import row_columns
 
 MARKERS = {"opens": "o", "slides": "s", "law": "D", "flows": "^", "cut off": "X", "rises": "v", "stable": "."}
 WORDS = {
@@ -38,17 +38,17 @@ def size_figure(runs: list[dict[str, Any]]) -> Figure:
             rows = [row for row in runs if row["ends"] == ends and row["damped"] == damped]
             if rows:
                 face, label = ("white", f"{WORDS[ends]} (damped)") if damped else ("C0", WORDS[ends])
-                places = columns(rows, "fx", "msd")
+                places = row_columns(rows, "fx", "msd")
                 sizes.plot(*places, marker, color="C0", markersize=4, markerfacecolor=face, label=label)
     free = [row for row in runs if not row["damped"]]
-    fx, slip, noise = columns(free, "fx", "slip", "noise")
+    fx, slip, noise = row_columns(free, "fx", "slip", "noise")
     sizes.plot(fx, slip**2, "_", color="C1", label="(slip of the layer)$^2$")
     sizes.plot(fx, noise, ":", color=INK, linewidth=0.7, label="noise of doubles")
     sizes.set(yscale="log", ylabel="largest $D$")
     few_decades(sizes, 8)
     sizes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     for key, colour, name in (("lost", "C0", "open"), ("sliding", "C2", "slide"), ("gained", "C3", "new")):
-        contacts.plot(*columns(free, "fx", key), ".-", color=colour, linewidth=0.6, label=name)
+        contacts.plot(*row_columns(free, "fx", key), ".-", color=colour, linewidth=0.6, label=name)
     contacts.set(xlabel="$F_x$", ylabel="contacts", xscale="log", ylim=(-0.5, max(5, 1.1 * contacts.dataLim.y1)))
     contacts.yaxis.set_major_locator(MaxNLocator(5, integer=True))
     contacts.legend()

@@ -12,20 +12,20 @@ from mpi4py import MPI
 from ...analysis import NoEquilibriumError
 from ...analysis.motion.growth import ABOVE
 from ...pywrap import Scene, SceneError
-from ...pywrap.runs.path import loads
-from ...pywrap.scenes.refusals import needed
+from ...pywrap.runs.equilibrium_path import loads
 from ...pywrap.scenes.study_sections import Eruptions
-from ...pywrap.settling.bed import settle
-from ..frame import Figures, Result, Study, Work
-from ..packings import path_from
-from ..rows import Rows
+from ...pywrap.scenes.validation import require_section
+from ...pywrap.settling.settle import settle
+from ..packing_tools import path_from
+from ..result_rows import Rows
+from ..study import Figures, Result, Study, Work
 from .compute import DECADES, OVER, QUIET, Start, erupt
 from .draw import WORDS, course_figure, size_figure
 
 
 def _compute(scene: Scene, work: Work) -> Result:
     """Every load of the scene until it is over; loads may be added."""
-    settings, rows = _checked(scene), work.rows
+    settings, rows = _check_section(scene), work.rows
     wanted, time = sorted(settings.load), settings.time
     kinds = (False,) if scene.damping is None else (False, True)
     missing = [fx for fx in wanted if any(rows.find(fx=fx, longest=time, damped=kind) is None for kind in kinds)]
@@ -92,15 +92,15 @@ def eruptions_of(scene: Scene, _: object) -> Result:
     SceneError
         If the scene has no section [ramp] or [eruptions].
     """
-    settings = _checked(scene)
+    settings = _check_section(scene)
     starts, flows_beyond = _starts(scene, sorted(settings.load), settings.time)
     runs = [erupt(each) for each in starts]
     return {"runs": [{k: v for k, v in run.items() if k != "series"} for run in runs], "flows_beyond": flows_beyond}
 
 
-def _checked(scene: Scene) -> Eruptions:
+def _check_section(scene: Scene) -> Eruptions:
     """The section [eruptions] of a scene whose ramp reaches its loads."""
-    until = needed(scene.ramp, "ramp").first
+    until = require_section(scene.ramp, "ramp").first
     if scene.eruptions is None:
         raise SceneError("the scene has no section [eruptions]: add it, with load, a list of F_x")
     last = max(scene.eruptions.load)
@@ -111,7 +111,7 @@ def _checked(scene: Scene) -> Eruptions:
 
 def _starts(scene: Scene, wanted: list[float], time: float) -> tuple[list[Start], float | None]:
     """The equilibria at the loads that the packing bears, and the last load that it bears if there are more."""
-    steps = loads(needed(scene.ramp, "ramp"))
+    steps = loads(require_section(scene.ramp, "ramp"))
     starts: list[Start] = []
     with path_from(settle(scene, communicator=MPI.COMM_SELF), scene) as path:
         for fx in wanted:
@@ -133,7 +133,7 @@ eruptions = Study(
     package=__package__ or "",
     name="eruptions",
     beside="eruptions",
-    check=_checked,
+    check=_check_section,
     compute=_compute,
     figures=_figures,
     page=_page,

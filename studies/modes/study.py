@@ -5,18 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...analysis.files.wholefile import write_json
-from ...figures.style import save, spared
+from ...analysis.files.atomic_write import write_json
+from ...figures.style import report_failure, save
 from ...figures.writers import write_film
 from ...pywrap import Scene, SceneError
-from ...pywrap.scenes.refusals import read_toml
-from ..hands import Progress, Say
-from ..sweep.compute import run_sweep
-from ..sweep.points import Sweep
+from ...pywrap.scenes.validation import read_toml
+from ..executors import Progress, Say
+from ..sweep.run_sweep import run_sweep
+from ..sweep.sweep_plan import Sweep
 from ..sweep.table import Row, write_csv
 from ..sweep.tasks import TASKS
 from .draw import PlaneFilm, over_load, plane
-from .table import Table, along
+from .table import Table, medians_over_load
 
 COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q", "pairs_error")
 
@@ -30,7 +30,7 @@ RATE = 2.0
 """Frames of the film a second."""
 
 
-def wanted_of(path: Path) -> Sweep:
+def read_modes_sweep(path: Path) -> Sweep:
     """The sweep of a file that has a sweep of the task "modes", or a scene, which is a sweep of one point.
 
     Raises
@@ -64,7 +64,7 @@ def modes(
     output : Path
         The folder: results.jsonl as of any sweep, modes.json, modes.csv, pictures and a film.
     part, say, progress, workers
-        As of :func:`~faultgouge.studies.sweep.compute.run_sweep`.
+        As of :func:`~faultgouge.studies.sweep.run_sweep.run_sweep`.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def modes(
     result = {"asked": sweep.as_dict(), "rows": lines, "packings": ends}
     write_json(output / "modes.json", result)
     write_csv(output / "modes.csv", COLUMNS, lines)
-    with spared("a picture of the modes", say):
+    with report_failure("a picture of the modes", say):
         _draw(rows, lines, output, say)
     return result
 
@@ -106,7 +106,9 @@ def _draw(rows: list[Row], lines: list[dict[str, Any]], output: Path, say: Say) 
     groups = {"all": good}
     if len(sizes) > 1:
         groups = {str(n): [row for row in good if row["values"].get("packing.disks") == n] for n in sizes}
-    courses = {name: along(Table(name, tuple(row["result"] for row in group))) for name, group in groups.items()}
+    courses = {
+        name: medians_over_load(Table(name, tuple(row["result"] for row in group))) for name, group in groups.items()
+    }
     save(over_load(courses), output / "modes")
     complex_loads = [load for load in good[0]["result"]["loads"] if load["pairs"]]
     if not complex_loads:

@@ -53,7 +53,7 @@ class Table:
         return Table(self.name, tuple(row for row in self.rows if row["seed"] in seeds))
 
 
-def along(table: Table, names: Sequence[str] = QUANTITIES) -> dict[str, Any]:
+def medians_over_load(table: Table, names: Sequence[str] = QUANTITIES) -> dict[str, Any]:
     """Medians with intervals at each load, and how many packings bear it."""
     found: dict[str, Any] = {"packings": len(table.rows), "loads": table.loads}
     found["count"] = [len(table.at(load, names[0])) for load in table.loads]

@@ -22,8 +22,8 @@ from ...figures.pair import PairCurve
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
 from ...pywrap.onset.undamped import OnsetRun, onset_run
 from ...pywrap.runs.undamped import perturb, time_step
-from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Perturb
+from ...pywrap.scenes.validation import require_section
 from ..triggering.compute import Triggering, equilibrium_at, series_of, trigger
 
 EFOLDS = 48.0
@@ -79,7 +79,11 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
 
     The series go to run.h5.
     """
-    run, fx, mu_ss = runs[0], needed(scene.perturb, "perturb").fx, needed(scene.friction, "friction").mu_ss
+    run, fx, mu_ss = (
+        runs[0],
+        require_section(scene.perturb, "perturb").fx,
+        require_section(scene.friction, "friction").mu_ss,
+    )
     # exact but for the product's rounding
     weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
     if weakened and fx <= weakened[0].onset.fx_c:
@@ -100,7 +104,7 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
 def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = None) -> OnsetRun:
     """Ramp and onset for one friction coefficient, from a settled bed; every equilibrium goes to the file."""
     one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
-    near = NEARBY * needed(scene.ramp, "ramp").first
+    near = NEARBY * require_section(scene.ramp, "ramp").first
     path.unlink(missing_ok=True)
     with Record(path, one) as record:
         run = onset_run(one, mu, reached=record.append, near_onset=near, bed=bed)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ...figures.packing import draw_packing
 from ...figures.pair import PairCurve, draw_pair
 from ...figures.series import draw_growth
-from ..frame import Figures
+from ..study import Figures
 from .compute import GrowthRun
 
 

@@ -12,8 +12,8 @@ from ...analysis.packing.solid_fraction import solid_fraction, solid_fraction_be
 from ...figures.pages import render
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
-from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.units import dashpot, quality_factor, real_units
+from ...pywrap.scenes.validation import require_section
 from ..triggering.compute import ABOVE_NOISE, Triggering, largest, summary
 from .compute import GrowthRun
 
@@ -48,7 +48,7 @@ def report(
         says=found,
         another=another,
         settled_with_friction=getattr(scene.packing, "settle_friction", False),
-        **({} if triggering is None else _triggered(triggering)),
+        **({} if triggering is None else _triggering_numbers(triggering)),
         **_in_si(scene, growth, triggering if another is None else None),
     )
 
@@ -59,13 +59,13 @@ def _is_earlier(one: Onset, other: Onset) -> bool | None:
     return None if abs(apart) <= one.error + other.error else apart > 0
 
 
-def _triggered(found: Triggering) -> dict[str, Any]:
+def _triggering_numbers(found: Triggering) -> dict[str, Any]:
     """What the section on triggering needs beside the runs."""
     numbers = summary(found)
     jump = numbers["jump"]
     return {
         "numbers": numbers,
-        "calibrated": isinstance(needed(found.scene.friction, "friction").v0, str),
+        "calibrated": isinstance(require_section(found.scene.friction, "friction").v0, str),
         "highest_speed": float(np.abs(found.runs["erupting"]["layer_velocity"]).max()),
         "jumped": None if jump is None else float(np.log10(jump / numbers["largest_D"]["perturbed"])),
         "above_noise": ABOVE_NOISE,

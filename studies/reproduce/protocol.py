@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...analysis.digits import with_uncertainty
-from ...analysis.files.wholefile import make_folder, write_json, write_text
+from ...analysis.files.atomic_write import make_folder, write_json, write_text
+from ...analysis.uncertain_digits import with_uncertainty
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
-from ...pywrap.settling.bed import settled_bed
-from ..frame import draw_all
-from ..hands import Say
+from ...pywrap.settling.settle import settle_bed
+from ..executors import Say
+from ..study import draw_all
 from ..triggering.compute import summary as triggering_summary
 from ..triggering.draw import figures as triggering_figures
 from .compute import growth_run, pair_curve, recorded_ramp, summary_of, triggering_run
@@ -75,7 +75,7 @@ def _ramps(scene: Scene, path: Path, say: Say) -> list[OnsetRun]:
     shared = not getattr(scene.packing, "settle_friction", False)
     if shared:
         say("settling")
-    bed, runs = settled_bed(scene) if shared else None, []
+    bed, runs = settle_bed(scene) if shared else None, []
     for number, mu in enumerate(scene.law.mus):
         say(f"mu = {mu:g}: {'' if shared else 'settling, '}ramp and onset")
         here = path if number == 0 else path.with_stem(f"{path.stem}-mu{mu:g}")

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...figures.style import INK, save, spared, styled
+from ...figures.style import INK, report_failure, save, styled
 from ..statistics import course
 from .table import Row
 
@@ -29,7 +29,7 @@ def draw_sweep(rows: Sequence[Row], folder: Path, say: Callable[[str], None]) ->
     runs = [(row, run) for row in rows for run in _dicts(row["result"].get("runs")) if {"fx", "msd"} <= run.keys()]
     if not reaches and not runs:
         return ""
-    with spared(f"{folder}/results.png", say):
+    with report_failure(f"{folder}/results.png", say):
         save(onsets_figure(reaches) if reaches else eruptions_figure(runs), folder / "results")
         return f" and {folder}/results.png"
     return ""
@@ -70,7 +70,7 @@ def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
     Forces are per disk of the upper layer; triangles stand where there is no onset up to there. Above stands how many
     scenes have an onset, and how many have none.
     """
-    keys = _varied([row for row, _ in found])
+    keys = _varied_keys([row for row, _ in found])
     figure = Figure(figsize=(3.4, 2.2 * (1 + len(keys))), layout="constrained")
     share, *panels = figure.subplots(1 + len(keys), 1, squeeze=False)[:, 0]
     reach = np.array([each for _, (each, _) in found])
@@ -108,7 +108,7 @@ def eruptions_figure(found: Sequence[tuple[Row, dict[str, float]]]) -> Figure:
     return figure
 
 
-def _varied(rows: Sequence[Row]) -> list[str]:
+def _varied_keys(rows: Sequence[Row]) -> list[str]:
     """The swept keys with more than one value, but for the seed, which is a sample and no axis."""
     keys = [key for key in rows[0]["values"] if key != SEED]
     return [key for key in keys if len({str(row["values"][key]) for row in rows}) > 1]

@@ -31,9 +31,9 @@ from ...analysis.spectrum.eigenpairs import eigenpairs
 from ...analysis.spectrum.spectrum import active_coordinates
 from ...pywrap import Scene, SceneError
 from ...pywrap.onset.path_error import with_path_error
-from ...pywrap.runs.path import EquilibriumPath, loads
-from ...pywrap.scenes.refusals import needed
-from ..packings import Start, pairs, path_from, sliding
+from ...pywrap.runs.equilibrium_path import EquilibriumPath, loads
+from ...pywrap.scenes.validation import require_section
+from ..packing_tools import Start, contact_pairs, path_from, sliding_contacts
 
 Ends = Literal["onset", "until", "flows"]
 
@@ -52,7 +52,7 @@ def onset(scene: Scene, start: Start) -> dict[str, Any]:
     NoEquilibriumError
         If the packing does not settle.
     """
-    needed(scene.ramp, "ramp")
+    require_section(scene.ramp, "ramp")
     if len(scene.law.mus) > 1:
         raise SceneError('a row has one friction coefficient: give the list as "law.mu" below [sweep]')
     rest = start(scene.law.mus[0])
@@ -72,7 +72,7 @@ def onset(scene: Scene, start: Start) -> dict[str, Any]:
 def first_window(path: EquilibriumPath, scene: Scene) -> tuple[Ends, float, Onset | None]:
     """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one."""
     try:
-        found = find_onset(path, loads(needed(scene.ramp, "ramp")), first=True)
+        found = find_onset(path, loads(require_section(scene.ramp, "ramp")), first=True)
     except NoEquilibriumError:
         return "flows", path.kept[-1].fx, None
     except OnsetError:
@@ -89,13 +89,13 @@ def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
     vector = near.right[:, 0].real / np.linalg.norm(near.right[:, 0].real)
     axes = vector.reshape(3, -1) ** 2
     weight = axes.sum(axis=0)
-    before, now = pairs(rest), pairs(packing)
+    before, now = contact_pairs(rest), contact_pairs(packing)
     row: dict[str, Any] = {
         "participation": float(1 / np.sum(weight**2)),
         "rotation": float(axes[2].sum()),
         "layer": float(weight[packing.top].sum()),
         "disks": np.argsort(weight)[::-1][:3].tolist(),
-        "sliding": int(np.count_nonzero(sliding(packing))),
+        "sliding": int(np.count_nonzero(sliding_contacts(packing))),
         "opened": len(before - now),
         "closed": len(now - before),
     }

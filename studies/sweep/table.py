@@ -14,7 +14,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from ...analysis.files.wholefile import write_text
+from ...analysis.files.atomic_write import write_text
 
 Row = dict[str, Any]
 

@@ -16,12 +16,12 @@ from typing import Any
 from ...pywrap import Scene
 from ...pywrap.scenes.study_sections import Modes
 from ..eruptions.study import eruptions_of
-from ..modes.compute import modes
-from ..packings import Start
+from ..modes.count_pairs import modes
+from ..packing_tools import Start
 from ..trigger.compute import settings
 from ..trigger.study import trigger
 from .onset import onset
-from .points import Point
+from .sweep_plan import Point
 from .table import Row
 from .triggering import triggering
 from .user_function import UserFunction, is_user_function, user_function
@@ -107,11 +107,11 @@ def estimate(task: str, points: Sequence[Point], known: Iterable[Row] = ()) -> l
         *([f"{refused} points make no scene, and will say why"] if refused else []),
         _expected_of_rows([row["cpu_seconds"] for row in known if row["says"] is None], len(scenes))
         if is_user_function(task)
-        else _expected(TASKS[task], scenes, settlings.values()),
+        else _expected_time(TASKS[task], scenes, settlings.values()),
     ]
 
 
-def _expected(task: Task, scenes: Sequence[Scene], settled: Iterable[Scene]) -> str:
+def _expected_time(task: Task, scenes: Sequence[Scene], settled: Iterable[Scene]) -> str:
     seconds = [task.seconds(scene) for scene in scenes]
     settling = sum(0.3 * _disks(scene) ** 1.3 for scene in settled)  # 0.3 s for 100 disks
     return (

@@ -28,15 +28,15 @@ from ...analysis import FaultgougeError
 from ...pywrap import Engine, Equilibrium, Scene
 from ...pywrap.lammps.dynamics import Weakening
 from ...pywrap.onset.path_error import with_path_error
-from ...pywrap.runs.path import EquilibriumPath
+from ...pywrap.runs.equilibrium_path import EquilibriumPath
 from ...pywrap.runs.undamped import perturb
-from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction, Perturb
-from ..packings import Start
-from ..statistics import lowers
+from ...pywrap.scenes.validation import require_section
+from ..packing_tools import Start
+from ..statistics import sign_test
 from ..triggering.compute import (
     Series,
-    calibrated,
+    calibrate_weakening,
     differs,
     equilibrium_at,
     foresee,
@@ -50,7 +50,7 @@ from .onset import first_window
 Row = dict[str, Any]
 
 
-def rise(eruption: Row, of: str = "weakening") -> float:
+def rise_in_decades(eruption: Row, of: str = "weakening") -> float:
     """Decades between the largest D of the perturbed run and of the one with mu(v), or of the "control"."""
     return float(np.log10(eruption[of] / eruption["perturbed"]))
 
@@ -71,7 +71,7 @@ def triggering(scene: Scene, start: Start) -> Row:
         `eruption` finds, None without a window between the two onsets, or without [perturb] in the scene.
     """
     row: Row = {"ramps": [], "lowered": None, "eruption": None}
-    needed(scene.ramp, "ramp")
+    require_section(scene.ramp, "ramp")
     try:
         for found in _examination(scene, start):
             row |= found
@@ -92,7 +92,7 @@ def _examination(scene: Scene, start: Start) -> Iterator[Row]:
     if len(ramps) < 2:
         return
     strong, weak = ramps[0], ramps[-1]
-    lowered = lowers(strong, weak)
+    lowered = sign_test(strong, weak)
     yield {"lowered": lowered}
     if lowered and strong["ends"] == "onset" and scene.perturb is not None and scene.friction is not None:
         window = weak["reach"], strong["reach"]
@@ -160,7 +160,7 @@ def eruption(
         return series_of(perturb(one, start, communicator=MPI.COMM_SELF, weakening=weakening))
 
     quiet = run(start, 0.0)
-    weakening = calibrated(friction, quiet)
+    weakening = calibrate_weakening(friction, quiet)
     perturbed, weakened = run(start, settings.amplitude), run(start, settings.amplitude, weakening)
     foreseen = foresee(start, friction.mu_ss * start.packing.law.mu, weakened, weakening.v0)
     outcome = judge(weakened, weakening.v0, foreseen)

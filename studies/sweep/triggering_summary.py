@@ -14,7 +14,7 @@ import numpy as np
 from ...figures.pages import lines
 from ..statistics import quartiles, share
 from .table import Row
-from .triggering import grows, rise
+from .triggering import grows, rise_in_decades
 
 RISES = (5, 10)
 """Rises in decades whose shares are given; the paper's figure 5 has 12."""
@@ -44,7 +44,7 @@ def summary(rows: Sequence[Row]) -> dict[str, Any]:
     several = [row for row in rows if len(row["result"].get("ramps", ())) > 1]
     decided = [row["result"]["lowered"] for row in several if row["result"]["lowered"] is not None]
     undecided = [row for row in several if row["result"]["lowered"] is None and row["says"] is None]
-    rises, controls = ([rise(each, of) for each in eruptions] for of in ("weakening", "control"))
+    rises, controls = ([rise_in_decades(each, of) for each in eruptions] for of in ("weakening", "control"))
 
     def at_least(values: list[float]) -> dict[str, Any]:
         return {str(decades): share(sum(each >= decades for each in values), len(values)) for decades in RISES}

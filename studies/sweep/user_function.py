@@ -31,7 +31,7 @@ from typing import Any
 
 from ...analysis import FaultgougeError
 from ...pywrap import Scene, SceneError
-from ..packings import Start
+from ..packing_tools import Start
 
 
 class UserFunctionError(FaultgougeError):

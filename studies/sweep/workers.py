@@ -22,10 +22,10 @@ from threadpoolctl import threadpool_limits
 
 from ...analysis import FaultgougeError, Packing
 from ...pywrap import Equilibrium, Scene, settle
-from ...pywrap.settling.bed import settled_bed
-from ..hands import Processes
-from ..packings import Start
-from .points import Point
+from ...pywrap.settling.settle import settle_bed
+from ..executors import Processes
+from ..packing_tools import Start
+from .sweep_plan import Point
 from .table import Row
 from .tasks import task_of
 from .user_function import UserFunctionError
@@ -41,7 +41,7 @@ class WorkerError(FaultgougeError):
     """Workers are killed again and again."""
 
 
-def computed(pool: Executor | None, task: str, points: Sequence[Point]) -> Generator[Row, None, None]:
+def compute_points(pool: Executor | None, task: str, points: Sequence[Point]) -> Generator[Row, None, None]:
     """The rows of points as they end; closing the generator takes back those that no worker has begun."""
     groups: dict[str, deque[Point]] = defaultdict(deque)
     for point in points:
@@ -52,7 +52,7 @@ def computed(pool: Executor | None, task: str, points: Sequence[Point]) -> Gener
     for group in groups.values():
         bed = None
         for number, point in enumerate(group):
-            row, bed = examined(task, point, bed, number + 1 < len(group))
+            row, bed = compute_point(task, point, bed, number + 1 < len(group))
             yield row
 
 
@@ -91,7 +91,7 @@ class _Shared:
 
     def _hand_out(self, point: Point, bed: Packing | None, group: deque[Point]) -> None:
         try:
-            future = self._pool.submit(examined, self._task, point, bed, bool(group))
+            future = self._pool.submit(compute_point, self._task, point, bed, bool(group))
         except BrokenExecutor:
             self._lost.append((point, bed, group))
         else:
@@ -109,7 +109,7 @@ class _Shared:
             self._hand_out(point, bed, group)
 
 
-def examined(task: str, point: Point, bed: Packing | None, keep: bool) -> tuple[Row, Packing | None]:
+def compute_point(task: str, point: Point, bed: Packing | None, keep: bool) -> tuple[Row, Packing | None]:
     """One point: its row, and if it is to be kept the packing as it settled.
 
     What goes wrong with a point is in its row under "says".
@@ -144,7 +144,7 @@ def _starter(scene: Scene, beds: list[Packing]) -> Start:
         if scene.packing.model_dump().get("settle_friction", False) and mu != scene.law.mus[0]:
             return settle(scene, mu, MPI.COMM_SELF)
         if not beds:
-            beds.append(settled_bed(scene, mu, MPI.COMM_SELF))
+            beds.append(settle_bed(scene, mu, MPI.COMM_SELF))
         return settle(scene, mu, MPI.COMM_SELF, bed=beds[0])
 
     return start

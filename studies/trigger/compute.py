@@ -30,13 +30,13 @@ from ...analysis.motion.forcing import floor_force, impulse_response
 from ...analysis.motion.response import layer_force
 from ...analysis.packing.packing import Floats
 from ...pywrap import Engine, Scene, SceneError
-from ...pywrap.runs.path import loads
+from ...pywrap.runs.equilibrium_path import loads
 from ...pywrap.runs.undamped import time_step
 from ...pywrap.scenes.study_sections import Trigger
 from ...pywrap.scenes.units import RealUnits
-from ...pywrap.settling.bed import settle
+from ...pywrap.settling.settle import settle
 from ..eruptions.compute import growth_rate
-from ..packings import path_from
+from ..packing_tools import path_from
 
 Row = dict[str, Any]
 
@@ -145,7 +145,7 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
     return [{"fx": packing.fx, "distance": distance} | row for row in rows]
 
 
-def chosen(predicted: list[Row], runs: int) -> list[Row]:
+def spread_over_map(predicted: list[Row], runs: int) -> list[Row]:
     """So many of the map, spread over its distances and its frequencies."""
     distances = sorted({each["distance"] for each in predicted}, reverse=True)
     rows = [sorted((p for p in predicted if p["distance"] == d), key=lambda p: p["omega"]) for d in distances]
@@ -158,7 +158,7 @@ def chosen(predicted: list[Row], runs: int) -> list[Row]:
     return picked
 
 
-def bisected(wave: Wave) -> Row:
+def bisect_amplitude(wave: Wave) -> Row:
     """a_c in LAMMPS, on this process alone.
 
     Returns

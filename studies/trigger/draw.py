@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ...analysis.packing.packing import Floats
 from ...figures.style import INK, styled
-from ..rows import columns
+from ..result_rows import row_columns
 
 WAVE = {"layer": "amplitude of the force $a$", "floor": "acceleration of the floor $a$"}
 
@@ -28,7 +28,7 @@ def map_figure(result: dict[str, Any]) -> Figure:
     norm = LogNorm(np.nanmin(amplitude), np.nanmax(amplitude))
     colours = axes.pcolormesh(_edges(omega), _edges(distance), amplitude, norm=norm, cmap="viridis_r")
     runs = [row for row in result["map"] if row["measured"] is not None]
-    across, up, measured = columns(runs, "omega", "distance", "measured")
+    across, up, measured = row_columns(runs, "omega", "distance", "measured")
     axes.scatter(across, up, c=measured, norm=norm, cmap="viridis_r", s=22, edgecolors="white", linewidths=0.9)
     axes.minorticks_off()
     bar = figure.colorbar(colours, ax=axes)
@@ -51,21 +51,21 @@ def threshold_figure(result: dict[str, Any]) -> Figure:
         axes.plot(omega, curve, color=colour, linewidth=3.2 - 2.4 * k / len(distance), label=f"${_power(each)}$")
         _runs(axes, [row for row in result["map"] if row["distance"] == each and row["measured"] is not None], colour)
     nearest = [row for row in result["map"] if row["distance"] == distance[0]]
-    axes.plot(*columns(nearest, "omega", "stationary"), ":", color=INK, linewidth=0.8)
+    axes.plot(*row_columns(nearest, "omega", "stationary"), ":", color=INK, linewidth=0.8)
     axes.legend(title="$1 - F_x/F_x^c$", ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return figure
 
 
 def _runs(axes: Axes, rows: list[dict[str, Any]], colour: str) -> None:
     """The bracket of each bisection, so far apart that both triangles are seen."""
-    omega, below, above = columns(rows, "omega", "below", "above")
+    omega, below, above = row_columns(rows, "omega", "below", "above")
     axes.plot(omega, 1.12 * above, "^", color=colour, markersize=3.5)
     axes.plot(omega, below / 1.12, "v", color=colour, markersize=3.5, markerfacecolor="white")
 
 
 def _grid(rows: list[dict[str, Any]]) -> tuple[Floats, Floats, Floats]:
     """Distances and frequencies, increasing, and a_c of the two."""
-    at, of, predicted = columns(rows, "distance", "omega", "predicted")
+    at, of, predicted = row_columns(rows, "distance", "omega", "predicted")
     distance, omega = np.unique(at), np.unique(of)
     amplitude = np.full((len(distance), len(omega)), np.nan)
     amplitude[np.searchsorted(distance, at), np.searchsorted(omega, of)] = predicted

@@ -5,26 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from ...analysis import Packing
-from ...analysis.digits import with_uncertainty
+from ...analysis.uncertain_digits import with_uncertainty
 from ...pywrap import Scene
 from ...pywrap.onset.damped import damped_onset_run
 from ...pywrap.onset.undamped import onset_run
-from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.units import real_units
-from ..frame import Result, Study, Work
-from ..packings import Start
+from ...pywrap.scenes.validation import require_section
+from ..packing_tools import Start
+from ..study import Result, Study, Work
 from ..sweep.onset import onset
 from .compute import (
     Row,
     Wave,
-    bisected,
-    chosen,
+    bisect_amplitude,
     equilibria,
     frequencies,
     in_si,
     middle,
     predictions,
     settings,
+    spread_over_map,
     threshold,
 )
 from .draw import map_figure, threshold_figure
@@ -32,14 +32,14 @@ from .draw import map_figure, threshold_figure
 
 def _check(scene: Scene) -> None:
     threshold(scene)
-    needed(scene.ramp, "ramp")
+    require_section(scene.ramp, "ramp")
 
 
 def _compute(scene: Scene, work: Work) -> Result:
     """The onset, the whole map, and the bisections."""
     onset = _onset(scene, work)
-    predicted = _predicted(scene, onset["fx_c"], work)
-    return _summary(scene, onset, predicted, _measured(scene, predicted, work))
+    predicted = _predict_map(scene, onset["fx_c"], work)
+    return _summary(scene, onset, predicted, _bisect_map(scene, predicted, work))
 
 
 def _summary(scene: Scene, onset: Row, predicted: list[Row], measured: list[Row]) -> Result:
@@ -94,12 +94,12 @@ def _onset(scene: Scene, work: Work) -> Row:
     return work.rows.append(kind="onset", fx_c=fx_c, error=error, undamped_fx_c=undamped)
 
 
-def _predicted(scene: Scene, fx_c: float, work: Work) -> list[Row]:
+def _predict_map(scene: Scene, fx_c: float, work: Work) -> list[Row]:
     """The whole map, a distance at a time."""
     distances = sorted(settings(scene).distance, reverse=True)
     missing = [d for d in distances if work.rows.find(kind="predicted", distance=d) is None]
     packings = equilibria(scene, [fx_c * (1 - d) for d in distances]) if missing else {}
-    for distance, found in _mapped(scene, packings, fx_c, missing):
+    for distance, found in _map_predictions(scene, packings, fx_c, missing):
         work.rows.append(kind="predicted", distance=distance, found=found)
         least = min(found, key=lambda each: each["predicted"])
         work.say(
@@ -109,7 +109,7 @@ def _predicted(scene: Scene, fx_c: float, work: Work) -> list[Row]:
     return [each for row in known for each in row["found"]]
 
 
-def _mapped(
+def _map_predictions(
     scene: Scene, packings: Mapping[float, Packing], fx_c: float, distances: Iterable[float]
 ) -> Iterator[tuple[float, list[Row]]]:
     """The predictions at each distance, the largest first; frequencies are those of the largest distance of all."""
@@ -119,9 +119,9 @@ def _mapped(
             yield distance, predictions(scene, packings[fx_c * (1 - distance)], distance, omegas)
 
 
-def _measured(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
+def _bisect_map(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
     """The bisections, those that are in the file already and those that are not."""
-    wanted = chosen(predicted, settings(scene).runs)
+    wanted = spread_over_map(predicted, settings(scene).runs)
 
     def known(each: Row) -> Row | None:
         return work.rows.find(kind="measured", fx=each["fx"], omega=each["omega"])
@@ -132,7 +132,7 @@ def _measured(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
     if missing:
         packings = equilibria(scene, {each["fx"] for each in wanted})  # all: the path is that of one run of the command
         waves = [Wave(scene, packings[each["fx"]], each) for each in missing]
-        for found in work.progress(work.share(bisected, waves), len(waves)):
+        for found in work.progress(work.share(bisect_amplitude, waves), len(waves)):
             work.rows.append(kind="measured", **found)
             at = f"omega = {found['omega']:.4g} at {found['distance']:g}"
             work.say(f"{at}: triggers from {middle(found['below'], found['above']):.4g} on in LAMMPS")
@@ -152,8 +152,10 @@ def trigger(scene: Scene, start: Start) -> Row:
     if first["ends"] != "onset":
         return {"ends": first["ends"], "fx_c": None, "map": [], "measured": []}
     packings = equilibria(scene, [first["fx_c"] * (1 - each) for each in wave.distance])
-    predicted = [row for _, rows in _mapped(scene, packings, first["fx_c"], wave.distance) for row in rows]
-    measured = [bisected(Wave(scene, packings[each["fx"]], each)) for each in chosen(predicted, wave.runs)]
+    predicted = [row for _, rows in _map_predictions(scene, packings, first["fx_c"], wave.distance) for row in rows]
+    measured = [
+        bisect_amplitude(Wave(scene, packings[each["fx"]], each)) for each in spread_over_map(predicted, wave.runs)
+    ]
     return {
         "ends": "onset",
         "fx_c": first["fx_c"],

@@ -38,10 +38,10 @@ from ...analysis.spectrum.normal_form import LEAST_CROSSOVER
 from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening
 from ...pywrap.onset.undamped import OnsetRun
-from ...pywrap.runs.path import next_equilibrium
+from ...pywrap.runs.equilibrium_path import next_equilibrium
 from ...pywrap.runs.undamped import perturb, time_step, weakening_of
-from ...pywrap.scenes.refusals import needed
 from ...pywrap.scenes.sections import Friction
+from ...pywrap.scenes.validation import require_section
 from .forecast import JUMP_SHARE, Forecast, forecast
 
 EARLY = 2000
@@ -172,7 +172,7 @@ def largest(run: Series) -> float:
     return float(run["msd"].max())
 
 
-def calibrated(friction: Friction, unperturbed: Series) -> Weakening:
+def calibrate_weakening(friction: Friction, unperturbed: Series) -> Weakening:
     """mu(v) with the v_0 of the scene, or with the largest velocity of the layer in an unperturbed run."""
     v0 = np.abs(unperturbed["layer_velocity"]).max() if isinstance(friction.v0, str) else friction.v0
     return weakening_of(friction, float(v0))
@@ -272,7 +272,7 @@ def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: O
     path : Path
         run.h5 of the ramp; gets the series unperturbed, perturbed, erupting, control and strong.
     """
-    settings, friction = needed(scene.perturb, "perturb"), needed(scene.friction, "friction")
+    settings, friction = require_section(scene.perturb, "perturb"), require_section(scene.friction, "friction")
     runs: dict[str, Series] = {}
 
     def run(
@@ -290,7 +290,7 @@ def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: O
         runs[name] = series
 
     run("unperturbed", 0.0, early=200)  # as `perturb` calibrates v_0
-    weakening = calibrated(friction, runs["unperturbed"])
+    weakening = calibrate_weakening(friction, runs["unperturbed"])
     run("perturbed", settings.amplitude)
     run("erupting", settings.amplitude, weakening, early=FALL)
     if below is not None:

@@ -21,13 +21,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import ArrayLike
 
-from ...analysis.digits import with_uncertainty
 from ...analysis.onset.pair_form import PairForm
 from ...analysis.packing.packing import Floats
+from ...analysis.uncertain_digits import with_uncertainty
 from ...figures.series import draw_series, few_decades, positive, scientific
 from ...figures.style import INK, styled
 from ...pywrap.lammps.dynamics import Weakening
-from ..frame import Figures
+from ..study import Figures
 from .compute import Sensitivity, Triggering
 
 Course = tuple[Floats, Floats]

@@ -5,7 +5,7 @@ packing is out of balance by f, and moves as :math:`M \\ddot q + K q = f` from r
 mu. This has both the jump and, where K has complex eigenvalues, the growth after it. It holds while displacements are
 small against overlaps.
 
-`chosen` says for which packings, of a list of seeds, the growth is large enough to see. It makes no run.
+`choose_seed` says for which packings, of a list of seeds, the growth is large enough to see. It makes no run.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from ...analysis import NoEquilibriumError, OnsetError, spectrum
 from ...analysis.motion.response import LinearMotion
 from ...pywrap import Equilibrium, Scene, SceneError, reach
 from ...pywrap.onset.undamped import onset_run
-from ...pywrap.scenes.refusals import needed
-from ..packings import seeded
+from ...pywrap.scenes.validation import require_section
+from ..packing_tools import with_seed
 
 JUMP_SHARE = 0.05
 """Share of the run with mu(v) that shows the jump, from the moment on at which friction weakens: 10 of 200 time units,
@@ -87,7 +87,7 @@ def forecast(start: Equilibrium, mu: float, time: float, window: float | None = 
     )
 
 
-def chosen(scene: Scene, seeds: Iterable[int]) -> Iterator[dict[str, Any]]:
+def choose_seed(scene: Scene, seeds: Iterable[int]) -> Iterator[dict[str, Any]]:
     """Try seeds until one is found whose packing erupts, by the rule; the last one that is yielded is it.
 
     The load is a thousandth below the first onset. The rule: with the weakened friction, D grows by `LEAST_GROWTH`
@@ -108,14 +108,14 @@ def chosen(scene: Scene, seeds: Iterable[int]) -> Iterator[dict[str, Any]]:
         forecast : of a run there, as a dict, or None.
     """
     for seed in seeds:
-        found = _tried(seeded(scene, seed), seed)
+        found = _try_seed(with_seed(scene, seed), seed)
         yield found
         if not found["says"]:
             return
 
 
-def _tried(scene: Scene, seed: int) -> dict[str, Any]:
-    friction, time = needed(scene.friction, "friction"), needed(scene.perturb, "perturb").time
+def _try_seed(scene: Scene, seed: int) -> dict[str, Any]:
+    friction, time = require_section(scene.friction, "friction"), require_section(scene.perturb, "perturb").time
     mu = scene.law.mus[0]
     try:
         fx = float(f"{(1 - BELOW) * onset_run(scene, mu).onset.fx_c:.5g}")

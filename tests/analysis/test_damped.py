@@ -8,8 +8,8 @@ from scipy.sparse import csr_array
 
 from faultgouge.analysis import NoEquilibriumError, find_onset, stiffness_matrix
 from faultgouge.analysis.damped_onset.modes import Pencil
-from faultgouge.analysis.damped_onset.weak import balancing_ratio, drag_onset, weak_limit
-from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating, growing_windows
+from faultgouge.analysis.damped_onset.weak_dissipation import balancing_ratio, drag_onset, weak_limit
+from faultgouge.analysis.damped_onset.windows import damped_windows, growing_windows, without_dissipation
 
 RNG = np.random.default_rng(11)
 TURN = np.linalg.qr(RNG.normal(size=(8, 8)))[0]
@@ -126,7 +126,7 @@ def test_reference_packing_with_normal_dashpots(path, cn, onset, digits):
     """The onsets that an independent computation had found, and LAPACK's root of the same to 1e-9."""
     from scipy.optimize import brentq  # slow to import
 
-    damped = dissipating(path, cn=cn)
+    damped = without_dissipation(path, cn=cn)
     window = damped_windows(damped, [0.0218, 0.0224])[0]
     assert window.fx_onset == pytest.approx(onset, abs=digits)
     assert window.kind == "hopf"
@@ -150,9 +150,9 @@ def undamped(path):
 @pytest.mark.slow
 def test_limit_of_weak_dashpots(path, undamped, cn, ct):
     """From the undamped pair, and from dashpots of 1e-3."""
-    predicted = weak_limit(dissipating(path, cn, ct), [0.019, 0.02, 0.021], undamped)
+    predicted = weak_limit(without_dissipation(path, cn, ct), [0.019, 0.02, 0.021], undamped)
     assert predicted.fx < undamped.fx_onset
-    weak = dissipating(path, 1e-3 * cn, 1e-3 * ct)
+    weak = without_dissipation(path, 1e-3 * cn, 1e-3 * ct)
     measured = damped_windows(weak, [0.021, undamped.fx_onset + 1e-6])[0]
     # what dashpots of 1e-3 do beyond the first order is of relative size 1e-6
     assert predicted.fx == pytest.approx(measured.fx_onset, rel=1e-6)
@@ -163,9 +163,11 @@ def test_limit_of_weak_dashpots(path, undamped, cn, ct):
 def test_balanced_dashpots_leave_the_onset_alone(path, undamped):
     ratio = balancing_ratio(path(undamped.fx_onset), undamped)
     assert ratio > 0
-    balanced = weak_limit(dissipating(path, 1.0, ratio), [0.02, 0.021], undamped)
+    balanced = weak_limit(without_dissipation(path, 1.0, ratio), [0.02, 0.021], undamped)
     assert balanced.fx == pytest.approx(undamped.fx_onset, rel=1e-8)
-    off = [weak_limit(dissipating(path, 1.0, share * ratio), [0.02, 0.021], undamped).fx for share in (0.5, 2.0)]
+    off = [
+        weak_limit(without_dissipation(path, 1.0, share * ratio), [0.02, 0.021], undamped).fx for share in (0.5, 2.0)
+    ]
     assert max(off) < undamped.fx_onset - 1e-10
 
 
@@ -175,7 +177,7 @@ def test_drag_shifts_the_onset_to_where_the_growth_exceeds_it(path, undamped):
     tau = 100.0
     predicted = drag_onset(path, [0.022, 0.0224], undamped, tau)
     assert predicted > undamped.fx_onset
-    measured = damped_windows(dissipating(path, drag_time=tau), [0.0218, 0.022])[0]
+    measured = damped_windows(without_dissipation(path, drag_time=tau), [0.0218, 0.022])[0]
     assert predicted == pytest.approx(measured.fx_onset, rel=1e-9)
     rates = np.linalg.eigvals(stiffness_matrix(path(predicted)).toarray())
     fastest = np.abs(np.sqrt(rates.astype(complex)).imag).max()
@@ -193,4 +195,4 @@ def test_drag_shifts_the_onset_to_where_the_growth_exceeds_it(path, undamped):
 )
 def test_impossible_searches(path, cn, loads, says):
     with pytest.raises(ValueError, match=says):
-        damped_windows(dissipating(path, cn), loads)
+        damped_windows(without_dissipation(path, cn), loads)

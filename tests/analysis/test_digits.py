@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from faultgouge.analysis.digits import with_uncertainty
+from faultgouge.analysis.uncertain_digits import with_uncertainty
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from faultgouge.analysis import mean_square_displacement
 from faultgouge.analysis.motion.matrix_functions import Modes, first_order
 from faultgouge.analysis.motion.oscillator import Oscillator
 from faultgouge.analysis.motion.response import layer_force, linear_response
-from faultgouge.analysis.motion.state_space import StateSpace, driven, released
+from faultgouge.analysis.motion.state_space import StateSpace, driven_motion, released_motion
 
 OMEGA = 2.0
 """That of a motion of `oblique`: resonance."""
@@ -66,7 +66,7 @@ def motion_of(matrix, force, start, time, tau=None, dt=None):
         return np.sum([modes.apply(function, time, vector) for function, vector in pairs], axis=0)
     system = StateSpace.of_matrices(csr_array(matrix), csr_array(np.eye(size) / tau), np.ones(size))
     rows, rest = block_diag(system.unweight, np.eye(size)), np.zeros(size)
-    pairs = ((partial(driven, OMEGA), system.state(rest, force)), (released, system.state(start, rest)))
+    pairs = ((partial(driven_motion, OMEGA), system.state(rest, force)), (released_motion, system.state(start, rest)))
     modes = Modes.of(system.matrix, first_order)
     found = sum(modes.apply(function, time, vector, rows)[0] for function, vector in pairs)
     return found[:, :size], found[:, size:]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Contacts, MindlinLaw, OutputError, PackingFileError, RunFile
-from faultgouge.analysis.files.wholefile import write_text
+from faultgouge.analysis.files.atomic_write import write_text
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import sys
 import pytest
 from reference_layer import LAYER, REFERENCE, toml
 
-from faultgouge.analysis.files.wholefile import alone_with, write_text
+from faultgouge.analysis.files.atomic_write import lock_output, write_text
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.lammps.names_of_files import plain_name, temporary_folder
+from faultgouge.pywrap.lammps.plain_file_names import plain_name, temporary_folder
 
 SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 2e-3}, "output": {"dumps": True}})
 STRANGE = """a 'b' "c" & <d> $x ${y} #"""
@@ -55,12 +55,12 @@ def test_a_restart_of_a_strange_name_and_decks_in_a_strange_folder(tmp_path, mon
     with plain_name(tmp_path / STRANGE) as name, temporary_folder() as folder:
         assert name.name == "file"
         assert folder.replace("/", "").replace("-", "").replace("_", "").isalnum()
-    from faultgouge.pywrap.lammps import names_of_files
+    from faultgouge.pywrap.lammps import plain_file_names
 
     decks = tmp_path / STRANGE
-    decks.symlink_to(names_of_files.DECKS)
-    monkeypatch.setattr(names_of_files, "DECKS", decks)
-    names_of_files.decks_folder.cache_clear()
+    decks.symlink_to(plain_file_names.DECKS)
+    monkeypatch.setattr(plain_file_names, "DECKS", decks)
+    plain_file_names.decks_folder.cache_clear()
     try:
         packing = settle(
             Scene.from_mapping({"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3}})
@@ -69,7 +69,7 @@ def test_a_restart_of_a_strange_name_and_decks_in_a_strange_folder(tmp_path, mon
             assert engine.packing == packing.packing
     finally:
         monkeypatch.undo()
-        names_of_files.decks_folder.cache_clear()
+        plain_file_names.decks_folder.cache_clear()
 
 
 @pytest.mark.parametrize("command", ["onset", "settle", "ramp"])
@@ -98,7 +98,7 @@ def test_a_read_only_file_is_kept(refusal, tmp_path, command):
 def test_a_file_that_another_run_writes_is_refused_before_work(refusal, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
     code = (
-        "import sys; from pathlib import Path; from faultgouge.analysis.files.wholefile import alone_with\n"
+        "import sys; from pathlib import Path; from faultgouge.analysis.files.atomic_write import alone_with\n"
         "with alone_with(Path('run.h5')): print('ready', flush=True); sys.stdin.read()"
     )
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
@@ -107,7 +107,7 @@ def test_a_file_that_another_run_writes_is_refused_before_work(refusal, tmp_path
         assert "another run is writing it" in refusal("ramp", "scene.toml", "-o", "run.h5", code=1)
         other.stdin.close()
     assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
-    with alone_with(tmp_path / "run.h5"):  # the lock went with the other
+    with lock_output(tmp_path / "run.h5"):  # the lock went with the other
         pass
 
 
@@ -152,7 +152,8 @@ def test_signals_of_the_system_end_in_a_sentence(tmp_path, number, code, says):
     work = (
         f"import os, signal, time; os.kill(os.getp{'p' * (number == signal.SIGHUP)}id(), {int(number)}); time.sleep(9)"
     )
-    script = f"from faultgouge.guard import guarded, keeps\ndef work():\n keeps('all is kept')\n {work}\nguarded(work)"
+    script = "from faultgouge.signal_guard import guarded, keeps\n"
+    script += f"def work():\n keeps('all is kept')\n {work}\nguarded(work)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (code, f"Error: {says}all is kept.\n")
 
@@ -160,7 +161,7 @@ def test_signals_of_the_system_end_in_a_sentence(tmp_path, number, code, says):
 @pytest.mark.slow
 def test_a_folder_that_is_gone_keeps_nothing(tmp_path):
     script = (
-        "import os, signal, time; from faultgouge.guard import guarded, keeps\n"
+        "import os, signal, time; from faultgouge.signal_guard import guarded, keeps\n"
         f"def work(): keeps('all is kept', {str(tmp_path / 'gone')!r}); os.kill(os.getppid(), 15); time.sleep(9)\n"
         "guarded(work)"
     )

@@ -12,9 +12,9 @@ from PIL import Image
 from reference_layer import BIN
 
 from faultgouge.analysis import RunFile
-from faultgouge.figures.view_pair import followed
+from faultgouge.figures.browser_pair import follow_eigenvalues
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.scenes.refusals import read_toml
+from faultgouge.pywrap.scenes.validation import read_toml
 
 PACKING = "F_x = 0.012, F_y = 3: 100 disks"
 MODE = r"mode \d+: lambda = [\d.]+, participation ratio 0\.\d+, rotation"
@@ -70,7 +70,7 @@ def test_few_eigenvalues_show_the_pair_that_all_show(beyond):
     """What a large packing has: the same pair at each load, and the eigenvalues that are closest to the pair."""
     with RunFile(beyond / "ramp.h5") as run:
         packings = [run.packing(k) for k in range(len(run))]
-    some, everything = (followed(packings, everything=each) for each in (False, True))
+    some, everything = (follow_eigenvalues(packings, everything=each) for each in (False, True))
     # one pair of one matrix by two iterations: their planes agree to rounding, which a split pair takes in as its root
     scale = np.abs(everything.pair).max()
     assert np.allclose(some.pair, everything.pair, rtol=0, atol=1e-7 * scale)

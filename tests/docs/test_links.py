@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,8 @@ from reference_layer import BIN, REFERENCE, SMALL, toml
 
 from docs.run_page import commands, files, run
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.scenes.refusals import read_toml
-from faultgouge.studies.sweep.points import Sweep
+from faultgouge.pywrap.scenes.validation import read_toml
+from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
 
 ROOT = Path(__file__).parents[2]
@@ -173,3 +174,18 @@ def test_a_packing_of_ones_own(faultgouge, tmp_path):
     text, pictures = printed_and_shown("own_packing")
     assert pictures == 3
     assert number(text, "own packing: F_x^c =") == pytest.approx(found["fx_c"], abs=found["error"] + 5e-12)
+
+
+@pytest.mark.parametrize(
+    ("page", "package"),
+    [
+        ("analysis", "faultgouge.analysis"),
+        ("pywrap", "faultgouge.pywrap"),
+        ("exchange", "faultgouge.pywrap.exchange"),
+        ("figures", "faultgouge.figures"),
+    ],
+)
+def test_the_api_pages_list_the_public_names_and_no_others(page, package):
+    text = (ROOT / "docs" / "api" / f"{page}.md").read_text()
+    [listed] = re.findall(r"autosummary::\n\n((?:   \w+\n)+)", text)
+    assert sorted(listed.split()) == sorted(import_module(package).__all__)

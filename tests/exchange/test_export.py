@@ -20,7 +20,7 @@ from faultgouge.analysis import Contacts, MindlinLaw, PackingFileError, RunFile,
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.exchange import (
     ModeVectors,
-    chosen_frames,
+    choose_frames,
     frames_of,
     packing_of,
     read_disks,
@@ -91,7 +91,7 @@ def film(path, suffix, says="all"):
     """Frames of a run.h5 as a file beside it."""
     target = path.with_name(f"frames{suffix}")
     with RunFile(path) as run:
-        write_frames(target, frames_of(run, chosen_frames(run, says)))
+        write_frames(target, frames_of(run, choose_frames(run, says)))
     return target
 
 

@@ -11,7 +11,7 @@ import pytest
 from reference_layer import BIN
 
 from faultgouge.analysis import BadInputError, RunFile, nearest_image
-from faultgouge.analysis.files.wholefile import MAGIC
+from faultgouge.analysis.files.atomic_write import MAGIC
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.exchange import read_disks, upper_layer, write_packing
 

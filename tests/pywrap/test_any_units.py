@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from faultgouge.analysis import MindlinLaw
 from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, perturb, ramp
 from faultgouge.pywrap.equilibria.rattlers import middle_of_cage
-from faultgouge.pywrap.settling.bed import own_units
+from faultgouge.pywrap.settling.settle import own_units
 
 UNITS = st.floats(-9, 9).map(lambda power: 10.0**power)
 

@@ -8,7 +8,7 @@ from faultgouge.analysis import find_onset
 from faultgouge.analysis.onset import full_operator
 from faultgouge.analysis.spectrum.spectrum import unit_rounding
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.runs.path import EquilibriumPath, loads
+from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath, loads
 
 
 @pytest.mark.long

@@ -12,10 +12,10 @@ from faultgouge.analysis import (
     transient_gain,
 )
 from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil
-from faultgouge.analysis.damped_onset.windows import dissipating
+from faultgouge.analysis.damped_onset.windows import without_dissipation
 from faultgouge.analysis.onset import Modes, full_operator
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.runs.path import EquilibriumPath
+from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
 from faultgouge.pywrap.runs.undamped import time_step
 
 
@@ -115,7 +115,7 @@ def path():
 @pytest.mark.parametrize(("fx", "cn", "unstable"), [(0.0155, 3.0, 1), (0.015, 3.0, 0)])
 def test_growth_with_dashpots_is_that_of_the_eigenvalue(path, fx, cn, unstable):
     """Over six decades of D; at 0.015 it is the dashpots that make the packing unstable."""
-    packing = dissipating(path, cn=cn)(fx)
+    packing = without_dissipation(path, cn=cn)(fx)
     assert len(spectrum(packing).pairs) == unstable
     modes = DampedModes.of(Pencil.of(packing))
     (index,) = modes.growing

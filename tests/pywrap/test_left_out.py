@@ -11,8 +11,8 @@ from reference_layer import LAYER, toml
 
 from faultgouge.analysis import MindlinLaw, PackingFileError, RunFile, read_dump
 from faultgouge.analysis.files.dumps import dump_frames
-from faultgouge.assessment.left_out.parts import same_motion
-from faultgouge.assessment.left_out.switches import Loaded
+from faultgouge.assessment.explain.parts import same_motion
+from faultgouge.assessment.explain.switches import Loaded
 from faultgouge.pywrap import Engine
 from faultgouge.pywrap.lammps.decks import DECKS
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from faultgouge.pywrap.exchange import Disks
-from faultgouge.pywrap.scenes.loose import layer_size, loose_start
+from faultgouge.pywrap.scenes.random_start import layer_size, random_start
 
 
 def smallest_gap(start: Disks) -> float:
@@ -33,7 +33,7 @@ def smallest_gap(start: Disks) -> float:
 def test_nothing_overlaps_and_the_upper_layer_lies_above(disks, radii, top, width, seed, periodic):
     """Radii have equal shares; those of the upper layer take turns, in equal steps along x."""
     top = int(top * disks)
-    start = loose_start(disks, tuple(radii), top, width, seed, periodic=periodic)
+    start = random_start(disks, tuple(radii), top, width, seed, periodic=periodic)
     # Places are sums of a few numbers below 1000, each rounded once: 1e-12 is ten times that.
     assert smallest_gap(start) > -1e-12
     assert start.box_length == (width if periodic else None)
@@ -51,8 +51,8 @@ def test_nothing_overlaps_and_the_upper_layer_lies_above(disks, radii, top, widt
 
 def test_a_seed_has_loose_starts_of_its_own():
     draws = [(7, 0), (7, 1), (7, 2), (8, 1), (1 + 2**32, 0), (1, 1)]
-    starts = [loose_start(100, (0.5, 0.7), 10, 11.9, seed, draw=draw).position for seed, draw in draws]
-    assert np.array_equal(starts[0], loose_start(100, (0.5, 0.7), 10, 11.9, 7).position)
+    starts = [random_start(100, (0.5, 0.7), 10, 11.9, seed, draw=draw).position for seed, draw in draws]
+    assert np.array_equal(starts[0], random_start(100, (0.5, 0.7), 10, 11.9, 7).position)
     assert len({start.tobytes() for start in starts}) == len(draws)
 
 
@@ -80,4 +80,4 @@ def test_layer_is_a_tenth_and_closes_the_box(disks, width, layer):
 )
 def test_what_cannot_be_laid_out_is_refused(arguments, says):
     with pytest.raises(ValueError, match=says):
-        loose_start(*arguments)
+        random_start(*arguments)

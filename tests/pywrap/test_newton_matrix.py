@@ -15,10 +15,10 @@ from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix,
 from faultgouge.analysis.factors.linear import ACCURATE, SparseSolver, elimination_order
 from faultgouge.assessment.stability.cases.packings import crystal
 from faultgouge.pywrap import Engine
-from faultgouge.pywrap.equilibria.newton import iterated
-from faultgouge.pywrap.equilibria.newton_matrix import AFLOAT, factored
+from faultgouge.pywrap.equilibria.newton import iterate_newton
+from faultgouge.pywrap.equilibria.newton_matrix import AFLOAT, factor_stiffness
 from faultgouge.pywrap.lammps.contact_graph import ContactGraph
-from faultgouge.pywrap.lammps.trial import Trial
+from faultgouge.pywrap.lammps.trial_state import Trial
 
 
 def trial_of(packing, force=None):
@@ -53,7 +53,7 @@ def of(contacts, kept):
 def test_solution(packing):
     force = np.random.default_rng(4).standard_normal(3 * len(packing))
     trial = trial_of(packing)
-    step = factored(trial, 0.0).solve(force)
+    step = factor_stiffness(trial, 0.0).solve(force)
     matrix = stiffness_matrix(packing).toarray()
     active = np.diag(matrix) != 0
     assert trial.graph.band(active).width < np.count_nonzero(active) / 4
@@ -67,11 +67,13 @@ def test_contacts_below_the_floor_are_left_out(reference_packing):
     packing = reference_packing(1.0)
     least = float(np.sort(packing.normal_force)[2])
     force = np.random.default_rng(5).standard_normal(300)
-    step = factored(trial_of(packing), least).solve(force)
+    step = factor_stiffness(trial_of(packing), least).solve(force)
     fewer = packing.loaded(least)
-    assert_allclose(step, factored(trial_of(fewer), 0.0).solve(force), rtol=1e-6, atol=1e-9 * np.abs(step).max())
+    assert_allclose(
+        step, factor_stiffness(trial_of(fewer), 0.0).solve(force), rtol=1e-6, atol=1e-9 * np.abs(step).max()
+    )
     assert np.array_equal(
-        factored(trial_of(packing), least).expelled,
+        factor_stiffness(trial_of(packing), least).expelled,
         (ContactGraph(fewer.contacts, fewer.radius).per_disk(np.ones(len(fewer.contacts))) == 1) & ~packing.top,
     )
 
@@ -79,7 +81,7 @@ def test_contacts_below_the_floor_are_left_out(reference_packing):
 def test_nothing_that_holds():
     position = np.column_stack([3.0 * np.arange(7), np.full(7, 5.0)])
     apart = Packing(position=position, radius=np.ones(7), contacts=Contacts([], [], []), law=MindlinLaw(1, 1, 1))
-    assert factored(trial_of(apart), 0.0) is None
+    assert factor_stiffness(trial_of(apart), 0.0) is None
     assert trial_of(apart).residual == 0.0
     assert trial_of(apart).floor == 0.0
 
@@ -98,7 +100,9 @@ def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
         change[[disk, 100 + disk, 200 + disk]] = rng.standard_normal(3)
         forces = [engine.displaced(base, displacement + sign * step * change).force for sign in (1, -1)]
     softening = (forces[1] - forces[0]) / (2 * step)
-    errors = [np.abs(factored(trial, trial.floor, start).solve(softening) - change).max() for start in (since, None)]
+    errors = [
+        np.abs(factor_stiffness(trial, trial.floor, start).solve(softening) - change).max() for start in (since, None)
+    ]
     # a hundredth of the stiffness is left
     assert errors[0] < 0.03 < 0.3 < errors[1]
 
@@ -119,7 +123,7 @@ def test_expelled_are_disks_with_one_contact_and_with_two_new_ones(reference_pac
     one, two, new = np.flatnonzero((ContactGraph(whole.contacts, whole.radius).degree > 2) & ~whole.top)[[0, 30, 60]]
     trial = without(without(without(whole, one, 1), two, 2), new, 2)
     since = without(trial, new, 0).contacts
-    expelled = factored(trial_of(trial), 0.0, ContactGraph(since, whole.radius)).expelled
+    expelled = factor_stiffness(trial_of(trial), 0.0, ContactGraph(since, whole.radius)).expelled
     assert expelled[one]
     assert not expelled[two]
     assert expelled[new]
@@ -142,8 +146,8 @@ def test_a_disk_between_two_new_contacts_takes_a_longer_step(reference_packing):
         return trial
 
     with pytest.raises(_Seen):
-        iterated(displaced, Trial.of(start))
-    expected = factored(trial, trial.floor, ContactGraph(start.contacts, start.radius)).solve(trial.force)
+        iterate_newton(displaced, Trial.of(start))
+    expected = factor_stiffness(trial, trial.floor, ContactGraph(start.contacts, start.radius)).solve(trial.force)
     expected[[disk, 100 + disk, 200 + disk]] *= 1.5
     np.testing.assert_array_equal(asked[1], expected)
 

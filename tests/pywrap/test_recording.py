@@ -13,12 +13,12 @@ import pytest
 from reference_layer import REFERENCE
 
 from faultgouge.analysis import RunFile
-from faultgouge.analysis.files import sealedfile
+from faultgouge.analysis.files import checksummed_file
 from faultgouge.pywrap import Equilibrium, Record, Scene, SceneError, perturb, reach, settle
-from faultgouge.pywrap.runs.undamped import sampling, weakening_of
+from faultgouge.pywrap.runs.undamped import sample_steps, weakening_of
 
 SCENE = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
-WRITERS = {"recording.py", "runfile.py", "sealedfile.py", "wholefile.py"}
+WRITERS = {"run_recorder.py", "runfile.py", "checksummed_file.py", "atomic_write.py"}
 
 
 def interrupted_at(number, work):
@@ -68,7 +68,7 @@ def begun(tmp_path_factory, equilibria):
 @pytest.mark.parametrize("share", [1e-9, math.inf], ids=["saved at the end", "saved at once"])
 @pytest.mark.long
 def test_what_is_said_is_what_is_stored(tmp_path, monkeypatch, begun, equilibria, share):
-    monkeypatch.setattr(sealedfile, "SHARE_OF_SAVING", share)
+    monkeypatch.setattr(checksummed_file, "SHARE_OF_SAVING", share)
     path, counts, number, interrupted = tmp_path / "run.h5", set(), 0, True
     while interrupted:
         path.write_bytes(begun)
@@ -116,7 +116,7 @@ def test_it_goes_on_to_the_bit(kind, tmp_path):
     weakening = weakening_of(wanted.friction, wanted.friction.v0)
     kept = []
     whole = list(perturb(wanted, start, weakening=weakening, keep=kept.append))
-    dt, steps = sampling(wanted.perturb, start.packing)
+    dt, steps = sample_steps(wanted.perturb, start.packing)
     assert len(kept) >= 1
     assert min(sample.friction for sample in whole) < max(sample.friction for sample in whole)
     rest = list(perturb(wanted, start, weakening=weakening, resume=kept[0]))

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from reference_layer import REFERENCE
 
-from faultgouge.pywrap.scenes.commands import COMMANDS
-from faultgouge.pywrap.scenes.estimate import estimated, foreseen
+from faultgouge.pywrap.scenes.command_sections import COMMANDS
+from faultgouge.pywrap.scenes.estimate import describe_work, estimate_work
 from faultgouge.pywrap.scenes.scene import Scene, SceneError
 
 ROOT = Path(__file__).parents[2]
@@ -269,13 +269,13 @@ def with_key(section, key, value):
 def test_runs_without_end_are_refused(key, value):
     scene = Scene.from_mapping(with_key("perturb", key, value))
     with pytest.raises(SceneError, match="the scene asks perturb for a year and more"):
-        foreseen(scene, "perturb")
-    assert foreseen(scene, "settle") == ""
+        describe_work(scene, "perturb")
+    assert describe_work(scene, "settle") == ""
 
 
 def test_a_reproduction_counts_what_it_runs():
     scene = Scene.from_mapping(SHORT)
-    one, onset = estimated(scene, "reproduce"), estimated(scene, "onset")
+    one, onset = estimate_work(scene, "reproduce"), estimate_work(scene, "onset")
     assert one.steps > onset.steps + 1e5
 
 
@@ -300,7 +300,9 @@ def test_time_of_a_search(disks, fy, step, until, cn, measured):
     packing = {"disks": disks, "width": 1.192 * disks**0.5, "seed": 1}
     scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": fy}, "ramp": {"step": step, "until": until}}
     scene |= {} if cn is None else {"damping": {"cn": cn}}
-    search, settling = (estimated(Scene.from_mapping(scene), command).seconds for command in ("onset --all", "settle"))
+    search, settling = (
+        estimate_work(Scene.from_mapping(scene), command).seconds for command in ("onset --all", "settle")
+    )
     assert measured / 3 < search - settling < 3 * measured
 
 
@@ -308,7 +310,7 @@ def test_time_of_a_search(disks, fy, step, until, cn, measured):
 def test_memory_of_a_search_in_slices(disks, measured):
     """Against peaks of the whole process in two threads, within a factor of two."""
     scene = SHORT | {"packing": {"disks": disks, "width": 1.2 * disks**0.5, "seed": 3}}
-    memory = estimated(Scene.from_mapping(scene), "onset").memory
+    memory = estimate_work(Scene.from_mapping(scene), "onset").memory
     assert measured / 2 < memory < 2 * measured
 
 

@@ -14,8 +14,8 @@ from scipy.linalg import eigvalsh
 from faultgouge.analysis import MindlinLaw, Packing, spectrum, stiffness_matrix, touching
 from faultgouge.pywrap import NoEquilibriumError, Scene, settle
 from faultgouge.pywrap.runs.undamped import ACCURATE_SHARE, time_step
-from faultgouge.pywrap.settling import settling
-from faultgouge.pywrap.settling.settling import minimized
+from faultgouge.pywrap.settling import minimize_energy as minimize_energy_module
+from faultgouge.pywrap.settling.minimize_energy import minimize_energy
 
 LARGE = {"disks": 400, "width": 24.0, "seed": 1}
 """Too large for dynamics alone."""
@@ -101,7 +101,7 @@ def test_disk_on_top_of_another_rolls_down():
     contacts = touching(position, radius, 8.0)
     packing = Packing(position=position, radius=radius, contacts=contacts, law=law, box_length=8.0, top=top, fy=3.0)
     assert lowest(packing)[0] < 0
-    packing, found = minimized(packing, 400)
+    packing, found = minimize_energy(packing, 400)
     assert found
     # it has pushed its neighbours apart on the smooth floor and lies on it
     assert packing.position[2, 1] < 0.5
@@ -111,7 +111,7 @@ def test_disk_on_top_of_another_rolls_down():
 
 @pytest.mark.slow
 def test_layer_that_still_sinks_when_steps_run_out_is_refused(monkeypatch):
-    monkeypatch.setattr(settling, "STEPS", 5000)
+    monkeypatch.setattr(minimize_energy_module, "STEPS", 5000)
     with pytest.raises(NoEquilibriumError, match=r"leave packing\.top out"):
         settle(scene(**LARGE, top=8))
 

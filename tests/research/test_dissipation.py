@@ -7,9 +7,9 @@ import pytest
 from reference_layer import SMALL, UNITS, toml
 
 from faultgouge.pywrap import Scene, SceneError
-from faultgouge.pywrap.onset.damped import damped_onset_run, ramped
+from faultgouge.pywrap.onset.damped import damped_onset_run, ramp_scene
 from faultgouge.pywrap.scenes.units import real_units
-from faultgouge.studies.packings import seeded
+from faultgouge.studies.packing_tools import with_seed
 from research.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
 
 TABLES = Path(__file__).parents[2] / "research" / "dissipation" / "tables"
@@ -25,7 +25,7 @@ def table(name):
 
 @pytest.fixture(scope="module")
 def ramp():
-    with ramped(SCENE) as found:
+    with ramp_scene(SCENE) as found:
         yield found
 
 
@@ -55,9 +55,9 @@ def test_the_limit_of_weak_dashpots_is_predicted(ramp):
 @pytest.mark.slow
 def test_an_onset_just_before_the_last_load_is_found():
     """The last load lies a millionth of F_x beyond the onset, which is less than small pencils know."""
-    scene = seeded(SCENE, 15)
+    scene = with_seed(SCENE, 15)
     assert (scene.packing.seed, scene.ramp) == (15, SCENE.ramp)
-    with ramped(scene) as found:
+    with ramp_scene(scene) as found:
         (case,) = weak_cases(found, [(0.0, 1.0)])
     assert case["measured"] == pytest.approx(case["predicted"], rel=1e-9)
 
@@ -85,7 +85,7 @@ def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp):
 def test_scenes_without_a_section():
     with pytest.raises(SceneError, match=r"no section \[damping\]"):
         damped_onset_run(SCENE, 1.0)
-    with pytest.raises(SceneError, match=r"no section \[ramp\]"), ramped(SCENE.model_copy(update={"ramp": None})):
+    with pytest.raises(SceneError, match=r"no section \[ramp\]"), ramp_scene(SCENE.model_copy(update={"ramp": None})):
         pass
 
 

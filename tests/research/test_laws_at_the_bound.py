@@ -7,7 +7,7 @@ import pytest
 
 from research.laws_at_the_bound.make import HERE, TABLES, read_table, write_page
 
-MODES = Path(__file__).parents[2] / "docs" / "modes" / "tables"
+MODES = Path(__file__).parents[2] / "research" / "modes" / "tables"
 
 
 def test_the_page_is_what_the_tables_make(tmp_path):

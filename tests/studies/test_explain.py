@@ -10,10 +10,10 @@ import pytest
 from mpi4py import MPI
 from reference_layer import SMALL
 
-from faultgouge.assessment.left_out.explain import _affordable, _switched, explain
-from faultgouge.assessment.left_out.explanation_table import in_words
-from faultgouge.assessment.left_out.parts import Cost, Part
-from faultgouge.assessment.left_out.switches import Feature, Loaded, Run, features
+from faultgouge.assessment.explain.explain import _affordable, _run_feature, explain
+from faultgouge.assessment.explain.explanation_table import in_words
+from faultgouge.assessment.explain.parts import Cost, Part
+from faultgouge.assessment.explain.switches import Feature, Loaded, Run, features
 from faultgouge.pywrap import Scene, settle
 
 SCENES = files("faultgouge") / "scenes"
@@ -135,10 +135,10 @@ def test_a_wrong_claim_is_found_out(run, tmp_path):
         loaded = Loaded.of(engine, tmp_path / "log")
     top = np.flatnonzero(run.packing.top)
     for touched, moves in (((), True), (top, False)):
-        part = _switched(Feature("push", "", run, pushed, touched, moves), loaded, 50, tmp_path)
+        part = _run_feature(Feature("push", "", run, pushed, touched, moves), loaded, 50, tmp_path)
         assert part.identical is False
         assert not part.included
-    honest = _switched(Feature("push", "", run, pushed, top), loaded, 50, tmp_path)
+    honest = _run_feature(Feature("push", "", run, pushed, top), loaded, 50, tmp_path)
     assert honest.identical is True
 
 

@@ -11,9 +11,9 @@ from reference_layer import SMALL, toml
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, spectrum, stiffness_matrix
 from faultgouge.analysis.onset import LIMITS
 from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, settle
-from faultgouge.studies.modes.compute import antisymmetric_norm, counted, modes, switched
-from faultgouge.studies.modes.sliced import sliced
-from faultgouge.studies.packings import sliding
+from faultgouge.studies.modes.count_in_slices import count_in_slices
+from faultgouge.studies.modes.count_pairs import antisymmetric_norm, count_pairs, count_with_part_of_b, modes
+from faultgouge.studies.packing_tools import sliding_contacts
 from research.modes.sets import sets
 
 SCENE = SMALL | {
@@ -36,7 +36,7 @@ def loaded():
 
 def test_counts_and_bounds_are_those_of_numpy(loaded):
     for packing in loaded:
-        found = counted(packing)
+        found = count_pairs(packing)
         mass = np.tile(packing.mass, 3)  # the inertia factor is 1
         dense = stiffness_matrix(packing).toarray() / np.sqrt(mass[:, None] * mass)
         plain = np.linalg.eigvals(dense[np.ix_(*[np.flatnonzero(dense.any(axis=1))] * 2)])
@@ -63,7 +63,7 @@ def test_a_packing_that_buckles_ends_its_branch_and_counts():
         box_length=4.0,
         fy=3.0,
     )
-    found = counted(column).as_dict()
+    found = count_pairs(column).as_dict()
     assert (found["pairs"], found["negative"]) == (0, 1)
     assert found["growth_rate"] == pytest.approx(spectrum(column).growth_rate(), rel=1e-9)
     # the ramp has come to the first load of the scene, 0.02 F_y
@@ -79,11 +79,11 @@ def test_without_b_no_pair_is_complex(loaded):
     same = stiffness_matrix(packing, coupled=every) - stiffness_matrix(packing)
     assert abs(same).max() == 0
     # the law is flat at its bound: what is within 1e-9 of the slip limit has the bound's force but for a rounding
-    np.testing.assert_array_equal(sliding(packing), packing.mobilised > 1 - 1e-13)
-    found = switched(packing)
+    np.testing.assert_array_equal(sliding_contacts(packing), packing.mobilised > 1 - 1e-13)
+    found = count_with_part_of_b(packing)
     assert found["none"]["pairs"] == 0
     assert found["sticking"]["pairs"] > 0
-    assert counted(packing).as_dict()["pairs"] >= found["sticking"]["pairs"]
+    assert count_pairs(packing).as_dict()["pairs"] >= found["sticking"]["pairs"]
 
 
 @pytest.mark.long
@@ -125,7 +125,7 @@ def test_displacements_that_lammps_would_refuse_end_no_ramp(name, seed):
 def test_pairs_counted_in_slices_are_those_of_all_eigenvalues(loaded):
     """Five slices of 60 disks, whose neighbours do not cover the spectrum."""
     for packing in loaded:
-        (found, error), every = sliced(packing, replace(LIMITS, own=35)), counted(packing)
+        (found, error), every = count_in_slices(packing, replace(LIMITS, own=35)), count_pairs(packing)
         assert abs(len(found) - len(every.omega)) <= error
         assert error <= 2
     assert np.sqrt(found).imag.max() == pytest.approx(every.omega[0].imag, rel=1e-2)

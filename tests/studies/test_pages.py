@@ -8,9 +8,9 @@ import pytest
 from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import RunFile
-from faultgouge.figures.pages import WIDTH, filled
-from faultgouge.figures.style import spared
-from faultgouge.studies.packings import distance
+from faultgouge.figures.pages import WIDTH, fill_paragraphs
+from faultgouge.figures.style import report_failure
+from faultgouge.studies.packing_tools import distance_of_bearing_disks
 from faultgouge.studies.sweep.draw import draw_sweep
 
 
@@ -31,22 +31,22 @@ PROSE = "The exponent is 0.5 - 0.001 + 0.002 > 0, as in 1. and in # 2, over all 
 
 
 def test_prose_and_items_are_folded_where_no_line_begins_a_list():
-    lines = filled(PROSE).split("\n")
+    lines = fill_paragraphs(PROSE).split("\n")
     assert max(map(len, lines)) <= WIDTH
     assert not [line for line in lines if re.match(r"([-+>#]|\d+\.) ", line)]
     assert " ".join(lines).split() == PROSE.split()
-    first, *more = filled("- " + PROSE).split("\n")
+    first, *more = fill_paragraphs("- " + PROSE).split("\n")
     assert first.startswith("- ")
     assert all(re.match(r"  \S", line) for line in more)
 
 
 def test_tables_pictures_code_and_formulas_stay():
     page = "\n".join(["| " + PROSE, "![" + PROSE + "](a.png)", "```", PROSE, "```", "$$", PROSE, "$$", "    " + PROSE])
-    assert filled(page) == page
+    assert fill_paragraphs(page) == page
 
 
 def test_an_interrupt_is_no_failed_picture(said):
-    with pytest.raises(KeyboardInterrupt), spared("x.png", said.append):
+    with pytest.raises(KeyboardInterrupt), report_failure("x.png", said.append):
         raise KeyboardInterrupt
     assert said == []
 
@@ -78,4 +78,4 @@ def test_disks_that_carry_nothing_have_no_part_in_d(reference_packing):
     packing = reference_packing(1.0)
     position = packing.position + 1e-3
     position[packing.rattlers] += 1.0
-    assert distance(packing, replace(packing, position=position)) == pytest.approx(2e-6, rel=1e-9)
+    assert distance_of_bearing_disks(packing, replace(packing, position=position)) == pytest.approx(2e-6, rel=1e-9)

@@ -9,11 +9,11 @@ import pytest
 from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
-from faultgouge.assessment.error_and_time.coverage.changing import FINER, drawn, read, restated
+from faultgouge.assessment.work_precision.coverage.changing import FINER, draw_scene, read, restate_case
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.onset.damped import damped_onset_run
 from faultgouge.pywrap.onset.path_error import OtherPaths, PathError, meeting, with_path_error
-from faultgouge.pywrap.runs.path import EquilibriumPath
+from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
 
 PAPER = Scene.from_toml(files("faultgouge") / "scenes/paper.toml").resolved()
 CASES = [case for case in read() if case.counts]
@@ -176,8 +176,8 @@ def test_the_limits_are_known_better_than_the_errors_that_they_judge():
 @pytest.mark.slow
 def test_what_the_table_states_is_stated_today():
     case = min((case for case in CASES if case.disks == 20 and case.kind == "undamped"), key=lambda case: case.fx_c)
-    again = restated(case)
-    assert drawn(case.number).packing.disks == 20
+    again = restate_case(case)
+    assert draw_scene(case.number).packing.disks == 20
     assert again.changes == case.changes
     assert again.fx_c == pytest.approx(case.fx_c, abs=case.stated)
     assert again.holds

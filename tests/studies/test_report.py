@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import discrete_frequency, spectrum
-from faultgouge.assessment import error_and_time as page
-from faultgouge.assessment.error_and_time.work_precision import dumps, relaxation
-from faultgouge.assessment.error_and_time.work_precision.extended import refined
-from faultgouge.assessment.error_and_time.work_precision.frequency import Mode, corrected
-from faultgouge.assessment.error_and_time.work_precision.study import Settings, compensated
+from faultgouge.assessment import work_precision as page
+from faultgouge.assessment.work_precision.methods import dumps, relaxation
+from faultgouge.assessment.work_precision.methods.extended import refine_eigenvalue
+from faultgouge.assessment.work_precision.methods.frequency import Mode, correct_dispersion
+from faultgouge.assessment.work_precision.methods.study import Settings, compensate
 from faultgouge.pywrap import Engine, Scene, ramp
 
 
@@ -27,7 +27,7 @@ def test_refined_eigenvalue_has_the_digits_it_says():
     with mpmath.workdps(40):
         exact = mpmath.eig(mpmath.matrix(matrix.tolist()))[0]
         for value, vector in zip(values, vectors.T, strict=True):
-            found = refined(matrix, complex(value), vector.astype(complex), condition=3.0)
+            found = refine_eigenvalue(matrix, complex(value), vector.astype(complex), condition=3.0)
             # a long double is the sum of two doubles
             high = complex(found.value)
             number = mpmath.mpc(high) + mpmath.mpc(complex(found.value - np.clongdouble(high)))
@@ -56,14 +56,14 @@ def test_all_ways_lead_to_one_equilibrium_and_a_relaxations_time_step_is_its_own
 
 @pytest.mark.parametrize(("fx", "growing", "least"), [(0.01, False, 1e-9), (0.024, True, 1e-6)])
 def test_runs_show_velocity_verlets_frequency(settings, fx, growing, least):
-    mode = Mode.of(compensated(settings.at(fx)).packing, growing)
+    mode = Mode.of(compensate(settings.at(fx)).packing, growing)
     dt = 0.4 * mode.limit
     with Engine(mode.packing) as engine:
         found = mode.measured(engine, dt, 3.0)
     predicted = mode.quantity(complex(discrete_frequency(mode.eigenvalue, dt)))
     assert mode.quantity(found) == pytest.approx(predicted, rel=least)
     assert abs(mode.quantity(found) / mode.exact - 1) > 10 * least
-    assert mode.quantity(corrected(found, dt)) == pytest.approx(mode.exact, rel=least)
+    assert mode.quantity(correct_dispersion(found, dt)) == pytest.approx(mode.exact, rel=least)
 
 
 @pytest.mark.slow

@@ -8,8 +8,8 @@ import pytest
 from faultgouge.analysis import stiffness_matrix
 from faultgouge.assessment.stability import CASES, StabilityError, check, stability
 from faultgouge.assessment.stability.cases import checks
-from faultgouge.assessment.stability.cases.case import Case, measured, refusal, refused
-from faultgouge.assessment.stability.cases.packings import crystal, sheared
+from faultgouge.assessment.stability.cases.case import Case, measured_outcome, refusal, refused_outcome
+from faultgouge.assessment.stability.cases.packings import crystal, shear_packing
 from faultgouge.pywrap import Equilibrium
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 
@@ -33,15 +33,15 @@ def crash():
 
 
 TROUBLE = [
-    Case("a", "good", lambda: measured(0.5, 1.0, "half of it")),
-    Case("a", "too large", lambda: measured(2.0, 1.0, "twice")),
-    Case("a", "no number", lambda: measured(float("nan"), 1.0, "what should hold")),
+    Case("a", "good", lambda: measured_outcome(0.5, 1.0, "half of it")),
+    Case("a", "too large", lambda: measured_outcome(2.0, 1.0, "twice")),
+    Case("a", "no number", lambda: measured_outcome(float("nan"), 1.0, "what should hold")),
     Case("b", "crash", crash),
-    Case("b", "refused", lambda: refused(lambda: int("x"), "invalid literal")),
-    Case("b", "not refused", lambda: refused(lambda: int("1"), "invalid literal")),
+    Case("b", "refused", lambda: refused_outcome(lambda: int("x"), "invalid literal")),
+    Case("b", "not refused", lambda: refused_outcome(lambda: int("1"), "invalid literal")),
     Case("b", "two lines", lambda: refusal("two\nlines", "two")),
     Case("b", "traceback", lambda: refusal("Traceback (most recent call last): wrong", "wrong")),
-    Case("b", "last", lambda: measured(0.0, 0.0, "nothing at all")),
+    Case("b", "last", lambda: measured_outcome(0.0, 0.0, "nothing at all")),
 ]
 
 
@@ -85,7 +85,7 @@ def test_checks_tell_a_wrong_operator_and_a_force(monkeypatch):
     wrong = checks.derivative(packing)
     assert wrong.status == "fails"
     assert 1e-5 < wrong.figure < 1e-2
-    balanced = sheared(packing).packing
+    balanced = shear_packing(packing).packing
     pushed = replace(balanced, fx=balanced.fx + 1e-9)
     found = Equilibrium(pushed, pushed.residual, rounding_floor(pushed), 0)
     assert checks.balance(found).status == "fails"

@@ -14,14 +14,14 @@ from reference_layer import BIN, REFERENCE, SMALL, toml
 
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
-from faultgouge.studies.hands import Processes, hands
+from faultgouge.studies.executors import Processes, open_executor
 from faultgouge.studies.sweep import workers
-from faultgouge.studies.sweep.compute import merge, run_sweep, stored
 from faultgouge.studies.sweep.draw import draw_sweep, onsets_figure, reach_of
-from faultgouge.studies.sweep.points import Sweep
+from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
+from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.tasks import TASKS, estimate
 from faultgouge.studies.sweep.user_function import user_function
-from faultgouge.studies.sweep.workers import WorkerError, computed
+from faultgouge.studies.sweep.workers import WorkerError, compute_points
 
 AXES = {"packing.seed": "1:4", "law.mu": [1.0, 0.5, -1.0]}
 TOML = 'task = "onset"\n' + toml({"sweep": {json.dumps(key): values for key, values in AXES.items()}})
@@ -172,7 +172,7 @@ def test_known_rows_tell_how_long_a_function_takes(tmp_path):
 
 @pytest.mark.slow
 def test_rows_are_the_onsets_of_their_scenes_and_share_settled_packings(tmp_path, monkeypatch):
-    settled, original = [], workers.settled_bed
+    settled, original = [], workers.settle_bed
     monkeypatch.setattr(workers, "settled_bed", lambda *given: settled.append(given) or original(*given))
     run_sweep(sweep_of({"packing.seed": [3, 2], "law.mu": [0.5, 1.0]}), tmp_path, say=id)
     assert len(settled) == 2
@@ -198,10 +198,10 @@ def test_a_cut_line_is_computed_again_and_a_longer_sweep_goes_on(tmp_path):
     run_sweep(sweep_of({"packing.seed": "1:2"}), tmp_path, say=said.append, workers=2)
     assert said == [f"1 of 2 points are in {lines} already"]
     assert lines.read_text().startswith(first)
-    assert [row["values"]["packing.seed"] for row in stored(lines).values()] == [1, 2]  # nothing of the cut line
+    assert [row["values"]["packing.seed"] for row in read_results(lines).values()] == [1, 2]  # nothing of the cut line
     lines.write_text("no result\n")
     with pytest.raises(SceneError, match="line 1"):
-        stored(lines)
+        read_results(lines)
 
 
 def test_failures_are_rows_and_merge_refuses_what_does_not_belong_together(tmp_path):
@@ -300,9 +300,9 @@ def stripped(row):
 
 @pytest.mark.long
 def test_a_killed_worker_takes_nothing_with_it(sweep):
-    rows, found = sorted(stripped(row) for row in computed(None, sweep.task, sweep.points)), []
-    with hands(2) as pool:
-        for row in computed(pool, sweep.task, sweep.points):
+    rows, found = sorted(stripped(row) for row in compute_points(None, sweep.task, sweep.points)), []
+    with open_executor(2) as pool:
+        for row in compute_points(pool, sweep.task, sweep.points):
             if not found:
                 one, _ = multiprocessing.active_children()
                 one.kill()
@@ -321,7 +321,7 @@ class Deadly(Processes):
 def test_a_point_that_kills_every_worker_is_not_tried_for_ever(sweep):
     pool = Deadly(2)
     with pytest.raises(WorkerError, match="fewer --workers"):
-        list(computed(pool, sweep.task, sweep.points))
+        list(compute_points(pool, sweep.task, sweep.points))
     pool.shutdown()
 
 

@@ -11,7 +11,7 @@ from reference_layer import REFERENCE, SMALL, toml
 from faultgouge.pywrap import Scene, SceneError, perturb, reach
 from faultgouge.studies.eruptions import eruptions
 from faultgouge.studies.trigger import trigger_map
-from faultgouge.studies.triggering.forecast import JUMP_SHARE, chosen, forecast
+from faultgouge.studies.triggering.forecast import JUMP_SHARE, choose_seed, forecast
 
 BASE = SMALL | {"packing": {"file": str(REFERENCE)}, "ramp": {"step": 1e-3, "until": 0.025}}
 
@@ -121,6 +121,6 @@ def test_the_jump_is_that_of_a_run_in_lammps():
 def test_the_shipped_packing_is_the_one_of_the_rule():
     """`python research/triggering/make.py` begins with seed 1."""
     scene = Scene.from_toml(files("faultgouge") / "scenes/triggered.toml")
-    (last,) = chosen(scene, [37, 38])
+    (last,) = choose_seed(scene, [37, 38])
     assert (last["seed"], last["fx"], last["says"]) == (scene.packing.seed, scene.perturb.fx, "")
     assert last["forecast"]["growth"] > 4

@@ -10,7 +10,7 @@ from faultgouge.analysis import RunFile
 from faultgouge.pywrap import NoEquilibriumError, Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.studies.reproduce import reproduce
-from faultgouge.studies.statistics import distribution, lowers, median_interval, quartiles, share
+from faultgouge.studies.statistics import distribution, median_interval, quartiles, share, sign_test
 from faultgouge.studies.sweep import triggering
 from faultgouge.studies.sweep.triggering_summary import in_words, summary
 
@@ -78,7 +78,7 @@ def test_wilson_interval():
 def test_what_is_known_of_censored_onsets():
     low, high, later, flows = ("onset", 0.01), ("onset", 0.02), ("until", 0.03), ("flows", 0.01)
     pairs = ((high, low), (low, high), (later, high), (flows, high), (high, flows))
-    assert [lowers(*ramps(strong, weak)) for strong, weak in pairs] == [True, False, True, None, None]
+    assert [sign_test(*ramps(strong, weak)) for strong, weak in pairs] == [True, False, True, None, None]
 
 
 def of_ends(function, ends):

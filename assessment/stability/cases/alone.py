@@ -46,17 +46,17 @@ fix             move all nve/disc 1.0
 def refused_by_lammps(disks: list[tuple[float, float]], commands: str, words: str) -> Outcome:
     """Disks of diameter one at given places, and commands that must end with an error which says the words."""
     placed = "".join(f"create_atoms 1 single {x!r} {y!r} 0.0\n" for x, y in disks)
-    return refused_by("lmp -in FILE -log none", HEAD + placed + LAW + commands, words)
+    return expect_refusal("lmp -in FILE -log none", HEAD + placed + LAW + commands, words)
 
 
-def refused_by(command: str, text: str, words: str) -> Outcome:
+def expect_refusal(command: str, text: str, words: str) -> Outcome:
     """A program that must refuse a FILE with this text, with an error which says the words."""
     world = MPI.COMM_WORLD
-    said = _said(command.split(), text) if world.rank == 0 else None
+    said = _last_error(command.split(), text) if world.rank == 0 else None
     return refusal(world.bcast(said), words)
 
 
-def _said(command: list[str], text: str) -> str:
+def _last_error(command: list[str], text: str) -> str:
     """The error of a program that reads a FILE with this text, or what happened instead."""
     program = str(Path(sys.executable).with_name(command[0]))
     # a process of its own must not think that it belongs to the ranks that started it

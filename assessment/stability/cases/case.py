@@ -61,15 +61,15 @@ class Case:
             if getattr(error, "one_rank", False):
                 raise
             lines = str(error).strip().splitlines()
-            return failed(f"{type(error).__name__}: {lines[0] if lines else 'no reason given'}")
+            return failed_outcome(f"{type(error).__name__}: {lines[0] if lines else 'no reason given'}")
 
 
-def failed(says: str) -> Outcome:
+def failed_outcome(says: str) -> Outcome:
     """The outcome of something that went wrong otherwise than by its figure."""
     return Outcome("fails", None, None, says)
 
 
-def measured(figure: float, bound: float, says: str) -> Outcome:
+def measured_outcome(figure: float, bound: float, says: str) -> Outcome:
     """The outcome of a measurement: it holds if the figure is a number within its bound."""
     figure = float(figure)
     if not isfinite(figure):
@@ -82,13 +82,13 @@ def refusal(sentence: str, words: str) -> Outcome:
     sentence = sentence.strip()
     if words in sentence and "\n" not in sentence and "Traceback" not in sentence:
         return Outcome("refused", None, None, sentence)
-    return failed(sentence or f"nothing was said, expected: {words}")
+    return failed_outcome(sentence or f"nothing was said, expected: {words}")
 
 
-def refused(attempt: Callable[[], Any], words: str, error: type[Exception] = ValueError) -> Outcome:
+def refused_outcome(attempt: Callable[[], Any], words: str, error: type[Exception] = ValueError) -> Outcome:
     """The outcome of an attempt that must raise an error of this type."""
     try:
         attempt()
     except error as reason:
         return refusal(str(reason), words)
-    return failed(f"it was not refused, expected: {words}")
+    return failed_outcome(f"it was not refused, expected: {words}")

@@ -16,8 +16,8 @@ import numpy as np
 
 from ....analysis import Packing, stiffness_matrix
 from ....pywrap import Engine, Equilibrium
-from .case import Outcome, measured
-from .packings import slipped, with_low_parts
+from .case import Outcome, measured_outcome
+from .packings import with_low_parts, with_slips
 
 FLOORS = 10.0
 """Newton's own limit, in units of the rounding floor."""
@@ -31,7 +31,7 @@ SHARES = (0.1, -0.4, 1.0, 0.02, -0.99, 0.7, -1.0)
 def balance(equilibrium: Equilibrium) -> Outcome:
     """Whether an equilibrium is one."""
     overlap = equilibrium.packing.geometry.overlap
-    return measured(
+    return measured_outcome(
         equilibrium.residual / equilibrium.floor,
         FLOORS,
         f"largest force on a disk, {equilibrium.residual:.1e}, in units of what rounding leaves, "
@@ -41,7 +41,7 @@ def balance(equilibrium: Equilibrium) -> Outcome:
 
 def derivative(packing: Packing) -> Outcome:
     """Whether K is the derivative of the forces in LAMMPS."""
-    packing = with_low_parts(slipped(packing, SHARES))
+    packing = with_low_parts(with_slips(packing, SHARES))
     law, overlap = packing.law, packing.geometry.overlap
     share = min(1.0, law.mu * law.kn / law.kt) if law.frictional else 1.0
     width = 2.0 ** np.floor(np.log2(1e-5 * share * overlap.min()))
@@ -63,7 +63,7 @@ def derivative(packing: Packing) -> Outcome:
     rounding = (
         40 * (np.finfo(float).eps * np.abs(packing.net_force).max() / scale + packing.coordinate_rounding) / width
     )
-    return measured(
+    return measured_outcome(
         worst / scale,
         1e-8 + rounding,
         f"largest difference of -dF/dq and K q, in units of max |K|, {DIRECTIONS} directions q, h = {width:.0e}; "

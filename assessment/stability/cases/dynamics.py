@@ -21,11 +21,11 @@ from scipy.linalg import eigh
 
 from ....analysis import Packing, spectrum, stable_timestep, stiffness_matrix, touching
 from ....pywrap import Engine, SceneError
-from ....pywrap.equilibria.rattlers import placed
+from ....pywrap.equilibria.rattlers import place_disks
 from ....pywrap.runs.undamped import time_step
 from .alone import refused_by_lammps
-from .case import Case, Outcome, measured, refused
-from .packings import crystal, law, sheared, slipped
+from .case import Case, Outcome, measured_outcome, refused_outcome
+from .packings import crystal, law, shear_packing, with_slips
 
 GROUP = "time stepping"
 
@@ -42,7 +42,7 @@ SHAKEN = 0.1
 @cache
 def _smooth() -> Packing:
     """Six disks without friction at rest: K is symmetric, and there is an energy."""
-    return sheared(crystal(3, 2, law(mu=0.0))).packing
+    return shear_packing(crystal(3, 2, law(mu=0.0))).packing
 
 
 @cache
@@ -54,17 +54,17 @@ def _fastest() -> tuple[np.ndarray, float]:
     return vectors[:, -1], stable_timestep(float(np.sqrt(values[-1])))
 
 
-def _displaced(packing: Packing, step: np.ndarray) -> Packing:
-    return placed(packing, packing.position + step.reshape(2, -1).T)
+def _displace_disks(packing: Packing, step: np.ndarray) -> Packing:
+    return place_disks(packing, packing.position + step.reshape(2, -1).T)
 
 
-def _excited(share: float, amplitude: float, steps: np.ndarray) -> np.ndarray:
+def _excite_mode(share: float, amplitude: float, steps: np.ndarray) -> np.ndarray:
     """Amplitude of the stiffest mode after so many steps of a share of the limit, in units of the first."""
     packing = _smooth()
     mode, limit = _fastest()
     size = amplitude * packing.geometry.overlap.min()
     found = []
-    with Engine(_displaced(packing, size * mode)) as engine, engine.undamped(share * limit) as dynamics:
+    with Engine(_displace_disks(packing, size * mode)) as engine, engine.undamped(share * limit) as dynamics:
         for forward in np.diff(steps, prepend=0).tolist():
             position = dynamics.advance(forward).position
             found.append(mode @ (position - packing.position).T.ravel() / size)
@@ -74,8 +74,8 @@ def _excited(share: float, amplitude: float, steps: np.ndarray) -> np.ndarray:
 def _below_the_limit(share: float, count: int) -> Outcome:
     steps = count // 100 * np.arange(1, 101)
     phase = np.arccos(1 - 2 * share**2)
-    error = np.abs(_excited(share, AMPLITUDE, steps) - np.cos(steps * phase)).max()
-    return measured(
+    error = np.abs(_excite_mode(share, AMPLITUDE, steps) - np.cos(steps * phase)).max()
+    return measured_outcome(
         error,
         1e-3,
         f"stiffest mode against cos(n Omega dt) over {count} steps, in units of its amplitude; that is "
@@ -86,15 +86,15 @@ def _below_the_limit(share: float, count: int) -> Outcome:
 def _over_the_limit() -> Outcome:
     packing = _smooth()
     limit = stable_timestep(spectrum(packing).omega_max)
-    return refused(lambda: time_step(packing, 1.01 * limit), "over the limit 2/omega_max", SceneError)
+    return refused_outcome(lambda: time_step(packing, 1.01 * limit), "over the limit 2/omega_max", SceneError)
 
 
 def _limit_is_sharp() -> Outcome:
     """What the refusal prevents: the growth of theory."""
     steps = np.array([10, 30])
-    first, last = np.abs(_excited(1.01, 1e-8, steps))
+    first, last = np.abs(_excite_mode(1.01, 1e-8, steps))
     kappa = np.arccosh(2 * 1.01**2 - 1)
-    return measured(
+    return measured_outcome(
         abs(np.log(last / first) / (20 * kappa) - 1),
         1e-3,
         f"growth of the stiffest mode in LAMMPS left alone, against kappa = {kappa:.4g} a step: the limit is sharp",
@@ -103,7 +103,7 @@ def _limit_is_sharp() -> Outcome:
 
 def _energy(packing: Packing, position: np.ndarray, velocity: np.ndarray, dt: float) -> float:
     """The conserved energy of an instant, from that of the packing at rest."""
-    moved = _displaced(packing, (position - packing.position).T.ravel())
+    moved = _displace_disks(packing, (position - packing.position).T.ravel())
     v = np.concatenate([velocity.T.ravel(), np.zeros(len(packing))])
     force = moved.net_force
     correction = v @ (stiffness_matrix(moved) @ v) / 12 - force @ force / 24
@@ -122,13 +122,13 @@ def _drift(steps: int, samples: int = 400) -> Outcome:
     energy, momentum = np.empty(samples), np.empty(samples)
     dt = 0.1 * limit
     # every rank has a run of its own, the same one: six disks on two ranks would do nothing but wait for each other
-    with Engine(_displaced(packing, push), MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
+    with Engine(_displace_disks(packing, push), MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
         for k in range(samples):
             motion = dynamics.advance(steps // samples)
             energy[k] = _energy(packing, motion.position, motion.velocity, dt)
             momentum[k] = motion.velocity[:, 0].sum() / np.abs(motion.velocity[:, 0]).sum()
     tenth = samples // 10
-    return measured(
+    return measured_outcome(
         abs(energy[-tenth:].mean() / energy[:tenth].mean() - 1),
         DRIFT,
         f"relative change of the energy of 6 disks without friction in {steps:.0e} undamped steps of 0.1 of the limit; "
@@ -141,13 +141,13 @@ def _momentum() -> Outcome:
     position = np.array([[3.0, 5.0], [3.999, 5.0], [3.5, 5.864]])
     radius = np.full(3, 0.5)
     bare = Packing(position=position, radius=radius, contacts=touching(position, radius, None), law=law())
-    packing = slipped(bare, (0.5, -0.9, 1.0))
+    packing = with_slips(bare, (0.5, -0.9, 1.0))
     worst = 0.0
     with Engine(packing) as engine, engine.undamped(1e-5) as dynamics:
         for _ in range(100):
             velocity = dynamics.advance(1000).velocity
             worst = max(worst, float((np.abs(velocity.sum(axis=0)) / np.abs(velocity).sum(axis=0)).max()))
-    return measured(
+    return measured_outcome(
         worst,
         1e-13,
         "momentum of three disks with friction that fly apart, in units of their own, 100,000 steps; forces on "

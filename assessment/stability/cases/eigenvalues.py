@@ -32,8 +32,8 @@ from ....analysis.onset import Modes, full_operator
 from ....analysis.spectrum.spectrum import SAFETY, unit_rounding
 from ....pywrap import Scene
 from ....pywrap.onset.undamped import OnsetRun, onset_run
-from .case import Case, Outcome, failed, measured
-from .packings import bed, crystal, law, sheared, with_rattlers
+from .case import Case, Outcome, failed_outcome, measured_outcome
+from .packings import bed, crystal, law, shear_packing, with_rattlers
 
 GROUP = "eigenvalues"
 
@@ -66,10 +66,10 @@ def _near_defective(eps: float, sign: int) -> Outcome:
     rounding = unit_rounding(matrix)
     believed = modes.partner[first] >= 0
     if believed and sign < 0:
-        return failed("a real pair is reported as complex")
+        return failed_outcome("a real pair is reported as complex")
     values = eigvals(matrix)
     one, other = values[np.argsort(np.abs(values - 1))[:2]]
-    return measured(
+    return measured_outcome(
         abs(found - exact),
         ROUNDINGS * rounding * 4 * SPLIT,
         f"error of D = {exact:.2g}, ten times 4 d u |A| the bound; the split is {abs(exact) ** 0.5:.2g}, of LAPACK's "
@@ -92,11 +92,11 @@ def _near_an_onset(distance: float) -> Outcome:
         modes = Modes.of(fx, full_operator(run.between[fx]))
         first, second = np.argsort(np.abs(modes.values - run.onset.windows[0].eigenvalue))[:2]
         if (modes.partner[first] >= 0) != (fx > run.onset.fx_c):
-            return failed(f"the pair is real above the onset, or complex below it, at {fx!r}")
+            return failed_outcome(f"the pair is real above the onset, or complex below it, at {fx!r}")
         discriminants.append(modes.pair((int(first), int(second))).discriminant)
         split = abs(modes.values[first] - modes.values[second])
     below, above = discriminants
-    return measured(
+    return measured_outcome(
         abs(below + above) / abs(below - above),
         CURVATURE * distance + 2 * run.onset.error / (distance * FX_C),
         f"D of 100 disks below and above F_x^c, {below:.3g} and {above:.3g}: difference of their sizes, in units of "
@@ -107,15 +107,15 @@ def _near_an_onset(distance: float) -> Outcome:
 
 def _rattlers() -> Outcome:
     """30 % of the disks touch nothing: the others' eigenvalues are what they were."""
-    settled = sheared(bed()).packing
+    settled = shear_packing(bed()).packing
     extra = round(len(settled) * 3 / 7)
     height = settled.position[:, 1].max() + 2.0 + 1.5 * np.arange(extra)
     hovering = np.column_stack([np.linspace(0.0, 5.0, extra), height])
     both = with_rattlers(settled, hovering, top=False)
     alone, found = spectrum(settled), spectrum(both)
     if len(found.eigenvalues) != len(alone.eigenvalues):
-        return failed(f"{len(found.eigenvalues)} eigenvalues instead of {len(alone.eigenvalues)}")
-    return measured(
+        return failed_outcome(f"{len(found.eigenvalues)} eigenvalues instead of {len(alone.eigenvalues)}")
+    return measured_outcome(
         np.abs(found.eigenvalues - alone.eigenvalues).max() / alone.rounding,
         0.0,
         f"eigenvalues with {len(found.rattlers)} rattlers of {len(both)} disks against those without the disks that "
@@ -128,7 +128,7 @@ def _scales() -> Outcome:
     scaled = [
         np.sort(spectrum(crystal(3, 2, law(kn))).eigenvalues.real) / kn for kn in (1e2, 1e4, 1e6, 1e8, 1e10, 1e12)
     ]
-    return measured(
+    return measured_outcome(
         np.abs(np.array(scaled) - scaled[0]).max() / scaled[0].max(),
         SAFETY * np.finfo(float).eps,
         "eigenvalues / k_n of a crystal for k_n from 1e2 to 1e12, in units of the largest: 50 roundings",

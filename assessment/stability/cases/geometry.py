@@ -10,9 +10,9 @@ import numpy as np
 from ....analysis import Contacts, MindlinLaw, Packing, spectrum, stiffness_matrix, touching
 from ....pywrap import Engine, Scene, SceneError
 from .alone import refused_by_lammps
-from .case import Case, Outcome, failed, measured, refused
+from .case import Case, Outcome, failed_outcome, measured_outcome, refused_outcome
 from .checks import balance
-from .packings import KN, at_rest, bed, crystal, law, sheared, with_rattlers
+from .packings import KN, at_rest, bed, crystal, law, shear_packing, with_rattlers
 
 GROUP = "geometry"
 
@@ -42,7 +42,7 @@ def _one_disk() -> Outcome:
     """On the floor under the load: k_n delta^(3/2) = F_y."""
     packing = at_rest(_disks([(3.0, 0.4995)], top=np.array([True]), fy=3.0)).packing
     exact = packing.law.overlap_of_force(3.0)
-    return measured(
+    return measured_outcome(
         abs(packing.geometry.overlap[0] / exact - 1),
         4e-16 * 3,
         "relative error of the overlap against (F_y/k_n)^(2/3): a few roundings",
@@ -53,7 +53,7 @@ def _two_disks() -> Outcome:
     """One on top of the other, upright: both contacts carry F_y."""
     top = np.array([False, True])
     packing = at_rest(_disks([(3.0, 0.4994), (3.0, 1.4988)], top=top, fy=3.0)).packing
-    return measured(
+    return measured_outcome(
         np.abs(packing.normal_force / 3.0 - 1).max(),
         1e-14,
         "relative error of the normal forces against F_y; a column is unstable, and stands because nothing pushes it",
@@ -64,7 +64,7 @@ def _three_disks() -> Outcome:
     """Two that touch, and one on top."""
     height = 0.499 + np.sqrt(0.998**2 - 0.499**2)
     position = [(3.0, 0.499), (3.998, 0.499), (3.499, height)]
-    return balance(sheared(_disks(position, top=np.array([False, False, True]), fy=3.0)))
+    return balance(shear_packing(_disks(position, top=np.array([False, False, True]), fy=3.0)))
 
 
 def _no_contact() -> Outcome:
@@ -76,7 +76,7 @@ def _no_contact() -> Outcome:
     with Engine(packing) as engine, engine.undamped(1e-4) as dynamics:
         moved = dynamics.advance(10_000).position[last] - hovering[0]
     counted = len(spectrum(packing).eigenvalues) - len(spectrum(settled).eigenvalues)
-    return measured(
+    return measured_outcome(
         np.abs(moved).max() + counted,
         0.0,
         "how far a loaded disk without contact went in 10,000 undamped steps, plus eigenvalues that it added: none",
@@ -89,7 +89,7 @@ def _zero_overlap() -> Outcome:
     with Engine(packing) as engine:
         found = engine.displace(packing, np.zeros(6))
         force = np.abs(engine.net_force).max()
-    return measured(
+    return measured_outcome(
         force + len(found.contacts) + stiffness_matrix(packing).nnz + np.abs(packing.net_force).max(),
         0.0,
         "forces, contacts and entries of K of two disks that touch exactly: none, and nothing is divided by zero",
@@ -105,7 +105,9 @@ def _at_the_bound() -> Outcome:
     excess = abs(abs(force[0]) - packing.law.mu * abs(force[1]))
     limit = packing.law.slip_limit(packing.geometry.overlap)
     stiffness = np.abs(packing.law.derivatives(packing.geometry.overlap, limit).slip_derivative[0])
-    return measured(excess + stiffness, 0.0, "|f_t| - mu f_n in LAMMPS, and df_t/ds of the analysis, at the bound")
+    return measured_outcome(
+        excess + stiffness, 0.0, "|f_t| - mu f_n in LAMMPS, and df_t/ds of the analysis, at the bound"
+    )
 
 
 def _opens_and_closes() -> Outcome:
@@ -118,7 +120,7 @@ def _opens_and_closes() -> Outcome:
     wrong = over.contacts.i.tolist() != [1] or over.contacts.j.tolist() != [2]
     wrong |= back.contacts.i.tolist() != [0] or back.contacts.j.tolist() != [1]
     slips = np.abs(np.concatenate([over.contacts.slip, back.contacts.slip])).max(initial=0.0)
-    return measured(wrong + slips, 0.0, "wrong contacts, and slips that should have been forgotten")
+    return measured_outcome(wrong + slips, 0.0, "wrong contacts, and slips that should have been forgotten")
 
 
 def _grazing() -> Outcome:
@@ -131,9 +133,9 @@ def _grazing() -> Outcome:
         beyond = engine.displace(closest, step)
     overlap = closest.geometry.overlap
     if len(aside.contacts) or len(beyond.contacts) or len(overlap) != 1:
-        return failed(f"contacts on the way: {len(overlap)} and {len(beyond.contacts)}")
+        return failed_outcome(f"contacts on the way: {len(overlap)} and {len(beyond.contacts)}")
     expected = float(aside.law.normal_force(1e-12))
-    return measured(
+    return measured_outcome(
         np.abs(force[1] / expected - [1, -1]).max() + np.abs(closest.contacts.slip[0]),
         1e-10,
         "relative error of the force at an overlap of 1e-12; low parts are known to 7e-24, 1e-11 of it",
@@ -141,25 +143,27 @@ def _grazing() -> Outcome:
 
 
 def _wide(columns: int) -> Outcome:
-    return balance(sheared(crystal(columns)))
+    return balance(shear_packing(crystal(columns)))
 
 
 NARROW = {"packing": {"disks": 10, "top": 1, "width": 2.7}, "law": {"kn": KN}, "load": {"fy": 3.0}}
 
 REFUSED: dict[str, Callable[[], Outcome]] = {
-    "box 2 wide": lambda: refused(lambda: crystal(2), "under two largest diameters"),
-    "box under two diameters, a scene": lambda: refused(
+    "box 2 wide": lambda: refused_outcome(lambda: crystal(2), "under two largest diameters"),
+    "box under two diameters, a scene": lambda: refused_outcome(
         lambda: Scene.from_mapping(NARROW), "widen the box", SceneError
     ),
-    "one centre": lambda: refused(
+    "one centre": lambda: refused_outcome(
         lambda: stiffness_matrix(_disks([(3.0, 3.0), (3.0, 3.0)], _contact(0.0))), "same centre"
     ),
     "one centre, LAMMPS": lambda: refused_by_lammps([(3.0, 3.0), (3.0, 3.0)], "run 0\n", "have the same centre"),
     "a centre inside of the other disk, LAMMPS": lambda: refused_by_lammps(
         [(3.0, 3.0), (3.4, 3.0)], "run 0\n", "contact law does not hold"
     ),
-    "a coordinate that is no number": lambda: refused(lambda: _disks([(3.0, float("nan"))], NONE), "not finite"),
-    "k_n infinite": lambda: refused(lambda: MindlinLaw(float("inf"), 1.0, 1.0), "must be finite"),
+    "a coordinate that is no number": lambda: refused_outcome(
+        lambda: _disks([(3.0, float("nan"))], NONE), "not finite"
+    ),
+    "k_n infinite": lambda: refused_outcome(lambda: MindlinLaw(float("inf"), 1.0, 1.0), "must be finite"),
 }
 
 MEASURED: dict[str, Callable[[], Outcome]] = {

@@ -7,10 +7,10 @@ from functools import partial
 
 from ....analysis import Packing
 from ....pywrap import Engine, NoEquilibriumError, equilibrate
-from .alone import refused_by
-from .case import Case, Outcome, refused
+from .alone import expect_refusal
+from .case import Case, Outcome, refused_outcome
 from .checks import balance, derivative
-from .packings import arches, at_rest, bed, crystal, law, sheared
+from .packings import arches, at_rest, bed, crystal, law, shear_packing
 
 GROUP = "stiffness and load"
 
@@ -24,7 +24,7 @@ load = { fy = 2e4 }
 
 
 def _balance(make: Make) -> Outcome:
-    return balance(sheared(make()))
+    return balance(shear_packing(make()))
 
 
 def _derivative(make: Make) -> Outcome:
@@ -36,7 +36,7 @@ def _flows() -> Outcome:
     start = at_rest(bed(law(mu=0.0)))
     packing = start.packing
     with Engine(packing) as engine:
-        return refused(lambda: equilibrate(engine, start, 1e-3 * packing.fy), "flows", NoEquilibriumError)
+        return refused_outcome(lambda: equilibrate(engine, start, 1e-3 * packing.fy), "flows", NoEquilibriumError)
 
 
 def _tolerance_below_the_floor() -> Outcome:
@@ -74,7 +74,7 @@ CASES = [
     Case(
         GROUP,
         "load 0.1 k_n from a loose start",
-        partial(refused_by, "faultgouge settle FILE -o run.h5", LOOSE, "contact law does not hold"),
+        partial(expect_refusal, "faultgouge settle FILE -o run.h5", LOOSE, "contact law does not hold"),
         True,
     ),
 ]

@@ -48,7 +48,7 @@ def crystal(
         overlap = law.overlap_of_force(0.5 * load * law.kn * (1.0 - overlap) / rise)
     row, column = np.divmod(np.arange(rows * columns), columns)
     position = np.column_stack([spacing * (column + 0.5 * (row % 2) + 0.25), 0.5 - reach + rise * row])
-    packing = _loaded(position, np.full(rows * columns, 0.5), columns * spacing, row == rows - 1, law, load)
+    packing = _load_packing(position, np.full(rows * columns, 0.5), columns * spacing, row == rows - 1, law, load)
     return replace(packing, position_low=np.zeros_like(position)) if compensated else packing
 
 
@@ -65,10 +65,10 @@ def arches(ratio: float, law: MindlinLaw = PAPERS, load: float = 1e-6) -> Packin
         ]
     )
     radius = np.repeat([1.0, small], [3, 6])
-    return _loaded(position, radius, 6.15, radius == 1.0, law, load)
+    return _load_packing(position, radius, 6.15, radius == 1.0, law, load)
 
 
-def _loaded(
+def _load_packing(
     position: Floats, radius: Floats, box: float, top: NDArray[np.bool_], law: MindlinLaw, load: float
 ) -> Packing:
     """A periodic packing without slips; load is F_y / k_n."""
@@ -89,7 +89,7 @@ def bed(law: MindlinLaw = PAPERS, load: float = LOAD, seed: int = 1) -> Packing:
     return settle(scene).packing
 
 
-def slipped(packing: Packing, shares: Sequence[float]) -> Packing:
+def with_slips(packing: Packing, shares: Sequence[float]) -> Packing:
     """The packing with slips in several states, by their shares of the limit, over and over."""
     slip = np.resize(shares, len(packing.contacts)) * packing.law.slip_limit(packing.geometry.overlap)
     return replace(packing, contacts=packing.contacts.slipped(slip))
@@ -122,7 +122,7 @@ def at_rest(packing: Packing) -> Equilibrium:
         return equilibrate(engine, _start(packing), 0.0)
 
 
-def sheared(packing: Packing) -> Equilibrium:
+def shear_packing(packing: Packing) -> Equilibrium:
     """An equilibrium far from sliding as a whole, F_x = 3e-3 F_y, or 0.3 mu F_y if that is less."""
     share = min(3e-3, 0.3 * packing.law.mu) if packing.law.frictional else 0.0
     with Engine(packing) as engine:

@@ -16,8 +16,8 @@ from mpi4py import MPI
 from ....analysis import spectrum, stable_timestep
 from ....pywrap import Engine
 from ....pywrap.lammps.decks import DECKS
-from ....pywrap.lammps.names_of_files import shared_folder
-from .case import Case, Outcome, measured
+from ....pywrap.lammps.plain_file_names import shared_folder
+from .case import Case, Outcome, measured_outcome
 from .loads import Make
 from .packings import arches, bed, crystal, law, with_low_parts
 
@@ -52,7 +52,7 @@ def _same_after_restart(make: Make, compensated: bool) -> Outcome:
         int(np.count_nonzero(one != other)) if one.shape == other.shape else one.size
         for one, other in zip(straight, resumed, strict=True)
     ]
-    return measured(
+    return measured_outcome(
         sum(differences),
         0,
         f"numbers that differ after {STEPS} more steps, of {sum(array.size for array in straight)}: coordinates, "

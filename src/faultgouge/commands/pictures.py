@@ -175,8 +175,8 @@ def view(
     if output.suffix.lower() != ".html":
         raise typer.BadParameter(f"-o {output}: a page is an .html")
     from faultgouge.analysis import RunFile
-    from faultgouge.figures.view import check_library, equally_spaced, loads_shown, write_view
-    from faultgouge.figures.view_pair import seconds
+    from faultgouge.figures.browser_page import check_library, equally_spaced, loads_shown, write_view
+    from faultgouge.figures.browser_pair import seconds
 
     check_library()
     refuse_snapshot(file)

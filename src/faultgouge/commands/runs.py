@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..guard import keeps
 from ..ranks import is_root
+from ..signal_guard import keeps
 from .terminal import (
     AsJson,
     Out,
@@ -21,8 +21,8 @@ from .terminal import (
     print_line,
     progress,
     read_scene,
+    report_fallback,
     say,
-    say_way,
     status,
     stored_files,
 )
@@ -56,7 +56,7 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
     wanted = read_scene(scene, "settle", "settle")
     check_output(output, scene, *stored_files(wanted))
     with Record(output, wanted, saved=keeps) as record:
-        last = _settled(wanted, record)
+        last = _settle_or_read(wanted, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
     packing = last.packing
@@ -76,18 +76,18 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     """
     from faultgouge.pywrap import Record
     from faultgouge.pywrap import ramp as ramp_up
-    from faultgouge.pywrap.runs.path import all_loads, count_behind
-    from faultgouge.pywrap.scenes.refusals import needed
+    from faultgouge.pywrap.runs.equilibrium_path import all_loads, count_behind
+    from faultgouge.pywrap.scenes.validation import require_section
 
     wanted = read_scene(scene, "ramp", "ramp")
     check_output(output, scene, *stored_files(wanted))
-    settings = needed(wanted.ramp, "ramp")
+    settings = require_section(wanted.ramp, "ramp")
     with Record(output, wanted, saved=keeps) as record:
-        start = _settled(wanted, record)
+        start = _settle_or_read(wanted, record)
         total, done = len(all_loads(settings)), count_behind(settings, record.forces)
         dumps = output.with_suffix("") if wanted.output is not None and wanted.output.dumps else None
         for equilibrium in progress(ramp_up(wanted, start, dumps=dumps, behind=done), "equilibria", total, done):
-            say_way(equilibrium)
+            report_fallback(equilibrium)
             record.append(equilibrium)
         record.finish()
     assert record.last is not None
@@ -116,13 +116,13 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     from faultgouge.analysis import RunFile
     from faultgouge.analysis.motion.growth import growth_of_run
     from faultgouge.pywrap import Record, reach
-    from faultgouge.pywrap.runs.path import step_of
-    from faultgouge.pywrap.runs.undamped import sampling
-    from faultgouge.pywrap.scenes.refusals import needed
+    from faultgouge.pywrap.runs.equilibrium_path import step_of
+    from faultgouge.pywrap.runs.undamped import sample_steps
+    from faultgouge.pywrap.scenes.validation import require_section
 
     wanted = read_scene(scene, "perturb", "perturb")
     check_output(output, scene, *stored_files(wanted))
-    settings = needed(wanted.perturb, "perturb")
+    settings = require_section(wanted.perturb, "perturb")
     mus = wanted.law.mus
     if len(mus) > 1:
         say(f"mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene, is run")
@@ -130,7 +130,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         if record.last is None:
             total = ceil(settings.fx / step_of(wanted) * (1 - 1e-9)) + 1
             for start in progress(reach(wanted, settings.fx), "equilibria", total):
-                say_way(start)
+                report_fallback(start)
             _lines(wanted, start)  # refuses what the packing does not allow, before anything is written
             record.append(start)
         assert record.last is not None
@@ -144,7 +144,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         return
     with RunFile(output) as file:
         series, packing = file.series("undamped"), file.packing()
-    dt = sampling(settings, packing)[0]
+    dt = sample_steps(settings, packing)[0]
     growth = growth_of_run(packing, series["time"], series["msd"], series["friction"], dt)
     if as_json:
         columns = {name: column.tolist() for name, column in series.items()}
@@ -159,22 +159,22 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
 
 def _lines(scene: Scene, start: Equilibrium) -> int:
     """Lines of the series of an undamped run; a time step or a time that the packing does not allow is refused."""
-    from faultgouge.pywrap.runs.undamped import sampling
+    from faultgouge.pywrap.runs.undamped import sample_steps
 
     assert scene.perturb is not None
-    return len(sampling(scene.perturb, start.packing)[1])
+    return len(sample_steps(scene.perturb, start.packing)[1])
 
 
 def _weakening(scene: Scene, record: Record) -> Weakening | None:
     """The friction that falls with velocity, its threshold v_0 calibrated if the scene says so."""
-    from faultgouge.pywrap.runs.undamped import unforced, weakening_of
+    from faultgouge.pywrap.runs.undamped import weakening_of, without_perturbation
 
     if scene.friction is None:
         return None
     assert record.last is not None
     threshold, why = scene.friction.v0, ""
     if isinstance(threshold, str):
-        run = record.undamped(unforced(scene), record.last, "calibration")
+        run = record.undamped(without_perturbation(scene), record.last, "calibration")
         samples = progress(run, "calibrating v0", _lines(scene, record.last))
         threshold = float(max(abs(sample.layer_velocity) for sample in samples))
         why = " (the largest velocity of the upper layer in an unforced run of this length: rounding noise)"
@@ -196,10 +196,10 @@ def _hysteresis(path: Path, settings: Ramp) -> Hysteresis | None:
 
 def _equilibria(path: Path) -> list[dict[str, Any]]:
     from faultgouge.analysis import RunFile
-    from faultgouge.pywrap.runs.recording import ways_of
+    from faultgouge.pywrap.runs.run_recorder import fallbacks
 
     with RunFile(path) as file:
-        ways = ways_of(file)
+        ways = fallbacks(file)
         names = ("fx", "residual", "floor", "evaluations")
         rows = zip(*(file.observable(name).tolist() for name in names), strict=True)
         return [
@@ -208,7 +208,7 @@ def _equilibria(path: Path) -> list[dict[str, Any]]:
         ]
 
 
-def _settled(scene: Scene, record: Record) -> Equilibrium:
+def _settle_or_read(scene: Scene, record: Record) -> Equilibrium:
     """The last equilibrium of a file; in a new one the settled packing, which is then in it."""
     from faultgouge.pywrap import settle
 

@@ -9,14 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
-from ..guard import keeps
 from ..ranks import is_root
+from ..signal_guard import keeps
 from .terminal import (
     AsJson,
     Folder,
     NewFolder,
     ScenePath,
-    alone_in,
+    lock_folder,
     print_json,
     print_line,
     progress,
@@ -36,7 +36,7 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     with their quartiles, and whether what both compute agrees to the bit. It
     takes some ten seconds.
     """
-    from faultgouge.assessment.left_out.explain import explain as explain_scene
+    from faultgouge.assessment.explain.explain import explain as explain_scene
 
     wanted = read_scene(scene, "explain", "settle")
     with status("switching features off and on"):
@@ -46,7 +46,7 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     elif is_root():
         from rich.console import Console
 
-        from faultgouge.assessment.left_out.explanation_table import explanation_table, in_words
+        from faultgouge.assessment.explain.explanation_table import explanation_table, in_words
 
         print_line(f"{in_words(explanation)}\n")
         console = Console(highlight=False)
@@ -74,7 +74,7 @@ def reproduce(
 
     keeps(f"what is in {output} so far is kept; the same command begins anew and replaces it", output)
     triggered = read_scene(shipped / "triggered.toml", "reproduce") if scene is None else None
-    with alone_in(output):
+    with lock_folder(output):
         run_protocol(wanted, output, say, triggered)
     print_line(f"written: {output}/report.md")
 
@@ -85,10 +85,10 @@ def report(
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points: a minute instead of ten.")] = False,
 ) -> None:
     """Error against run time: which method to take when, for six tasks, with figures and numbers."""
-    from faultgouge.assessment.error_and_time import report as run_studies
+    from faultgouge.assessment.work_precision import report as run_studies
 
     keeps(f"{output} has the studies that were finished; the same command begins anew and replaces them", output)
-    with alone_in(output):
+    with lock_folder(output):
         run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
     print_line(f"written: {output}/report.md")
 
@@ -104,7 +104,7 @@ def stability(
     from faultgouge.assessment.stability import stability as try_cases
 
     keeps(f"{output} has the cases that were finished; the same command begins anew and replaces them", output)
-    with alone_in(output):
+    with lock_folder(output):
         result = try_cases(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
     counts = Counter(case["status"] for case in result.get("cases", ()))
     (say if as_json else print_line)(
@@ -146,7 +146,7 @@ def _into_folder(
     """Run a study of a scene that goes on in its folder; `what` is counted, and `kept` is what an interrupt leaves."""
     wanted = read_scene(scene, name)
     keeps(f"{output}/{name}.jsonl has {kept}; the same command goes on from there", output)
-    with alone_in(output):
+    with lock_folder(output):
         result = study(wanted, output, say, lambda results, count: progress(results, what, count))
     (say if as_json else print_line)(f"written: {output}/{name}.md")
     if as_json:

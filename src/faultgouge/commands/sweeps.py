@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ..guard import keeps
 from ..ranks import is_root
+from ..signal_guard import keeps
 from .terminal import Folder, Workers, print_line, progress, say, table_of
 
 app = typer.Typer()
@@ -37,16 +37,16 @@ def sweep(
     is a result, too, with its sentence. Of several ranks, on several machines
     perhaps, one hands out the work: mpiexec -n 5 keeps 4 cores busy.
     """
-    from faultgouge.studies.sweep.compute import LINES, run_sweep, stored
     from faultgouge.studies.sweep.draw import draw_sweep
-    from faultgouge.studies.sweep.points import Sweep
-    from faultgouge.studies.sweep.points import shard as part_of
+    from faultgouge.studies.sweep.run_sweep import LINES, read_results, run_sweep
+    from faultgouge.studies.sweep.sweep_plan import Sweep
+    from faultgouge.studies.sweep.sweep_plan import shard as part_of
     from faultgouge.studies.sweep.tasks import TASKS, estimate
 
     wanted, part = Sweep.from_toml(file, TASKS), _shard(shard)
     if dry_run:
         if is_root():
-            known = stored(output / LINES)
+            known = read_results(output / LINES)
             missing = [point for point in part_of(wanted.points, part) if point.key not in known]
             for line in estimate(wanted.task, missing, known.values()):
                 print_line(line)
@@ -67,8 +67,8 @@ def merge(
     output: Annotated[Path, typer.Option("-o", "--output", help="The folder to write.")] = Path("merged"),
 ) -> None:
     """Shards of a sweep put together: the table of a sweep that was never divided."""
-    from faultgouge.studies.sweep.compute import merge as merge_parts
     from faultgouge.studies.sweep.draw import draw_sweep
+    from faultgouge.studies.sweep.run_sweep import merge as merge_parts
 
     if is_root():
         sweep, rows = merge_parts(parts, output, print_line)
@@ -80,7 +80,7 @@ def _summarise(task: str, rows: list[dict[str, Any]], output: Path) -> None:
     """Of the task "triggering", shares over all scenes: in words, and summary.json."""
     if task != "triggering":
         return
-    from faultgouge.analysis.files.wholefile import write_json
+    from faultgouge.analysis.files.atomic_write import write_json
     from faultgouge.studies.sweep.triggering_summary import in_words, summary
 
     numbers = summary(rows)
@@ -116,12 +116,12 @@ def modes(
     medians over its packings.
     """
     from faultgouge.studies.modes.study import modes as count_modes
-    from faultgouge.studies.modes.study import wanted_of
-    from faultgouge.studies.sweep.compute import LINES
-    from faultgouge.studies.sweep.points import shard as part_of
+    from faultgouge.studies.modes.study import read_modes_sweep
+    from faultgouge.studies.sweep.run_sweep import LINES
+    from faultgouge.studies.sweep.sweep_plan import shard as part_of
     from faultgouge.studies.sweep.tasks import estimate
 
-    wanted, part = wanted_of(file), _shard(shard)
+    wanted, part = read_modes_sweep(file), _shard(shard)
     if is_root():
         for line in estimate(wanted.task, part_of(wanted.points, part)):
             (print_line if dry_run else say)(line)

@@ -47,11 +47,11 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON."
 
 def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     """What a command reads of a scene, a TOML file; if its task is long, what is to be done and how long is said."""
-    from faultgouge.pywrap.scenes.estimate import foreseen
+    from faultgouge.pywrap.scenes.estimate import describe_work
     from faultgouge.pywrap.scenes.scene import Scene
 
     scene = Scene.from_toml(path, command=command)
-    ahead = foreseen(scene, task) if task is not None else ""
+    ahead = describe_work(scene, task) if task is not None else ""
     if ahead:
         say(ahead)
     return scene
@@ -109,21 +109,21 @@ def stored_series(file: Path) -> dict[str, Any] | None:
 
 def check_output(output: Path, *inputs: Path) -> None:
     """Refuse a file that cannot be written, or is one of the inputs, before any work."""
-    from faultgouge.analysis.files.wholefile import check_output as check
+    from faultgouge.analysis.files.atomic_write import check_output as check
 
     check(output, *inputs)
 
 
 @contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
+def lock_folder(folder: Path) -> Iterator[None]:
     """Make a folder for results, and keep other runs out of it, on rank 0."""
-    from faultgouge.analysis.files.wholefile import alone_with, make_folder
+    from faultgouge.analysis.files.atomic_write import lock_output, make_folder
 
     if not is_root():
         yield
         return
     make_folder(folder)
-    with alone_with(folder):
+    with lock_output(folder):
         yield
 
 
@@ -145,7 +145,7 @@ def say(message: str) -> None:
         print(message, file=sys.stderr)
 
 
-def say_way(equilibrium: Equilibrium) -> None:
+def report_fallback(equilibrium: Equilibrium) -> None:
     """Of an equilibrium that was not reached by halved increments, how it was."""
     if equilibrium.way is not None:
         say(

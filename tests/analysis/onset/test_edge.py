@@ -7,8 +7,8 @@ import pytest
 from scipy.sparse import csr_array
 
 from faultgouge.analysis.onset import Family, Limits, LostPairError, Modes, Pair
-from faultgouge.analysis.onset.edge import edge_from_inside, load_error, locate
-from faultgouge.analysis.onset.pair import continued
+from faultgouge.analysis.onset.eigenvalue_pair import continue_pair
+from faultgouge.analysis.onset.window_edges import edge_from_inside, load_error, locate_edge
 
 BASIS = np.eye(12) + 0.1 * np.random.default_rng(2).normal(size=(12, 12))
 INVERSE = np.linalg.inv(BASIS)
@@ -48,7 +48,7 @@ def large(operator):
 def test_pair_is_followed_beside_a_third_eigenvalue(third, f):
     """Real, double or complex, with the third one closer than the pair's own spread of 5."""
     operator = family(1.0, third)
-    found = continued(state(operator, f + 0.05), f, operator(f))
+    found = continue_pair(state(operator, f + 0.05), f, operator(f))
     assert found is not None
     assert found.mean == pytest.approx(10, abs=1e-11)
     assert found.discriminant == pytest.approx(1.0 - f, abs=1e-10)
@@ -69,7 +69,7 @@ def test_confusion_of_pairs_is_no_contact_change():
     """Two modes that stay real on one side, a pair that is complex on the other."""
     operator = family(1.0, 15.5)
     with pytest.raises(LostPairError, match="cannot be told from its neighbours at F_x = "):
-        locate(large(operator), others(operator, 0.0, 45, 50), state(operator, 2.2))
+        locate_edge(large(operator), others(operator, 0.0, 45, 50), state(operator, 2.2))
 
 
 def test_edge_where_the_equilibrium_jumps():

@@ -8,13 +8,13 @@ from scipy.sparse import csr_array
 from test_found import PASSING, cut_off
 from test_slicing import FEW, on_ranks
 
-from faultgouge.analysis.damped_onset.edge import DampedWindow
-from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, fastest_growing, growing_near, nearest_mode
-from faultgouge.analysis.damped_onset.sliced import SlicedGrowing, first_growing
-from faultgouge.analysis.damped_onset.windows import damped_windows, dissipating
-from faultgouge.analysis.onset.found import Candidate
+from faultgouge.analysis.damped_onset.first_window import SlicedGrowing, first_growing
+from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, fastest_growing, find_growing_near, nearest_mode
+from faultgouge.analysis.damped_onset.window_edges import DampedWindow
+from faultgouge.analysis.damped_onset.windows import damped_windows, without_dissipation
+from faultgouge.analysis.onset.slice_store import Candidate
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset.damped import ramped
+from faultgouge.pywrap.onset.damped import ramp_scene
 
 KINDS = {"weak": {"cn": 0.1}, "medium": {"cn": 10.0}, "drag": {"drag_time": 100.0}}
 
@@ -30,7 +30,7 @@ def search(path):
     """The search of the reference packing, from a little before its onset on."""
 
     def make(kind, limits=FEW):
-        damped = dissipating(path, **KINDS[kind])
+        damped = without_dissipation(path, **KINDS[kind])
         loads = np.array(path.grid[18:])
         return lambda **how: first_growing(lambda fx: Pencil.of(damped(fx)), loads, limits=limits, **how)
 
@@ -40,7 +40,7 @@ def search(path):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_window_is_that_among_all_modes(path, search, kind):
-    expected = damped_windows(dissipating(path, **KINDS[kind]), path.grid[18:], first=True)[0]
+    expected = damped_windows(without_dissipation(path, **KINDS[kind]), path.grid[18:], first=True)[0]
     found, doubtful = search(kind)()
     assert doubtful == ()
     assert abs(found.fx_onset - expected.fx_onset) <= found.error + expected.error
@@ -92,16 +92,16 @@ def test_slices_that_bear_more_are_left_out_until_they_do_not(loads):
 
 @pytest.mark.slow
 def test_modes_near_a_frequency_are_those_of_all(path):
-    damped = dissipating(path, cn=0.1)
+    damped = without_dissipation(path, cn=0.1)
     modes = DampedModes.of(Pencil.of(damped(0.023)))
     for rate in modes.rates[[3, 100, 200]]:
         found = nearest_mode(modes.pencil, float(rate.imag) * (1 + 1e-6))
         assert found.rate == pytest.approx(rate, rel=1e-9)
     assert len(modes.growing)
     for rate in modes.rates[modes.growing]:
-        found = [mode.rate for mode in growing_near(modes.pencil, 1.001j * rate.imag, 12)]
+        found = [mode.rate for mode in find_growing_near(modes.pencil, 1.001j * rate.imag, 12)]
         assert min(abs(each - rate) for each in found) < 1e-9 * abs(rate)
-        assert growing_near(Pencil.of(damped(0.02)), 1j * rate.imag, 12) == []
+        assert find_growing_near(Pencil.of(damped(0.02)), 1j * rate.imag, 12) == []
     assert fastest_growing(modes.pencil).rate == pytest.approx(max(modes.rates, key=lambda s: s.real), rel=1e-9)
     assert fastest_growing(Pencil.of(damped(0.02))) is None
 
@@ -120,8 +120,8 @@ def test_packings_against_all_eigenvalues(disks, seed, kind, grows):
     """The companion matrix has no eigenvalue that grows just below the onset, and one just above; or none at all."""
     packing = {"disks": disks, "width": round(1.192 * disks**0.5, 1), "seed": seed}
     scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 2e-3, "until": 0.04}}
-    with ramped(Scene.from_mapping(scene)) as ramp:
-        path = dissipating(ramp.path, **kind)
+    with ramp_scene(Scene.from_mapping(scene)) as ramp:
+        path = without_dissipation(ramp.path, **kind)
 
         def fastest(fx):
             return np.linalg.eigvals(Pencil.of(path(fx)).system.matrix).real.max()

@@ -11,9 +11,9 @@ from tiling import tiled
 
 from faultgouge.analysis import FaultgougeError, NoEquilibriumError, OnsetError, complex_windows, find_onset
 from faultgouge.analysis.onset import LIMITS, Family, Limits, full_operator
-from faultgouge.analysis.onset.basis import Bases
+from faultgouge.analysis.onset.eigenbasis import Bases
+from faultgouge.analysis.onset.first_window import first_window
 from faultgouge.analysis.onset.ranks import ALONE
-from faultgouge.analysis.onset.sliced import first_window
 
 
 def searched(operator, loads, limits=LIMITS):

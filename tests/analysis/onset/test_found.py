@@ -14,9 +14,9 @@ from test_slicing import FEW, on_ranks
 from faultgouge.analysis import FaultgougeError
 from faultgouge.analysis.errors import OutputError
 from faultgouge.analysis.onset import Family, Ranks, full_operator
-from faultgouge.analysis.onset.found import Border, Candidate, DamagedSliceError, Found, Pass
-from faultgouge.analysis.onset.sliced import first_window
-from faultgouge.analysis.onset.slicing import SliceError
+from faultgouge.analysis.onset.block_lanczos import SliceError
+from faultgouge.analysis.onset.first_window import first_window
+from faultgouge.analysis.onset.slice_store import Border, Candidate, DamagedSliceError, Found, Pass
 
 PASSING = replace(FEW, kept=0, wait=0.1)
 """Slices of 24 modes, in bases that are not kept in memory."""

@@ -8,9 +8,9 @@ from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 
 from faultgouge.analysis.onset import LIMITS, Limits, Modes, full_operator
-from faultgouge.analysis.onset.basis import Basis
-from faultgouge.analysis.onset.pair import continued, inverse_of
-from faultgouge.analysis.onset.screening import may_meet
+from faultgouge.analysis.onset.eigenbasis import Basis
+from faultgouge.analysis.onset.eigenvalue_pair import continue_pair, inverse_of
+from faultgouge.analysis.onset.perturbation_screening import may_meet
 
 SLACK = LIMITS.slack
 
@@ -34,8 +34,8 @@ def test_continued_pair_is_that_of_lapack(path, fx, factors):
     start = pair_of(path(0.022))
     limits = Limits() if factors == "dense" else Limits(dense_factors=0)
     if factors == "of a neighbour":
-        start = continued(start, 0.0221, full_operator(path(0.0221)), limits)
-    found, expected = continued(start, fx, matrix, limits), dense_pair(matrix, start)
+        start = continue_pair(start, 0.0221, full_operator(path(0.0221)), limits)
+    found, expected = continue_pair(start, fx, matrix, limits), dense_pair(matrix, start)
     assert (found.inverse is not None) == (factors != "dense")
     if factors == "of a neighbour":
         assert found.inverse is start.inverse
@@ -56,7 +56,7 @@ def test_continuation_is_refused_rather_than_wrong(path):
     modes = Modes.of(0.022, matrix)
     apart = modes.pair((30, 200))
     wrong = replace(apart, right=np.eye(300)[:, [7, 107]], left=np.eye(300)[:, [7, 107]])
-    assert continued(wrong, 0.022, matrix) is None
+    assert continue_pair(wrong, 0.022, matrix) is None
 
 
 def test_overlap_of_a_block_is_that_of_the_eigenvectors(path):
@@ -73,9 +73,9 @@ def test_factors_of_a_distant_neighbour_are_given_up(path):
     matrix = full_operator(path(0.022))
     start = pair_of(path(0.0219))
     far = inverse_of(matrix, 10 * start.mean, limits)
-    found = continued(replace(start, inverse=far), 0.022, matrix, limits)
+    found = continue_pair(replace(start, inverse=far), 0.022, matrix, limits)
     assert found.inverse is not far
-    assert found.discriminant == pytest.approx(continued(start, 0.022, matrix, limits).discriminant, rel=1e-9)
+    assert found.discriminant == pytest.approx(continue_pair(start, 0.022, matrix, limits).discriminant, rel=1e-9)
 
 
 @pytest.mark.parametrize("fx", [0.0215, 0.0218330564, 0.022])
@@ -84,7 +84,7 @@ def test_slope_of_the_discriminant(path, fx):
     step = 1e-6
     below, middle, above = (full_operator(path(fx + offset * step)) for offset in (-1, 0, 1))
     pair = dense_pair(middle, pair_of(path(0.022)))
-    slope = (continued(pair, fx, above).discriminant - continued(pair, fx, below).discriminant) / 2
+    slope = (continue_pair(pair, fx, above).discriminant - continue_pair(pair, fx, below).discriminant) / 2
     assert pair.slope((above - below) / 2) == pytest.approx(slope, rel=1e-5)
 
 

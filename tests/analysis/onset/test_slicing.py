@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse import csc_array, diags_array
 
 from faultgouge.analysis.onset import LIMITS, Limits, Ranks
-from faultgouge.analysis.onset.slicing import SliceError, factored, slices
+from faultgouge.analysis.onset.block_lanczos import SliceError, factor_shifted, slices
 
 FEW = Limits(own=24, coarse=60, first_look=20, one_basis=50)
 
@@ -56,7 +56,7 @@ def test_part_of_the_spectrum(modes):
 
     def watched(matrix, shift):
         shifts.append(shift)
-        return factored(matrix, shift)
+        return factor_shifted(matrix, shift)
 
     kinds = {"limits": Limits(coarse=60), "factorise": watched}
     matrix = network(34, 4)
@@ -92,13 +92,13 @@ def test_degenerate_eigenvalues_are_all_found():
 
 def overlooking(matrix, shift):
     """An inertia that is one too high from some shift on, as if an eigenvalue had been overlooked."""
-    solve, below = factored(matrix, shift)
+    solve, below = factor_shifted(matrix, shift)
     return solve, below + (shift > 4.0)
 
 
 def inaccurate(matrix, shift):
     """Factors of a matrix that is off by 2e-4: half of a mean distance of eigenvalues at their upper end."""
-    return factored(csc_array(matrix * (1 + 2e-4)), shift)
+    return factor_shifted(csc_array(matrix * (1 + 2e-4)), shift)
 
 
 @pytest.mark.slow
@@ -118,7 +118,7 @@ def next_to_an_eigenvalue(distance):
 
     def watched(matrix, shift):
         shifts.append(shift)
-        return factored(matrix, shift)
+        return factor_shifted(matrix, shift)
 
     for _ in range(30):  # the eigenvalue moves the shift a little
         shifts.clear()
@@ -180,12 +180,12 @@ def failing(rank, matrix, shift):
     """An error that the second of two ranks meets."""
     if shift > 6 and rank == 1:
         raise SliceError("of one rank")
-    return factored(matrix, shift)
+    return factor_shifted(matrix, shift)
 
 
 def overlooking_at_the_border(rank, matrix, shift):
     """Inertias that are too high by one on the second of two ranks."""
-    solve, below = factored(matrix, shift)
+    solve, below = factor_shifted(matrix, shift)
     return solve, below + rank
 
 

@@ -15,12 +15,12 @@ from faultgouge.analysis import (
     complex_windows,
     find_onset,
 )
-from faultgouge.analysis.digits import with_uncertainty
 from faultgouge.analysis.onset import Family, Limits, Modes, force_bearing, full_operator
-from faultgouge.analysis.onset.dense import all_windows
-from faultgouge.analysis.onset.modes import assign
-from faultgouge.analysis.onset.pair import deepest_dip
-from faultgouge.analysis.onset.screening import Screen
+from faultgouge.analysis.onset.all_windows import all_windows
+from faultgouge.analysis.onset.eigenvalue_pair import deepest_dip
+from faultgouge.analysis.onset.modes import assign_modes
+from faultgouge.analysis.onset.perturbation_screening import Screen
+from faultgouge.analysis.uncertain_digits import with_uncertainty
 
 
 @pytest.mark.parametrize("d", [0.01, 0.3])
@@ -251,7 +251,7 @@ def test_modes_that_cross_keep_their_names():
         expected = np.arange(12)
         if exchanged:
             expected[:2] = 1, 0
-        np.testing.assert_array_equal(assign(here, there), expected)
+        np.testing.assert_array_equal(assign_modes(here, there), expected)
 
 
 @pytest.mark.parametrize("noise", [1e-12, 1e-9, 1e-6])

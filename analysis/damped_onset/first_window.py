@@ -1,0 +1,356 @@
+"""The first window of growing motion of a large packing: clusters in slices of the spectrum, and the operator.
+
+Dissipation and the antisymmetric part couple a mode to its neighbours in the spectrum only. So slices are searched as
+for complex pairs (:mod:`~faultgouge.analysis.onset.first_window`). In the eigenbasis of a slice the modes that may grow
+are named, clusters about them announce where one begins to, and the operator confirms it
+(:mod:`~faultgouge.analysis.damped_onset.perturbation_screening`).
+
+**Slices that are left out.** In each slice the antisymmetric part may be so many times larger before it can feed any
+motion as much as the motion loses (`Reduced.bears`). As long as it has not grown by `TRUSTED` of that, a slice is not
+looked at again.
+
+**Strong dashpots** couple more modes than a cluster can have, and clusters may miss a motion. Then all eigenvalues are
+looked at, at the last load that was passed before the first window; what grows there is followed back to its onset. A
+window that ends before that load is not excluded.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, pairwise
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse.linalg import ArpackError
+
+from ..errors import NoEquilibriumError
+from ..onset.eigenbasis import Basis, Levels
+from ..onset.first_window import Increments, Sliced, Watch, search_along
+from ..onset.limits import LIMITS, Limits
+from ..onset.ranks import ALONE, Ranks
+from ..onset.slice_store import Border, Candidate, Found
+from ..onset.window_edges import DoubtError, LostPairError, LostTrackError, track_pair
+from ..packing.packing import Floats
+from ..spectrum.spectrum import active_coordinates
+from .all_windows import nearly_growing, search_cluster
+from .modes import DampedMode, Pencil, fastest_growing, find_growing_near
+from .perturbation_screening import LARGEST, Cluster, find_cores, group_clusters, may_grow, project_pencil, shift_load
+from .window_edges import Crossing, DampedWindow, solve_edge, window_of
+
+TRUSTED = 0.5
+"""Share of what a slice bears up to which it is left out: its modes change on the way."""
+
+BEFOREHAND = 1.3
+"""Where further slices have to be looked at, those that would have to at so many times larger loads are looked at, too:
+bases that are kept are made anew."""
+
+MOST_AHEAD = 8
+"""Increments at the most that are looked at while bases that are not kept pass by."""
+
+LOOKS = 6
+"""Looks at an announced mode, for a load at which it grows."""
+
+NEAREST = 12
+"""Modes about a frequency among which one that grows is looked for where a cluster does not know its shape."""
+
+SETTLED = 0.02
+"""Share of an increment by which the place of the largest growth may still move."""
+
+
+def first_growing(
+    pencil: Callable[[float], Pencil],
+    loads: Floats,
+    watch: Watch = lambda says: None,
+    ranks: Ranks = ALONE,
+    folder: Path | None = None,
+    limits: Limits = LIMITS,
+) -> tuple[DampedWindow | None, Increments]:
+    """The first window of growing motion of a large packing, if there is one, and increments before it in doubt.
+
+    Parameters
+    ----------
+    pencil : callable
+        fx -> Pencil. Loads beyond the one above the onset are asked for as by `search_along`.
+    loads : ndarray, shape (S,)
+        The increasing loads of the ramp, force per top disk.
+    watch, ranks, folder, limits
+        As of :func:`~faultgouge.analysis.find_onset`.
+
+    Returns
+    -------
+    DampedWindow or None
+        Its end is None where the mode grows at the next load.
+    tuple of (float, float)
+        Increments on which clusters announce a growing mode that the operator was not seen to have; and all loads
+        before the window, where clusters may have missed one and all modes are too many to be looked at.
+    """
+    oracle = SlicedGrowing(pencil, None, watch, ranks, folder, limits)
+    try:
+        first, doubtful = search_along(oracle, loads)
+    except NoEquilibriumError:
+        first, doubtful = oracle.looked_over(None, ()) if oracle.crowded else (None, ())
+        if first is None:
+            raise
+        return first, doubtful
+    return oracle.looked_over(first, doubtful) if oracle.crowded else (first, doubtful)
+
+
+class SlicedGrowing(Sliced[Pencil, DampedWindow]):
+    """The oracle of growing motion.
+
+    Small differences of large couplings tell where weak dashpots begin to feed a mode. So clusters know that a mode is
+    about to grow, and not where: all that they announce is looked at, and the operator follows it to its onset.
+    """
+
+    locates = False
+    crowded = False
+    """Whether dashpots have coupled more modes than a cluster can have, so that clusters may have missed a motion."""
+
+    _borne: Floats | None = None  # |A - A^T| up to which each mode of the spectrum is left out
+    _borders: Sequence[Border] = ()  # of the slices that were searched last
+    _lost: float | None = None  # frequency of the motion that is in doubt
+    _passing = False  # whether bases are not kept
+
+    def ahead(self, done: int) -> int:
+        """More and more of them, as dissipation may put off the onset by much; each costs a tenth of the bases."""
+        return min(done + 1, MOST_AHEAD)
+
+    # What clusters announce
+
+    def candidates(self, places: Sequence[Pencil], depth: int) -> list[list[Candidate]]:
+        """The modes that begin to grow in clusters of the slices that are looked at.
+
+        Of parts of an increment, while bases pass by, these are the slices about the motion that is in doubt.
+        """
+        if depth and self._lost is not None and self._passing:
+            about = [
+                each for each in self._borders if not self._lost**2 < each.first and not self._lost**2 > each.beyond
+            ]
+            if about:
+                self.bases.narrow((about[0].modes[0], about[-1].modes[1]))
+                return super().candidates(places, depth)
+        count = len(active_coordinates(places[0].stiffness))
+        if self._borne is None or len(self._borne) != count:
+            self._borne = np.zeros(count)
+        feed = max(antisymmetric(place) for place in places)
+        if np.all(self._borne > feed):
+            return [[] for _ in places[1:]]
+        first, stop = self.bases.modes or (0, 0)
+        if min(self._borne[:first].min(initial=np.inf), self._borne[stop:].min(initial=np.inf)) <= feed:
+            feed *= BEFOREHAND
+        loud = np.flatnonzero(self._borne <= feed)
+        self.bases.narrow((int(loud[0]), int(loud[-1]) + 1))
+        self._passing = not self.bases.keeps(places[0].stiffness)
+        return super().candidates(places, depth)
+
+    def _found_by_all(self, places: Sequence[Pencil]) -> list[Found]:
+        found = super()._found_by_all(places)
+        self._borders = [each.border for each in found]
+        self.crowded = self.crowded or any(each.crowded for each in found)
+        if self._borne is not None:
+            for each in found:
+                self._borne[slice(*each.border.modes)] = TRUSTED * each.bears
+        return found
+
+    def _look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[Pencil]) -> Found:
+        here, found, crowded = project_pencil(basis, levels, places[0]), [], False
+        for before, after in pairwise(places):
+            there = shift_load(basis, before, here, after)
+            named = may_grow(here, there)
+            cores = find_cores(named[(named >= basis.own.start) & (named < basis.own.stop)])
+            loud = [each for each in group_clusters(basis, (before, here), (after, there), cores) if not each.quiet]
+            found.append(list(chain.from_iterable(map(find_growing, loud))))
+            crowded = crowded or any(each.right.shape[1] > LARGEST[0] for each in loud)
+            here = there
+        return Found(basis.border, found, here.bears * antisymmetric(places[-1]), crowded)
+
+    # What the operator has
+
+    def looked_over(self, first: DampedWindow | None, doubtful: Increments) -> tuple[DampedWindow | None, Increments]:
+        """The first window after a look at all modes at the last load that was passed before it, and what is in doubt.
+
+        A motion that grows there is followed back to its onset, before which all modes are looked at again.
+        """
+        while True:
+            below = [each for each in self._passed if first is None or each.fx < first.fx_onset]
+            if not below:
+                return first, doubtful
+            last = below.pop()
+            unsure = (*doubtful, (self._passed[0].fx, last.fx))
+            if last.stiffness.shape[0] > self.limits.lapack:
+                return first, unsure
+            self.watch(f"all modes at F_x = {last.fx:.6g}, as the dashpots couple many")
+            try:
+                mode = fastest_growing(last)
+                if mode is None:
+                    return first, doubtful
+                first = self._follow_back(mode, below, None)
+            except (ArpackError, LostPairError, NoEquilibriumError):
+                return first, unsure
+
+    def _confirm_window(self, candidate: Candidate, there: Pencil, first: DampedWindow | None) -> DampedWindow | None:
+        self.watch(f"a motion that grows from about F_x = {candidate.onset:.6g}: its onset")
+        place = there if candidate.inside == there.fx else self.at(candidate.inside)
+        guess = predict_mode(candidate, place)
+        self._lost = guess.rate.imag
+        mode = guess.at(place, guess.rate)
+        announced = candidate.onset < there.fx  # else the mode nearly grows
+        if mode is None and announced:
+            mode = self._beside(guess, place, there)
+        if mode is not None and announced and not mode.growing:
+            mode = self._most(mode, there)
+        if mode is None or not mode.growing or (first is not None and self._opens_later(mode, first)):
+            return None
+        above = follow_mode(mode, there)
+        end = None if above.growing else self._edge(above, mode)
+        return self._follow_back(mode, self._passed, end)
+
+    def _follow_back(self, mode: DampedMode, passed: Sequence[Pencil], end: Crossing | None) -> DampedWindow:
+        """The window of a mode that grows, followed back along the loads that were passed."""
+        for place in reversed(passed):
+            below = follow_mode(mode, place)
+            if not below.growing:
+                return window_of(self._edge(below, mode), end)
+            mode = below
+        return window_of(Crossing(mode.fx, 0.0, mode.rate.imag, "start"), end)
+
+    def _edge(self, outside: DampedMode, inside: DampedMode) -> Crossing:
+        """Where a mode begins or ends to grow between a load where it does not and one where it does.
+
+        It is followed from inside, with the increment halved until the mode outside leads back to the one inside. Next
+        to where two modes coalesce either of them may stand for the other one farther out.
+        """
+        width = self.limits.jump * abs(inside.fx - outside.fx)
+        while abs(inside.fx - outside.fx) > width:
+            back = outside.at(inside.pencil)
+            if back is not None and back.same(inside):
+                try:
+                    return solve_edge(self._track_mode(outside, inside), *sorted((outside.fx, inside.fx)))
+                except LostPairError:
+                    pass
+            middle = follow_mode(inside, self.at(0.5 * (outside.fx + inside.fx)))
+            outside, inside = (outside, middle) if middle.growing else (middle, inside)
+        middle_fx, half = 0.5 * (outside.fx + inside.fx), 0.5 * abs(inside.fx - outside.fx)
+        return Crossing(middle_fx, half, inside.rate.imag, "contact change")
+
+    def _track_mode(self, *known: DampedMode) -> Callable[[float], DampedMode]:
+        """A mode at any load, from loads at which it is known."""
+        return track_pair({mode.fx: mode for mode in known}, lambda near, fx: follow_mode(near[0], self.at(fx)))
+
+    def _opens_later(self, mode: DampedMode, first: DampedWindow) -> bool:
+        """Whether a mode does not grow yet where the first window so far opens."""
+        if mode.fx <= first.fx_onset:
+            return False
+        return not follow_mode(mode, self.at(first.fx_onset)).growing
+
+    def _beside(self, guess: DampedMode, *places: Pencil) -> DampedMode | None:
+        """A motion that grows at one of some loads, about the frequency at which one was announced; None if none does.
+
+        Where contacts change, a cluster does not know the shapes of modes any more, and announces what there is not.
+        """
+        try:
+            for place in places:
+                growing = find_growing_near(
+                    place, guess.rate if guess.rate.imag == 0 else 1j * guess.rate.imag, NEAREST
+                )
+                if growing:
+                    return min(growing, key=lambda each: abs(each.rate - guess.rate))
+        except ArpackError as error:
+            raise DoubtError from error
+        return None
+
+    def _most(self, mode: DampedMode, there: Pencil) -> DampedMode | None:
+        """The mode where it grows on an increment, by parabolas through Re s; None if it is seen to lose energy."""
+        here = self._passed[-1]
+        try:
+            ends = [follow_mode(mode, place) for place in (here, there)]
+            at = self._track_mode(mode, *ends)
+            known = {each.fx: each for each in (mode, *ends)}
+            if len(known) < 3:
+                middle = 0.5 * (here.fx + there.fx)
+                known[middle] = at(middle)
+            for _ in range(LOOKS):
+                best = max(known.values(), key=lambda each: each.rate.real)
+                if best.growing:
+                    return best
+                fx = parabola_vertex(sorted(known.values(), key=lambda each: abs(each.fx - best.fx))[:3])
+                fx = float(np.clip(fx, here.fx, there.fx))
+                if min(abs(fx - load) for load in known) < SETTLED * (there.fx - here.fx):
+                    return None
+                known[fx] = at(fx)
+        except LostPairError as error:  # nothing is lost but what a cluster has announced
+            raise DoubtError from error
+        raise DoubtError
+
+
+def antisymmetric(place: Pencil) -> float:
+    """|A - A^T|, 1 / time^2: what feeds motion."""
+    return float(np.linalg.norm((place.stiffness - place.stiffness.T).data))
+
+
+def find_growing(cluster: Cluster) -> Iterator[Candidate]:
+    """The modes of a cluster that begin to grow, and those that nearly do so at its upper load."""
+    below, above = cluster.loads
+    try:
+        oracle, there = search_cluster(cluster)
+    except LostTrackError:  # its windows are not told apart: what grows at its ends has to do
+        oracle, there = None, cluster.pencil(above)
+    windows = () if oracle is None else oracle.windows()
+    for window in windows:
+        if oracle is not None and window.fx_end is not None and cluster.owns(window.frequency):
+            modes = oracle.at(0.5 * (window.fx_onset + window.fx_end)).modes
+            if len(modes.growing):
+                nearest = min(modes.growing, key=lambda k: abs(modes.rates[k].imag - window.frequency))
+                yield make_candidate(window.fx_onset, cluster.lifted(modes.mode(int(nearest))))
+    begun = {window.frequency: window.fx_onset for window in windows if window.fx_end is None}
+    for mode in nearly_growing(cluster, there.modes):
+        onset = above
+        if mode.growing:
+            onset = min(begun.items(), key=lambda each: abs(each[0] - mode.rate.imag))[1] if begun else below
+        yield make_candidate(onset, cluster.lifted(mode))
+
+
+def make_candidate(onset: float, mode: DampedMode) -> Candidate:
+    """What is kept of a mode of a cluster."""
+    right, left = (np.column_stack([each.real, each.imag]) for each in (mode.right, mode.left))
+    return Candidate(onset, mode.fx, right, left)
+
+
+def predict_mode(candidate: Candidate, pencil: Pencil) -> DampedMode:
+    """The mode of a cluster as one of the operator: its s is the root of y^H T(s) x above the axis of real s, or
+    the upper one of two on the axis."""
+    x, y = (np.asarray(each @ np.array([1.0, 1.0j])) for each in (candidate.right, candidate.left))
+    products = [complex(np.vdot(y, each)) for each in (x, pencil.damping @ x, pencil.stiffness @ x)]
+    return DampedMode(pencil, complex(max(np.roots(products), key=lambda s: (s.imag, s.real))), x, y)
+
+
+def follow_mode(mode: DampedMode, pencil: Pencil) -> DampedMode:
+    """A mode at another load, in small steps of the straight line between both pencils where it has to be.
+
+    Raises
+    ------
+    LostPairError
+        If the shortest steps are too long.
+    """
+    if mode.pencil is pencil:
+        return mode
+    start, done, step = mode.pencil, 0.0, 1.0
+    while done < 1:
+        share = min(1.0, done + step)
+        image = mode.at(pencil if share == 1 else start.towards(pencil, share))
+        if image is not None:
+            mode, done = image, share
+        elif step > LIMITS.shortest:
+            step *= 0.5
+        else:
+            raise LostPairError(
+                f"the motion of frequency {mode.rate.imag:.6g} cannot be told from its neighbours between F_x = "
+                f"{start.fx:.10g} and {pencil.fx:.10g}: take smaller increments"
+            )
+    return mode
+
+
+def parabola_vertex(modes: Sequence[DampedMode]) -> float:
+    """Where a parabola through Re s of three modes has its top; the best of them if it has none."""
+    loads, rates = np.array([mode.fx for mode in modes]), np.array([mode.rate.real for mode in modes])
+    scale = np.ptp(loads)
+    curve, slope, _ = np.polyfit((loads - loads[0]) / scale, rates, 2)
+    return float(loads[0] - 0.5 * slope / curve * scale) if curve < 0 else float(loads[0])

@@ -1,0 +1,181 @@
+r"""The damped onset in the limit of weak damping, from the undamped pair alone.
+
+Weak damping moves the eigenvalue :math:`s = i\sqrt\lambda` of an undamped motion to the side by
+:math:`\mathrm{Re}\,s = -y^H G x / (2 y^H x)`, G the mass-weighted damping matrix. If K is symmetric, y is x and every
+motion is damped, G being positive. Where two eigenvalues are about to coalesce, :math:`y^H x \to 0` with opposite
+signs of the two: one of them is damped more and more, and the other one begins to grow *before* they meet. With the 2 x
+2 block :math:`B = m + N` of the pair (tr N = 0, :math:`D = (\lambda_1 - \lambda_2)^2 = 2\,\mathrm{tr} N^2`) and with
+:math:`G_B = (U^T V)^{-1} U^T G V` on the same bases (:mod:`~faultgouge.analysis.onset.eigenvalue_pair`) the two rates
+are
+
+.. math:: \mathrm{Re}\,s_\pm = -\tfrac14 \left[ \mathrm{tr}\, G_B \pm \frac{2\,\mathrm{tr}(N G_B)}{\sqrt D} \right],
+
+so that one of them vanishes at the root of
+
+.. math:: h(F) = (\mathrm{tr}\, G_B)^2 D - 4\, [\mathrm{tr}(N G_B)]^2 ,
+
+which is a smooth function of the load, through the coalescence and beyond. This root is the limit of the damped onset
+as :math:`C \to 0` with a fixed ratio :math:`C_N : C_T`. It lies below the undamped onset, and at it for that ratio
+alone for which :math:`\mathrm{tr}(N G_B) = 0` at the coalescence (`balancing_ratio`). This is Ziegler's paradox of
+destabilisation by damping (Ziegler, Ing.-Arch. 20, 49 (1952)), as Bottema resolved it (Indag. Math. 18, 403 (1956);
+Kirillov and Verhulst, arXiv:0906.1650; Bigoni and Kirillov, CISM 586 (2019)).
+
+**Drag alone**, :math:`C = M/\tau`, commutes with all: :math:`s^2 + s/\tau + \lambda = 0`. On the axis, s = i omega,
+:math:`\lambda = \omega^2 - i\omega/\tau`: the motion grows where
+:math:`(\mathrm{Im}\,\lambda)^2 > \mathrm{Re}\,\lambda / \tau^2`, to second order in :math:`1/\omega\tau` where
+:math:`2\,|\mathrm{Im}\sqrt\lambda| > 1/\tau`. In terms of the pair, :math:`-D/4 = m/\tau^2`: drag shifts the onset to
+larger loads, by an amount that is quadratic in :math:`1/\tau` as long as D is linear in the load.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import NoEquilibriumError
+from ..onset import Family, LostPairError, Pair, Window, force_bearing, full_operator
+from ..operators.damping import damping_matrix
+from ..packing.packing import Floats, Packing
+from ..spectrum.spectrum import mass_weighted
+
+DIGITS = 1e-12
+"""Width to which the limit is bracketed, in units of the load."""
+
+
+@dataclass(frozen=True)
+class WeakLimit:
+    """What weak damping of a given ratio does to a pair that coalesces.
+
+    Attributes
+    ----------
+    fx : float
+        The limit of the damped onset, force per top disk.
+    frequency : float
+        sqrt(lambda) of the mode that begins to grow, radian / time.
+    """
+
+    fx: float
+    frequency: float
+
+
+def damping_block(packing: Packing, pair: Pair) -> Floats:
+    """G_B of a packing's damping on the bases of a pair, shape (2, 2), 1 / time."""
+    return pair.block(mass_weighted(damping_matrix(force_bearing(packing)), packing))
+
+
+def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, window: Window) -> WeakLimit | None:
+    """The limit of the damped onset as the dissipation tends to zero, from one undamped pair.
+
+    Parameters
+    ----------
+    equilibrium : callable
+        fx -> Packing in equilibrium, as in :func:`~faultgouge.analysis.find_onset`. Of its dashpots the ratio C_N : C_T
+        alone counts.
+    forces : array_like, shape (S,)
+        The increasing loads of the ramp.
+    window : Window
+        The undamped window of the pair, as of :func:`~faultgouge.analysis.find_onset`.
+
+    Returns
+    -------
+    WeakLimit or None
+        None if the pair grows at the smallest load already, or cannot be followed down to where it does not.
+    """
+    from scipy.optimize import brentq
+
+    pair_at, loads = _follow_pair(equilibrium, window), np.asarray(forces, dtype=np.float64)
+    above = window.fx_onset
+
+    def h(fx: float) -> float:
+        """Positive as long as weak damping damps both modes of the pair."""
+        pair = pair_at(fx)
+        g, n = damping_block(equilibrium(fx), pair), pair.traceless
+        return float(np.trace(g) ** 2 * pair.discriminant - 4 * np.trace(n @ g) ** 2)
+
+    try:
+        for below in loads[loads < window.fx_onset][::-1]:
+            if h(float(below)) > 0:
+                break
+            above = float(below)
+        else:
+            return None
+        # of a balanced pair h at the coalescence is rounding noise of either sign
+        fx = above if h(above) >= 0 else float(brentq(h, float(below), above, xtol=DIGITS * abs(above)))
+        pair, packing = pair_at(fx), equilibrium(fx)
+    except (LostPairError, NoEquilibriumError):
+        return None
+    g = damping_block(packing, pair)
+    sign = -np.sign(np.trace(pair.traceless @ g))  # the mode in which the two terms cancel
+    value = pair.mean + sign * 0.5 * np.sqrt(max(0.0, pair.discriminant))
+    return WeakLimit(fx, float(np.sqrt(value)))
+
+
+def drag_onset(
+    equilibrium: Callable[[float], Packing],
+    forces: ArrayLike,
+    window: Window,
+    drag_time: float,
+) -> float | None:
+    """Load at which an undamped pair begins to grow in spite of a drag: 2 |Im omega| = 1/tau, and exactly.
+
+    Parameters
+    ----------
+    equilibrium, forces, window
+        As in :func:`weak_limit`.
+    drag_time : float
+        tau, time.
+
+    Returns
+    -------
+    float or None
+        Force per top disk; None if the drag holds the pair down to the window's end or the ramp's.
+    """
+    from scipy.optimize import brentq
+
+    pair_at, loads = _follow_pair(equilibrium, window), np.asarray(forces, dtype=np.float64)
+    last = loads[-1] if window.fx_end is None else min(window.fx_end, loads[-1])
+    below = window.fx_onset
+
+    def excess(fx: float) -> float:
+        """-D/4 - m/tau^2, 1 / time^4: positive where the pair grows."""
+        pair = pair_at(fx)
+        return -0.25 * pair.discriminant - pair.mean / drag_time**2
+
+    for above in [*loads[(loads > below) & (loads < last)], last]:
+        if excess(float(above)) > 0:
+            return float(brentq(excess, below, float(above), xtol=DIGITS * abs(last)))
+        below = float(above)
+    return None
+
+
+def balancing_ratio(packing: Packing, window: Window) -> float:
+    """C_T / C_N for which weak dashpots leave the onset of a pair where it is.
+
+    Parameters
+    ----------
+    packing : Packing
+        The equilibrium at the undamped onset.
+    window : Window
+        The undamped window of the pair.
+
+    Returns
+    -------
+    float
+        -tr(N G_N) / tr(N G_T) of unit dashpots of either kind; negative if both destabilise on the same side, so that
+        no ratio balances the pair.
+    """
+    pair = _follow_pair(lambda fx: packing, window)(window.fx_onset)
+    along, across = (
+        np.trace(pair.traceless @ damping_block(replace(packing, law=replace(packing.law, cn=n, ct=t)), pair))
+        for n, t in ((1.0, 0.0), (0.0, 1.0))
+    )
+    return float(-along / across) if across else np.inf
+
+
+def _follow_pair(equilibrium: Callable[[float], Packing], window: Window) -> Callable[[float], Pair]:
+    """The undamped pair at any load, from its coalescence: the plane of two parallel vectors, made invariant."""
+    family = Family(lambda fx: full_operator(equilibrium(fx)), 0.0)
+    onset = family.at(window.fx_onset)
+    guess = onset.modes.pair(onset.modes.about(window.eigenvalue))
+    return family.track({onset.fx: family.followed(guess, onset)})

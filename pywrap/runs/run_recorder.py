@@ -1,0 +1,293 @@
+"""run.h5 of a scene: begun, or opened where a run was cut off."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from mpi4py import MPI
+
+from ...analysis import RunFile, solid_fraction
+from ...analysis.files.atomic_write import check_output, lock_output
+from ...analysis.packing.arrays import Floats
+from ..equilibria.quasistatic import Equilibrium
+from ..lammps.dynamics import Motion, Weakening
+from ..scenes.command_sections import COMMANDS
+from ..scenes.scene import SECTIONS, Scene
+from ..scenes.validation import SceneError
+from .undamped import Checkpoint, Sample, perturb, sample_steps
+
+T = TypeVar("T")
+Task = Literal["ramp", "perturb"]
+
+
+class Record:
+    """run.h5 of a scene: opened where it was cut off, or begun.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    scene : Scene
+        The scene; a file of another scene is refused.
+    communicator : mpi4py.MPI.Comm, optional
+        Rank 0 writes; all by default.
+    task : {"ramp", "perturb"}
+        What the file is for: a settled packing and its ramp, or an undamped run. A file for the other is refused.
+    saved : callable, optional
+        Told in words what the file holds, and its path, whenever it has been saved.
+
+    Attributes
+    ----------
+    last : Equilibrium or None
+        The last one in the file.
+
+    Raises
+    ------
+    SceneError
+        If the file holds another scene, or is for another task.
+    OutputError
+        If the file cannot be written, or another run is writing it.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        scene: Scene,
+        communicator: MPI.Comm | None = None,
+        task: Task = "ramp",
+        saved: Callable[[str, Path], object] = lambda words, path: None,
+    ) -> None:
+        self.path, self.scene, self.task = path, scene, task
+        self.communicator = communicator or MPI.COMM_WORLD
+        self._file: RunFile | None = None
+        self._said = saved
+        self._alone = ExitStack()
+        try:
+            self.last: Equilibrium | None = raise_on_all_ranks(self.communicator, self._resume)
+        except BaseException:
+            self._alone.close()
+            raise
+
+    def _resume(self) -> Equilibrium | None:
+        check_output(self.path)
+        self._alone.enter_context(lock_output(self.path))
+        if not self.path.exists():
+            return None
+        file = RunFile(self.path, "a")
+        stored = json.loads(file.attributes.get("scene", "{}"))
+        difference = _difference(stored, self.scene.resolved(), self.task)
+        if difference:
+            raise SceneError(
+                f"{self.path} holds a run of another scene ({difference}): give another name with -o, or delete it"
+            )
+        task = file.attributes.get("task", "ramp")
+        if task != self.task:
+            raise SceneError(f"{self.path} is a file of the command {task}: give another name with -o, or delete it")
+        if len(file) == 0:
+            return None
+        self._file = file
+        self._say_saved()
+        row = {name: file.observable(name)[-1] for name in ("residual", "floor", "evaluations")}
+        way = fallbacks(file).get(len(file) - 1)
+        return Equilibrium(file.packing(), float(row["residual"]), float(row["floor"]), int(row["evaluations"]), way)
+
+    @property
+    def forces(self) -> Floats:
+        """F_x of the equilibria in the file, force; the same on all ranks."""
+        return raise_on_all_ranks(self.communicator, lambda: np.zeros(0) if self._file is None else self._file.fx)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run has come to its end; the same on all ranks."""
+        return bool(raise_on_all_ranks(self.communicator, lambda: self._file is not None and self._file.complete))
+
+    def finish(self) -> None:
+        """The run has come to its end."""
+        if self._file is not None:
+            with self._file.change():
+                self._file.put_checkpoint()
+                self._file.complete = True
+            self._file.save()
+            self._say_saved()
+
+    def append(self, equilibrium: Equilibrium) -> None:
+        """Write one equilibrium."""
+        if self.communicator.rank == 0:
+            if self._file is None:
+                attributes = self._attributes() | {"solid_fraction": solid_fraction(equilibrium.packing)}
+                self._file = RunFile.create(self.path, equilibrium.packing, attributes)
+            file = self._file
+            with file.change():
+                file.complete = False
+                scene = json.dumps(json.loads(file.attributes.get("scene", "{}")) | self.scene.resolved())
+                if scene != file.attributes.get("scene"):  # a ramp goes on from a file of `settle`, or further
+                    file.put_attribute("scene", scene)
+                file.append(equilibrium.packing, floor=equilibrium.floor, evaluations=equilibrium.evaluations)
+                if equilibrium.way is not None:
+                    file.put_attribute("ways", json.dumps(fallbacks(file) | {len(file) - 1: equilibrium.way}))
+            self._say_saved()
+        self.last = equilibrium
+
+    def undamped(
+        self, scene: Scene, start: Equilibrium, name: str = "undamped", weakening: Weakening | None = None
+    ) -> Iterator[Sample]:
+        """An undamped run whose lines go into a time series; it goes on where it was cut off.
+
+        Parameters
+        ----------
+        scene : Scene
+            With a section [perturb].
+        start : Equilibrium
+            Where the run begins.
+        name : str
+            Of the series.
+        weakening : Weakening, optional
+            As of `perturb`.
+
+        Yields
+        ------
+        Sample
+            Those that were in the file first.
+        """
+        assert scene.perturb is not None
+        _, steps = sample_steps(scene.perturb, start.packing)
+        known, checkpoint = raise_on_all_ranks(self.communicator, lambda: self._known(name))
+        yield from known
+        if len(known) == len(steps):
+            return
+        trajectory = scene.output is not None and scene.output.trajectory and name == "undamped"
+        samples: list[Sample] = []
+        motions: list[tuple[float, Motion]] = []
+
+        run = perturb(
+            scene,
+            start,
+            communicator=self.communicator,
+            weakening=weakening,
+            watch=(lambda time, motion: motions.append((time, motion))) if trajectory else None,
+            keep=lambda reached: self._keep(name, samples, motions, reached),
+            resume=checkpoint,
+        )
+        for sample in run:
+            samples.append(sample)
+            yield sample
+        self._keep(name, samples, motions, None)
+
+    def append_motion(self, time: float, motion: Motion) -> None:
+        """Write positions of an undamped run, series trajectory."""
+        self._append_motions([(time, motion)])
+
+    def _known(self, name: str) -> tuple[list[Sample], Checkpoint | None]:
+        """Lines of a series so far, and the state after them."""
+        if self._file is None or name not in self._file.names_of_series:
+            return [], None
+        columns = self._file.series(name)
+        rows = zip(*(columns[key].tolist() for key in columns), strict=True)
+        samples = [Sample(**dict(zip(columns, row, strict=True))) for row in rows]
+        state = self._file.checkpoint
+        return samples, Checkpoint(int(state.pop("step")), state) if state else None
+
+    def _keep(
+        self, name: str, samples: list[Sample], motions: list[tuple[float, Motion]], reached: Checkpoint | None
+    ) -> None:
+        """Write what has come since the last checkpoint, together with this one."""
+        if self._file is not None and (samples or reached):
+            with self._file.change():
+                self._file.complete = False
+                if samples:
+                    columns = {key: [getattr(sample, key) for sample in samples] for key in vars(samples[0])}
+                    self._file.append_series(name, **columns)
+                self._append_motions(motions)
+                state: dict[str, Any] = {} if reached is None else {"step": reached.step, **reached.state}
+                self._file.put_checkpoint(**state)
+            self._say_saved(f", and the series {name}" + (f" up to t = {samples[-1].time:g}" if samples else ""))
+        samples.clear()
+        motions.clear()
+
+    def _append_motions(self, motions: list[tuple[float, Motion]]) -> None:
+        if self._file is None or not motions:
+            return
+        low = [motion.position_low for _, motion in motions if motion.position_low is not None]
+        times, positions = [time for time, _ in motions], [motion.position for _, motion in motions]
+        self._file.append_trajectory(times, positions, low or None)
+
+    def _say_saved(self, more: str = "") -> None:
+        """Say what the stored file holds, if it holds all."""
+        file = self._file
+        if file is None or not file.saved or len(file) == 0:
+            return
+        goes_on = "is complete" if file.complete else "the same command goes on from there"
+        count = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}{more}"
+        self._said(f"{self.path} holds {count}; {goes_on}", self.path)
+
+    def _attributes(self) -> dict[str, str | int | float]:
+        return {
+            "task": self.task,
+            "scene": json.dumps(self.scene.resolved()),
+            "seed": getattr(self.scene.packing, "seed", -1),
+            "ranks": self.communicator.size,
+            **{f"version_{name}": version(name) for name in ("faultgouge", "lammps", "numpy", "scipy", "h5py")},
+        }
+
+    def __enter__(self) -> Record:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            self._file.save()
+            self._say_saved()
+            self._file.close()
+        self._alone.close()
+
+
+def fallbacks(file: RunFile) -> dict[int, str]:
+    """Of equilibria that were reached by another way than halved increments, their number and that way."""
+    return {int(number): way for number, way in json.loads(file.attributes.get("ways", "{}")).items()}
+
+
+def raise_on_all_ranks(communicator: MPI.Comm, work: Callable[[], T]) -> T:
+    """What rank 0 finds, on all ranks; an error that it meets is met by all."""
+    result: tuple[T | None, Exception | None] = (None, None)
+    if communicator.rank == 0:
+        try:
+            result = work(), None
+        except Exception as error:  # of whatever kind: the other ranks wait for it
+            result = None, error
+    value, failure = communicator.bcast(result)
+    if failure is not None:
+        raise failure
+    return value
+
+
+def _difference(stored: dict[str, Any], wanted: dict[str, Any], task: Task) -> str:
+    """The first key in which two resolved scenes differ, ramp.until left aside: a ramp may be prolonged.
+
+    Sections that the command of the file does not read are left aside, too, and those that a settled packing does not
+    need and one of the two does not have, since a ramp goes on from a file of `settle`.
+    """
+    stored, wanted = COMMANDS[task].part(stored), COMMANDS[task].part(wanted)
+    may_lack = set() if task == "perturb" else {"relax", "ramp", "output"}
+    for section in sorted(stored.keys() | wanted.keys()):
+        if section in may_lack - (stored.keys() & wanted.keys()):
+            continue
+        here, there = stored.get(section), wanted.get(section)
+        if isinstance(here, dict) and isinstance(there, dict):
+            for key in sorted(here.keys() | there.keys()):
+                old, new = (each.get(key, _default(section, key)) for each in (here, there))
+                if (section, key) != ("ramp", "until") and old != new:
+                    return f"{section}.{key} is {old} there and {new} here"
+        elif here != there:
+            return f"{section} is {'there' if here is not None else 'missing there'}"
+    return ""
+
+
+def _default(section: str, key: str) -> Any:
+    """What a key is that a file does not have, because it was written before there was such a key."""
+    fields = (model.model_fields[key] for model in SECTIONS.get(section, ()) if key in model.model_fields)
+    return next((field.default for field in fields if not field.is_required()), None)

@@ -1,0 +1,121 @@
+r"""Where a settling starts: disks that touch nothing yet, the upper layer above them.
+
+The disks have equal shares of the given radii, the upper layer too, where they take turns. It is evenly spaced along
+x, in as many tiers as it takes to keep its disks apart: a layer that is wider than the box when stretched out closes
+it, and cannot sink into the bed. The others are shuffled over the cells of a lattice that is wide enough for the
+largest disk, each at a random place inside its own cell. So no two disks overlap, whatever the seed, at a cost that
+grows as their number. The paper says only "loosely packed disks". A layer as open as this one, of which a third is
+filled, does not carry: without weight of their own the disks give way, and an upper layer that is loaded alone sinks
+to the floor. A settling from here has to lay a bed first.
+
+Even on a bed a heavy layer may sink, as a heavy liquid does through a light one. Without friction a bed bears shear
+stresses of a tenth of its pressure at the most, and that pressure is the weight of the layer above. Where the layer is
+thinner than elsewhere the bed is pressed up, the layer slides off the bulge, and gets thinner there; a layer of one or
+two disks differs by more than a tenth from place to place, since it is made of disks, and a wide one will find its weak
+spot. A layer of several disks comes to rest. A tenth of all disks, the paper's 10 of 100 if those are its layer, keeps
+the geometry the same for packings of all sizes.
+"""
+
+import numpy as np
+
+from ..exchange import Disks
+
+CELL = 1.25
+"""Smallest side of a cell, in largest diameters: a quarter is the room for placing a largest disk."""
+
+
+LAYER = 0.1
+"""Share of the disks that are the upper layer, where a scene does not say."""
+
+
+def layer_size(disks: int, radii: tuple[float, ...], width: float) -> int:
+    """Number of disks of an upper layer that comes to rest: a tenth of all, and enough to close the box.
+
+    Parameters
+    ----------
+    disks : int
+        Number of disks, the upper layer included.
+    radii : tuple of float
+        Radii, length, each of an equal share of the disks.
+    width : float
+        Width of the box, length.
+    """
+    side_by_side = width / (2 * float(np.mean(radii)))
+    return min(disks, max(1, round(max(LAYER * disks, side_by_side))))
+
+
+def _generator(seed: int, draw: int) -> np.random.Generator:
+    """Random numbers of a seed, of which each draw has its own."""
+    draws = np.random.SeedSequence(seed, spawn_key=(draw,) if draw else ())
+    return np.random.Generator(np.random.PCG64(draws))
+
+
+def random_start(
+    disks: int,
+    radii: tuple[float, ...],
+    top: int,
+    width: float,
+    seed: int,
+    *,
+    periodic: bool = True,
+    draw: int = 0,
+) -> Disks:
+    """Disks above the floor that overlap nowhere, the same on every platform for one seed.
+
+    Parameters
+    ----------
+    disks : int
+        Number of disks, the upper layer included.
+    radii : tuple of float
+        Radii, length; each is given to an equal share of the disks, a remainder to the first ones.
+    top : int
+        Number of disks in the upper layer, the last ones by index.
+    width : float
+        Width of the box, 0 <= x < width, length.
+    seed : int
+        Seed of numpy's PCG64.
+    periodic : bool
+        Whether x is periodic. All disks lie within the width in either case.
+    draw : int
+        Which of the loose starts of the seed: 0 is the first.
+
+    Returns
+    -------
+    Disks
+        Positions, radii, the upper layer and the period; the floor is y = 0.
+
+    Raises
+    ------
+    ValueError
+        If the upper layer has more disks than there are, or a disk is wider than the box.
+    """
+    if not 0 <= top <= disks or disks < 1:
+        raise ValueError(f"an upper layer of {top} disks cannot be made from {disks}")
+    sizes = np.resize(np.sort(radii), disks)
+    diameter = 2 * sizes.max()
+    if diameter > width:
+        raise ValueError(f"a disk of radius {sizes.max()} is wider than the box of width {width}")
+
+    generator = _generator(seed, draw)
+    bulk = generator.permutation(sizes[top:])
+    columns = max(1, int(width / (CELL * diameter)))
+    side = np.array([width / columns, CELL * diameter])
+    full, rest = divmod(len(bulk), columns)
+    # In the last, incomplete row the free cells are as random as the disks.
+    cells = np.concatenate([np.arange(full * columns), full * columns + generator.permutation(columns)[:rest]])
+    corner = np.column_stack([cells % columns, cells // columns]) * side
+    inside = corner + bulk[:, None] + (side - 2 * bulk[:, None]) * generator.random((len(bulk), 2))
+
+    order = np.arange(top)
+    # as many tiers as divide the layer, so that its ends do not meet across the periodic side
+    tiers = next((t for t in range(1, top + 1) if top % t == 0 and diameter * top <= t * width), 1)
+    height = side[1] * (full + (rest > 0)) + diameter * (order % tiers + 0.5)
+    above = np.column_stack([width * (order + 0.5) / max(top, 1), height])
+    return Disks(
+        f"the loose start of the seed {seed}",
+        position=np.concatenate([inside, above]),
+        radius=np.concatenate([bulk, sizes[:top]]),
+        id=np.arange(1, disks + 1),
+        top=np.arange(disks) >= len(bulk),
+        box_length=width if periodic else None,
+    )

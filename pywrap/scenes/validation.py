@@ -1,0 +1,152 @@
+"""What a scene is refused for, in one sentence: what is wrong, where, and what to do.
+
+pydantic finds what is wrong with a section; `sentence` says so in words of the scene.
+"""
+
+import reprlib
+import sys
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias, TypeGuard, TypeVar
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from ...analysis import BadInputError
+from ...analysis.files.plain_file import read_plain_text
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+SMALLEST, LARGEST = 1e-100, 1e100
+"""Between these a number may be: LAMMPS reads no subnormal ones, and products of three stay finite."""
+
+
+def check_number(value: float) -> float:
+    """A number that is 0 or of a size with which one can compute; any other is refused."""
+    if value != 0 and not SMALLEST <= abs(value) <= LARGEST:
+        raise refusal_sentence(
+            "", f"= {reprlib.repr(value)} is refused: give a number between {SMALLEST:g} and {LARGEST:g}"
+        )
+    return value
+
+
+Positive: TypeAlias = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(check_number)]
+NotNegative: TypeAlias = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(check_number)]
+
+T = TypeVar("T")
+
+KEYS = {
+    "ramp": "step and until",
+    "perturb": "fx and time",
+    "damping": "cn, ct or tau",
+    "friction": "v0, the velocity at which friction weakens",
+    "eruptions": "load, a list of F_x",
+}
+"""What a section needs at least."""
+
+
+MISSING = {"friction.v_ss": ', and the paper gives no value: give a velocity, or a multiple such as "10 v0"'}
+"""What is said of a key that is missing, where it is more than to add the key."""
+
+
+class SceneError(BadInputError):
+    """A scene that cannot be run: one sentence that says what is wrong, where, and what to do."""
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """What the TOML file of a scene or of a sweep holds; SceneError if it cannot be read, or is no TOML."""
+    try:
+        return tomllib.loads(read_plain_text(path))
+    except OSError as error:
+        raise SceneError(f"{path}: the {what} cannot be read ({error.strerror}): correct its path.") from None
+    except ValueError as error:  # bytes that are not UTF-8, or text that is not TOML
+        raise SceneError(f"{path}: the {what} is not valid TOML: {error}.") from None
+    except RecursionError:
+        raise SceneError(f"{path}: the {what} is nested too deeply: give sections, keys, numbers and lists.") from None
+
+
+class Section(BaseModel):
+    """A section of a scene: no key is changed, unknown or of another type than its own."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, validate_default=True)
+
+
+RULES = {
+    "greater_than": "give a number above {gt}",
+    "greater_than_equal": "give a number of at least {ge}",
+    "less_than": "give a number below {lt}",
+    "less_than_equal": "give a number of at most {le}",
+    "finite_number": "give a finite number",
+    "float_type": "give a number",
+    "int_type": "give a whole number",
+    "int_from_float": "give a whole number",
+    "bool_type": "give true or false",
+    "literal_error": "give {expected}",
+    "path_type": "give the name of a file, in quotes",
+    "tuple_type": "give a list of numbers",
+    "too_short": "give at least one number",
+}
+
+
+def refusal_sentence(key: str, says: str) -> PydanticCustomError:
+    """An error of `key` of the section (or of the field, if empty) that is being checked."""
+    return PydanticCustomError("refused", "{key} {says}", {"key": key, "says": says})
+
+
+def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ...]]) -> str:
+    """One error of pydantic as: where, what is wrong, what to do; `sections` has the models of each section."""
+    kind, context = error["type"], error.get("ctx", {})
+    path = [str(part) for part in error["loc"] if part not in ("generated", "stored")]
+    if kind == "extra_forbidden":
+        return _unknown_key(path, "stored" in error["loc"], sections)
+    place = ".".join([*path, *filter(None, [context.get("key")])])
+    if kind == "refused":
+        return f"{place} {context['says']}"
+    if kind == "missing":
+        what = f"{path[1]} to [{path[0]}]" if len(path) > 1 else f"the section [{place}]"
+        return f"{place} is missing{MISSING.get(place, f': add {what}')}"
+    if not path:
+        return "a scene maps the names of sections to their keys, and this one is no mapping: give a dict"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return f"{place} is not a section: write [{place}] and its keys below"
+    rule = RULES[kind].format(**context) if kind in RULES else error["msg"]
+    return f"{place} = {reprlib.repr(error['input'])} is refused: {rule}"
+
+
+def _unknown_key(path: list[str], stored: bool, sections: Mapping[str, tuple[type[Section], ...]]) -> str:
+    *above, key = path
+    homes = [name for name, models in sections.items() if any(key in model.model_fields for model in models)]
+    if not above:
+        if homes:
+            return f"{key} stands outside of its section: move it below [{homes[0]}]"
+        (nearest,) = get_close_matches(key, ["precision", *sections], 1, cutoff=0)
+        return f"{key} is no key of a scene: the nearest is {nearest}"
+    section = above[0]
+    if section in homes and stored:
+        return f"packing.{key} cannot stand beside packing.file, which decides it: leave one of them out"
+    if homes:
+        return f"{section}.{key} is no key of [{section}]: the nearest is {homes[0]}.{key}"
+    keys = [name for model in sections[section] for name in model.model_fields]
+    (nearest,) = get_close_matches(key, keys, 1, cutoff=0)
+    return f"{section}.{key} is no key of [{section}]: the nearest is {section}.{nearest}"
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a value of a scene is a number with which one can compute."""
+    # A comparison, because math.isfinite overflows on whole numbers, which TOML may hold of any size.
+    return (
+        isinstance(value, (int, float))
+        and not isinstance(value, bool)
+        and (value == 0 or SMALLEST <= abs(value) <= LARGEST)
+    )
+
+
+def require_section(section: T | None, name: str) -> T:
+    """A section of a scene that a task cannot do without."""
+    if section is None:
+        raise SceneError(f"the scene has no section [{name}]: add it, with {KEYS[name]}")
+    return section

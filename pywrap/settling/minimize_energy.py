@@ -1,0 +1,227 @@
+r"""A loose packing brought to rest under its load, without friction, whatever its size.
+
+Without friction the disks have an energy, that of the contacts and of the load,
+
+.. math:: E(q) = \frac{k_n}{p + 1} \sum_c \delta_c^{p+1} + F_y \sum_{top} y_i, \qquad F = -\partial E/\partial q,
+
+and settling is to find a minimum of it. Most of the way are rearrangements, in which contacts open and close one after
+the other: damped dynamics takes them in their stride, at a thousandth of the price of a linear solve a step (deck parts
+gather.in, bed.in, damp.in). The end is slow for dynamics and quick for Newton's method, if that is taught to live with
+what floats: a packing without friction has modes without stiffness (all of it may slide along the floor, a chain is
+about to buckle, a disk is held by nothing), on which K is singular or has a negative eigenvalue. So the flow
+:math:`\dot q = F` is integrated with implicit steps of length :math:`1/\sigma` (pseudo-transient continuation; Kelley
+and Keyes, SIAM J. Numer. Anal. 35, 508 (1998)),
+
+.. math:: (K + \sigma)\, \Delta q = F(q), \qquad q \leftarrow q + \alpha\, \Delta q .
+
+On stiff modes that is Newton's step, while floating parts creep by :math:`F/\sigma`. :math:`\sigma` is large enough for
+K + sigma to be positive definite, which the signs of its pivots tell, so that every step goes down and no saddle
+attracts; it falls where a whole step is good, and Newton's method with its quadratic convergence is what remains.
+:math:`\alpha < 1` where the step runs into something: it is shortened until the slope :math:`F \cdot \Delta q` along it
+is no longer uphill. Energies are never compared, as their differences drown in rounding long before forces do.
+
+All of this is NumPy on the whole packing, the same on every rank. Where Newton's method gets lost in a rearrangement,
+dynamics goes on from there, down to a tenth of the force before.
+"""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import TypeAlias
+
+import numpy as np
+from scipy.sparse import csc_array, diags_array
+
+from ...analysis import NoEquilibriumError, Packing, stiffness_matrix
+from ...analysis.factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
+from ...analysis.packing.arrays import Floats
+from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
+from ..equilibria.rattlers import place_disks
+from ..lammps.engine import Engine
+
+Watch: TypeAlias = Callable[[str], None]
+
+SMALL = 300
+"""Disks up to which dynamics goes all the way: a second or two."""
+
+TOLERANCES = tuple(10.0**-k for k in range(4, 10))
+"""Forces at which dynamics hands over to Newton's method, in units of F_y, one after the other as that fails. At the
+first, a packing of 3000 disks needs about 20 iterations; at the last the contacts are what they will be."""
+
+ABOVE_ROUNDING = 20.0
+"""Roundings of a contact's force to which dynamics can bring a disk: a disk has up to six contacts, the stiffest of
+which carry ten times F_y, and velocity Verlet stirs the last digits at each step."""
+
+STEPS = 400_000
+"""Time steps of one stage of dynamics, at the most, for more than SMALL disks: a layer may sink for ever. With the
+upper layer of `loose.layer_size` a stage takes 10,000 to 50,000, whatever the size of the packing."""
+
+ITERATIONS = 60
+"""Iterations before dynamics takes over again; where no rearrangement is under way, 15 to 40 do."""
+
+LONGEST = 0.1
+"""Longest displacement in one iteration, in smallest radii: no disk jumps over another."""
+
+UPHILL = 0.5
+"""A step is shortened if the slope at its end is uphill and steeper than this share of the slope at its begin."""
+
+LIGHT = 0.02
+"""Viscosity for few disks, in units of what is critical for a contact that carries F_y, of disks of mass one: about
+sqrt(F_y) in the paper's units, that of bed.in, and as good in any others."""
+
+DENSITY = 0.8
+"""Area fraction to which a high start is gathered: below that of any jammed packing of disks, 0.82 to 0.85."""
+
+SHEAR = 0.2
+"""Speed of shear waves in a packing without friction, in units of that of a sound wave along a row of contacts: a
+packing that has hardly more contacts than it needs resists compression, and shear little. With it the number of steps
+is the least, within a factor of two in the damping, for 1000, 3000 and 10,000 disks."""
+
+
+def settle_loose(engine: Engine, loose: Packing, watch: Watch = lambda says: None, bed: bool = True) -> Packing:
+    """A loose start at rest on the floor, under the load on its upper layer.
+
+    Parameters
+    ----------
+    engine : Engine
+        LAMMPS with the loose start.
+    loose : Packing
+        The start: no contacts, at F_x = 0.
+    watch : callable, optional
+        Told in words what begins.
+    bed : bool
+        Whether to lay a bed first, by a pull on every disk. Without, the load begins at once: for disks without
+        friction that lie on each other already.
+
+    Returns
+    -------
+    Packing
+        At rest to the rounding floor; where that is not found, to the last of the tolerances; or as it was when the
+        steps ran out.
+    """
+    if loose.law.frictional or len(loose) <= SMALL:
+        finest = max(TOLERANCES[-1] * loose.fy, ABOVE_ROUNDING * contact_rounding(loose))
+        if bed:
+            engine.settle(finest)
+        else:
+            engine.damp(loose, finest, STEPS, LIGHT * float(np.sqrt(_stiffest(loose))))
+        packing = engine.packing
+        try:
+            return equilibrate(engine, Equilibrium.of(packing), 0.0).packing
+        except NoEquilibriumError:
+            return packing if loose.law.frictional else minimize_energy(packing)[0]
+    watch(f"dynamics down to {TOLERANCES[0]:.0e} F_y on a disk")
+    if bed:
+        engine.settle(TOLERANCES[0] * loose.fy, _height(loose) / loose.position[:, 1].max(), _viscosity(loose), STEPS)
+    else:
+        engine.damp(loose, TOLERANCES[0] * loose.fy, STEPS, _viscosity(loose))
+    for tolerance, finer in pairwise(TOLERANCES):
+        packing = engine.packing
+        if largest_force(packing) > (1 + 1e-6) * tolerance * loose.fy:  # but for the rounding of forces
+            return packing  # out of steps: the layer sinks
+        watch("Newton's method")
+        packing, found = minimize_energy(packing)
+        if found:
+            return packing
+        watch(f"dynamics down to {finer:.0e} F_y on a disk")
+        engine.damp(packing, finer * loose.fy, STEPS)
+    return minimize_energy(engine.packing)[0]
+
+
+def minimize_energy(packing: Packing, iterations: int = ITERATIONS) -> tuple[Packing, bool]:
+    """The packing at the energy's minimum downhill from it, by Newton's method with implicit steps.
+
+    Parameters
+    ----------
+    packing : Packing
+        Without friction, near a minimum.
+    iterations : int
+        Linear solves, at the most.
+
+    Returns
+    -------
+    Packing
+        The minimum; or, where it is not reached, as far downhill as the iteration came.
+    bool
+        Whether the force is down at the rounding floor.
+    """
+    best, least = packing, largest_force(packing)
+    sigma = _stiffest(packing) * min(1.0, least / packing.fy) * 1e-2
+    sigma = max(sigma, 1e-12 * _stiffest(packing))
+    here = packing
+    for _ in range(iterations):
+        factors = _positive(here, sigma)
+        if factors is None:
+            sigma *= 10
+            continue
+        step = factors.solve(here.net_force[: 2 * len(here)])
+        here, share = _downhill(here, step)
+        sigma *= 0.2 if share > 0.5 else 4.0 if share < 0.1 else 1.0
+        residual = largest_force(here)
+        if least < 10 * rounding_floor(best) and residual > 0.5 * least:
+            return best, True
+        if residual < least:
+            best, least = here, residual
+    found = least < 10 * rounding_floor(best)
+    return best if found else here, found
+
+
+def _downhill(packing: Packing, step: Floats) -> tuple[Packing, float]:
+    """As far along a step as it leads downhill, and the share of it that this is."""
+    move = step.reshape(2, -1).T
+    share = min(1.0, LONGEST * packing.radius.min() / np.hypot(*move.T).max())
+    slope = packing.net_force[: len(step)] @ step
+    while True:
+        there = place_disks(packing, packing.position + share * move)
+        after = there.net_force[: len(step)] @ step
+        if after >= -UPHILL * slope or share < 1e-6:
+            return there, share
+        # where the slope would vanish if it fell evenly; a contact that closed on the way makes it fall late
+        share *= max(0.1, slope / (slope - after))
+
+
+def _positive(packing: Packing, sigma: float) -> Factors | None:
+    """Factors of K + sigma for x and y; None if that is not positive definite."""
+    size = 2 * len(packing)
+    matrix = csc_array(stiffness_matrix(packing)[:size, :size] + diags_array(np.full(size, sigma)))
+    try:
+        # symmetric, and without pivoting: the pivots are positive if and only if the matrix is positive definite; by
+        # SuperLU, so that a seed gives the same packing whatever is installed
+        factors = symmetric_lu(matrix, mumps=False)
+    except SingularMatrixError:
+        return None
+    return None if factors.negative else factors
+
+
+def largest_force(packing: Packing) -> float:
+    """Largest force on a disk, with torque over radius; disks that touch nothing included, which may fall."""
+    return float(np.linalg.norm(packing.net_force.reshape(3, -1), axis=0).max())
+
+
+def _stiffest(packing: Packing) -> float:
+    """Stiffness of a contact that carries F_y."""
+    return float(packing.law.normal_stiffness(packing.law.overlap_of_force(packing.fy)))
+
+
+def contact_rounding(packing: Packing) -> float:
+    """What one unit in the last place of a coordinate is to the force of a contact that carries F_y."""
+    return _stiffest(packing) * float(np.finfo(float).eps * _width(packing))
+
+
+def _width(packing: Packing) -> float:
+    return float(np.ptp(packing.position[:, 0])) if packing.box_length is None else packing.box_length
+
+
+def _height(packing: Packing) -> float:
+    """Of the disks at the area fraction to which they are gathered."""
+    return float(np.pi * np.sum(packing.radius**2) / (_width(packing) * DENSITY))
+
+
+def _viscosity(packing: Packing) -> float:
+    """Damping that is critical for the slowest shear wave across the height, mass / time: 2 m omega.
+
+    Its omega is pi c / (2 height), with c = SHEAR d (k / m)^(1/2) and the stiffness k of a contact under the pressure.
+    """
+    diameter = 2 * float(packing.radius.mean())
+    carried = packing.fy * packing.top.sum() * diameter / _width(packing)
+    stiffness = float(packing.law.normal_stiffness(packing.law.overlap_of_force(carried)))
+    return float(np.pi * SHEAR * diameter * np.sqrt(packing.mass.mean() * stiffness) / _height(packing))

@@ -1,0 +1,94 @@
+"""Disks of another code brought to rest under this law and load.
+
+Without slips they rest without friction first, and friction begins with zero slips: so K is symmetric at F_x = 0, as
+in a packing of our own. Disks that come with slips keep friction and rest by overdamped dynamics. Dynamics begins where
+the disks are. It makes what rearrangements there are; Newton's method does the last digits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...analysis import BadInputError, NoEquilibriumError, Packing, nearest_image
+from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
+from ..equilibria.rattlers import clear_rattlers
+from ..lammps.engine import Engine
+from .minimize_energy import ABOVE_ROUNDING, TOLERANCES, Watch, contact_rounding, largest_force, settle_loose
+
+SEEN = 0.01
+"""Displacement, in radii of the disk, from which a disk counts as moved."""
+
+
+def bring_to_rest(packing: Packing, watch: Watch = lambda says: None) -> tuple[Equilibrium, str]:
+    """Bring a packing to rest under its law and load.
+
+    Parameters
+    ----------
+    packing : Packing
+        Disks as another code left them.
+    watch : callable, optional
+        Told in words what begins.
+
+    Returns
+    -------
+    Equilibrium
+        At rest.
+    str
+        What moved, and by how much.
+
+    Raises
+    ------
+    BadInputError
+        If a packing without slips is under a shear force, which nothing holds without friction.
+    NoEquilibriumError
+        If it does not come to rest.
+    """
+    slipped = packing.law.frictional and bool(np.any(packing.contacts.slip))
+    if not slipped and packing.fx != 0:
+        raise BadInputError(
+            f"without slips the disks rest without friction first, and F_x = {packing.fx:g} would push them along for "
+            "ever: leave --fx out, and raise F_x by `faultgouge ramp`."
+        )
+    resting = _with_friction(packing) if slipped else _without(packing, watch)
+    idle = len(resting.loaded(rounding_floor(resting)).rattlers)
+    if idle > 0.5 * len(resting):
+        raise NoEquilibriumError(
+            f"the upper layer sank through the bed, and {idle} of {len(resting)} disks carry nothing: choose a layer "
+            "that closes the box (--top), or a lower load (--fy)"
+        )
+    with Engine(resting) as engine:
+        found = equilibrate(engine, Equilibrium.of(resting), resting.fx)
+    return found, _what_moved(packing, found)
+
+
+def _what_moved(before: Packing, found: Equilibrium) -> str:
+    """What coming to rest has done to a packing, in words."""
+    after = found.packing
+    moved = np.hypot(*nearest_image(after.position - before.position, after.box_length).T)
+    far = int(np.sum(moved > SEEN * after.radius))
+    old, new = (set(zip(p.contacts.i.tolist(), p.contacts.j.tolist(), strict=True)) for p in (before, after))
+    return (
+        f"brought to rest: the largest force on a disk was {largest_force(before):.3g} and is {found.residual:.2g}; "
+        f"{far} of {len(after)} disks moved by more than {SEEN:.0%} of their radius, the farthest by "
+        f"{moved.max():.3g}, all by {np.sqrt(np.mean(moved**2)):.3g} (rms); {len(new - old)} contacts closed and "
+        f"{len(old - new)} opened"
+    )
+
+
+def _without(packing: Packing, watch: Watch) -> Packing:
+    # where disks rest does not depend on their masses, and the time step of dynamics is that of masses of one
+    law, ones = replace(packing.law, mu=0.0, ct=0.0), np.ones(len(packing))
+    smooth = replace(packing, law=law, mass=ones)
+    with Engine(smooth) as engine:
+        found = settle_loose(engine, smooth, watch, bed=False)
+    return replace(
+        clear_rattlers(found, rounding_floor(found)), law=packing.law, angle=packing.angle, mass=packing.mass
+    )
+
+
+def _with_friction(packing: Packing) -> Packing:
+    with Engine(packing) as engine:
+        engine.relax(max(TOLERANCES[-1] * packing.fy, ABOVE_ROUNDING * contact_rounding(packing)))
+        return engine.packing

@@ -1,0 +1,248 @@
+"""The packing of a scene in equilibrium at F_x = 0: generated and settled, or read from a file.
+
+All functions are collective over the ranks of the communicator.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ...analysis import MindlinLaw, NoEquilibriumError, Packing
+from ...analysis.packing.arrays import Floats
+from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
+from ..equilibria.rattlers import clear_rattlers
+from ..exchange import packing_of
+from ..lammps.engine import Engine
+from ..scenes.packing_section import GeneratedPacking
+from ..scenes.scene import Scene
+from ..scenes.validation import SceneError
+from .minimize_energy import Watch, settle_loose
+
+OUT_OF_BALANCE = 1e-3
+"""Residual of a stored packing, in units of F_y, above which it counts as not settled: the packing would
+rearrange rather than relax."""
+
+STIFFNESS = 2e5
+"""k_n while a packing settles: the paper's, so that its scenes settle in their own units."""
+
+DIGITS = 12
+"""Decimal digits of the numbers that settle: more than anybody gives, and fewer than a change of units leaves right."""
+
+SLIPPERY = 1e-3
+"""Friction coefficient below which friction bears no packing: contacts are at their bound at slips of a thousandth of
+an overlap, and K has no tangential stiffness there."""
+
+STARTS = 5
+"""Loose starts of a seed that settle one after the other, until a layer stays on top. Of 100 disks under the paper's
+load it sinks from one start in a hundred."""
+
+
+def settle(
+    scene: Scene,
+    mu: float | None = None,
+    communicator: MPI.Comm | None = None,
+    watch: Watch = lambda says: None,
+    bed: Packing | None = None,
+) -> Equilibrium:
+    """The packing of a scene in equilibrium at F_x = 0.
+
+    A generated packing settles without friction, and friction begins with zero slips (or settles with
+    friction, if the scene says so); a stored one is taken as it is. Both are brought to the rounding floor. Where the
+    upper layer sinks through the bed, the next loose start of the seed is settled, up to `STARTS` of them.
+
+    Settling is chaotic: two arithmetics would end in two packings. It takes doubles in either arithmetic, so that a
+    seed is one packing, and compensated arithmetic begins where the settled packing is brought to its own floor.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is wanted.
+    mu : float, optional
+        Friction coefficient; by default the scene's first.
+    communicator : mpi4py.MPI.Comm, optional
+        The ranks that share the packing; all by default.
+    watch : callable, optional
+        Told in words what begins, for a packing of more than 300 disks, which takes a while.
+    bed : Packing, optional
+        What `settle_bed` gives for a scene that settles as this one does: it is then not settled again, and the
+        equilibrium is the same to the bit.
+
+    Returns
+    -------
+    Equilibrium
+
+    Raises
+    ------
+    SceneError
+        If a stored packing is not in balance.
+    NoEquilibriumError
+        If the packing does not come to rest.
+    """
+    packing = (
+        settle_bed(scene, mu, communicator, watch)
+        if bed is None
+        else replace(bed, law=law_of(scene, scene.law.mus[0] if mu is None else mu))
+    )
+    packing = _in_arithmetic(packing, scene.precision)
+    with Engine(packing, communicator) as engine:
+        try:
+            return equilibrate(engine, Equilibrium.of(packing), packing.fx)
+        except NoEquilibriumError as error:
+            raise NoEquilibriumError(
+                f"the packing does not come to rest (a disk feels {packing.residual:.2g}): {_cure(scene, packing)}"
+            ) from error
+
+
+def _cure(scene: Scene, packing: Packing) -> str:
+    """What to do about a packing that has no equilibrium near where it is."""
+    if 0 < packing.law.mu < SLIPPERY:
+        return f"friction of mu = {packing.law.mu:g} holds next to nothing; take a larger law.mu, or 0 for no friction"
+    if isinstance(scene.packing, GeneratedPacking):
+        return (
+            "put more disks into the upper layer (leave packing.top out for as many as it takes), or try another seed"
+        )
+    return (
+        f"no equilibrium lies near where {scene.packing.file} has its disks: check law and load against those it was "
+        "settled with, or bring it to rest by `faultgouge import --relax`"
+    )
+
+
+def settle_bed(
+    scene: Scene,
+    mu: float | None = None,
+    communicator: MPI.Comm | None = None,
+    watch: Watch = lambda says: None,
+) -> Packing:
+    """The packing of a scene as it has settled, not yet balanced to the rounding floor; arguments as of `settle`.
+
+    Scenes that settle without friction, and differ only in friction and in what follows, share it.
+    """
+    law = law_of(scene, scene.law.mus[0] if mu is None else mu)
+    generated = isinstance(scene.packing, GeneratedPacking)
+    return _settle_starts(scene, law, communicator, watch) if generated else _take_stored(scene, law)
+
+
+def shared_bed(scene: Scene, watch: Watch = lambda says: None) -> Packing | None:
+    """The bed that all friction coefficients of a scene begin from; None if each has its own, or there is one alone."""
+    alone = len(scene.law.mus) == 1
+    own = isinstance(scene.packing, GeneratedPacking) and scene.packing.settle_friction
+    return None if alone or own else settle_bed(scene, watch=watch)
+
+
+def law_of(scene: Scene, mu: float) -> MindlinLaw:
+    cn, ct = (scene.damping.cn, scene.damping.ct) if scene.damping else (0.0, 0.0)
+    law, history = scene.law, scene.law.history
+    memory = {"rescaled": history == "rescaled", "coulomb": history == "coulomb"}
+    return MindlinLaw(law.kn, law.kt, mu, law.exponent, cn, ct, **memory)
+
+
+def load_of(scene: Scene) -> dict[str, Any]:
+    """What packings of the scene have beside disks and law."""
+    drag_time = scene.damping.tau if scene.damping else None
+    return {"fy": scene.load.fy, "inertia_factor": scene.inertia_factor, "drag_time": drag_time}
+
+
+def _settle_starts(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None, watch: Watch) -> Packing:
+    """The first of the seed's loose starts whose upper layer stays on top, settled in `own_units`."""
+    assert isinstance(scene.packing, GeneratedPacking)
+    section, own, fy = own_units(scene.packing, law, scene.load.fy)
+    settling_law = own if section.settle_friction else replace(own, mu=0.0)
+    for draw in range(STARTS):
+        if draw:
+            watch(f"the upper layer sank through the bed: loose start {draw + 1} of {STARTS}")
+        start = section.start(draw)
+        assert start.top is not None
+        loose = packing_of(start, settling_law, start.top, **load_of(scene) | {"fy": fy})
+        with Engine(loose, communicator) as engine:
+            packing = settle_loose(engine, loose, watch)
+        idle = len(packing.loaded(rounding_floor(packing)).rattlers)
+        if idle <= 0.5 * len(packing):
+            break
+    else:
+        raise NoEquilibriumError(
+            f"the upper layer sank through the bed from each of {STARTS} loose starts, and {idle} of {len(packing)} "
+            "disks carry nothing: without friction only a layer that closes the box stays on top, so put more disks "
+            "into it (leave packing.top out for as many as it takes)"
+        )
+    if not section.settle_friction:
+        packing = replace(clear_rattlers(packing, rounding_floor(packing)), angle=np.zeros(len(packing)))
+    return _in_scene(packing, scene, law, scene.packing.start(draw).radius)
+
+
+def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[GeneratedPacking, MindlinLaw, float]:
+    """What a scene settles, in the units of a packing: its smallest diameter is the length, and k_n is `STIFFNESS`.
+
+    Settling is chaotic, and amplifies the last digit of any number. A seed is one packing all the same, whatever units
+    the scene has: radii, width and F_y are rounded here to `DIGITS`, so that two scenes that differ in their units
+    alone settle the same numbers.
+
+    Parameters
+    ----------
+    packing : GeneratedPacking
+        Radii and width in the scene's length.
+    law : MindlinLaw
+        In the scene's force / length^exponent.
+    fy : float
+        The scene's force.
+
+    Returns
+    -------
+    GeneratedPacking, MindlinLaw, float
+        The same in the packing's units. Dashpots are left out: settling has a damping of its own.
+    """
+    length = 2 * min(packing.radii)
+    radii = tuple(_round_numbers(radius / length) for radius in packing.radii)
+    section = packing.model_copy(update={"radii": radii, "width": _round_numbers(packing.width / length)})
+    tangential = Fraction(law.kt / law.kn).limit_denominator(1000)  # a share such as 2/7, to the bit
+    kt = tangential.numerator * STIFFNESS / tangential.denominator
+    if not np.isclose(kt, law.kt / law.kn * STIFFNESS, rtol=10.0**-DIGITS, atol=0.0):
+        kt = _round_numbers(law.kt / law.kn * STIFFNESS)
+    own = MindlinLaw(STIFFNESS, kt, law.mu, law.exponent, rescaled=law.rescaled)
+    return section, own, _round_numbers(fy / (law.kn * length**law.exponent) * STIFFNESS)
+
+
+def _round_numbers(number: float) -> float:
+    return float(f"{number:.{DIGITS}g}")
+
+
+def _in_scene(packing: Packing, scene: Scene, law: MindlinLaw, radius: Floats) -> Packing:
+    """A packing in `own_units` as one of the scene's units, law and load, with the radii of the scene."""
+    assert isinstance(scene.packing, GeneratedPacking)
+    length = 2 * min(scene.packing.radii)
+    contacts = packing.contacts
+    found = replace(
+        packing,
+        position=length * packing.position,
+        radius=radius,
+        contacts=contacts.slipped(length * contacts.slip),
+        law=law,
+        # where disks rest does not depend on their masses
+        mass=scene.packing.mass_of(radius),
+        box_length=None if packing.box_length is None else scene.packing.width,
+        fy=scene.load.fy,
+    )
+    return found.loaded(0.0)  # a contact that carries next to nothing may open by rounding
+
+
+def _in_arithmetic(packing: Packing, precision: str) -> Packing:
+    """The packing with low parts of its coordinates, or without."""
+    if precision == "double":
+        return replace(packing, position_low=None)
+    return packing if packing.compensated else replace(packing, position_low=np.zeros_like(packing.position))
+
+
+def _take_stored(scene: Scene, law: MindlinLaw) -> Packing:
+    assert not isinstance(scene.packing, GeneratedPacking)
+    packing = _in_arithmetic(scene.packing.packing(law, **load_of(scene)), scene.precision)
+    if packing.residual > OUT_OF_BALANCE * scene.load.fy:
+        raise SceneError(
+            f"{scene.packing.file}: the packing is not in balance, a disk feels {packing.residual:.3g} under "
+            f"fy = {scene.load.fy:g}: check law and load against those it was settled with, or bring it to rest by "
+            "`faultgouge import --relax`"
+        )
+    return packing

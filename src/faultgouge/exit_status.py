@@ -1,0 +1,75 @@
+"""How the command ends when something goes wrong: one sentence and one exit code, on all ranks.
+
+Exit codes: 1 for a computation that failed, 2 for bad input; 130 and 143 for signals, see
+:mod:`faultgouge.signal_guard`.
+
+An error that all ranks meet ends them one by one; one that a rank meets alone would leave the others waiting for ever.
+Which of the two it is, the ranks find out by meeting: who is alone for `MEETING` ends all.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import traceback
+from pathlib import Path
+from typing import NoReturn
+
+from .ranks import is_root, size
+
+MEETING = 3.0
+"""Seconds within which all ranks come to an error that all of them meet."""
+
+HEARD = 0.5
+"""Seconds between the sentence and the end of all ranks: an abort drops what mpiexec has not yet passed on."""
+
+
+def fail(error: Exception) -> NoReturn:
+    """Say what went wrong and end."""
+    sentence, code = _sentence(error), int(getattr(error, "exit_code", 1))
+    known_to_one = isinstance(error, OSError) or getattr(error, "one_rank", False)
+    alone = size() > 1 and (known_to_one or not _all_are_here())
+    if sentence and (alone or is_root()):
+        _print(sentence)
+    if alone:
+        from mpi4py import MPI
+
+        time.sleep(HEARD)
+        MPI.COMM_WORLD.Abort(code)
+    sys.exit(code)
+
+
+def _all_are_here() -> bool:
+    """Whether all ranks come here: a rank that meets an error alone waits in vain."""
+    if "mpi4py.MPI" not in sys.modules:
+        return True  # MPI is not there to be waited in
+    from mpi4py import MPI
+
+    meeting, deadline = MPI.COMM_WORLD.Ibarrier(), time.monotonic() + MEETING
+    while not meeting.Test():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def _print(sentence: str) -> None:
+    from rich.console import Console
+
+    Console(stderr=True, soft_wrap=True, highlight=False).print("[bold red]Error:[/bold red] ", end="")
+    print(sentence, file=sys.stderr, flush=True)
+
+
+def _sentence(error: Exception) -> str:
+    show = getattr(error, "format_message", None)
+    if show:
+        return str(show()).strip()
+    from faultgouge.analysis import FaultgougeError
+
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else f"{error.strerror}"
+    if isinstance(error, FaultgougeError):
+        return str(error).strip()
+    places = traceback.extract_tb(error.__traceback__)
+    where = f"{Path(places[-1].filename).name}:{places[-1].lineno}" if places else "unknown place"
+    return f"this should not have happened ({type(error).__name__} at {where}: {error}): please report it"

@@ -1,0 +1,188 @@
+"""A command works in a process of its own, and a guard beside it ends with it: in one sentence, within two seconds.
+
+Python runs a signal's handler between two of its own instructions, and LAMMPS or LAPACK may be minutes away from the
+next one; SciPy's `eig` does not even let another thread run. So the process that the shell or mpiexec has started
+forks before anything heavy is imported. Its child does the work. The guard waits for the child and for signals, hands
+SIGINT (Ctrl-C), SIGTERM and SIGHUP on, and gives the child `GRACE` to close files and to end other processes. Nothing
+is lost by that, as files of results are whole at any moment (:mod:`faultgouge.analysis.files.atomic_write`). Then the
+guard says what is kept, in the words that the child has left in memory that both share (`keeps`), and exits with 128
+and the number of the signal: 130, 143 or 129.
+When the guard ends, in whatever way, the kernel kills the child. A child that a library has ended (SIGSEGV, SIGABRT,
+or SIGKILL for want of memory), or a limit of CPU time (SIGXCPU), ends in a sentence as well.
+
+Under mpiexec every rank has its guard. mpiexec hands a signal to all ranks and kills the others once the work of one is
+gone, so the guards end `TOGETHER`, and the work after them. Rank 0 alone speaks.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from types import FrameType
+from typing import NoReturn
+
+from . import parent_death
+from .ranks import is_root, size
+
+GRACE = 0.8
+"""Seconds that the work has after a signal to close files and to end other processes."""
+
+TOGETHER, LAST = 1.2, 1.7
+"""Seconds after a signal at which the guards of several ranks end, all with the same exit code, and until which their
+work is there: mpiexec kills all ranks as soon as the work of one is gone, and then reports the kill."""
+
+SIGNALS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # `nohup` has a command go on without its terminal
+    SIGNALS[signal.SIGHUP] = "the terminal or the connection was closed"
+
+NOTHING = "nothing was written, and the same command begins anew"
+_shared = mmap.mmap(-1, 4096)
+"""Shared by guard and work: what an interrupt leaves, as UTF-8, a place and words that each end with a zero, and
+`CLOSED`."""
+
+CLOSED = 4095
+"""The byte of the shared memory that is not zero once the work has closed its files after a signal."""
+
+
+class Interrupted(BaseException):
+    """A signal asks the work to end. No `Exception`: nothing on the way may take it for a failure."""
+
+
+def raise_interrupt_in(error: BaseException) -> None:
+    """Raise the interrupt that an error was made of: Python before 3.12 makes one of what `__set_name__` raises."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, Interrupted):
+            raise cause
+        cause = cause.__cause__ or cause.__context__
+
+
+def keeps(words: str, path: str | os.PathLike[str] = "") -> None:
+    """Set what is said at an interrupt: what is kept, and how to go on; and the file or folder that must be there."""
+    place = os.path.abspath(path) if path else ""
+    _shared[:CLOSED] = f"{place}\0{words}".encode()[: CLOSED - 1].ljust(CLOSED, b"\0")
+
+
+def guarded(work: Callable[[], None]) -> NoReturn:
+    """Do the work of a command, and exit with its exit code."""
+    if threading.active_count() > 1 or "numpy" in sys.modules:  # no fresh process: not one to be forked
+        _work(work, guard=False)
+    keeps(NOTHING)
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    waited = {*SIGNALS, signal.SIGCHLD}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, waited)
+    guard = os.getpid()
+    child = os.fork()
+    if child == 0:
+        parent_death.end_with(guard)
+        for number in SIGNALS:  # also where they were ignored, as in the background of a script
+            signal.signal(number, _raise)
+        sys.unraisablehook = _raised_where_nothing_passes
+        signal.pthread_sigmask(signal.SIG_SETMASK, before - set(SIGNALS))
+        _work(work, guard=True)
+    _watch(child, waited)
+
+
+def _work(work: Callable[[], None], guard: bool) -> NoReturn:
+    """What the child does."""
+    try:
+        work()
+    except Interrupted as signalled:
+        sys.stdout.flush()
+        if not guard:
+            os._exit(128 + signalled.args[0])
+        _shared[CLOSED] = 1
+        os.kill(os.getppid(), signalled.args[0])  # where the work alone was signalled
+        if size() > 1:
+            parent_death.outlive()
+        time.sleep(max(0.0, signalled.args[1] + LAST - time.monotonic()))
+        os._exit(128 + signalled.args[0])
+    sys.exit(0)
+
+
+def _raise(number: int, frame: FrameType | None) -> None:
+    for each in SIGNALS:
+        signal.signal(each, signal.SIG_IGN)  # the guard's copy of the same signal
+    raise Interrupted(number, time.monotonic())
+
+
+def _raised_where_nothing_passes(lost: sys.UnraisableHookArgs) -> None:
+    """Raise an interrupt anew that came in a callback or a destructor, which let no exception pass."""
+    if not isinstance(lost.exc_value, Interrupted):
+        sys.__unraisablehook__(lost)
+        return
+    number = lost.exc_value.args[0]
+    signal.signal(signal.SIGALRM, lambda *_: _raise(number, None))
+    signal.setitimer(signal.ITIMER_REAL, 0.01)
+
+
+def _watch(child: int, waited: set[signal.Signals]) -> NoReturn:
+    """Wait for the child or a signal."""
+    while True:
+        number = signal.sigwait(waited)
+        if number == signal.SIGCHLD:
+            ended, status = os.waitpid(child, os.WNOHANG)
+            if ended:
+                _end(status, time.monotonic())
+        else:
+            _hand_on(child, number)
+
+
+def _hand_on(child: int, number: int) -> NoReturn:
+    """Let the child close its files after a signal; the kernel ends it when the guard has ended."""
+    begin = time.monotonic()
+    os.kill(child, number)
+    while not _shared[CLOSED] and time.monotonic() < begin + GRACE:
+        ended, _ = os.waitpid(child, os.WNOHANG)
+        if ended:
+            break
+        time.sleep(0.01)
+    else:
+        if not _shared[CLOSED]:
+            os.kill(child, signal.SIGSTOP)  # so that it writes no more than is said to be kept
+            if sys.stderr.isatty():
+                sys.stderr.write("\x1b[?25h\n")  # the cursor, which a progress bar has hidden
+    _interrupted(number, begin)
+
+
+def _interrupted(number: int, begin: float) -> NoReturn:
+    if is_root():
+        _say(f"{SIGNALS[signal.Signals(number)]}: {_kept()}")
+    if size() > 1:
+        time.sleep(max(0.0, begin + TOGETHER - time.monotonic()))
+    os._exit(128 + number)
+
+
+def _end(status: int, now: float) -> NoReturn:
+    """End as the child has ended."""
+    code = os.waitstatus_to_exitcode(status)
+    if code - 128 in set(SIGNALS):
+        _interrupted(code - 128, now)
+    if code == -signal.SIGKILL:
+        _say(f"killed from outside, for want of memory perhaps: {_kept()}")
+        os._exit(128 + signal.SIGKILL)
+    if code == -signal.SIGXCPU:
+        _say(f"the limit of CPU time (ulimit -t) is reached: {_kept()}")
+        os._exit(128 + signal.SIGXCPU)
+    if code < 0:
+        _say(f"a library has ended the command ({signal.Signals(-code).name}); please report it: {_kept()}")
+        os._exit(1)
+    os._exit(code)
+
+
+def _kept() -> str:
+    place, words, *_ = _shared[:CLOSED].decode(errors="replace").split("\0")
+    if place and not os.path.exists(place):
+        return f"{place} is not there, and the same command begins anew"
+    return words
+
+
+def _say(sentence: str) -> None:
+    with suppress(OSError):  # nobody may be there to read it
+        print(f"Error: {sentence}.", file=sys.stderr, flush=True)

@@ -1,0 +1,267 @@
+r"""Complex pairs along a ramp: how many, how fast, and what stops them.
+
+Beyond the first window the operator :math:`K = S + A` of a packing, S symmetric and A antisymmetric, has ever more
+complex pairs. With :math:`\omega = \sqrt\lambda`, the mean square displacement of a pair grows at the rate
+:math:`2 |\mathrm{Im}\,\omega|`, and
+
+.. math:: Q = \frac{|\mathrm{Re}\,\omega|}{2\,|\mathrm{Im}\,\omega|}
+
+is the quality factor below which a dissipation that gives each mode the loss :math:`\omega/Q` stops the growth. The
+least Q over the pairs of a load is the Q that stops them all. The *share* of complex modes is twice the number of pairs
+over the number of eigenvalues; rattlers have none.
+
+**Which pairs count.** Rounding makes pairs of eigenvalues that nearly meet, with imaginary parts of up to
+:math:`(u |A|_F\, c)^{1/2}` for couplings c (:mod:`~faultgouge.analysis.spectrum.spectrum`). No coupling is larger than
+the largest eigenvalue, so that a pair beyond that bound is real without a look at its vectors. Of the others the
+vectors are computed, and decide.
+
+**Where the branch ends.** A real negative eigenvalue is the classical instability: Newton's method has passed a turning
+point, and no packing reaches such an equilibrium by itself. The loads of a packing end before it ("turning point").
+
+**Large packings.** Of more than `ALL` disks the pairs are counted in slices of the spectrum, with a stated error
+(:mod:`~faultgouge.studies.modes.count_in_slices`): the key pairs_error of a load.
+
+**A bound.** The imaginary part of an eigenvalue is at most the norm of the antisymmetric part, :math:`|\mathrm{Im}\,
+\lambda| \le |(A - A^T)/2|_2` with A the mass-weighted operator (Bendixson, Acta Math. 25, 359 (1902)): the key bound. A
+contact couples two disks alone, so that the norm does not grow with the number of disks unless contacts become
+stiffer or more loaded: growth rates cannot grow with it for ever.
+
+**Where b matters.** A tangential force that depends on the overlap, :math:`b = \partial f_t/\partial\delta`, makes K
+non-symmetric. Of packings of up to `SMALL` disks pairs are also counted with b of sticking contacts alone, of sliding
+contacts alone, and of none, at the same equilibria. (The turning of the tangent, which is non-symmetric too, stays.)
+With rescaled slips b is the mean of that of contacts which close and of contacts which part, and the key while has the
+pairs with either (:mod:`~faultgouge.analysis.packing.law`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigvals
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import eigsh
+
+from ...analysis import (
+    NoEquilibriumError,
+    Packing,
+    dynamical_matrix,
+    eigenpairs,
+    eigenvalues,
+    growth_rate,
+    negative_eigenvalues,
+    stiffness_matrix,
+)
+from ...analysis.spectrum.spectrum import (
+    SAFETY,
+    Complexes,
+    active_coordinates,
+    exceeds_rounding,
+    mass_weighted,
+    unit_rounding,
+)
+from ...pywrap import Equilibrium, Scene
+from ...pywrap.runs.equilibrium_path import EquilibriumPath
+from ...pywrap.scenes.study_sections import Modes
+from ...pywrap.scenes.validation import require_section
+from ..packing_tools import Start, path_from, sliding_contacts
+from .count_in_slices import count_in_slices
+
+ALL = 1000
+"""Disks up to which all eigenvalues are computed: ten seconds a load, and 70 MB."""
+
+SMALL = 300
+"""Disks up to which b is switched: three more decompositions a load."""
+
+BESIDE = 1e-9
+"""Distance of a shift from the eigenvalue whose vectors are wanted, in units of the eigenvalue."""
+
+NORM = 1e-6
+"""Relative error of the norm squared: it is a bound that is several times larger than what it bounds."""
+
+DIGITS = 7
+"""Digits of the frequencies that are stored."""
+
+
+@dataclass(frozen=True)
+class Counted:
+    """The complex pairs of one packing.
+
+    Attributes
+    ----------
+    omega : ndarray of complex, shape (P,)
+        Of each pair the frequency with positive real and imaginary part, fastest growing first, 1 / time.
+    modes : int
+        Number of eigenvalues.
+    error : int or None
+        Of the number of pairs, where these are counted in slices.
+    negative : tuple of float
+        The real negative eigenvalues, the most negative first, 1 / time^2.
+    """
+
+    omega: Complexes
+    modes: int
+    error: int | None = None
+    negative: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, values: Complexes) -> Counted:
+        """Those of some eigenvalues, of which all with positive imaginary part count."""
+        omega = np.sqrt(values[values.imag > 0])
+        return cls(omega[np.argsort(-omega.imag)], len(values))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers: pairs, negative, share, growth_rate, omega (of the fastest pair), least_q."""
+        fastest = self.omega[0] if len(self.omega) else None
+        rates = [growth_rate(value) for value in self.negative[:1]] + [2 * w.imag for w in self.omega[:1]]
+        return {
+            "pairs": len(self.omega),
+            "share": 2 * len(self.omega) / self.modes if self.modes else 0.0,
+            "negative": len(self.negative),
+            "growth_rate": float(max(rates, default=0.0)),
+            "omega": None if fastest is None else float(fastest.real),
+            "least_q": float(np.min(self.omega.real / (2 * self.omega.imag))) if len(self.omega) else None,
+        }
+
+
+def count_pairs(packing: Packing) -> Counted:
+    """The complex pairs of a packing that exceed their rounding uncertainty.
+
+    Parameters
+    ----------
+    packing : Packing
+        In equilibrium.
+    """
+    if len(packing) > ALL:
+        found, error = count_in_slices(packing)
+        size, negative = dynamical_matrix(packing)[0].shape[0], tuple(negative_eigenvalues(packing).tolist())
+        return replace(Counted.of(found), modes=size, error=error, negative=negative)
+    values = eigenvalues(packing)
+    rounding = unit_rounding(dynamical_matrix(packing)[0].data)
+    surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))
+    doubtful = np.flatnonzero((values.imag > 0) & (values.imag <= surely))
+    noise = [k for k in doubtful if not _is_real(packing, values[k], rounding)]
+    values = values.copy()
+    values[noise] = values[noise].real
+    return replace(Counted.of(values), negative=tuple(negative_eigenvalues(packing).tolist()))
+
+
+def _is_real(packing: Packing, value: complex, rounding: float) -> bool:
+    found = eigenpairs(packing, value * (1 + BESIDE), 2)
+    nearest = int(np.argmin(np.abs(found.values - value)))
+    return exceeds_rounding(value, float(found.overlap[nearest]), rounding)
+
+
+def antisymmetric_norm(packing: Packing) -> float:
+    """|(A - A^T)/2|_2 of the mass-weighted operator, which no |Im lambda| exceeds, 1 / time^2."""
+    matrix, _ = dynamical_matrix(packing)
+    skew = csr_array(0.5 * (matrix - matrix.T))
+    if skew.shape[0] < 3 or abs(skew).max() == 0:
+        return 0.0
+    start = np.random.default_rng(0).standard_normal(skew.shape[0])
+    largest = eigsh(csr_array(skew.T @ skew), 1, which="LA", v0=start, tol=NORM, return_eigenvectors=False)
+    return float(np.sqrt(largest[0]))
+
+
+def count_with_part_of_b(packing: Packing) -> dict[str, dict[str, Any]]:
+    """The complex pairs with b of sticking contacts alone, of sliding contacts alone, and of none."""
+    slides = sliding_contacts(packing)
+    return {
+        name: Counted.of(_values(packing, coupled)).as_dict()
+        for name, coupled in (("sticking", ~slides), ("sliding", slides), ("none", np.zeros_like(slides)))
+    }
+
+
+def parting(packing: Packing) -> dict[str, dict[str, Any]]:
+    """The complex pairs of a law with rescaled slips while all contacts close, and while all part."""
+    return {
+        name: Counted.of(_values(packing, parting=share)).as_dict()
+        for name, share in (("closing", 0.0), ("parting", 1.0))
+    }
+
+
+def _values(packing: Packing, coupled: NDArray[np.bool_] | None = None, parting: float = 0.5) -> Complexes:
+    """Eigenvalues of K in which b counts for some contacts; pairs within the bound of rounding are made real."""
+    matrix = mass_weighted(stiffness_matrix(packing, coupled=coupled, parting=parting), packing)
+    active = active_coordinates(matrix)
+    dense = matrix[active][:, active].toarray()
+    values = np.asarray(eigvals(dense, check_finite=False), dtype=np.complex128)
+    surely = np.sqrt(SAFETY * unit_rounding(dense) * np.abs(values).max(initial=0.0))
+    return np.where(np.abs(values.imag) > surely, values, values.real)
+
+
+def modes(scene: Scene, start: Start) -> dict[str, Any]:
+    """The complex pairs of a scene at the loads of its section [modes], as a row of a sweep: the task "modes".
+
+    Raises
+    ------
+    SceneError
+        If the scene has no section [ramp].
+    NoEquilibriumError
+        If the packing does not settle.
+    """
+    return along_ramp(scene, start(scene.law.mus[0]), _load)
+
+
+def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
+    """What there is to see of the packing at each load of [modes] that it bears.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a section [ramp].
+    start : callable
+        mu -> the settled packing.
+    look : callable
+        Packing -> the numbers of one load.
+    """
+    step, wanted = require_section(scene.ramp, "ramp").step, (scene.modes or Modes()).fx_over_fy
+    row: dict[str, Any] = {"ends": "until", "loads": []}
+    with path_from(rest, scene) as path:
+        for share in sorted(wanted):
+            try:
+                packing = _climb_to(path, share * scene.load.fy, step)
+            except NoEquilibriumError:
+                row["ends"] = "no equilibrium"
+                break
+            if len(negative_eigenvalues(packing)):
+                row["ends"] = "turning point"
+                break
+            row["loads"].append({"fx_over_fy": share, "fx": packing.fx} | look(packing))
+    return row | {"reach": path.kept[-1].fx, "contacts": len(rest.packing.contacts)}
+
+
+def _climb_to(path: EquilibriumPath, fx: float, step: float) -> Packing:
+    """The packing at fx, by multiples of the step up to there."""
+    for k in range(round(path.kept[-1].fx / step), int(fx / step) + 1):
+        if path.kept[-1].fx < k * step < fx:
+            path(k * step)
+            del path.kept[:-2]  # thousands of equilibria of a large packing would fill the memory
+    return path(fx)
+
+
+def _load(packing: Packing) -> dict[str, Any]:
+    """What is told of one load."""
+    found = count_pairs(packing)
+    row = found.as_dict() | {
+        "modes": found.modes,
+        "contacts": len(packing.contacts),
+        "sliding": int(np.count_nonzero(sliding_contacts(packing))),
+        "rattlers": len(packing.rattlers),
+        "bound": antisymmetric_norm(packing),
+    }
+    if found.error is not None:
+        row["pairs_error"] = found.error
+    if len(found.omega):
+        value = found.omega[0] ** 2
+        pair = eigenpairs(packing, value * (1 + BESIDE), 1)
+        row |= {"participation": float(pair.participation[0]), "rotation": float(pair.rotation[0])}
+    if len(packing) <= SMALL:
+        row["b_of"] = count_with_part_of_b(packing)
+        if packing.law.rescales:
+            row["while"] = parting(packing)
+    digits = [[float(f"{w.real:.{DIGITS}g}"), float(f"{w.imag:.{DIGITS}g}")] for w in found.omega.tolist()]
+    return row | {"frequencies": digits}

@@ -1,0 +1,57 @@
+"""What studies ask of a packing: its path of equilibria on this process alone, its contacts, and those that slide."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ..analysis import Packing, mean_square_displacement
+from ..pywrap import Engine, Equilibrium, Scene
+from ..pywrap.runs.equilibrium_path import EquilibriumPath
+
+Start = Callable[[float], Equilibrium]
+"""mu -> the settled packing of a scene with this friction coefficient."""
+
+AT_LIMIT = 1 - 1e-9
+"""Share of the slip limit from which a contact slides: it is clamped to the limit, to rounding."""
+
+
+def with_seed(scene: Scene, seed: int) -> Scene:
+    """The same scene with another packing."""
+    return scene.model_copy(update={"packing": scene.packing.model_copy(update={"seed": seed})})
+
+
+@contextmanager
+def path_from(rest: Equilibrium, scene: Scene) -> Iterator[EquilibriumPath]:
+    """The equilibria of a scene over F_x from the settled packing on; LAMMPS closes in the end."""
+    with Engine(rest.packing, MPI.COMM_SELF) as engine:
+        yield EquilibriumPath(engine, rest, scene)
+
+
+def shake_disks(engine: Engine, packing: Packing, size: float, seed: int) -> None:
+    """Put a packing into LAMMPS, x and y of each disk at random about where they are, by this standard deviation."""
+    noise = np.zeros(3 * len(packing))
+    noise[: 2 * len(packing)] = size * np.random.default_rng(seed).standard_normal(2 * len(packing))
+    engine.restore(engine.displace(packing, noise))
+
+
+def distance_of_bearing_disks(first: Packing, now: Packing) -> float:
+    """D of the disks that carry load at the start, length^2."""
+    kept = np.ones(len(first), dtype=bool)
+    kept[first.rattlers] = False
+    return float(mean_square_displacement(now.position[kept], first.position[kept], first.box_length))
+
+
+def contact_pairs(packing: Packing, chosen: NDArray[np.bool_] | slice = slice(None)) -> set[tuple[int, int]]:
+    """The contacts of a packing, or some of them, as (i, j)."""
+    contacts = packing.contacts
+    return set(zip(contacts.i[chosen].tolist(), contacts.j[chosen].tolist(), strict=True))
+
+
+def sliding_contacts(packing: Packing) -> NDArray[np.bool_]:
+    """Which contacts are at Coulomb's bound."""
+    return np.abs(packing.contacts.slip) >= AT_LIMIT * packing.law.slip_limit(packing.geometry.overlap)

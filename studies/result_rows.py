@@ -1,0 +1,89 @@
+"""Results that are written as they come: a line of JSON each, in a file that an interrupted study goes on with."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..analysis.packing.packing import Floats
+from ..pywrap import Scene, SceneError
+
+
+def read_keyed_rows(path: Path, key: str, what: str) -> list[dict[str, Any]]:
+    """The rows of a file, each with a key; none if there is no file. A last line that a kill has cut is taken off.
+
+    Raises
+    ------
+    SceneError
+        If a line is no such row.
+    """
+    if not path.exists():
+        return []
+    data = path.read_bytes()
+    complete = data[: data.rfind(b"\n") + 1]
+    if complete != data:
+        os.truncate(path, len(complete))
+    rows = []
+    for number, line in enumerate(complete.splitlines(), 1):
+        try:
+            rows.append(json.loads(line))
+            rows[-1][key]
+        except (ValueError, KeyError, TypeError):
+            raise SceneError(
+                f"{path}: line {number} is no result of {what}: take it out, or give another folder"
+            ) from None
+    return rows
+
+
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """The rows of a table that is whole."""
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def row_columns(rows: Sequence[Mapping[str, Any]], *names: str) -> Floats:
+    """Numbers of rows, shape (names, rows); nan where there is none."""
+    return np.array([[row[name] for row in rows] for name in names], dtype=np.float64)
+
+
+def append_row(path: Path, row: Mapping[str, Any]) -> None:
+    """Write a row; it is in the file when this returns."""
+    with path.open("a") as file:
+        file.write(json.dumps(row) + "\n")
+
+
+def keep_rows(path: Path, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Rows as they come, each in the file before it is handed on."""
+    for row in rows:
+        append_row(path, row)
+        yield row
+
+
+class Rows:
+    """Lines of one scene in a file, NAME.jsonl; lines of other scenes are left alone.
+
+    The section `beside` of the scene may change without making its lines worthless.
+    """
+
+    def __init__(self, path: Path, scene: Scene, beside: str) -> None:
+        self.path = path
+        resolved = {name: keys for name, keys in scene.resolved().items() if name != beside}
+        self._scene = hashlib.sha256(json.dumps(resolved, sort_keys=True).encode()).hexdigest()[:12]
+        self.rows = [row for row in read_keyed_rows(path, "scene", "a study") if row["scene"] == self._scene]
+
+    def append(self, **row: Any) -> dict[str, Any]:
+        """Write a line; it is in the file when this returns."""
+        row = {"scene": self._scene, "version": version("faultgouge")} | row
+        append_row(self.path, row)
+        self.rows.append(row)
+        return row
+
+    def find(self, **wanted: Any) -> dict[str, Any] | None:
+        """The first line with these values, if there is one."""
+        return next((row for row in self.rows if all(row.get(key) == value for key, value in wanted.items())), None)

@@ -1,0 +1,142 @@
+"""The frame of studies: what every study leaves in its folder, and a study of one scene that goes on in its folder.
+
+What a study of one scene found is kept row by row in NAME.jsonl, and rows of the same scene are not computed again.
+NAME.json, pictures and NAME.md are written in the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from matplotlib.figure import Figure
+from mpi4py import MPI
+
+from ..analysis.files.atomic_write import make_folder, write_json, write_text
+from ..figures.pages import render
+from ..figures.style import report_failure, save, save_as
+from ..pywrap import Scene
+from ..pywrap.scenes.units import real_units
+from .executors import Progress, Say, Share, open_executor
+from .result_rows import Rows
+
+Result = dict[str, Any]
+
+Figures = Mapping[str, Callable[[], Figure]]
+"""What draws each picture, by the name of its file."""
+
+
+def leave(
+    folder: Path,
+    package: str,
+    name: str,
+    result: Result,
+    page: Result,
+    figures: Figures,
+    say: Say,
+    keep: Callable[[Figure, Path], object] = save,
+) -> Path:
+    """Write what a study has found into its folder, and return the path of its page.
+
+    Parameters
+    ----------
+    package, name : str
+        `__package__` of the study, whose folder has the template NAME.md.j2, and NAME.
+    result : dict
+        What NAME.json holds.
+    page : dict
+        What the template names.
+    figures, say, keep
+        As of `draw_all`.
+    """
+    write_json(folder / f"{name}.json", result)
+    draw_all(figures, folder, say, keep)
+    write_text(folder / f"{name}.md", render(package, f"{name}.md.j2", **page))
+    return folder / f"{name}.md"
+
+
+def draw_all(figures: Figures, folder: Path, say: Say, keep: Callable[[Figure, Path], object] = save) -> None:
+    """Draw pictures, which `keep` saves under paths without ending; one that cannot be drawn costs a sentence alone."""
+    for name, figure in figures.items():
+        with report_failure(f"{name}.png", say):
+            keep(figure(), folder / name)
+
+
+def save_png(figure: Figure, stem: Path) -> None:
+    """Save a figure as PNG alone."""
+    save_as(figure, stem.with_suffix(".png"))
+
+
+class Work(NamedTuple):
+    """What the computing part of a study is given beside the scene: what is known, and how to share and to speak."""
+
+    rows: Rows
+    share: Share
+    say: Say
+    progress: Progress
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study of one scene, which is called with the scene and a folder.
+
+    Attributes
+    ----------
+    package, name : str
+        As of `leave`.
+    beside : str
+        A section of the scene that may change without making what was found worthless.
+    check : callable
+        Raises SceneError for a scene without what is needed.
+    compute : callable
+        Scene and `Work` to what NAME.json holds beside the scene and its units.
+    figures : callable
+        From what NAME.json holds and the rows, what draws each picture.
+    page : callable
+        From what NAME.json holds, what the template names beside `result`, which is that, and its `units`.
+    """
+
+    package: str
+    name: str
+    beside: str
+    check: Callable[[Scene], object]
+    compute: Callable[[Scene, Work], Result]
+    figures: Callable[[Result, Rows], Figures]
+    page: Callable[[Result], Result]
+
+    def __call__(
+        self, scene: Scene, output: Path, say: Say = print, progress: Progress = lambda results, _: results
+    ) -> Result:
+        """Compute what is missing, and leave numbers, pictures and page in a folder, which is made if need be.
+
+        Under `mpiexec -n K` all K ranks call this; one hands out the work, the others take it.
+
+        Returns
+        -------
+        dict
+            What NAME.json holds; empty on ranks other than 0.
+
+        Raises
+        ------
+        SceneError
+            If the scene does not say what is needed.
+        OnsetError, NoEquilibriumError
+            If the packing has no onset, or bears none of the loads.
+        """
+        self.check(scene)
+        pool: Any
+        with open_executor(workers=1) as pool:
+            if MPI.COMM_WORLD.rank != 0:
+                return {}
+            share: Share = map if pool is None else partial(pool.map, unordered=True)
+            make_folder(output)
+            rows = Rows(output / f"{self.name}.jsonl", scene, self.beside)
+            found = self.compute(scene, Work(rows, share, say, progress))
+        real = real_units(scene)
+        result = {"scene": scene.resolved(), "units": None if real is None else real.as_dict()} | found
+        names = {"result": result, "units": result["units"], **self.page(result)}
+        leave(output, self.package, self.name, result, names, self.figures(result, rows), say)
+        return result

@@ -1,0 +1,173 @@
+"""Run a sweep: every point is a line of results.jsonl as soon as it has ended, and results.csv the table of all.
+
+Shards of a sweep, each with a folder of its own, are put together by `merge`.
+
+Points are handed out to workers (:mod:`.workers`), each with one thread. The table does not depend on the number of
+workers, on shards, or on where a run was cut off.
+
+A folder holds sweep.json (what was asked for), results.jsonl and results.csv. Lines of results.jsonl that are of a
+point of this sweep are not computed again. A last line that a kill has cut is computed again.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from ...analysis.files.atomic_write import make_folder, write_json, write_text
+from ...analysis.files.plain_file import read_plain_text
+from ...pywrap import SceneError
+from .. import result_rows
+from ..executors import Progress, Say, open_executor
+from .sweep_plan import Sweep, shard
+from .table import Row, write_tables
+from .tasks import TASKS
+from .workers import compute_points
+
+LINES, ASKED, LOCK = "results.jsonl", "sweep.json", "sweep.lock"
+
+
+def run_sweep(
+    sweep: Sweep,
+    output: Path,
+    part: tuple[int, int] = (1, 1),
+    say: Say = print,
+    progress: Progress = lambda rows, _: rows,
+    workers: int | None = 1,
+    executor: Executor | None = None,
+) -> list[Row]:
+    """Compute what is missing of a sweep, and write its table.
+
+    Parameters
+    ----------
+    sweep : Sweep
+        What is wanted.
+    output : Path
+        The folder, made if need be.
+    part : tuple of (int, int)
+        K and N: part K of N, counted from 1.
+    say : callable
+        Takes a line of words.
+    progress : callable
+        Takes the rows that end and their number, and hands the rows on.
+    workers : int or None
+        Processes that compute; None: as many as this process may use cores. Ranks of mpiexec take their place.
+    executor : concurrent.futures.Executor, optional
+        Computes in place of these, on other machines perhaps. Its workers have faultgouge and one thread each: LAMMPS
+        does not stand several threads in a process.
+
+    Returns
+    -------
+    list of dict
+        The rows of this part in the order of the sweep; empty on ranks other than 0.
+
+    Raises
+    ------
+    SceneError
+        If another process writes to the folder.
+    WorkerError
+        If workers are killed again and again.
+    """
+    points = shard(sweep.points, part)
+    with open_executor(workers, executor) as pool:
+        if MPI.COMM_WORLD.rank != 0:
+            return []
+        make_folder(output)
+        with _lock_folder(output):
+            write_json(output / ASKED, sweep.as_dict() | {"shard": list(part)})
+            known = read_results(output / LINES)
+            missing = [point for point in points if point.key not in known]
+            if len(missing) < len(points):
+                say(f"{len(points) - len(missing)} of {len(points)} points are in {output / LINES} already")
+            with closing(compute_points(pool, sweep.located_task, missing)) as ended:
+                for row in progress(result_rows.keep_rows(output / LINES, ended), len(missing)):
+                    known[row["key"]] = row
+            table = [known[point.key] for point in points]
+            write_tables(table, sweep.names, output)
+    return table
+
+
+def read_results(path: Path) -> dict[str, Row]:
+    """The rows of results.jsonl by key."""
+    return {row["key"]: row for row in result_rows.read_keyed_rows(path, "key", "a sweep")}
+
+
+def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep, list[Row]]:
+    """Merge folders of sweeps into one.
+
+    Parameters
+    ----------
+    parts : sequence of Path
+        Folders that `sweep` has left.
+    output : Path
+        The folder, made if need be.
+    say : callable
+        Takes a line of words.
+
+    Returns
+    -------
+    sweep : Sweep
+        Which they are of.
+    rows : list of dict
+
+    Raises
+    ------
+    SceneError
+        If the parts do not belong together, or are no parts.
+    """
+    for part in parts:
+        if not (part / ASKED).is_file():
+            raise SceneError(
+                f"{part} is no folder of a sweep (it has no {ASKED}): give folders that `faultgouge sweep` has left"
+            )
+    asked = [_read(part / ASKED) for part in parts]
+    for part, each in zip(parts, asked, strict=True):
+        each.pop("shard", None)
+        if each != asked[0]:
+            raise SceneError(f"{part} is of another sweep than {parts[0]}: merge parts of one sweep")
+    code = asked[0].pop("code", "")
+    sweep = Sweep.from_mapping(asked[0], TASKS, name=str(parts[0] / ASKED), code=code)
+    known: dict[str, Row] = {}
+    for part in parts:
+        known |= read_results(part / LINES)
+    table = [known[point.key] for point in sweep.points if point.key in known]
+    make_folder(output)
+    write_json(output / ASKED, sweep.as_dict() | {"shard": [1, 1]})
+    write_text(output / LINES, "".join(json.dumps(row) + "\n" for row in table))
+    write_tables(table, sweep.names, output)
+    say(f"{len(table)} of {len(sweep.points)} scenes from {len(parts)} folders; written: {output}/results.csv")
+    if len(table) < len(sweep.points):
+        say(f"the other {len(sweep.points) - len(table)} are in none of them: `faultgouge sweep` goes on from here")
+    return sweep, table
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        value = json.loads(read_plain_text(path))
+    except OSError as error:
+        raise SceneError(f"{path} cannot be read ({error.strerror}): correct its path") from None
+    except ValueError as error:
+        raise SceneError(f"{path} is not valid JSON ({error}): give a file that faultgouge has written") from None
+    if not isinstance(value, dict):
+        raise SceneError(f"{path} is no result of faultgouge: give a file that it has written")
+    return value
+
+
+@contextmanager
+def _lock_folder(folder: Path) -> Iterator[None]:
+    """Keep other processes out of a folder; the lock goes with the process."""
+    with (folder / LOCK).open("w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise SceneError(
+                f"{folder}: another process writes to this folder: wait for its end, or give every shard its own folder"
+            ) from None
+        yield

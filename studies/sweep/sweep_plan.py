@@ -1,0 +1,223 @@
+"""A sweep: one scene with lists of values for some of its keys, in TOML.
+
+    task = "onset"                                 # or "file.py:function", see user_function
+    [sweep]
+    "packing.seed" = "1:200"                       # 1, 2, ..., 200
+    "law.mu" = [1.0, 0.8]
+    "packing.disks, packing.width" = [[100, 11.9], [400, 23.8]]      # keys that vary together
+    [scene.law]
+    kn = 2e5
+    ...
+
+The points are the product of the lists, the last key varying fastest. Every point is a scene of its own, and carries as
+its key a hash of the task and of the resolved scene, so that a result is known again whatever sweep it came from.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from math import prod
+from pathlib import Path
+from typing import Any
+
+from ...pywrap import Scene, SceneError
+from ...pywrap.scenes.validation import read_toml
+from .user_function import is_user_function, locate, user_function
+
+MOST_POINTS = 1_000_000
+"""Points of a sweep at the most: more is a slip of the pen."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One scene of a sweep.
+
+    Attributes
+    ----------
+    number : int
+        Its place in the sweep.
+    values : dict
+        The swept keys and their values.
+    scene : Scene or None
+        None if the values make no scene.
+    says : str or None
+        Why not.
+    key : str
+        Sixteen hexadecimal digits that stand for task and scene.
+    """
+
+    number: int
+    values: dict[str, Any]
+    scene: Scene | None
+    says: str | None
+    key: str
+
+    @cached_property
+    def settling(self) -> str:
+        """What decides how the packing settles; points of one settling share the settled packing."""
+        if self.scene is None:
+            return self.key
+        resolved = self.scene.resolved()
+        for section in ("ramp", "friction", "output"):
+            resolved.pop(section, None)
+        resolved["perturb"] = self.scene.inertia_factor
+        if not resolved["packing"].get("settle_friction", False):
+            resolved["law"].pop("mu")
+        return digest(resolved)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What is wanted of which scenes.
+
+    Attributes
+    ----------
+    task : str
+        Name of a task, or "file.py:function" as it was given.
+    axes : dict
+        Values by swept key; several keys that vary together are one, separated by commas.
+    scene : dict
+        What all scenes share, sections by name.
+    code : str
+        Of a function of the user's, sixteen hexadecimal digits that stand for its code; else empty.
+    folder : Path
+        From which the file of such a function counts.
+    """
+
+    task: str
+    axes: dict[str, list[Any]]
+    scene: dict[str, Any]
+    code: str = ""
+    folder: Path = Path()
+
+    @classmethod
+    def from_toml(cls, path: str | Path, tasks: Mapping[str, object]) -> Sweep:
+        """Read a sweep of one of these tasks from a TOML file; SceneError if it cannot be read, or describes none."""
+        path = Path(path)
+        return cls.from_mapping(read_toml(path, "sweep"), tasks, path.parent, str(path))
+
+    @classmethod
+    def from_mapping(
+        cls,
+        mapping: Mapping[str, Any],
+        tasks: Mapping[str, object],
+        folder: Path = Path(),
+        name: str = "sweep",
+        code: str = "",
+    ) -> Sweep:
+        """Make a sweep from what a TOML file would hold; SceneError if it describes none.
+
+        A relative packing.file, and the file of a function, count from `folder`. A function whose `code` is given is
+        not looked for.
+        """
+        unknown = sorted(mapping.keys() - {"task", "sweep", "scene"})
+        if unknown:
+            raise SceneError(f"{name}: {unknown[0]} is no key of a sweep: it has task, [sweep] and [scene.SECTION].")
+        task = mapping.get("task")
+        if isinstance(task, str) and is_user_function(task):
+            code = code or user_function(locate(task, folder)).code
+        elif task not in tasks:
+            raise SceneError(
+                f"{name}: task = {task!r} is refused: give one of {', '.join(sorted(tasks))}, or a function of "
+                'yours as "file.py:function".'
+            )
+        for section in ("sweep", "scene"):
+            if not isinstance(mapping.get(section, {}), Mapping):
+                raise SceneError(f"{name}: {section} is not a section: write [{section}] and its keys below.")
+        axes = {key: _values(key, values, name) for key, values in mapping.get("sweep", {}).items()}
+        count = prod(map(len, axes.values()))
+        if count > MOST_POINTS:
+            raise SceneError(f"{name}: {count} scenes are more than {MOST_POINTS}: make several sweeps of it.")
+        scene = {part: _absolute(part, values, folder) for part, values in mapping.get("scene", {}).items()}
+        for key in axes.keys() & {"packing.file"}:
+            axes[key] = [str((folder / str(each)).resolve()) for each in axes[key]]
+        sweep = cls(str(task), axes, scene, code, folder)
+        says = [point.says for point in sweep.points]
+        if all(each is not None for each in says):  # what is wrong with every scene is refused before any work is done
+            raise SceneError(f"{name}: no point of the sweep is a scene that can be run: {says[0]}")
+        return sweep
+
+    @property
+    def located_task(self) -> str:
+        """The task, with the path of its file from the root if it is a function of a file."""
+        return locate(self.task, self.folder) if self.code else self.task
+
+    @property
+    def names(self) -> list[str]:
+        """The swept keys, each by itself."""
+        return [name for key in self.axes for name in _split_keys(key)]
+
+    @cached_property
+    def points(self) -> tuple[Point, ...]:
+        """Every point, in the order of the table."""
+        return tuple(self._point(number, values) for number, values in enumerate(product(*self.axes.values())))
+
+    def _point(self, number: int, chosen: tuple[Any, ...]) -> Point:
+        values: dict[str, Any] = {}
+        for key, value in zip(self.axes, chosen, strict=True):
+            names = _split_keys(key)
+            values.update(zip(names, value if len(names) > 1 else [value], strict=True))
+        mapping = {name: dict(part) if isinstance(part, Mapping) else part for name, part in self.scene.items()}
+        for name, value in values.items():
+            section, _, key = name.rpartition(".")
+            (mapping.setdefault(section, {}) if section else mapping)[key] = value
+        try:
+            scene = Scene.from_mapping(mapping, command=self.task)
+        except SceneError as error:
+            return Point(number, values, None, str(error).removeprefix("scene: "), digest([self._known_as, mapping]))
+        return Point(number, values, scene, None, digest([self._known_as, scene.resolved()]))
+
+    @property
+    def _known_as(self) -> str:
+        """What stands for the task in the keys of rows: of a function its name and its code, wherever its file is."""
+        return f"{self.task.rpartition(':')[2]} {self.code}" if self.code else self.task
+
+    def as_dict(self) -> dict[str, Any]:
+        """The sweep as JSON holds it."""
+        return {"task": self.task, "sweep": self.axes, "scene": self.scene} | ({"code": self.code} if self.code else {})
+
+
+def shard(points: tuple[Point, ...], part: tuple[int, int]) -> tuple[Point, ...]:
+    """Part K of N of the points, counted from 1: whole settlings, so that no two parts settle the same packing."""
+    mine, of = part
+    order: dict[str, int] = {}
+    for point in points:
+        order.setdefault(point.settling, len(order))
+    return tuple(point for point in points if order[point.settling] % of == mine - 1)
+
+
+def digest(value: Any) -> str:
+    """Sixteen hexadecimal digits that stand for a value."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True, default=str).encode()).hexdigest()[:16]
+
+
+def _absolute(part: str, values: Any, folder: Path) -> Any:
+    """A section of a scene with the path of a stored packing made absolute."""
+    if part != "packing" or not isinstance(values, Mapping) or not isinstance(values.get("file"), str):
+        return dict(values) if isinstance(values, Mapping) else values
+    return dict(values) | {"file": str((folder / values["file"]).resolve())}
+
+
+def _split_keys(key: str) -> list[str]:
+    return [name.strip() for name in key.split(",")]
+
+
+def _values(key: str, values: Any, name: str) -> list[Any]:
+    """The values of a swept key: those of a list, or the whole numbers of "FIRST:LAST"."""
+    names = _split_keys(key)
+    if isinstance(values, str):
+        match = re.fullmatch(r"\s*(\d{1,12})\s*:\s*(\d{1,12})\s*", values)
+        if not match or int(match[1]) > int(match[2]) or int(match[2]) - int(match[1]) >= MOST_POINTS:
+            raise SceneError(f'{name}: "{key}" = {values!r} is no range: give "FIRST:LAST", both included, or a list.')
+        values = list(range(int(match[1]), int(match[2]) + 1))
+    if not isinstance(values, list) or not values:
+        raise SceneError(f'{name}: "{key}" = {values!r} is refused: give a list of values, or a range "FIRST:LAST".')
+    if len(names) > 1 and not all(isinstance(each, list) and len(each) == len(names) for each in values):
+        raise SceneError(f'{name}: "{key}" names {len(names)} keys: each value is a list of {len(names)}.')
+    return values
