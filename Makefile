@@ -5,9 +5,9 @@
 # make fuzz        a thousand odd scenes, 300 damaged files, 60 kills; says what went wrong (an hour)
 # make plugin      builds the C++ plugin anew, after an edit of it
 # make check       format, lint and types
-# make benchmark   time per step beside LAMMPS's own granular styles; what each part of a scene costs; where an increment's
-#                  time goes; error against run time; growth with size
-# make pictures    the report and the stiff cases that the documentation shows, in docs/report and docs/stability
+# make benchmark   measures all that docs/benchmarks.md shows, and writes that page anew (a quarter of an hour)
+# make pictures    the report and the stiff cases that the documentation shows, anew and with the version that made
+#                  them, in docs/report and docs/stability (a quarter of an hour); before a release
 # make wheel       sdist and wheel, to be given away, in dist/
 # make wheel-aarch64   the same wheel for 64-bit ARM, cross-compiled
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
@@ -65,13 +65,7 @@ format: $(VENV)/.check
 	$(BIN)/clang-format -i pair_mindlin_smooth/*.h pair_mindlin_smooth/*.cpp analysis/factors/*.cpp
 
 benchmark: $(VENV)/.installed
-	$(BIN)/python benchmarks/time_per_step.py
-	$(BIN)/python benchmarks/time_per_step.py --disks 100000 --turns 5
-	$(BIN)/faultgouge explain scenes/paper.toml
-	$(BIN)/faultgouge explain scenes/frictionless.toml
-	$(BIN)/python benchmarks/increment.py
-	$(BIN)/python benchmarks/scale.py
-	$(BIN)/faultgouge report -o report
+	$(BIN)/python benchmarks/make.py
 
 pictures: $(VENV)/.installed
 	$(BIN)/faultgouge report -o docs/report

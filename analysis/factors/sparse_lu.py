@@ -39,7 +39,7 @@ class SingularMatrixError(FaultgougeError):
 SYMMETRIC: dict[str, Any] = {"relax": 1, "options": {"SymmetricMode": True}}
 
 MUMPS_FROM = 1_000_000
-"""Coordinates from which on MUMPS is used: it takes as long there, and half of the memory (docs/benchmarks.md)."""
+"""Coordinates from which on MUMPS is used: it takes as long there, and half of the memory."""
 
 
 class Factors(Protocol):

@@ -1,4 +1,4 @@
-"""An explanation as a table for a terminal."""
+"""An explanation in two sentences, and as a table for a terminal."""
 
 from rich.console import Group
 from rich.table import Table
@@ -6,6 +6,32 @@ from rich.text import Text
 
 from .explain import Explanation
 from .parts import Cost
+
+
+def in_words(explanation: Explanation) -> str:
+    """What is in and what is out, and what leaving it out saves, in two sentences.
+
+    What is saved is told for parts that a step would take longer with, by more than their quartiles leave open: what
+    they would cost one at a time.
+    """
+    inside = [part.name for part in explanation.parts if part.included]
+    outside = [part for part in explanation.parts if not part.included]
+    saves = {
+        part.name: 100 * (part.cost.ratio[1] - 1)
+        for part in outside
+        if part.cost is not None and part.cost.per == "step" and part.cost.ratio[0] > 1
+    }
+    first = f"In: {_listed(inside)}. Out: {_listed([part.name for part in outside])}"
+    if not saves:
+        return f"{first}; that saves no time that can be measured."
+    dearest = sorted(saves, key=lambda name: -saves[name])
+    each = _listed([f"{saves[name]:.0f} % for {name}" for name in dearest])
+    return f"{first}. A step would take longer by {each}, one at a time."
+
+
+def _listed(names: list[str]) -> str:
+    *others, last = names or ["nothing"]
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def explanation_table(explanation: Explanation) -> Group:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from ...analysis import MindlinLaw
@@ -183,7 +183,7 @@ def estimate_work(scene: Keys, task: Task) -> Estimate:
     return Estimate(disks, steps, increments, memory, written, seconds)
 
 
-def describe_work(scene: Keys, task: Task, packings: int = 1) -> str:
+def describe_work(scene: Keys, task: Task) -> str:
     """What a command will do and how long that takes, in a line; empty where it takes no time.
 
     Parameters
@@ -192,16 +192,13 @@ def describe_work(scene: Keys, task: Task, packings: int = 1) -> str:
         What is wanted.
     task : {"settle", "ramp", "perturb", "onset", "onset --all", "reproduce"}
         As in `estimate_work`.
-    packings : int
-        How many packings of the scene, one after the other.
 
     Raises
     ------
     SceneError
         If it takes a year, more memory than there is, or a file of more than `LARGEST_FILE`.
     """
-    one = estimate_work(scene, task)
-    work = replace(one, steps=packings * one.steps, seconds=packings * one.seconds, written=packings * one.written)
+    work = estimate_work(scene, task)
     if not work.seconds < LONGEST:
         what = "a year and more"
     elif work.memory > _installed_memory():
@@ -209,8 +206,7 @@ def describe_work(scene: Keys, task: Task, packings: int = 1) -> str:
     elif work.written > LARGEST_FILE:
         what = f"more than the {_bytes(LARGEST_FILE)} that a file may take"
     else:
-        what = task if packings == 1 else f"{task}, {packings} packings"
-        return f"{what}: {work}" if work.seconds > WORTH_SAYING else ""
+        return f"{task}: {work}" if work.seconds > WORTH_SAYING else ""
     raise SceneError(f"the scene asks {task} for {what} ({work}): {_remedy(scene, task)}")
 
 

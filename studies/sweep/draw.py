@@ -67,7 +67,8 @@ def draw_pairs(axes: Axes, packings: Iterable[tuple[Row, Row, bool]], **style: A
 def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
     """The share of scenes with an onset up to F_x, and the onsets over each swept key.
 
-    Forces are per disk of the upper layer; triangles stand where there is no onset up to there.
+    Forces are per disk of the upper layer; triangles stand where there is no onset up to there. Above stands how many
+    scenes have an onset, and how many have none.
     """
     keys = _varied_keys([row for row, _ in found])
     figure = Figure(figsize=(3.4, 2.2 * (1 + len(keys))), layout="constrained")
@@ -76,6 +77,8 @@ def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
     onset = np.array([each for _, (_, each) in found])
     share.step(*course(reach, onset), where="post")
     share.set(xlabel="$F_x$", ylabel="share with an onset", xlim=(0, None), ylim=(0, 1))
+    without = int(np.count_nonzero(~onset))
+    share.set_title(f"{len(onset)} scenes: {len(onset) - without} with an onset, {without} without", fontsize=8)
     for axes, key in zip(panels, keys, strict=True):
         place = _places(axes, key, [row for row, _ in found])
         axes.plot(place[onset], reach[onset], "o", color="C0", markersize=3, label="onset")

@@ -99,7 +99,7 @@ def read_results(path: Path) -> dict[str, Row]:
     return {row["key"]: row for row in result_rows.read_keyed_rows(path, "key", "a sweep")}
 
 
-def merge(parts: Sequence[Path], output: Path, say: Say = print) -> list[Row]:
+def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep, list[Row]]:
     """Merge folders of sweeps into one.
 
     Parameters
@@ -113,8 +113,9 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> list[Row]:
 
     Returns
     -------
-    list of dict
-        The rows.
+    sweep : Sweep
+        Which they are of.
+    rows : list of dict
 
     Raises
     ------
@@ -144,7 +145,7 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> list[Row]:
     say(f"{len(table)} of {len(sweep.points)} scenes from {len(parts)} folders; written: {output}/results.csv")
     if len(table) < len(sweep.points):
         say(f"the other {len(sweep.points) - len(table)} are in none of them: `faultgouge sweep` goes on from here")
-    return table
+    return sweep, table
 
 
 def _read(path: Path) -> dict[str, Any]:

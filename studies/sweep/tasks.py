@@ -48,7 +48,7 @@ def _onset(scene: Scene) -> float:
     """An onset, measured with 50 to 1,000 disks up to F_x = 0.01 F_y.
 
     1 s for 100 disks and 30 increments, of which an increment costs as the number of disks to the power of 1.6
-    (docs/benchmarks.md has exponents from 1.1 to 1.7).
+    (measured exponents go from 1.1 to 1.7).
     """
     return 0.03 * _increments(scene) * _disks(scene) ** 1.6
 

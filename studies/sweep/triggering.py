@@ -49,12 +49,6 @@ from .onset import first_window
 
 Row = dict[str, Any]
 
-FINEST_STEP = 1 / 3000
-"""Increment of F_x, in units of F_y, below which a ramp only costs: onsets are solved for, and come out the same."""
-
-LONGEST_TIME = 200.0
-"""Length of the undamped runs, time, at the most: with 100 disks, four of them take some 30 s."""
-
 
 def rise_in_decades(eruption: Row, of: str = "weakening") -> float:
     """Decades between the largest D of the perturbed run and of the one with mu(v), or of the "control"."""
@@ -134,17 +128,6 @@ def first_onset(scene: Scene, mu: float, start: Start) -> tuple[Row, tuple[Equil
             whole = with_path_error(found, path)
             reach, error = whole.fx_c, whole.error
         return {"mu": mu, "ends": ends, "reach": reach, "error": error}, tuple(path.kept)
-
-
-def economical(scene: Scene) -> Scene:
-    """The scene with increments and undamped runs that take seconds a packing, see `FINEST_STEP` and `LONGEST_TIME`."""
-    changes: dict[str, Any] = {}
-    if scene.ramp is not None:
-        step = min(max(scene.ramp.step, FINEST_STEP * scene.load.fy), scene.ramp.first)
-        changes["ramp"] = scene.ramp.model_copy(update={"step": step})
-    if scene.perturb is not None:
-        changes["perturb"] = scene.perturb.model_copy(update={"time": min(scene.perturb.time, LONGEST_TIME)})
-    return scene.model_copy(update=changes)
 
 
 def eruption(

@@ -31,7 +31,7 @@ MODE = r"mode \d+: lambda = [\d.]+, participation ratio 0\.\d+, rotation"
 @pytest.mark.slow
 def test_a_packing_and_modes(beyond, faultgouge_in, options, name, says, times):
     done = faultgouge_in(beyond, "draw", "ramp.h5", *options.split(), "-o", name)
-    assert len(re.findall(says, done.stderr)) == times
+    assert len(re.findall(says, done.stdout)) == times
     assert (beyond / name).stat().st_size > 10_000
 
 

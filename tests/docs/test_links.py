@@ -3,12 +3,18 @@
 import json
 import re
 import subprocess
+import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
-from reference_layer import BIN, toml
+from reference_layer import BIN, REFERENCE, SMALL, toml
 
-from docs.run_page import commands, run
+from docs.run_page import commands, files, run
+from faultgouge.pywrap import Scene
+from faultgouge.pywrap.scenes.validation import read_toml
+from faultgouge.studies.sweep.sweep_plan import Sweep
+from faultgouge.studies.sweep.tasks import TASKS
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
@@ -65,27 +71,53 @@ def test_a_wrong_page_is_found_out(tmp_path):
     assert "exit code 1" in code
 
 
+def with_blocks(language):
+    """Pages with blocks of a language; two ranks that share their cores with others take ten times as long."""
+    for path in PROSE:
+        text = path.read_text()
+        if re.search(rf"^```{language}\n(?!# [\w.]+\n)", text, re.MULTILINE):
+            yield pytest.param(path, id=path.name, marks=[pytest.mark.ranks] * ("\n$ mpiexec" in text))
+
+
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("page", "count", "pictures"),
-    [
-        # two ranks that share their cores with others take ten times as long
-        pytest.param("README.md", 4, 0, marks=pytest.mark.ranks),
-        pytest.param("docs/decks.md", 4, 0, marks=pytest.mark.ranks),
-        ("docs/tutorial.md", None, 5),
-        ("docs/api.md", None, 1),
-        ("docs/howto_sweep.md", 2, 0),
-    ],
-)
-def test_a_page_shows_what_its_commands_print(tmp_path, page, count, pictures):
-    path = ROOT / page
-    assert count in (None, len(list(commands(path))))
+@pytest.mark.parametrize("path", list(with_blocks("console")))
+def test_a_page_shows_what_its_commands_print(tmp_path, path):
+    assert list(commands(path))
     assert run(path, tmp_path) == []
     shown = re.findall(r"\]\((pictures/tutorial/[\w.]+)\)", path.read_text())
     assert all((path.parent / picture).exists() for picture in shown)
-    made = [Path(picture).name for picture in shown] or [path.name for path in tmp_path.glob("*.png")]
-    assert len(made) == pictures
-    assert all((tmp_path / picture).stat().st_size > 10_000 for picture in made)
+    assert all((tmp_path / Path(picture).name).stat().st_size > 10_000 for picture in shown)
+
+
+@pytest.mark.parametrize("path", list(with_blocks("toml")))
+def test_scenes_and_sweeps_of_a_page_are_read(tmp_path, path):
+    base = {"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+    (tmp_path / "packing.json").write_text(REFERENCE.read_text())
+    for text in re.findall(r"^```toml\n(.*?)^```", path.read_text(), re.MULTILINE | re.DOTALL):
+        (tmp_path / "block.toml").write_text(text)
+        if "[sweep]" in text:
+            points = Sweep.from_toml(tmp_path / "block.toml", TASKS).points
+            assert [point.says for point in points if point.scene is None] == []
+        elif "[packing]" in text:
+            Scene.from_toml(tmp_path / "block.toml")
+        else:
+            Scene.from_mapping(base | read_toml(tmp_path / "block.toml", "scene"))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("path", list(with_blocks("python")))
+def test_blocks_of_python_run_one_after_the_other(faultgouge, tmp_path, path):
+    """In a folder with the run of a scene that erupts, whose files have the names that pages give them."""
+    text = path.read_text()
+    for name, block in files(path).items():
+        (tmp_path / name).write_text(block)
+    if "scene.toml" not in files(path):
+        (tmp_path / "scene.toml").write_text(toml(SMALL))
+    faultgouge("ramp", "scene.toml", "-o", "run.h5")
+    script = re.findall(r"^```python\n(?!# [\w.]+\n)(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    (tmp_path / "blocks.py").write_text("\n".join(script))
+    done = subprocess.run([sys.executable, "blocks.py"], cwd=tmp_path, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
 
 
 def test_the_readme_is_short():
@@ -142,3 +174,18 @@ def test_a_packing_of_ones_own(faultgouge, tmp_path):
     text, pictures = printed_and_shown("own_packing")
     assert pictures == 3
     assert number(text, "own packing: F_x^c =") == pytest.approx(found["fx_c"], abs=found["error"] + 5e-12)
+
+
+@pytest.mark.parametrize(
+    ("page", "package"),
+    [
+        ("analysis", "faultgouge.analysis"),
+        ("pywrap", "faultgouge.pywrap"),
+        ("exchange", "faultgouge.pywrap.exchange"),
+        ("figures", "faultgouge.figures"),
+    ],
+)
+def test_the_api_pages_list_the_public_names_and_no_others(page, package):
+    text = (ROOT / "docs" / "api" / f"{page}.md").read_text()
+    [listed] = re.findall(r"autosummary::\n\n((?:   \w+\n)+)", text)
+    assert sorted(listed.split()) == sorted(import_module(package).__all__)

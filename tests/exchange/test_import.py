@@ -168,7 +168,7 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packi
     assert not (tmp_path / "one.h5").exists()
     found = []
     for name, ranks in (("one.h5", None), ("two.h5", 2)):
-        assert "brought to rest" in faultgouge(*words, "--relax", "-o", name, ranks=ranks).stderr
+        assert "brought to rest" in faultgouge(*words, "--relax", "-o", name, ranks=ranks).stdout
         with RunFile(tmp_path / name) as file:
             found.append(file.packing())
     rest = found[0]

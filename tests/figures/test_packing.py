@@ -95,6 +95,22 @@ def test_arrows_show_the_load_on_the_upper_layer(packing):
     assert not draw_packing(replace(packing, fx=0.0, fy=0.0)).findobj(Quiver)
 
 
+@pytest.mark.parametrize("fx", [0.01, -0.01])
+def test_no_arrow_of_the_weight_runs_through_the_shear_force_and_its_name(packing, fx):
+    """The highest disk of the layer is moved to each place where the arrow or its name might stand."""
+    top = np.flatnonzero(packing.top)
+    for place in np.linspace(0.3, 0.7, 9) * packing.box_length:
+        position = packing.position.copy()
+        position[top, 0] = place + np.linspace(0, 1.5, len(top))
+        position[top, 1] = position[:, 1].max() + 1
+        figure = draw_packing(replace(packing, position=position, fx=fx))
+        down, along = figure.findobj(Quiver)
+        (name,) = [text for text in figure.axes[0].texts if text.get_text() == "$F_x$"]
+        ends = [name.get_position()[0] - np.sign(fx) * 0.7, along.X[0] + along.U[0]]
+        crossing = (min(ends) < down.X) & (max(ends) > down.X) & (along.Y[0] < down.Y)
+        assert not crossing.any()
+
+
 @pytest.mark.slow
 def test_saved_twice_gives_the_same_bytes_and_no_settings_leak_out(tmp_path, packing):
     before = dict(matplotlib.rcParams)
@@ -150,6 +166,17 @@ def test_a_complex_mode_is_drawn_at_two_moments_with_arrows_and_the_colour_of_ro
     assert second.V[at_top] == pytest.approx(-first.U[at_top], rel=1e-12)
     (disks,) = figure.axes[0].findobj(EllipseCollection)
     np.testing.assert_allclose(disks.get_array(), [1.0, -0.5, 0.0])
+    assert "on the scale of the left picture" in figure.axes[1].get_title()
+
+
+def test_the_second_moment_of_a_mode_is_magnified_and_says_so(pyramid):
+    """Next to an onset a mode is nearly real: a quarter of a period later hardly anything moves."""
+    moved = np.zeros((3, 3), dtype=complex)
+    moved[0, 2], moved[1, 2], moved[2] = 1.0, 4e-4j, [2.0, -1.0, 0.0]
+    figure = draw_modes(pyramid, [Mode(4, 10 + 2j, moved, 0.3, 0.1)], "a pair")
+    first, second = (axes.findobj(Quiver)[0] for axes in figure.axes[:2])
+    assert np.hypot(second.U, second.V).max() == pytest.approx(0.8 * np.hypot(first.U, first.V).max(), rel=1e-12)
+    assert "arrows and colours times 2000" in figure.axes[1].get_title()
 
 
 def test_the_pair_over_the_load_has_both_members_and_an_inset_about_its_onset():

@@ -277,9 +277,6 @@ def test_a_reproduction_counts_what_it_runs():
     scene = Scene.from_mapping(SHORT)
     one, onset = estimate_work(scene, "reproduce"), estimate_work(scene, "onset")
     assert one.steps > onset.steps + 1e5
-    assert describe_work(scene, "reproduce", 1000).startswith("reproduce, 1000 packings: about ")
-    with pytest.raises(SceneError, match="the scene asks reproduce for a year and more"):
-        describe_work(scene, "reproduce", 10**9)
 
 
 @pytest.mark.parametrize(
@@ -299,7 +296,7 @@ def test_a_reproduction_counts_what_it_runs():
     ],
 )
 def test_time_of_a_search(disks, fy, step, until, cn, measured):
-    """Against processor time (docs/benchmarks.md, seed 11 and quartz), within a factor of three, settling apart."""
+    """Against processor time of seed 11 and of quartz, within a factor of three, settling apart."""
     packing = {"disks": disks, "width": 1.192 * disks**0.5, "seed": 1}
     scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": fy}, "ramp": {"step": step, "until": until}}
     scene |= {} if cn is None else {"damping": {"cn": cn}}
@@ -311,7 +308,7 @@ def test_time_of_a_search(disks, fy, step, until, cn, measured):
 
 @pytest.mark.parametrize(("disks", "measured"), [(3000, 1.7e9), (10_000, 0.9e9), (30_000, 1.7e9), (100_000, 5.2e9)])
 def test_memory_of_a_search_in_slices(disks, measured):
-    """Against peaks of the whole process in two threads (docs/benchmarks.md), within a factor of two."""
+    """Against peaks of the whole process in two threads, within a factor of two."""
     scene = SHORT | {"packing": {"disks": disks, "width": 1.2 * disks**0.5, "seed": 3}}
     memory = estimate_work(Scene.from_mapping(scene), "onset").memory
     assert measured / 2 < memory < 2 * measured

@@ -98,5 +98,5 @@ def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_in)
     assert found.work > 0  # friction takes energy
     moved = layer_displacement(packings)[:, 0]
     assert found.remaining == moved[-1] - moved[5]
-    drawn = faultgouge_in(tmp_path, "draw", "cycle.h5", "-o", "cycle.svg").stderr
+    drawn = faultgouge_in(tmp_path, "draw", "cycle.h5", "-o", "cycle.svg").stdout
     assert "rattlers" not in drawn  # said of a packing

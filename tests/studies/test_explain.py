@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from importlib.resources import files
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from mpi4py import MPI
 from reference_layer import SMALL
 
 from faultgouge.assessment.explain.explain import _affordable, _run_feature, explain
+from faultgouge.assessment.explain.explanation_table import in_words
+from faultgouge.assessment.explain.parts import Cost, Part
 from faultgouge.assessment.explain.switches import Feature, Loaded, Run, features
 from faultgouge.pywrap import Scene, settle
 
@@ -50,6 +53,22 @@ def frictionless():
     mapping = Scene.from_toml(SCENES / "frictionless.toml").resolved()
     pulse = {"fx": 0.0, "time": 1.0, "signal": "pulse", "amplitude": 1e-9, "omega": 3.0}
     return explain(Scene.from_mapping(mapping | {"output": {"dumps": True, "trajectory": True}, "perturb": pulse}))
+
+
+def test_the_first_sentences_say_what_is_in_what_is_out_and_what_that_saves():
+    def part(name, included, seconds):
+        cost = None if seconds is None else Cost("step", np.array([[1.0, each] for each in seconds]))
+        return Part(name, included, "", (), cost, "", True)
+
+    parts = (
+        part("floor", True, [1.1]),
+        part("drag", False, [1.1, 1.3, 1.5]),
+        part("signal", False, [0.9, 1.02, 1.1]),
+        part("threads", False, None),
+    )
+    said = in_words(SimpleNamespace(parts=parts))
+    assert said == "In: floor. Out: drag, signal and threads. A step would take longer by 30 % for drag, one at a time."
+    assert in_words(SimpleNamespace(parts=parts[:1])).endswith("Out: nothing; that saves no time that can be measured.")
 
 
 def included(explanation):

@@ -65,7 +65,7 @@ def test_a_spectrum_keeps_its_eigenvalues_and_draw_its_words(
     assert len(result["eigenvalues"]) > 200
     assert result["transient_gain"] is None
     assert "the transient gain was not found (LinAlgError: no convergence); the eigenvalues are complete" in done.stderr
-    assert "100 disks" in faultgouge_here("draw", "run.h5", code=1).stderr
+    assert "100 disks" in faultgouge_here("draw", "run.h5", code=1).stdout
 
 
 def test_a_sweep_keeps_its_rows(tmp_path, no_pictures, said):

@@ -16,7 +16,7 @@ from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.studies.executors import Processes, open_executor
 from faultgouge.studies.sweep import workers
-from faultgouge.studies.sweep.draw import draw_sweep
+from faultgouge.studies.sweep.draw import draw_sweep, onsets_figure, reach_of
 from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.tasks import TASKS, estimate
@@ -142,7 +142,7 @@ def test_rows_of_a_function_are_known_by_its_code_and_shards_merge_without_it(tm
     user_function.cache_clear()
     assert not set(before) & {point.key for point in function_sweep(tmp_path, "contacts").points}
     file.unlink()
-    assert [row["key"] for row in merge(parts, tmp_path / "whole", id)] == before
+    assert [row["key"] for row in merge(parts, tmp_path / "whole", id)[1]] == before
 
 
 @pytest.mark.parametrize(
@@ -218,12 +218,19 @@ def test_failures_are_rows_and_merge_refuses_what_does_not_belong_together(tmp_p
     assert [row["says"] for row in table(tmp_path / "c")] == [failed["says"]]
 
 
+def test_the_picture_counts_the_scenes_without_an_onset():
+    rows = [{"values": {"law.mu": mu}, "result": {"fx_c": mu / 50, "ends": "onset"}} for mu in (0.5, 1.0)]
+    rows.append({"values": {"law.mu": 0.2}, "result": {"reach": 0.03, "ends": "until"}})
+    share = onsets_figure([(row, reach_of(row)) for row in rows]).axes[0]
+    assert share.get_title() == "3 scenes: 2 with an onset, 1 without"
+
+
 @pytest.mark.slow
 def test_the_dry_run_counts_and_computes_nothing(faultgouge, tmp_path):
     (tmp_path / "sweep.toml").write_text(TOML)
     done = faultgouge("sweep", "sweep.toml", "-o", "out", "--dry-run")
-    assert "8 scenes to compute, 4 packings to settle" in done.stderr
-    assert "4 points make no scene" in done.stderr
+    assert "8 scenes to compute, 4 packings to settle" in done.stdout
+    assert "4 points make no scene" in done.stdout
     assert not (tmp_path / "out").exists()
 
 

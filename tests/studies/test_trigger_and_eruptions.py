@@ -119,7 +119,7 @@ def test_the_jump_is_that_of_a_run_in_lammps():
 
 @pytest.mark.slow
 def test_the_shipped_packing_is_the_one_of_the_rule():
-    """`python docs/triggered.py` begins with seed 1."""
+    """`python research/triggering/make.py` begins with seed 1."""
     scene = Scene.from_toml(files("faultgouge") / "scenes/triggered.toml")
     (last,) = choose_seed(scene, [37, 38])
     assert (last["seed"], last["fx"], last["says"]) == (scene.packing.seed, scene.perturb.fx, "")

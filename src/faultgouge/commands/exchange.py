@@ -10,7 +10,17 @@ import typer
 from ..ranks import is_root
 from ..signal_guard import keeps
 from .pictures import modes_of
-from .terminal import Frame, PackingFile, check_output, progress, say, status, stored_packing, stored_snapshot
+from .terminal import (
+    Frame,
+    PackingFile,
+    check_output,
+    print_line,
+    progress,
+    say,
+    status,
+    stored_packing,
+    stored_snapshot,
+)
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -103,7 +113,7 @@ def import_(
     if is_root():
         _store(output, packing)
     contacts_of = f"{len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers"
-    say(
+    print_line(
         f"{len(packing)} disks, {int(packing.top.sum())} of them the upper layer, {contacts_of}; residual "
         f"{packing.residual:.2g}; written to {output}"
     )
@@ -119,7 +129,7 @@ def _import_deck(file: Path, output: Path, slides: bool) -> None:
         snapshot = run_deck(file, slides=slides)
     if is_root():
         write_snapshot(output, snapshot, {"deck": file.read_text(errors="replace")})
-    say(f"{repr(snapshot).removeprefix('<Snapshot: ').removesuffix('>')}; written to {output}")
+    print_line(f"{repr(snapshot).removeprefix('<Snapshot: ').removesuffix('>')}; written to {output}")
 
 
 @app.command(epilog="Example: faultgouge export run.h5 --mode pair -o packing.vtp")
@@ -165,7 +175,7 @@ def export(
             from faultgouge.pywrap.exchange.snapshot_export import modes_of_snapshot, write_snapshot_for_others
 
             found = [] if mode is None else modes_of_snapshot(snapshot, mode)
-            say(f"{write_snapshot_for_others(output, snapshot, found)}; written to {output}")
+            print_line(f"{write_snapshot_for_others(output, snapshot, found)}; written to {output}")
         return
     check_writer(output, mode is not None)
     packing = stored_packing(file, frame)
@@ -174,7 +184,7 @@ def export(
     modes = [] if mode is None else modes_of(packing, mode)[0]
     vectors = [ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes]
     words = write_packing(output, packing, vectors)
-    say(f"F_x = {packing.fx:g}: {words}; written to {output}")
+    print_line(f"F_x = {packing.fx:g}: {words}; written to {output}")
 
 
 def _export_frames(file: Path, says: str, output: Path) -> None:
@@ -192,7 +202,7 @@ def _export_frames(file: Path, says: str, output: Path) -> None:
         numbers = choose_frames(run, says)
         write_frames(output, progress(frames_of(run, numbers), "frames", len(numbers)))
         what = "an undamped run" if "trajectory" in run.names_of_series else "equilibria"
-    say(f"{len(numbers)} frames of {what}; written to {output}")
+    print_line(f"{len(numbers)} frames of {what}; written to {output}")
 
 
 def _place_disks(file: Path, frame: int | None, floor: float, width: str | None, contacts: Path | None) -> Disks:
@@ -291,7 +301,7 @@ def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
         )
     with status("coming to rest") as show:
         found, words = bring_to_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
-    say(words)
+    print_line(words)
     return found.packing
 
 

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..ranks import is_root
-from .terminal import Frame, PackingFile, check_output, progress, refuse_snapshot, say, stored_packing, stored_series
+from .terminal import (
+    Frame,
+    PackingFile,
+    check_output,
+    print_line,
+    progress,
+    refuse_snapshot,
+    say,
+    stored_packing,
+    stored_series,
+)
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -84,17 +94,17 @@ def draw(
         figure = draw_cycle(cycle)
     elif series is not None:
         growth = growth_of_run(packing, series["time"], series["msd"], series["friction"])
-        say(growth.says)
+        print_line(growth.says)
         figure = draw_growth(series["time"], series["msd"], growth.predicted, growth.measured)
     elif mode is None:
-        say(in_words(packing))
+        print_line(in_words(packing))
         figure = draw_packing(packing, color=color.value, caption=True)
     else:
         modes, what = modes_of(packing, mode)
-        say("\n".join([f"F_x = {packing.fx:g}: {what}", *(each.plain for each in modes)]))
+        print_line("\n".join([f"F_x = {packing.fx:g}: {what}", *(each.plain for each in modes)]))
         figure = draw_modes(packing, modes, what)
     save_as(figure, output)
-    say(f"written to {output}")
+    print_line(f"written to {output}")
 
 
 @app.command(epilog="Example: faultgouge movie perturb.h5 -o eruption.gif")
@@ -139,7 +149,7 @@ def movie(
         film = _film_of_file(file, count, color.value, span, dots)
     write_film(film, output, rate, lambda frames, total: progress(frames, "frames", total))
     width, height = film.size
-    say(f"{count} frames of {width} x {height} dots; written to {output}")
+    print_line(f"{count} frames of {width} x {height} dots; written to {output}")
 
 
 @app.command(epilog="Example: faultgouge view run.h5 -o page.html")
@@ -183,7 +193,7 @@ def view(
     if seconds(packings) > 5:
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
     write_view(packings, output, title, series, lambda them: progress(them, "loads"))
-    say(f"{len(packings)} loads, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
+    print_line(f"{len(packings)} loads, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
 
 
 def _cycle(file: Path) -> list[Packing]:

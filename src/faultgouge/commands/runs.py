@@ -18,13 +18,13 @@ from .terminal import (
     ScenePath,
     check_output,
     print_json,
+    print_line,
     progress,
     read_scene,
     report_fallback,
     say,
     status,
     stored_files,
-    tell,
 )
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
     packing = last.packing
-    tell(
+    print_line(
         f"{len(packing)} disks, {len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers; "
         f"residual {last.residual:.2g} (rounding floor {last.floor:.2g}); written to {output}"
     )
@@ -97,9 +97,9 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     if as_json:
         print_json({"equilibria": _equilibria(output), "hysteresis": None if left is None else asdict(left)})
         return
-    tell(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")
+    print_line(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")
     if left is not None:
-        tell(
+        print_line(
             f"F_x is back at {left.fx:g}: the upper layer has moved by {left.remaining:.4g} since it was there first, "
             f"and the loads have done the work {left.work:.4g} on it"
         )

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import typer
 
@@ -16,16 +16,14 @@ from .terminal import (
     Folder,
     NewFolder,
     ScenePath,
-    Workers,
     lock_folder,
     print_json,
+    print_line,
     progress,
     read_scene,
     say,
     status,
 )
-
-T = TypeVar("T")
 
 app = typer.Typer()
 
@@ -48,8 +46,9 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     elif is_root():
         from rich.console import Console
 
-        from faultgouge.assessment.explain.explanation_table import explanation_table
+        from faultgouge.assessment.explain.explanation_table import explanation_table, in_words
 
+        print_line(f"{in_words(explanation)}\n")
         console = Console(highlight=False)
         # a file or a pipe has no width, and a table of 80 columns is hard to read
         Console(highlight=False, width=max(console.width, 150)).print(explanation_table(explanation))
@@ -61,45 +60,23 @@ def reproduce(
         Path | None, typer.Argument(metavar="[SCENE]", help="Another scene than the one that ships.")
     ] = None,
     output: NewFolder = Path("results"),
-    ensemble: Annotated[
-        int, typer.Option(min=0, metavar="M", help="Instead, onsets and eruptions of M packings of the scene.")
-    ] = 0,
-    workers: Workers = None,
 ) -> None:
     """The paper's protocol on one packing: its figures, numbers and a report.
 
     Without a scene, figures 1, 3 and 4 are of paper.toml, and figure 5 is of
     triggered.toml, a packing in which the instability does the work.
-
-    With --ensemble M: how generic that is, from M packings that differ in their
-    seeds. An interrupted ensemble goes on, and grows with a larger M. A packing
-    takes a minute at the most on one core; all cores work, or --workers N.
     """
     from importlib.resources import files
 
     shipped = Path(str(files("faultgouge") / "scenes"))
-    wanted = read_scene(scene or shipped / "paper.toml", "reproduce", "reproduce", max(ensemble, 1))
-    if ensemble:
-        from faultgouge.studies.reproduce.ensemble import ensemble as examine_packings
-
-        keeps(f"what {output}/results.jsonl has is kept, and the same command goes on from there", output)
-
-        def bar(members: Iterable[T], count: int) -> Iterator[T]:
-            for number, member in enumerate(progress(members, "packings", count), 1):
-                yield member
-                keeps(f"{output}/results.jsonl has {number} more packings; the same command goes on from there", output)
-
-        examine_packings(wanted, ensemble, output, say, bar, workers)
-        say(f"written: {output}/ensemble.json")
-        return
-
+    wanted = read_scene(scene or shipped / "paper.toml", "reproduce", "reproduce")
     from faultgouge.studies.reproduce import reproduce as run_protocol
 
     keeps(f"what is in {output} so far is kept; the same command begins anew and replaces it", output)
     triggered = read_scene(shipped / "triggered.toml", "reproduce") if scene is None else None
     with lock_folder(output):
         run_protocol(wanted, output, say, triggered)
-    say(f"written: {output}/report.md")
+    print_line(f"written: {output}/report.md")
 
 
 @app.command(epilog="Example: faultgouge report --quick -o report")
@@ -113,7 +90,7 @@ def report(
     keeps(f"{output} has the studies that were finished; the same command begins anew and replaces them", output)
     with lock_folder(output):
         run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
-    say(f"written: {output}/report.md")
+    print_line(f"written: {output}/report.md")
 
 
 @app.command(epilog="Example: mpiexec -n 2 faultgouge stability -o stability")
@@ -130,7 +107,7 @@ def stability(
     with lock_folder(output):
         result = try_cases(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
     counts = Counter(case["status"] for case in result.get("cases", ()))
-    say(
+    (say if as_json else print_line)(
         f"{counts.total()} cases: {counts['holds']} hold, {counts['refused']} are refused in a sentence, "
         f"{counts['fails']} fail; written: {output}/stability.md"
     )
@@ -171,6 +148,6 @@ def _into_folder(
     keeps(f"{output}/{name}.jsonl has {kept}; the same command goes on from there", output)
     with lock_folder(output):
         result = study(wanted, output, say, lambda results, count: progress(results, what, count))
-    say(f"written: {output}/{name}.md")
+    (say if as_json else print_line)(f"written: {output}/{name}.md")
     if as_json:
         print_json(result)

@@ -9,7 +9,7 @@ import typer
 
 from ..ranks import is_root
 from ..signal_guard import keeps
-from .terminal import Folder, Workers, progress, say, show_table
+from .terminal import Folder, Workers, print_line, progress, say, table_of
 
 app = typer.Typer()
 
@@ -49,15 +49,16 @@ def sweep(
             known = read_results(output / LINES)
             missing = [point for point in part_of(wanted.points, part) if point.key not in known]
             for line in estimate(wanted.task, missing, known.values()):
-                say(line)
+                print_line(line)
         return
     keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there", output)
     rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count), workers)
     if is_root():
         failed = sum(row["says"] is not None for row in rows)
-        say(
+        print_line(
             f"{len(rows)} scenes, {failed} of them failed; written: {output}/results.csv{draw_sweep(rows, output, say)}"
         )
+        _summarise(wanted.task, rows, output)
 
 
 @app.command(epilog="Example: faultgouge merge shard1 shard2 shard3 -o whole")
@@ -70,7 +71,22 @@ def merge(
     from faultgouge.studies.sweep.run_sweep import merge as merge_parts
 
     if is_root():
-        draw_sweep(merge_parts(parts, output, say), output, say)
+        sweep, rows = merge_parts(parts, output, print_line)
+        draw_sweep(rows, output, say)
+        _summarise(sweep.task, rows, output)
+
+
+def _summarise(task: str, rows: list[dict[str, Any]], output: Path) -> None:
+    """Of the task "triggering", shares over all scenes: in words, and summary.json."""
+    if task != "triggering":
+        return
+    from faultgouge.analysis.files.atomic_write import write_json
+    from faultgouge.studies.sweep.triggering_summary import in_words, summary
+
+    numbers = summary(rows)
+    write_json(output / "summary.json", numbers)
+    for line in in_words(numbers):
+        print_line(line)
 
 
 def _shard(text: str) -> tuple[int, int]:
@@ -108,7 +124,7 @@ def modes(
     wanted, part = read_modes_sweep(file), _shard(shard)
     if is_root():
         for line in estimate(wanted.task, part_of(wanted.points, part)):
-            say(line)
+            (print_line if dry_run else say)(line)
     if dry_run:
         return
     keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there", output)
@@ -116,13 +132,13 @@ def modes(
     if is_root():
         _show_modes(result["rows"])
         failed = [each["says"] for each in result["packings"] if each["says"] is not None]
-        say(f"packings: {len(result['packings'])}, failed: {len(failed)}; written: {output}/modes.json")
+        print_line(f"packings: {len(result['packings'])}, failed: {len(failed)}; written: {output}/modes.json")
         for sentence in failed[:1]:
-            say(f"the first that failed: {sentence}")
+            print_line(f"the first that failed: {sentence}")
 
 
 def _show_modes(rows: list[dict[str, Any]]) -> None:
-    """The loads of a packing, or the first of many, as a table on standard error."""
+    """The loads of a packing, or the first of many, as a table."""
     first = [row for row in rows if (row["disks"], row["seed"]) == (rows[0]["disks"], rows[0]["seed"])]
     lines = []
     for row in first:
@@ -131,4 +147,4 @@ def _show_modes(rows: list[dict[str, Any]]) -> None:
         numbers = pairs, f"{row['share']:.3f}", f"{row['growth_rate']:.4g}", least
         lines.append((f"{row['fx_over_fy']:g}", *numbers))
     if lines:
-        show_table(("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q"), lines)
+        print_line(table_of(("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q"), lines))

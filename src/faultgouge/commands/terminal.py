@@ -45,13 +45,13 @@ Frame = Annotated[int, typer.Option(help="Which equilibrium; negative ones count
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
-def read_scene(path: Path, command: str, task: Task | None = None, packings: int = 1) -> Scene:
+def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     """What a command reads of a scene, a TOML file; if its task is long, what is to be done and how long is said."""
     from faultgouge.pywrap.scenes.estimate import describe_work
     from faultgouge.pywrap.scenes.scene import Scene
 
     scene = Scene.from_toml(path, command=command)
-    ahead = describe_work(scene, task, packings) if task is not None else ""
+    ahead = describe_work(scene, task) if task is not None else ""
     if ahead:
         say(ahead)
     return scene
@@ -133,22 +133,16 @@ def print_json(value: dict[str, Any]) -> None:
         print(json.dumps(value, indent=1))
 
 
-def print_line(message: str) -> None:
-    """A result on standard output."""
+def print_line(result: str) -> None:
+    """A line of the result on standard output, for people; `print_json` is for programs, and goes instead of it."""
     if is_root():
-        print(message, flush=True)
+        print(result, flush=True)  # before what follows on standard error
 
 
 def say(message: str) -> None:
     """A line on standard error."""
     if is_root():
         print(message, file=sys.stderr)
-
-
-def tell(result: str) -> None:
-    """A line of the result on standard output, for people; `print_json` is for programs, and goes instead of it."""
-    if is_root():
-        print(result)
 
 
 def report_fallback(equilibrium: Equilibrium) -> None:
@@ -229,8 +223,3 @@ def table_of(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     lines = [list(headings), *map(list, rows)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join("   ".join(map(str.ljust, line, widths)).rstrip() for line in lines)
-
-
-def show_table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
-    """A table on standard error."""
-    say(table_of(headings, rows))

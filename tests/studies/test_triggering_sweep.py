@@ -1,19 +1,18 @@
-"""The study of the protocol: one packing, another that is triggered, and ensembles, of which nothing is dropped."""
+"""The protocol on one packing, another that is triggered, and sweeps of many, of which nothing is dropped."""
 
 import json
 
 import numpy as np
 import pytest
-from reference_layer import REFERENCE, SMALL, toml
+from reference_layer import SMALL, toml
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import NoEquilibriumError, Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
-from faultgouge.studies.reproduce import ensemble as study
 from faultgouge.studies.reproduce import reproduce
-from faultgouge.studies.reproduce.ensemble_figure import ensemble_figure
 from faultgouge.studies.statistics import distribution, median_interval, quartiles, share, sign_test
 from faultgouge.studies.sweep import triggering
+from faultgouge.studies.sweep.triggering_summary import in_words, summary
 
 SCENE = SMALL | {
     "packing": SMALL["packing"] | {"seed": 2},
@@ -130,51 +129,53 @@ def test_what_was_found_before_a_failure_is_kept(scene, monkeypatch):
     assert result["says"] == "no eruption today"
 
 
-def test_eruptions_are_counted(scene):
-    result = study.summary(scene, MEMBERS)
+def test_eruptions_are_counted():
+    result = summary(MEMBERS)
     assert {name: (each["count"], each["of"]) for name, each in result["rises"].items()} == {"5": (3, 4), "10": (2, 4)}
     assert [each["count"] for each in result["control_rises"].values()] == [4, 0]
     assert (result["grows"]["count"], result["grows"]["of"]) == (2, 4)
     assert (result["perturbation_shows"]["count"], result["perturbation_shows"]["of"]) == (3, 4)
     assert (result["lowered"]["count"], result["lowered"]["of"]) == (5, 6)
+    assert result["lowered_unknown"] == 1
     assert result["rise_quartiles"] == pytest.approx([4.5, 8.5, 11.25])
-    assert [each["seed"] for each in result["failed"]] == [7]
+    strong, weak = result["onsets"]
+    assert (strong["found"]["count"], strong["none_until"]) == (5, 2)
+    assert (weak["found"]["count"], weak["none_until"]) == (6, 1)
+    words = "\n".join(in_words(result))
+    assert "mu = 1: an onset in 5 of 7 (71 %, 95 % interval 36 to 92 %)" in words
+    assert "weakening friction lowers the onset in 5 of 6" in words
 
 
-def test_figure_shows_pairs_and_rises():
-    onsets, pairs, rises = ensemble_figure([each["result"] for each in MEMBERS]).axes
-    # level where packings are lost from sight
-    assert onsets.lines[0].get_ydata() == pytest.approx(np.array([0, 1, 5, 5]) / 7)
-    drawn = [(*line.get_xydata()[0], line.get_marker(), line.get_markerfacecolor()) for line in pairs.lines[:6]]
-    assert drawn[:4] == [(0.02, 0.01, "o", face) for face in ("none", "none", "C0", "C0")]
-    assert drawn[4:] == [(0.01, 0.02, "o", "none"), (0.03, 0.02, ">", "none")]
-    assert len(rises.patches) == 2  # the packings and their controls
+def test_the_summary_keeps_what_was_found_before_a_failure():
+    broken = row(8, [end("onset", 0.01)], says="no eruption today")
+    result = summary([broken, row(9, says="did not settle")])
+    assert (result["onsets"][0]["found"]["count"], result["lowered"]["of"], result["lowered_unknown"]) == (1, 0, 0)
+    assert in_words(summary([row(9, says="did not settle")])) == []
 
 
 @pytest.mark.slow
 def test_what_cannot_be_studied_is_refused(tmp_path):
-    stored = Scene.from_mapping(SCENE | {"packing": {"file": str(REFERENCE)}})
-    with pytest.raises(SceneError, match="stored one"):
-        study.ensemble(stored, 2, tmp_path)
     # the window is narrow: from 0.01159 to 0.01217
     coarse = Scene.from_mapping(TRIGGERED | {"ramp": {"step": 1e-2, "until": 0.02}})
     with pytest.raises(SceneError, match="no load of the ramp lies in a window"):
         reproduce(coarse, tmp_path / "out", say=id)
 
 
-@pytest.mark.ranks
 @pytest.mark.long
-def test_ranks_share_the_packings_and_go_on_where_an_ensemble_ended(faultgouge, tmp_path):
-    changes = {"law": SCENE["law"], "ramp": {"step": 5e-3, "until": 1e-2}}
-    (tmp_path / "scene.toml").write_text(toml(SMALL | changes | {"packing": SMALL["packing"] | {"seed": 3}}))
-    for name, number, ranks in (("one", 1, None), ("one", 2, None), ("shared", 2, 2)):
-        done = faultgouge("reproduce", "scene.toml", "--ensemble", number, "-o", name, ranks=ranks)
-        assert ("1 of 2 points are in one" in done.stderr) is ((name, number) == ("one", 2))
-    one, shared = (json.loads((tmp_path / name / "ensemble.json").read_text()) for name in ("one", "shared"))
-    assert one == shared
-    assert one["seeds"] == [3, 4]
-    for ending in ("png", "svg"):
-        assert (tmp_path / "shared" / f"ensemble.{ending}").stat().st_size > 0
+def test_shards_merge_into_the_summary_of_the_whole(faultgouge, tmp_path):
+    scene = SMALL | {"law": SCENE["law"], "ramp": {"step": 5e-3, "until": 1e-2}}
+    text = 'task = "triggering"\n[sweep]\n"packing.seed" = "3:4"\n' + toml(scene, "scene.")
+    (tmp_path / "sweep.toml").write_text(text)
+    whole = faultgouge("sweep", "sweep.toml", "-o", "whole").stdout
+    for part in (1, 2):
+        faultgouge("sweep", "sweep.toml", "--shard", f"{part}/2", "-o", f"part{part}")
+    merged = faultgouge("merge", "part1", "part2", "-o", "merged").stdout
+    one, other = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("whole", "merged"))
+    assert one == other
+    assert [each["mu"] for each in one["onsets"]] == [1.0, 0.8]
+    said = f"mu = 1: an onset in {one['onsets'][0]['found']['count']} of 2"
+    assert said in whole
+    assert said in merged
 
 
 @pytest.mark.long
