@@ -15,6 +15,7 @@ import ctypes
 import os
 import shutil
 import signal
+import weakref
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from multiprocessing.connection import Client, Connection, Listener
@@ -41,6 +42,10 @@ CHUNK = 2000
 
 SLOWEST, FASTEST = 1e-4, 0.2
 """Rates of the drag, per time step; explicit drag alternates from 1 on."""
+
+
+Kept = tuple[float, Connection, Snapshot | None]
+"""A load, the copy of the process that is there, and its packing; the first has none."""
 
 
 def lammps_path(
@@ -87,18 +92,17 @@ def lammps_path(
 
 
 class LammpsPath:
-    """See :func:`lammps_path`; `close`, or the end of a with block, ends the copies of the process."""
+    """See :func:`lammps_path`; `close`, the end of a with block or of the program ends the copies of the process."""
 
     def __init__(self, relaxation: "_Relaxation") -> None:
-        self._folder = TemporaryDirectory(prefix="faultgouge")
-        folder = Path(self._folder.name)
-        self._listener = Listener(str(folder / "path"), "AF_UNIX")
-        self._kept: list[tuple[float, Connection, Snapshot | None]] = []
-        self._owner = os.getpid()
+        folder = TemporaryDirectory(prefix="faultgouge")
+        self._listener = Listener(f"{folder.name}/path", "AF_UNIX")
+        self._kept: list[Kept] = []
         ctypes.CDLL(None).fflush(None)  # what is buffered would be written twice
-        self._root = os.fork()
-        if self._root == 0:
-            _be_start(relaxation, folder)
+        root = os.fork()
+        if root == 0:
+            _be_start(relaxation, Path(folder.name))
+        self._end = weakref.finalize(self, _end, self._kept, root, os.getpid(), self._listener, folder)
         self._kept.append((-np.inf, self._listener.accept(), None))
 
     def __call__(self, value: float) -> Snapshot:
@@ -114,7 +118,10 @@ class LammpsPath:
         found = copy.recv()
         if isinstance(found, FaultgougeError):
             copy.close()
-            raise found
+            try:
+                raise found
+            finally:
+                del found  # its traceback has this frame, and so this path
         if value > self._kept[-1][0]:
             self._kept.append((value, copy, found))
         else:
@@ -123,16 +130,7 @@ class LammpsPath:
 
     def close(self) -> None:
         """End all copies of the process."""
-        if self._kept and os.getpid() == self._owner:  # copies of this process have this path, too
-            for _, copy, _ in self._kept:
-                with suppress(OSError):
-                    copy.send(None)  # another copy of this process may keep the connection open
-                copy.close()
-            self._kept.clear()
-            os.kill(self._root, signal.SIGKILL)  # it may wait for a copy whose result nobody wants
-            os.waitpid(self._root, 0)
-            self._listener.close()
-            self._folder.cleanup()
+        self._end()
 
     def __enter__(self) -> "LammpsPath":
         return self
@@ -142,8 +140,20 @@ class LammpsPath:
     ) -> None:
         self.close()
 
-    def __del__(self) -> None:
-        self.close()
+
+def _end(kept: list[Kept], root: int, owner: int, listener: Listener, folder: "TemporaryDirectory[str]") -> None:
+    """End the copies of this process, which have this path, too, and must not end it."""
+    if os.getpid() != owner:
+        return
+    for _, copy, _ in kept:
+        with suppress(OSError):
+            copy.send(None)  # another copy of this process may keep the connection open
+        copy.close()
+    kept.clear()
+    os.kill(root, signal.SIGKILL)  # it may wait for a copy whose result nobody wants
+    os.waitpid(root, 0)
+    listener.close()
+    folder.cleanup()
 
 
 def _be_start(relaxation: "_Relaxation", folder: Path) -> NoReturn:
