@@ -5,8 +5,9 @@ that is known, and what was reached beyond the largest one is kept: as a copy of
 LAMMPS in it. Contact histories stay what they are, to the bit; a restart file of LAMMPS may lose some. The instance of
 the user stays as it was.
 
-The load jumps, and the drag takes what the jump sets free. The drag adapts: its rate is doubled or halved as long as
-the residual falls faster for it, since motion in n decades ends soonest near the critical damping of the slowest mode.
+The load jumps, and the drag takes what the jump sets free. Motion ends soonest at the critical damping of the slowest
+mode, where the force that is out of balance is half of the drag. Where it is more than twice the drag, the rate of the
+drag is doubled. Where it is less than a quarter, since the packing creeps or a loose sphere rolls away, it is halved.
 The error of the path itself is not known: of increments half as large some contacts slide otherwise
 (:class:`~faultgouge.analysis.Onset` has None for it), and a second path with smaller increments tells it.
 """
@@ -256,7 +257,7 @@ class _Relaxation:
     def relax(self, value: float) -> Snapshot:
         """Run with drag until the packing rests."""
         lmp, dt = self.lmp, float(self.lmp.extract_global("dt"))
-        found, way, before, factor = self.look(), 0.0, np.inf, 2.0
+        found, way = self.look(), 0.0
         moving, mass = found.ids[found.free], float(found.mass[found.free].mean())
         for _ in range(0, self.steps, CHUNK):
             drag = mass * self.rate / dt
@@ -270,9 +271,10 @@ class _Relaxation:
             free = np.isin(lmp.numpy.extract_atom("id")[:count], moving)
             radius = lmp.numpy.extract_atom("radius")[:count, None]
             f, torque, v, omega = (lmp.numpy.extract_atom(name)[:count] for name in ("f", "torque", "v", "omega"))
-            # with the drag beside: forces of a vibration vanish together at times, velocities then do not
-            parts = np.hstack([f, torque / radius, drag * v, spin * omega / radius])[free]
-            residual = float(np.linalg.norm(parts, axis=1).max())
+            forces = np.hstack([f, torque / radius])[free]
+            drags = np.hstack([drag * v, spin * omega / radius])[free]
+            # both: the forces of a vibration vanish together at times, and those on a sphere that rolls away always
+            residual = float(np.linalg.norm(np.hstack([forces, drags]), axis=1).max())
             way += CHUNK * dt * float(np.linalg.norm(v[free], axis=1).mean())
             contact = found.contacts.normal_force
             if residual <= self.balance * (contact.mean() if len(contact) else np.inf):
@@ -286,10 +288,9 @@ class _Relaxation:
                     return found
             if way > 2 * found.radius.mean():
                 raise NoEquilibriumError(f"The packing flows at {value:.10g}: its particles have moved by a diameter.")
-            fall, before = residual / before, residual
-            if fall > 0.5:  # slower than half in a chunk: the other way
-                factor = 1 / factor if fall > 0.9 else factor
-                self.rate = float(np.clip(self.rate * factor, SLOWEST, FASTEST))
+            ratio = np.linalg.norm(forces) / max(np.linalg.norm(drags), np.finfo(float).tiny)
+            self.rate *= 2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0
+            self.rate = float(np.clip(self.rate, SLOWEST, FASTEST))
         raise NoEquilibriumError(
             f"The packing does not come to rest at {value:.10g} in {self.steps} steps: {residual:.3g} is out of "
             "balance; give more steps, or the packing creeps."
