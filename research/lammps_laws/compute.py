@@ -161,7 +161,10 @@ def damping_needed(found: Snapshot) -> dict[str, float] | None:
         low, high = (middle, high) if grows(middle) else (low, middle)
     c = found.contacts
     ratio = high * c.normal_dashpot.mean() / 2 / np.sqrt(c.normal_stiffness.mean() * found.mass.mean() / 2)
-    return {"share": float(high), "restitution": float(np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2))) if ratio < 1 else 0.0}
+    return {
+        "share": float(high),
+        "restitution": float(np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2))) if ratio < 1 else 0.0,
+    }
 
 
 def compute(table: Path, count: int, seeds: range, watch: Any = print) -> None:
