@@ -123,12 +123,18 @@ def styles_of(lmp: Any) -> tuple[str, dict[str, str], str, str]:
     return values["Pair style"], fixes, values["Units"], values["Atom style"]
 
 
-def log_of(lmp: Any) -> list[str] | None:
-    """The lines of an instance's log, which is closed by the question; None without a log."""
+def log_path(lmp: Any) -> Path | None:
+    """An instance's log, which is closed by the question; None without a log."""
     before = _open_logs()
     lmp.command("log none")
     closed = [path for descriptor, path in before.items() if descriptor not in _open_logs()]
-    return Path(closed[0]).read_text(errors="replace").splitlines() if len(closed) == 1 else None
+    return Path(closed[0]) if len(closed) == 1 else None
+
+
+def log_of(lmp: Any) -> list[str] | None:
+    """The lines of an instance's log, which is closed by the question; None without a log."""
+    path = log_path(lmp)
+    return None if path is None else path.read_text(errors="replace").splitlines()
 
 
 def only_log() -> list[str] | None:

@@ -9,6 +9,7 @@ from faultgouge.analysis import (
     Snapshot,
     damping_matrix,
     eigenvalues,
+    find_onset,
     linear_response,
     normal_modes,
     spectrum,
@@ -16,6 +17,7 @@ from faultgouge.analysis import (
     stiffness_matrix,
     transient_gain,
 )
+from faultgouge.analysis.packing.arrays import derive_frozen
 from faultgouge.analysis.packing.snapshot import PER_CONTACT
 
 STEP = np.longdouble(1e-8)
@@ -238,6 +240,38 @@ def test_the_analysis_takes_a_snapshot_as_a_packing(bed):
     step = stable_timestep(bed)
     assert step == pytest.approx(2 / mu, rel=1e-7)
     assert abs(step - 2 / mu) <= step.error + 1e-12 * step
+
+
+def test_onset_of_a_family_of_snapshots():
+    """Tangential forces grow with the load; bisection with all eigenvalues finds the same edge."""
+    still = make(2, arms_meet=True, slides=False)
+    # without large pushes along contacts, which buckle
+    c = derive_frozen(still.contacts, normal_force=1e-3 * still.contacts.normal_force)
+
+    def at(load: float) -> Snapshot:
+        force = load * c.tangential_force
+        b = 0.5 * force / c.overlap[:, None]
+        return derive_frozen(
+            still, fx=load, load_error=1e-9, contacts=derive_frozen(c, tangential_force=force, closing=b, parting=b)
+        )
+
+    def pairs(load: float) -> bool:
+        root = np.sqrt(still.coordinate_mass)
+        values = np.linalg.eigvals(stiffness_matrix(at(load)).toarray() / root / root[:, None])
+        return bool(np.any(values.imag > 1e-7 * np.abs(values).max()))
+
+    loads = np.linspace(0, 5, 11)
+    onset = find_onset(at, loads, first=True)
+    high = loads[np.argmax([pairs(load) for load in loads])]
+    assert high > 0
+    low = high - 0.5
+    while high - low > 1e-11:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if pairs(middle) else (middle, high)
+    # the imaginary part is 1e-7 of the largest eigenvalue some 2e-9 beyond the edge
+    assert onset.fx_c == pytest.approx(high, abs=1e-8)
+    assert 1e-9 <= onset.error < 2e-9
+    assert onset.as_dict()["error_of_path"] is None
 
 
 def test_gain_of_a_snapshot(path):

@@ -14,7 +14,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "howto_own_lammps.md"
 def test_script_of_the_page(tmp_path):
     text = PAGE.read_text()
     blocks = dict(re.findall(r"^```\w+\n# ([\w.]+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL))
-    assert blocks.keys() == {"slope.in", "look.py"}
+    assert blocks.keys() == {"slope.in", "look.py", "heap.in", "heap.py"}
     for name, block in blocks.items():
         (tmp_path / name).write_text(block)
     first = re.search(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)[1]
@@ -25,3 +25,16 @@ def test_script_of_the_page(tmp_path):
     assert "40 spheres" in done.stdout
     assert "LAMMPS moves as K and C say: True" in done.stdout
     assert "<Spectrum: 240 eigenvalues" in done.stdout
+
+
+@pytest.mark.long
+def test_heap_of_the_page(tmp_path):
+    text = PAGE.read_text()
+    blocks = dict(re.findall(r"^```\w+\n# (heap[.\w]+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL))
+    for name, block in blocks.items():
+        (tmp_path / name).write_text(block)
+    done = subprocess.run([sys.executable, "heap.py"], cwd=tmp_path, capture_output=True, text=True, timeout=3600)
+    assert done.returncode == 0, done.stderr
+    first, rests, flows = (float(each) for each in re.findall(r"([\d.]+)(?= degrees|$)", done.stdout, re.MULTILINE)[:3])
+    assert 0.01 < first < 1.0  # other builds pour another heap
+    assert 15.0 < rests < flows < 27.0

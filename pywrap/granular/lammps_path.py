@@ -1,0 +1,297 @@
+"""A path of equilibria of a live LAMMPS: at each load its own dynamics relax the packing, with drag.
+
+Equilibria with friction depend on how they were reached. Each load is therefore reached from the nearest smaller load
+that is known, and what was reached beyond the largest one is kept: as a copy of the process (`fork`), which waits with
+LAMMPS in it. Contact histories stay what they are, to the bit; a restart file of LAMMPS may lose some. The instance of
+the user stays as it was.
+
+The load jumps, and the drag takes what the jump sets free. Motion ends soonest at the critical damping of the slowest
+mode, where the force that is out of balance is half of the drag. Where it is more than twice the drag, the rate of the
+drag is doubled. Where it is less than a quarter, since the packing creeps or a loose sphere rolls away, it is halved.
+The error of the path itself is not known: of increments half as large some contacts slide otherwise
+(:class:`~faultgouge.analysis.Onset` has None for it), and a second path with smaller increments tells it.
+"""
+
+import ctypes
+import os
+import shutil
+import signal
+import weakref
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from multiprocessing.connection import Client, Connection, Listener
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Any, NoReturn
+
+import numpy as np
+
+from ...analysis import NoEquilibriumError, Snapshot
+from ...analysis.errors import FaultgougeError
+from ...analysis.packing.arrays import derive_frozen
+from . import forked_look
+from .from_lammps import from_lammps
+from .granular_commands import SnapshotError
+
+REST = 1e-8
+"""Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
+rounding, 1e-12 of a force whose overlap is 1e-4 of a radius."""
+
+CHUNK = 2000
+"""Steps between two looks: many beside the set-up of a run, few beside a relaxation."""
+
+SLOWEST, FASTEST = 1e-4, 0.2
+"""Rates of the drag, per time step; explicit drag alternates from 1 on."""
+
+
+Kept = tuple[float, Connection, Snapshot | None]
+"""A load, the copy of the process that is there, and its packing; the first has none."""
+
+
+def lammps_path(
+    lmp: Any,
+    apply: Callable[[Any, float], object] | str,
+    *,
+    commands: Iterable[str] | None = None,
+    slides: bool = False,
+    balance: float = REST,
+    steps: int = 1_000_000,
+) -> "LammpsPath":
+    """Equilibria of LAMMPS's own packing as a function of a load, for :func:`~faultgouge.analysis.find_onset`.
+
+    ``path(value)`` is the Snapshot in equilibrium at a value, with `fx` the value and `load_error` the shift of the
+    value that sets as much out of balance as the relaxation has left.
+
+    Parameters
+    ----------
+    lmp : lammps.lammps
+        The instance, where the path begins; on one rank and one thread. The instance does not change.
+    apply : callable or str
+        ``apply(lmp, value)`` sets the load, whatever was set before; or the name of a variable of style equal or
+        internal, on which a fix of the deck depends.
+    commands, slides
+        As of :func:`~faultgouge.pywrap.from_lammps`.
+    balance : float
+        Largest residual at rest, as a share of the mean contact force.
+    steps : int
+        Time steps after which a packing that is not at rest flows.
+
+    Raises
+    ------
+    SnapshotError
+        If the instance has several ranks or threads. ``path(value)`` raises it as `from_lammps` does, and where a load
+        changes no force.
+    NoEquilibriumError
+        By ``path(value)``, where the packing flows: its particles have moved by their diameter in the mean, or do not
+        come to rest.
+    """
+    if not forked_look.can_copy(lmp):
+        raise SnapshotError("lammps_path keeps copies of the process: use one rank and one thread.")
+    given = None if commands is None else list(commands)
+    return LammpsPath(_Relaxation(lmp, apply, given, slides, balance, steps))
+
+
+class LammpsPath:
+    """See :func:`lammps_path`; `close`, the end of a with block or of the program ends the copies of the process."""
+
+    def __init__(self, relaxation: "_Relaxation") -> None:
+        folder = TemporaryDirectory(prefix="faultgouge")
+        self._listener = Listener(f"{folder.name}/path", "AF_UNIX")
+        self._kept: list[Kept] = []
+        ctypes.CDLL(None).fflush(None)  # what is buffered would be written twice
+        root = os.fork()
+        if root == 0:
+            _be_start(relaxation, Path(folder.name))
+        self._end = weakref.finalize(self, _end, self._kept, root, os.getpid(), self._listener, folder)
+        self._kept.append((-np.inf, self._listener.accept(), None))
+
+    def __call__(self, value: float) -> Snapshot:
+        """The packing in equilibrium at a value."""
+        value = float(value)
+        below, there, snapshot = next(each for each in reversed(self._kept) if each[0] <= value or each[0] == -np.inf)
+        if snapshot is not None and below == value:
+            return snapshot
+        there.send(value)
+        if not there.recv():
+            raise SnapshotError(f"LAMMPS ended without a word while it relaxed at {value:g}.")
+        copy = self._listener.accept()
+        found = copy.recv()
+        if isinstance(found, FaultgougeError):
+            copy.close()
+            try:
+                raise found
+            finally:
+                del found  # its traceback has this frame, and so this path
+        if value > self._kept[-1][0]:
+            self._kept.append((value, copy, found))
+        else:
+            copy.close()
+        return found
+
+    def close(self) -> None:
+        """End all copies of the process."""
+        self._end()
+
+    def __enter__(self) -> "LammpsPath":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _end(kept: list[Kept], root: int, owner: int, listener: Listener, folder: "TemporaryDirectory[str]") -> None:
+    """End the copies of this process, which have this path, too, and must not end it."""
+    if os.getpid() != owner:
+        return
+    for _, copy, _ in kept:
+        with suppress(OSError):
+            copy.send(None)  # another copy of this process may keep the connection open
+        copy.close()
+    kept.clear()
+    os.kill(root, signal.SIGKILL)  # it may wait for a copy whose result nobody wants
+    os.waitpid(root, 0)
+    listener.close()
+    folder.cleanup()
+
+
+def _be_start(relaxation: "_Relaxation", folder: Path) -> NoReturn:
+    """The life of the first copy of the process, and of all copies of it."""
+    try:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        _own_log(relaxation.lmp, folder)
+        forked_look.quieten(relaxation.lmp)
+        there = Client(str(folder / "path"), "AF_UNIX")
+        while (value := there.recv()) is not None:
+            source, sink = os.pipe()
+            child = os.fork()
+            if child:
+                os.close(sink)
+                there.send(os.read(source, 1) != b"")  # nothing comes from a copy that has died
+                os.close(source)
+                continue
+            there.close()
+            os.close(source)
+            _own_log(relaxation.lmp, folder)
+            found = relaxation.result(value)
+            os.write(sink, b"x")
+            os.close(sink)
+            there = Client(str(folder / "path"), "AF_UNIX")
+            there.send(found)
+    except (EOFError, OSError):  # the path is closed
+        pass
+    finally:
+        os._exit(0)
+
+
+def _own_log(lmp: Any, folder: Path) -> None:
+    """Go on in a copy of the log, where there is one: copies of a process must not write to the same file."""
+    before = forked_look.log_path(lmp)
+    if before is not None:
+        own = folder / f"log.{os.getpid()}"
+        shutil.copyfile(before, own)
+        lmp.command(f'log "{own}" append')
+
+
+class _Relaxation:
+    """LAMMPS and how it comes to rest."""
+
+    def __init__(
+        self,
+        lmp: Any,
+        apply: Callable[[Any, float], object] | str,
+        commands: list[str] | None,
+        slides: bool,
+        balance: float,
+        steps: int,
+    ) -> None:
+        self.lmp, self.apply, self.commands = lmp, apply, commands
+        self.slides, self.balance, self.steps = slides, balance, steps
+        self.rate = 0.01  # of the drag, per time step: critical for a mode of 1000 steps
+
+    def result(self, value: float) -> Snapshot | FaultgougeError:
+        """The equilibrium at a value, or why there is none."""
+        try:
+            self.set(value)
+            found = self.relax(value)
+            change = forked_look.in_a_copy(lambda: self.force_change(value))
+            if change == 0.0:
+                return SnapshotError(
+                    f"No force changes with the load at {value:g}: does apply set it, or a fix read the variable?"
+                )
+            return derive_frozen(found, fx=value, load_error=found.residual / change)
+        except FaultgougeError as error:
+            return error
+        except Exception as error:  # LAMMPS, and a user's function, raise what they choose
+            return SnapshotError(f"At {value:g}: {forked_look.stopped(error)}")
+
+    def set(self, value: float) -> None:
+        """Set the load."""
+        if not isinstance(self.apply, str):
+            self.apply(self.lmp, value)
+        elif self.lmp.set_internal_variable(self.apply, value) != 0:
+            self.lmp.command(f"variable {self.apply} equal {value:.17g}")
+
+    def look(self) -> Snapshot:
+        """The packing as it stands, moving or not."""
+        return from_lammps(self.lmp, self.commands, slides=self.slides, balance=np.inf)
+
+    def force_change(self, value: float) -> float:
+        """Largest change of a force per value, of particles that stay where they are."""
+        step = 1e-4 * max(abs(value), 1e-2)
+        forces = []
+        for each in (value, value + step):
+            self.set(each)
+            self.lmp.command("run 0 post no")
+            count = self.lmp.extract_setting("nlocal")
+            order = np.argsort(self.lmp.numpy.extract_atom("id")[:count])
+            forces.append(np.array(self.lmp.numpy.extract_atom("f")[:count][order]))
+        change = float(np.linalg.norm(forces[1] - forces[0], axis=1).max())
+        # forces have a rounding of 1e-16 of themselves, and of 1e-12 where overlaps are small beside coordinates
+        return change / step if change > 1e-11 * np.abs(forces[0]).max() else 0.0
+
+    def relax(self, value: float) -> Snapshot:
+        """Run with drag until the packing rests."""
+        lmp, dt = self.lmp, float(self.lmp.extract_global("dt"))
+        found, way = self.look(), 0.0
+        moving, mass = found.ids[found.free], float(found.mass[found.free].mean())
+        for _ in range(0, self.steps, CHUNK):
+            drag = mass * self.rate / dt
+            lmp.command(f"fix faultgouge_drag all viscous {drag:.17g}")
+            turning = lmp.has_style("fix", "viscous/sphere")  # else the dashpots of contacts damp rotation
+            spin = drag * float(np.mean(found.radius**2)) if turning else 0.0
+            if turning:
+                lmp.command(f"fix faultgouge_spin all viscous/sphere {spin:.17g}")
+            lmp.command(f"run {CHUNK} post no")
+            count = lmp.extract_setting("nlocal")
+            free = np.isin(lmp.numpy.extract_atom("id")[:count], moving)
+            radius = lmp.numpy.extract_atom("radius")[:count, None]
+            f, torque, v, omega = (lmp.numpy.extract_atom(name)[:count] for name in ("f", "torque", "v", "omega"))
+            forces = np.hstack([f, torque / radius])[free]
+            drags = np.hstack([drag * v, spin * omega / radius])[free]
+            # both: the forces of a vibration vanish together at times, and those on a sphere that rolls away always
+            residual = float(np.linalg.norm(np.hstack([forces, drags]), axis=1).max())
+            way += CHUNK * dt * float(np.linalg.norm(v[free], axis=1).mean())
+            contact = found.contacts.normal_force
+            if residual <= self.balance * (contact.mean() if len(contact) else np.inf):
+                found = self.look()
+                if found.residual <= self.balance * found.contacts.normal_force.mean():
+                    for array in (v, omega):
+                        array[:] = 0.0
+                    lmp.command("unfix faultgouge_drag")
+                    if turning:
+                        lmp.command("unfix faultgouge_spin")
+                    return found
+            if way > 2 * found.radius.mean():
+                raise NoEquilibriumError(f"The packing flows at {value:.10g}: its particles have moved by a diameter.")
+            ratio = np.linalg.norm(forces) / max(np.linalg.norm(drags), np.finfo(float).tiny)
+            self.rate *= 2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0
+            self.rate = float(np.clip(self.rate, SLOWEST, FASTEST))
+        raise NoEquilibriumError(
+            f"The packing does not come to rest at {value:.10g} in {self.steps} steps: {residual:.3g} is out of "
+            "balance; give more steps, or the packing creeps."
+        )

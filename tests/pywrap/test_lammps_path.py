@@ -1,0 +1,81 @@
+"""Equilibria of a LAMMPS of one's own along a load: a slope that is tilted, a force on a layer, and what goes wrong."""
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import NoEquilibriumError, find_onset, spectrum
+
+LAW = "hertz/history 1e5 3e4 40 20 0.5 1"
+
+
+def layer(tmp_path, count: int = 20):
+    """Disks of two sizes at rest on a floor in LAMMPS, and its log."""
+    from faultgouge.pywrap import Engine  # loads what is needed, in order
+
+    assert Engine
+    from mpi4py import MPI
+
+    from faultgouge.pywrap.lammps.instance import lammps_instance
+
+    rng = np.random.default_rng(2)
+    places = [(1.05 * (k % 5 + 0.5) + rng.uniform(-0.1, 0.1), 0.6 + 1.05 * (k // 5)) for k in range(count)]
+    lmp = lammps_instance(MPI.COMM_SELF, tmp_path / "log.lammps")
+    for line in [
+        "units lj", "dimension 2", "atom_style sphere", "boundary p f p", "newton off", "comm_modify vel yes",
+        "region box block 0 5.25 0 40 -0.5 0.5", "create_box 2 box",
+        *(f"create_atoms {1 + k % 2} single {x:.17g} {y:.17g} 0" for k, (x, y) in enumerate(places)),
+        "set type 1 diameter 0.8", "set type 2 diameter 1.0", "set group all density/disc 1.0",
+        f"pair_style gran/{LAW}", "pair_coeff * *", f"fix floor all wall/gran {LAW} yplane 0 NULL contacts",
+        "group top id 16:20", "variable slope equal 0.0", "variable push internal 0.0",
+        "fix load all gravity 1.0 vector v_slope -1 0", "fix pull top addforce v_push 0 0",
+        "fix move all nve/sphere disc", "fix drag all viscous 1.0", "timestep 1e-3", "run 30000 post no", "unfix drag",
+    ]:  # fmt: skip
+        lmp.command(line)
+    return lmp
+
+
+@pytest.mark.slow
+def test_tilt_of_a_slope(tmp_path):
+    """Loads in balance, back and forth, as one copy of LAMMPS after the other reaches them; then it flows."""
+    from faultgouge.pywrap import lammps_path
+
+    lmp = layer(tmp_path)
+    before = np.array(lmp.numpy.extract_atom("x"))
+    with lammps_path(lmp, "slope") as path:
+        found = {value: path(value) for value in (0.0, 0.02, 0.1, 0.05)}
+        for value, each in found.items():
+            assert each.fx == value
+            assert each.residual < 1e-8 * each.contacts.normal_force.mean()
+            assert 0 < each.load_error < 1e-7
+            weight = each.mass.sum()
+            assert each.load[:, 0].sum(axis=0) == pytest.approx(
+                [weight * value / np.hypot(value, 1), -weight / np.hypot(value, 1), 0], abs=1e-9
+            )
+        assert path(0.02) is found[0.02]
+        assert path(0.05) == found[0.05]  # from 0.02 both times, to the bit
+        with pytest.raises(NoEquilibriumError, match=r"flows at 0\.9"):
+            path(0.9)
+        onset = find_onset(path, [0.0, 0.02], first=True)
+    assert len(spectrum(found[0.1]).pairs) > 0
+    assert onset.fx_c <= 0.02
+    assert np.array_equal(lmp.numpy.extract_atom("x"), before)
+    lmp.close()
+
+
+@pytest.mark.slow
+def test_force_on_a_layer(tmp_path):
+    """By a function; it says where it changes nothing, and what it raises reaches the caller in a sentence."""
+    from faultgouge.pywrap import SnapshotError, lammps_path
+
+    lmp = layer(tmp_path)
+
+    def push(lmp, value: float) -> None:
+        lmp.set_internal_variable("push", value)
+
+    with lammps_path(lmp, push) as path:
+        assert path(0.02).load[15:, 0, 0] == pytest.approx(0.02, abs=1e-9)
+    with lammps_path(lmp, lambda *_: None) as path, pytest.raises(SnapshotError, match=r"No force changes .* at 0\.1"):
+        path(0.1)
+    with lammps_path(lmp, "tilt") as path, pytest.raises(SnapshotError, match=r"At 0\.1: LAMMPS stopped: .*tilt"):
+        path(0.1)
+    lmp.close()
