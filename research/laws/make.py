@@ -1,0 +1,65 @@
+"""Both laws of friction side by side: the tables computed, the page made from them, or a tenth of them computed again.
+
+python -m research.laws.make compute FOLDER [SET ...]   what the tables lack of all sets, resumable; an hour
+python -m research.laws.make page                       README.md and laws.json, from the tables
+python -m research.laws.make check FOLDER [SET ...]     one packing in ten once more, compared with the tables
+
+Without a SET, such as "force 100", all of them. From the folder of the repository.
+"""
+
+import sys
+from math import ceil
+from pathlib import Path
+
+from faultgouge.studies.sweep.run_sweep import run_sweep
+from faultgouge.studies.sweep.sweep_plan import Sweep
+from faultgouge.studies.sweep.tasks import TASKS
+from research.laws.page import write_page
+from research.laws.sets import sets
+from research.modes.make import different
+from research.modes.packing_rows import condense, read_known
+
+HERE = Path(__file__).parent
+TABLES = HERE / "tables"
+
+
+def compute(folder: Path, names: list[str], share: float = 1.0, tables: Path | None = None) -> None:
+    """A share of the packings of each set, on one process, but for those of the tables."""
+    for name, sweep in sets().items():
+        rows = {} if tables is None else read_known(tables, name)
+        seeds = [point.values["packing.seed"] for point in sweep.points]
+        seeds = [seed for seed in seeds[: ceil(share * len(seeds))] if seed not in rows]
+        if seeds and (not names or name in names):
+            print(f"{name}: {len(seeds)} packings", flush=True)
+            rest = {"task": sweep.task, "sweep": {"packing.seed": seeds}, "scene": sweep.scene}
+            run_sweep(Sweep.from_mapping(rest, TASKS), folder / name.replace(" ", "_"))
+
+
+def check(folder: Path, names: list[str]) -> None:
+    """The first tenth of the packings of each set, compared with the tables: every number of every load."""
+    compute(folder, names, 0.1)
+    condense(folder, folder / "tables")
+    compared, wrong = 0, []
+    for path in sorted((folder / "tables").glob("*.jsonl")):
+        before = read_known(TABLES, path.stem)
+        for seed, row in read_known(folder / "tables", path.stem).items():
+            for one, other in zip(row["loads"], before[seed]["loads"], strict=True):
+                compared += 1
+                wrong += [
+                    f"{path.stem}, seed {seed}, F_x/F_y = {one['fx_over_fy']}: {key}" for key in different(one, other)
+                ]
+    print("\n".join([f"{compared} loads compared, {len(wrong)} numbers of them differ", *wrong]))
+    sys.exit(len(wrong) > 0)
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["compute", folder, *names]:
+            compute(Path(folder), names, tables=TABLES)
+            condense(Path(folder), TABLES)
+        case ["page"]:
+            print(write_page(TABLES, HERE))
+        case ["check", folder, *names]:
+            check(Path(folder), names)
+        case _:
+            sys.exit(__doc__)

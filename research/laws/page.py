@@ -1,0 +1,121 @@
+"""The page of the study: its template filled with what the tables hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from faultgouge.analysis.files.atomic_write import write_json, write_text
+from faultgouge.figures.pages import render
+from faultgouge.studies.result_rows import read_rows
+from faultgouge.studies.statistics import interval, median, median_interval, share
+from research.laws.both_laws import BRANCHES, RESTITUTIONS
+from research.modes.loss import GROWS
+from research.modes.page import finite, part
+
+Row = dict[str, Any]
+
+WORDS = {"smooth": "smoothed", "same": "standard, same equilibria", "loaded": "standard, own ramp"}
+STATES = tuple(WORDS)
+
+DRAG = 2.0
+"""1/tau of the drag with which the deck of stock LAMMPS loads (`stock_lammps`)."""
+
+MEDIANS = ("share", "growth_rate", "least_q", "drag_rate")
+
+
+def write_page(tables: Path, folder: Path) -> Path:
+    """Write README.md and laws.json from the tables of a folder; the path of the page."""
+    found = numbers(
+        {path.stem: [row for row in read_rows(path) if row["says"] is None] for path in tables.glob("*.jsonl")}
+    )
+    write_json(folder / "laws.json", finite(found))
+    formats = {"middle": interval, "quality": partial(interval, digits=".3g"), "part": part, "across": across}
+    formats |= {"restitutions": RESTITUTIONS, "words": WORDS}
+    write_text(folder / "README.md", render("research.laws", "README.md.j2", **found, **formats))
+    return folder / "README.md"
+
+
+def across(at: dict[str, Any], name: str, told: Callable[[Any], str] = str, restitution: float | None = None) -> str:
+    """The cells of a row: one quantity of the three states, of one restitution if one is given."""
+    found = [at[state][name] for state in STATES]
+    return " | ".join(told(each if restitution is None else each[restitution]) for each in found)
+
+
+def numbers(tables: dict[str, list[Row]]) -> dict[str, Any]:
+    """What the page says: sets of equilibria by name and load, runs by state and restitution, first windows by law."""
+    sets = {
+        name.replace("_", " "): by_load(rows)
+        for name, rows in sorted(tables.items())
+        if name.split("_")[0] in ("force", "quartz")
+    }
+    growth = tables.get("growth_100", [])
+    onsets = {name.split("_")[1]: first_windows(rows) for name, rows in tables.items() if name.startswith("onset_")}
+    return {"sets": sets, "runs": runs(growth), "grown": len(growth), "onsets": onsets}
+
+
+def by_load(rows: Sequence[Row]) -> dict[float, dict[str, Any]]:
+    """Of each load the numbers of each state; `branches` has those of K of the slider at the same equilibria."""
+    loads = sorted({load["fx_over_fy"] for row in rows for load in row["loads"]})
+    found = {}
+    for fx in loads:
+        at = [load for row in rows for load in row["loads"] if load["fx_over_fy"] == fx]
+        seen = {name: [load[name] for load in at if name in load] for name in STATES}
+        found[fx] = {name: described(each) for name, each in seen.items()} | {
+            "branches": {branch: median([each[branch] for each in seen["same"]]) for branch in BRANCHES}
+        }
+    return found
+
+
+def described(states: Sequence[Row]) -> dict[str, Any]:
+    """Counts and medians of one state at one load."""
+    found: dict[str, Any] = {"packings": len(states), "with_pairs": counted(each["pairs"] > 0 for each in states)}
+    found["moved"] = sum(each["moved"] > 0 for each in states)
+    found |= {name: median([np.inf if each[name] is None else each[name] for each in states]) for name in MEDIANS}
+    found["lowest_q"] = min((each["least_q"] for each in states if each["least_q"] is not None), default=None)
+    damped = [dict(map(tuple, each["damped"])) for each in states]
+    found["grows"] = {e: counted(each[e] > GROWS for each in damped if e in each) for e in RESTITUTIONS}
+    found["beyond_drag"] = sum(each["drag_rate"] > DRAG for each in states)
+    alone = [each["normal_dashpots"] for each in states if "normal_dashpots" in each]
+    found["fastest_normal_alone"] = 2 * max(alone, default=0.0)
+    found["normal_alone"] = counted(each > GROWS for each in alone)
+    return found
+
+
+def counted(which: Iterable[bool]) -> dict[str, Any]:
+    """How many, with Wilson's interval of the share."""
+    told = list(which)
+    return share(sum(told), len(told))
+
+
+def runs(rows: Sequence[Row]) -> dict[str, dict[float, dict[str, Any]]]:
+    """By state and restitution: packings whose motion grows in all draws and in any, and how K's rate compares."""
+    found: dict[str, dict[float, dict[str, Any]]] = {}
+    for name in STATES:
+        each = [run for row in rows for load in row["loads"] for run in load.get(name, {"runs": []})["runs"]]
+        for e in sorted({run["restitution"] for run in each}, reverse=True):
+            chosen = [run for run in each if run["restitution"] == e]
+            rates = [[draw["rate"] is not None for draw in run["draws"]] for run in chosen]
+            ratios = [
+                draw["rate"] / run["predicted"] for run in chosen for draw in run["draws"] if draw["rate"] is not None
+            ]
+            found.setdefault(name, {})[e] = {
+                "predicted": counted(run["predicted"] > 2 * GROWS for run in chosen),
+                "always": counted(map(all, rates)),
+                "ever": counted(map(any, rates)),
+                "ratio": [float(np.median(ratios)), min(ratios), max(ratios)] if ratios else None,
+                "most": max(draw["last_over_first"] for run in chosen for draw in run["draws"] if draw["rate"] is None)
+                if not all(map(all, rates))
+                else None,
+            }
+    return found
+
+
+def first_windows(rows: Sequence[Row]) -> dict[str, Any]:
+    """How many packings have a first window up to the end of the ramp, and the median of F_x^c."""
+    reach, found = [row["reach"] for row in rows], [row["ends"] == "onset" for row in rows]
+    return {"windows": counted(found), "median": median_interval(reach, found)}

@@ -1,0 +1,76 @@
+"""Both laws of friction: the page comes out of the committed tables, and its conclusions are in them."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reference_layer import parted
+
+from research.laws.both_laws import as_slider
+from research.laws.page import write_page
+
+ROOT = Path(__file__).parents[2]
+LAWS = ROOT / "research" / "laws"
+FOUND = json.loads((LAWS / "laws.json").read_text())
+USUAL = FOUND["sets"]["force 100"]
+
+
+@pytest.mark.slow
+def test_the_page_comes_out_of_the_tables(tmp_path):
+    assert write_page(LAWS / "tables", tmp_path).read_text() == (LAWS / "README.md").read_text()
+    (words, numbers), (stored, expected) = (parted(each / "laws.json") for each in (tmp_path, LAWS))
+    assert words == stored
+    assert numbers == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("load", ["0.2", "0.3"])
+@pytest.mark.parametrize("state", ["same", "loaded"])
+def test_the_standard_law_has_pairs_and_no_growth_with_strong_loss(load, state):
+    """Intervals of both laws are apart in what the page calls different."""
+    smooth, standard = USUAL[load]["smooth"], USUAL[load][state]
+    assert standard["grows"]["0.9"]["high"] < smooth["grows"]["0.9"]["low"]
+    assert standard["with_pairs"]["low"] > 0.5
+    assert standard["growth_rate"][2] < 0.5 * smooth["growth_rate"][1]
+    assert standard["least_q"][1] > 2 * smooth["least_q"][2]
+    assert standard["grows"]["0.99"]["count"] > 0
+
+
+def test_lammps_grows_where_the_pencil_does_and_nowhere_else():
+    for state, runs in FOUND["runs"].items():
+        for run in runs.values():
+            if state == "smooth":
+                assert run["always"]["count"] == run["predicted"]["count"] > 0
+                assert 0.8 < run["ratio"][1] <= run["ratio"][2] < 1.2
+            else:
+                assert run["ever"]["count"] == 0
+
+
+def test_pages_have_the_counts_of_the_tables():
+    counts = {
+        state: {load: "{count} of {of}".format(**USUAL[load][state]["grows"]["0.9"]) for load in ("0.2", "0.3")}
+        for state in ("smooth", "same", "loaded")
+    }
+    paper = (ROOT / "docs" / "paper.md").read_text()
+    cells = " | ".join(f"{each['0.2']} / {each['0.3']}" for each in counts.values())
+    assert f"| motion grows with the restitution 0.9 | {cells} |" in paper
+    for page in ("README.md", "research/modes/referee.md", "paper/paper.md"):
+        text = " ".join((ROOT / page).read_text().split())
+        assert counts["smooth"]["0.2"] in text, page
+        assert counts["same"]["0.2"] in text, page
+
+
+def test_the_slider_takes_the_forces_over(reference_packing):
+    packing = reference_packing(0.3)
+    limit = packing.law.slip_limit(packing.geometry.overlap)
+    slip = np.resize([-1.0, 0.05, 0.5, 0.99, 1.0], len(limit)) * limit
+    packing = replace(packing, contacts=packing.contacts.slipped(slip))
+    other = as_slider(packing)
+    forces = [each.law.tangential_force(each.geometry.overlap, each.contacts.slip) for each in (packing, other)]
+    # two roots and a quotient; forces are a few units of the load
+    np.testing.assert_allclose(forces[1], forces[0], rtol=1e-14)
+    assert other.residual == pytest.approx(packing.residual, abs=1e-12)
+    bound = [each.law.at_bound(each.geometry.overlap, each.contacts.slip) for each in (packing, other)]
+    assert np.array_equal(*bound)
+    assert bound[0].any()
