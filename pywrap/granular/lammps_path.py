@@ -227,7 +227,7 @@ class _Relaxation:
         except FaultgougeError as error:
             return error
         except Exception as error:  # LAMMPS, and a user's function, raise what they choose
-            return SnapshotError(f"At {value:g}: {forked_look.stopped(error)}")
+            return SnapshotError(f"At {value:g}: {forked_look.explain_error(error)}")
 
     def set(self, value: float) -> None:
         """Set the load."""

@@ -66,7 +66,8 @@ def grow(packing: Packing, draw: int) -> dict[str, Any]:
     """D at the end of a run over that at its first look, and the rate of its growth, 1 / time, None if it grows not."""
     dt = time_step(packing)
     steps = max(1, round(LOOK / dt))
-    times, squares = [], []
+    times: list[float] = []
+    squares: list[float] = []
     with Engine(packing, MPI.COMM_SELF) as engine:
         shake_disks(engine, packing, SEED, draw)
         with engine.undamped(dt) as dynamics:

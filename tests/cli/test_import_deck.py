@@ -43,7 +43,7 @@ def test_deck(faultgouge_here, tmp_path, shape):
     folder.mkdir()
     (folder / "pile.in").write_text(DECK.format(**shape, word="contacts"))
     done = faultgouge_here("import", "own/pile.in", "-o", "pile.h5")
-    assert f"3 {'disks' if shape is FLAT else 'spheres'}, " in done.stderr
+    assert f"3 {'disks' if shape is FLAT else 'spheres'}, " in done.stdout
     snapshot = read_snapshot(tmp_path / "pile.h5")
     assert snapshot.residual < 1e-6
     found = json.loads(faultgouge_here("spectrum", "pile.h5", "--json").stdout)

@@ -140,7 +140,7 @@ def test_all_announced_modes_are_looked_at_also_beside_one_that_grew_before():
     begun = {0.5: DampedWindow(-1.0, None, 1.0, 0.0, "hopf"), 0.9: DampedWindow(-2.0, None, 1.0, 0.0, "hopf")}
 
     class Told(SlicedGrowing):
-        def _confirmed(self, candidate, there, first):
+        def _confirm_window(self, candidate, there, first):
             return begun[candidate.onset]
 
     empty = csr_array((2, 2))
