@@ -85,7 +85,7 @@ def test_a_ramp_that_was_cut_off_goes_on_and_two_ranks_write_the_same(faultgouge
 @pytest.mark.slow
 @pytest.mark.parametrize("loads", [(0.0,), (0.0, 1e-3)], ids=["settled", "with a ramp"])
 def test_settle_finishes_a_settling_and_no_ramp(faultgouge, tmp_path, loads):
-    scene = Scene.from_toml(tmp_path / "scene.toml")
+    scene = Scene.from_toml(tmp_path / "scene.toml", command="settle")
     settled = settle(scene)
     with Record(tmp_path / "run.h5", scene) as record:  # as a kill between the packing and the end leaves it
         for fx in loads:

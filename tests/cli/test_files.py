@@ -98,8 +98,8 @@ def test_a_read_only_file_is_kept(refusal, tmp_path, command):
 def test_a_file_that_another_run_writes_is_refused_before_work(refusal, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
     code = (
-        "import sys; from pathlib import Path; from faultgouge.analysis.files.atomic_write import alone_with\n"
-        "with alone_with(Path('run.h5')): print('ready', flush=True); sys.stdin.read()"
+        "import sys; from pathlib import Path; from faultgouge.analysis.files.atomic_write import lock_output\n"
+        "with lock_output(Path('run.h5')): print('ready', flush=True); sys.stdin.read()"
     )
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, **pipes) as other:

@@ -99,7 +99,7 @@ def film(path, suffix, says="all"):
 @pytest.mark.slow
 def test_each_equilibrium_of_a_ramp_comes_back_to_the_bit(faultgouge_here, tmp_path, ramp, sheared, suffix):
     done = faultgouge_here("export", ramp, "--frames", "all", "-o", f"film{suffix}")
-    assert f"2 frames of equilibria; written to film{suffix}" in done.stderr
+    assert f"2 frames of equilibria; written to film{suffix}" in done.stdout
     with RunFile(ramp) as run:
         for number in range(2):
             assert back(read_disks(tmp_path / f"film{suffix}", number)) == run.packing(number)

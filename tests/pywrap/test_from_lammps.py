@@ -162,13 +162,16 @@ def test_motion_of_lammps(beds, law, damped, d):
     assert len(contacts) > len(snapshot)
     assert snapshot.damped
     steps = [(2e-4 if damped else 8e-4) / 2**k for k in range(4)]
-    runs = [compare_motion(lmp, snapshot, 0.2, 4e-5, timestep=step) for step in steps]
+    # at most a twentieth of the smallest overlap, beyond which the forces' cubic terms are seen; but with `granular`,
+    # which turns its history beyond 1e-10 of the bound alone, a smaller motion is seen less well
+    amplitude = min(4e-5, 0.05 * float(contacts.overlap.min())) if law.startswith("gran/") else 4e-5
+    runs = [compare_motion(lmp, snapshot, 0.2, amplitude, timestep=step) for step in steps]
     error = [run.difference for run in runs]
-    assert not contacts.at_bound.any()
     if law in RESCALED:
         # the mean of two derivatives: what is left is of second order in their difference
         assert error[-1] < 0.1
         return
+    assert not contacts.at_bound.any()
     order = 1 if damped else 2
     assert error[2] / error[3] == pytest.approx(2**order, rel=0.1)
     # extrapolated to a step of zero: without the terms in h and h^2, or in h^2 and h^4

@@ -173,7 +173,7 @@ def test_known_rows_tell_how_long_a_function_takes(tmp_path):
 @pytest.mark.slow
 def test_rows_are_the_onsets_of_their_scenes_and_share_settled_packings(tmp_path, monkeypatch):
     settled, original = [], workers.settle_bed
-    monkeypatch.setattr(workers, "settled_bed", lambda *given: settled.append(given) or original(*given))
+    monkeypatch.setattr(workers, "settle_bed", lambda *given: settled.append(given) or original(*given))
     run_sweep(sweep_of({"packing.seed": [3, 2], "law.mu": [0.5, 1.0]}), tmp_path, say=id)
     assert len(settled) == 2
     rows = table(tmp_path)
