@@ -9,19 +9,22 @@ are named, clusters about them announce where one begins to, and the operator co
 motion as much as the motion loses (`Reduced.bears`). As long as it has not grown by `TRUSTED` of that, a slice is not
 looked at again.
 
-**Strong dashpots** couple more modes than a cluster can have, and clusters may miss a motion. Then all eigenvalues are
-looked at, at the last load that was passed before the first window; what grows there is followed back to its onset. A
-window that ends before that load is not excluded.
+**Strong dashpots** couple more modes than a cluster can have, and clusters may miss a motion. From the load on at which
+that is so, all motions that grow are looked for with the operator itself
+(:mod:`~faultgouge.analysis.damped_onset.imaginary_axis`), at loads whose numbers on the ramp grow by `FARTHER`. Those
+that grow are followed back to where they begin to, and all are looked for again at the last load of the ramp before the
+first onset, until none grows there. A window that lies between two of these loads is not excluded.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
 from scipy.sparse.linalg import ArpackError
 
-from ..errors import NoEquilibriumError
+from ..errors import FaultgougeError, NoEquilibriumError
 from ..onset.eigenbasis import Basis, Levels
 from ..onset.first_window import Increments, Sliced, Watch, search_along
 from ..onset.limits import LIMITS, Limits
@@ -31,7 +34,8 @@ from ..onset.window_edges import DoubtError, LostPairError, LostTrackError, trac
 from ..packing.packing import Floats
 from ..spectrum.spectrum import active_coordinates
 from .all_windows import nearly_growing, search_cluster
-from .modes import DampedMode, Pencil, fastest_growing, find_growing_near
+from .imaginary_axis import growing_modes
+from .modes import DampedMode, Pencil, find_growing_near
 from .perturbation_screening import LARGEST, Cluster, find_cores, group_clusters, may_grow, project_pencil, shift_load
 from .window_edges import Crossing, DampedWindow, solve_edge, window_of
 
@@ -50,6 +54,9 @@ LOOKS = 6
 
 NEAREST = 12
 """Modes about a frequency among which one that grows is looked for where a cluster does not know its shape."""
+
+FARTHER = 1.5
+"""Ratio of the numbers of two loads at which all motions are looked for: each takes as long as two passes over slices."""
 
 SETTLED = 0.02
 """Share of an increment by which the place of the largest growth may still move."""
@@ -81,16 +88,17 @@ def first_growing(
     tuple of (float, float)
         Increments on which clusters announce a growing mode that the operator was not seen to have; and all loads
         before the window, where clusters may have missed one and all modes are too many to be looked at.
+
+    Raises
+    ------
+    NoEquilibriumError
+        If a load has none before a motion is seen to grow.
+    UncoveredAxisError, LostPairError
+        If clusters miss motions, and those of the operator cannot be told from each other or followed.
     """
     oracle = SlicedGrowing(pencil, None, watch, ranks, folder, limits)
-    try:
-        first, doubtful = search_along(oracle, loads)
-    except NoEquilibriumError:
-        first, doubtful = oracle.looked_over(None, ()) if oracle.crowded else (None, ())
-        if first is None:
-            raise
-        return first, doubtful
-    return oracle.looked_over(first, doubtful) if oracle.crowded else (first, doubtful)
+    first, doubtful = search_along(oracle, loads)
+    return oracle.look_at_all(loads, doubtful) if oracle.crowded else (first, doubtful)
 
 
 class SlicedGrowing(Sliced[Pencil, DampedWindow]):
@@ -102,12 +110,21 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
 
     locates = False
     crowded = False
-    """Whether dashpots have coupled more modes than a cluster can have, so that clusters may have missed a motion."""
+    """Whether dashpots couple more modes than a cluster can have, so that clusters may miss a motion."""
 
     _borne: Floats | None = None  # |A - A^T| up to which each mode of the spectrum is left out
     _borders: Sequence[Border] = ()  # of the slices that were searched last
     _lost: float | None = None  # frequency of the motion that is in doubt
     _passing = False  # whether bases are not kept
+
+    @property
+    def finished(self) -> bool:
+        """Whether the first window has been found, or all motions are to be looked for without clusters."""
+        return super().finished or (self.crowded and self._few_enough(self._passed[-1]))
+
+    def _few_enough(self, place: Pencil) -> bool:
+        """Whether all motions that grow at a load can be looked for."""
+        return place.stiffness.shape[0] <= self.limits.axis
 
     def ahead(self, done: int) -> int:
         """More and more of them, as dissipation may put off the onset by much; each costs a tenth of the bases."""
@@ -145,6 +162,8 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
         found = super()._found_by_all(places)
         self._borders = [each.border for each in found]
         self.crowded = self.crowded or any(each.crowded for each in found)
+        if self.crowded and self._few_enough(places[0]):
+            return [replace(each, candidates=[[] for _ in places[1:]]) for each in found]
         if self._borne is not None:
             for each in found:
                 self._borne[slice(*each.border.modes)] = TRUSTED * each.bears
@@ -157,34 +176,79 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
             named = may_grow(here, there)
             cores = find_cores(named[(named >= basis.own.start) & (named < basis.own.stop)])
             loud = [each for each in group_clusters(basis, (before, here), (after, there), cores) if not each.quiet]
-            found.append(list(chain.from_iterable(map(find_growing, loud))))
             crowded = crowded or any(each.right.shape[1] > LARGEST[0] for each in loud)
+            given_up = crowded and self._few_enough(after)
+            found.append([] if given_up else list(chain.from_iterable(map(find_growing, loud))))
             here = there
         return Found(basis.border, found, here.bears * antisymmetric(places[-1]), crowded)
 
     # What the operator has
 
-    def looked_over(self, first: DampedWindow | None, doubtful: Increments) -> tuple[DampedWindow | None, Increments]:
-        """The first window after a look at all modes at the last load that was passed before it, and what is in doubt.
+    def look_at_all(self, loads: Floats, doubtful: Increments) -> tuple[DampedWindow | None, Increments]:
+        """The first window by all motions that grow at some loads, from the last one on that clusters have passed.
 
-        A motion that grows there is followed back to its onset, before which all modes are looked at again.
+        Arguments beyond the loads of the ramp, and what is returned, are as of `first_growing`.
+
+        Raises
+        ------
+        NoEquilibriumError
+            If there is none at a load before one at which a motion grows.
+        UncoveredAxisError, LostPairError
+            If the motions of a load cannot be told, or none of those that grow can be followed.
         """
+        known = self._passed[-1].fx
+        if not self._few_enough(self._passed[-1]):
+            return self.first, (*doubtful, (self._passed[0].fx, known))
         while True:
-            below = [each for each in self._passed if first is None or each.fx < first.fx_onset]
-            if not below:
-                return first, doubtful
-            last = below.pop()
-            unsure = (*doubtful, (self._passed[0].fx, last.fx))
-            if last.stiffness.shape[0] > self.limits.lapack:
-                return first, unsure
-            self.watch(f"all modes at F_x = {last.fx:.6g}, as the dashpots couple many")
+            done = int(np.searchsorted(loads, self._passed[-1].fx, side="right"))
+            farther = int(np.searchsorted(loads, known, side="right")) * FARTHER
+            flows = self._pass_loads(loads[done : max(done + 1, int(farther))])
+            growing = self._all_growing(self._passed[-1])
+            if growing:
+                break
+            if flows is not None:
+                raise flows
+            if self._passed[-1].fx >= loads[-1]:
+                return None, doubtful
+            known = self._passed[-1].fx
+        first: DampedWindow | None = None
+        while growing:
+            first = self._earliest_of(growing, first, known)
+            below = [each for each in self._passed if first is not None and known < each.fx < first.fx_onset]
+            growing = self._all_growing(below[-1]) if below else []
+        return first, (*doubtful, *self.doubtful)
+
+    def _pass_loads(self, loads: Floats) -> NoEquilibriumError | None:
+        """Take the operators at some loads to those that were passed, up to one without an equilibrium."""
+        for load in loads:
             try:
-                mode = fastest_growing(last)
-                if mode is None:
-                    return first, doubtful
-                first = self._follow_back(mode, below, None)
-            except (ArpackError, LostPairError, NoEquilibriumError):
-                return first, unsure
+                self._passed.append(self.at(float(load)))
+            except NoEquilibriumError as error:
+                return error
+        return None
+
+    def _all_growing(self, place: Pencil) -> list[DampedMode]:
+        """All motions that grow at a load, the fastest first."""
+        self.watch(f"all motions that grow at F_x = {place.fx:.6g}, as the dashpots couple many modes")
+        return sorted(growing_modes(place), key=lambda mode: -mode.rate.real)
+
+    def _earliest_of(
+        self, growing: list[DampedMode], first: DampedWindow | None, known: float
+    ) -> DampedWindow | None:
+        """The first window, once each of some motions that grow is followed back; `known` is a load at which none does."""
+        below = [each for each in self._passed if each.fx < growing[0].fx]
+        lost: FaultgougeError | None = None
+        for mode in growing:
+            try:
+                if first is None or not self._opens_later(mode, first):
+                    window = self._follow_back(mode, below, None)
+                    first = window if first is None or window.fx_onset < first.fx_onset else first
+            except (LostPairError, NoEquilibriumError) as error:
+                lost = error
+                self.doubtful.append((known, mode.fx))
+        if first is None and lost is not None:
+            raise lost
+        return first
 
     def _confirm_window(self, candidate: Candidate, there: Pencil, first: DampedWindow | None) -> DampedWindow | None:
         self.watch(f"a motion that grows from about F_x = {candidate.onset:.6g}: its onset")

@@ -300,22 +300,6 @@ def find_growing_near(pencil: Pencil, point: complex, count: int) -> list[Damped
     return found
 
 
-def fastest_growing(pencil: Pencil) -> DampedMode | None:
-    """The motion that grows fastest at a load, by all eigenvalues from LAPACK; None if none grows.
-
-    Raises
-    ------
-    ArpackError
-        If its vectors are not found.
-    """
-    values = np.linalg.eigvals(pencil.system.matrix)
-    for s in sorted(values[(values.real > 1e-6 * abs(values)) & (values.imag >= 0)], key=lambda each: -each.real):
-        found = find_growing_near(pencil, complex(s), 1)
-        if found:
-            return found[0]
-    return None
-
-
 def refine_mode(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> DampedMode | None:
     """The mode nearest to some vectors and an eigenvalue, by the two-sided iteration; None if it does not converge."""
     a, g, unit = pencil.stiffness, pencil.damping, eye_array(len(x))

@@ -135,8 +135,9 @@ class Limits:
     """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision."""
     ahead: int = 2
     """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
-    lapack: int = 5000
-    """Coordinates up to which all eigenvalues with dissipation are asked for: a minute for 3,000, and as their cube."""
+    axis: int = 10_000
+    """Coordinates up to which all motions that grow at a load are looked for along the imaginary axis, where clusters
+    miss some: 6 s for 3,000, and as their square."""
     wait: float = 2.0
     """Seconds between two looks at what other searches have found, where these have taken all that is left."""
     chunk: int = 1024

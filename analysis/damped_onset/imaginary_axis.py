@@ -1,0 +1,181 @@
+r"""All motions that grow at a load: discs about points of the imaginary axis, each searched by shift and invert.
+
+Strong dashpots couple hundreds of modes. All eigenvalues take time with the cube of their number, and most of them lie
+far to the left. So the imaginary axis is covered by discs, from zero to the largest frequency that an undamped mode has
+(:math:`s = i \omega` with a unit vector x demands :math:`\omega^2 = x^H A_s x`, with the symmetric part of A). In each
+of them Arnoldi's iteration with :math:`(Z - \sigma)^{-1}` finds the eigenvalues next to the middle :math:`\sigma`. A
+disc reaches as far as these have converged.
+
+**What is covered** is a strip on either side of the axis, where two discs overlap `HALF_WIDTH` of a radius wide at the
+least. A motion that grows faster than that may lie between two discs. It has crossed the strip at a smaller load.
+
+A disc costs one sparse factorisation and `KRYLOV` solutions in single precision, which tell eigenvalues to 1e-3 of
+their distance from the middle. Whatever comes as close to the axis as that is solved for in double precision.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csc_array, csr_array, eye_array
+from scipy.sparse.linalg import ArpackError
+
+from ..errors import FaultgougeError
+from ..factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
+from ..packing.packing import Floats
+from ..spectrum.spectrum import Complexes, active_coordinates
+from .all_windows import drop_duplicates
+from .modes import DampedMode, Pencil, find_growing_near, refine_mode
+
+KRYLOV = 40
+"""Dimension of a Krylov space: 80 cost a fifth more for the same length of the axis, 20 do not reach far enough."""
+
+CONVERGED = 1e-3
+"""Residual of an eigenvalue that counts as found, in units of its own: that of single precision is some 1e-4."""
+
+PIVOT = 0.01
+"""Share of the largest entry of a column from which on the diagonal entry is the pivot: MUMPS's default."""
+
+TOUCH = 0.9
+"""Share of the radius on the axis that counts as covered."""
+
+HALF_WIDTH = 0.4
+"""Of the strip that is covered, in units of the smaller radius at hand: (1 - TOUCH^2)^(1/2), rounded down."""
+
+AHEAD = 0.8
+"""Distance of a new middle from what is covered, in units of the last disc's radius, as radii change."""
+
+STRAYED = 0.05
+"""Way that a refined eigenvalue may have gone, in units of its distance from the middle: else it is another one."""
+
+SMALLEST = 1e-6
+"""Radius, in units of the largest frequency, below which the axis cannot be covered."""
+
+
+class UncoveredAxisError(FaultgougeError):
+    """The imaginary axis cannot be covered with discs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Disc:
+    """What is known about a point of the imaginary axis.
+
+    Attributes
+    ----------
+    middle : complex
+        The point.
+    radius : float
+        All eigenvalues that are closer are known.
+    values : ndarray of complex, shape (k,)
+        These, or more.
+    vectors : ndarray of complex, shape (n, k)
+        Their displacements.
+    residuals : ndarray, shape (k,)
+        In units of the eigenvalues of the inverse.
+    """
+
+    middle: complex
+    radius: float
+    values: Complexes
+    vectors: Complexes
+    residuals: Floats
+
+    @classmethod
+    def about(cls, middle: complex, stiffness: csr_array, damping: csr_array) -> "Disc":
+        """Arnoldi's iteration with (Z - middle)^(-1), Z of the state (x, s x), by s^2 + s G + A of n coordinates."""
+        size, shift = stiffness.shape[0], np.complex64(middle)
+        factors = _factors(csc_array(stiffness + middle * damping + middle**2 * eye_array(size)))
+        most = min(KRYLOV, 2 * size)
+        basis = np.zeros((2 * size, most + 1), np.complex64, order="F")
+        small = np.zeros((most + 1, most), complex)
+        start = np.random.default_rng(0).standard_normal(2 * size)
+        basis[:, 0] = start / np.linalg.norm(start)
+        steps = most
+        for k in range(most):
+            place, speed = basis[:size, k], basis[size:, k]
+            x = -factors.solve(speed + (damping @ place + shift * place))
+            state, known = np.concatenate([x, place + shift * x]), basis[:, : k + 1]
+            before = float(np.linalg.norm(state))
+            for _ in range(2):  # twice is enough
+                part = (state.conj() @ known).conj()
+                state -= known @ part
+                small[: k + 1, k] += part
+            rest = float(np.linalg.norm(state))
+            small[k + 1, k] = rest
+            if not rest > 1e-5 * before:  # the space is all that the start has
+                steps, small[k + 1, k] = k + 1, 0.0
+                break
+            basis[:, k + 1] = state / np.float32(rest)
+        inverse, vectors = np.linalg.eig(small[:steps, :steps])
+        order = np.argsort(-np.abs(inverse))
+        inverse, vectors = inverse[order], vectors[:, order]
+        residuals = small[steps, steps - 1].real * np.abs(vectors[-1]) / np.abs(inverse)
+        unknown = np.flatnonzero(residuals > CONVERGED)
+        count = int(unknown[0]) if len(unknown) else steps
+        radius = np.inf
+        if len(unknown):
+            radius = 1 / (abs(inverse[count]) * (1 + min(1.0, float(residuals[count]))))
+        displacements = basis[:size, :steps] @ vectors[:, :count]
+        return cls(middle, radius, middle + 1 / inverse[:count], displacements, residuals[:count])
+
+    @property
+    def near_axis(self) -> list[int]:
+        """Which of the eigenvalues may have a real part that is not negative."""
+        distance = np.abs(self.values - self.middle)
+        near = self.values.real > -(CONVERGED + self.residuals) * distance
+        return np.flatnonzero(near & (self.values.imag > -CONVERGED * distance)).tolist()
+
+
+def growing_modes(pencil: Pencil) -> list[DampedMode]:
+    """The motions that grow at a load, each once; see the module.
+
+    Parameters
+    ----------
+    pencil : Pencil
+        Of any size; the time grows with the square of the number of coordinates.
+
+    Raises
+    ------
+    UncoveredAxisError
+        If discs become too small, or an eigenvalue next to the axis cannot be told from its neighbours.
+    """
+    active = active_coordinates(pencil.stiffness)
+    if not len(active):
+        return []
+    a, g = (csr_array(each[active][:, active]) for each in pencil.matrices)
+    unit = float(np.sqrt(np.abs(a + a.T).sum(axis=1).max() / 2))  # no frequency is larger
+    rough = csr_array((a / unit**2).astype(np.float32)), csr_array((g / unit).astype(np.float32))
+    covered, radius, found = 0.0, 0.05, []
+    while covered < 1:
+        disc = Disc.about(1j * (covered + AHEAD * radius), *rough)
+        begin, end = (disc.middle.imag + side * TOUCH * disc.radius for side in (-1, 1))
+        radius = min(disc.radius, 0.8 * radius if begin > covered else 1.0)
+        if radius < SMALLEST:
+            raise UncoveredAxisError(f"the motions about the frequency {covered * unit:.6g} lie too close to be told")
+        if begin <= covered:
+            covered = end
+        for k in disc.near_axis:
+            x = np.zeros(pencil.stiffness.shape[0], complex)
+            x[active] = disc.vectors[:, k] / np.linalg.norm(disc.vectors[:, k])
+            found += _solve(pencil, x, complex(disc.values[k]) * unit, abs(disc.values[k] - disc.middle) * unit)
+    return drop_duplicates([mode for mode in found if mode.growing and mode.rate.imag >= 0])
+
+
+def _solve(pencil: Pencil, x: Complexes, s: complex, distance: float) -> list[DampedMode]:
+    """The mode of an eigenvalue that is nearly known; or those next to it that grow, where it is lost on the way."""
+    mode = refine_mode(pencil, x, x.conj(), s)
+    if mode is not None and abs(mode.rate - s) < STRAYED * distance:
+        return [mode]
+    try:
+        return find_growing_near(pencil, s, 1)
+    except ArpackError as error:
+        raise UncoveredAxisError(f"the motion about s = {s:.6g} cannot be told from its neighbours") from error
+
+
+def _factors(matrix: csc_array) -> Factors:
+    """In single precision; where a pivot is zero, those of a matrix that differs by a rounding."""
+    single = csc_array(matrix.astype(np.complex64))
+    try:
+        return symmetric_lu(single, pivoting=PIVOT)
+    except SingularMatrixError:
+        rounding = np.finfo(np.float32).eps * np.abs(single.data).max()
+        return symmetric_lu(csc_array(single + rounding * eye_array(single.shape[0], dtype=np.complex64)))
