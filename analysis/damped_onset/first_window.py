@@ -55,7 +55,7 @@ LOOKS = 6
 NEAREST = 12
 """Modes about a frequency among which one that grows is looked for where a cluster does not know its shape."""
 
-FARTHER = 1.5
+FARTHER = 2
 """Ratio of the numbers of two loads at which all motions are looked for: each takes as long as two passes over slices."""
 
 SETTLED = 0.02
@@ -201,8 +201,8 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
             return self.first, (*doubtful, (self._passed[0].fx, known))
         while True:
             done = int(np.searchsorted(loads, self._passed[-1].fx, side="right"))
-            farther = int(np.searchsorted(loads, known, side="right")) * FARTHER
-            flows = self._pass_loads(loads[done : max(done + 1, int(farther))])
+            farther = FARTHER * int(np.searchsorted(loads, known, side="right"))
+            flows = self._pass_loads(loads[done : max(done + 1, farther)])
             growing = self._all_growing(self._passed[-1])
             if growing:
                 break
@@ -232,9 +232,7 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
         self.watch(f"all motions that grow at F_x = {place.fx:.6g}, as the dashpots couple many modes")
         return sorted(growing_modes(place), key=lambda mode: -mode.rate.real)
 
-    def _earliest_of(
-        self, growing: list[DampedMode], first: DampedWindow | None, known: float
-    ) -> DampedWindow | None:
+    def _earliest_of(self, growing: list[DampedMode], first: DampedWindow | None, known: float) -> DampedWindow | None:
         """The first window, once each of some motions that grow is followed back; `known` is a load at which none does."""
         below = [each for each in self._passed if each.fx < growing[0].fx]
         lost: FaultgougeError | None = None

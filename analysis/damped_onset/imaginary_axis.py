@@ -6,8 +6,11 @@ far to the left. So the imaginary axis is covered by discs, from zero to the lar
 of them Arnoldi's iteration with :math:`(Z - \sigma)^{-1}` finds the eigenvalues next to the middle :math:`\sigma`. A
 disc reaches as far as these have converged.
 
-**What is covered** is a strip on either side of the axis, where two discs overlap `HALF_WIDTH` of a radius wide at the
-least. A motion that grows faster than that may lie between two discs. It has crossed the strip at a smaller load.
+**What is covered** is the whole right half-plane. With :math:`s = p + i \omega` the imaginary part of
+:math:`x^H (s^2 + s G + A) x = 0` says that :math:`p \le \beta / 2 \omega`, as G takes energy, with the norm
+:math:`\beta` of the antisymmetric part of A; and the real part that p is no more than :math:`2^{1/2}` of the largest
+frequency. Where the discs on the axis do not reach as far to the right, rectangles are covered with further discs, and
+halved as long as a disc does not hold one of them.
 
 A disc costs one sparse factorisation and `KRYLOV` solutions in single precision, which tell eigenvalues to 1e-3 of
 their distance from the middle. Whatever comes as close to the axis as that is solved for in double precision.
@@ -37,9 +40,6 @@ PIVOT = 0.01
 
 TOUCH = 0.9
 """Share of the radius on the axis that counts as covered."""
-
-HALF_WIDTH = 0.4
-"""Of the strip that is covered, in units of the smaller radius at hand: (1 - TOUCH^2)^(1/2), rounded down."""
 
 AHEAD = 0.8
 """Distance of a new middle from what is covered, in units of the last disc's radius, as radii change."""
@@ -143,20 +143,39 @@ def growing_modes(pencil: Pencil) -> list[DampedMode]:
         return []
     a, g = (csr_array(each[active][:, active]) for each in pencil.matrices)
     unit = float(np.sqrt(np.abs(a + a.T).sum(axis=1).max() / 2))  # no frequency is larger
+    beta = float(np.abs(a - a.T).sum(axis=1).max() / 2) / unit**2
     rough = csr_array((a / unit**2).astype(np.float32)), csr_array((g / unit).astype(np.float32))
-    covered, radius, found = 0.0, 0.05, []
-    while covered < 1:
-        disc = Disc.about(1j * (covered + AHEAD * radius), *rough)
-        begin, end = (disc.middle.imag + side * TOUCH * disc.radius for side in (-1, 1))
-        radius = min(disc.radius, 0.8 * radius if begin > covered else 1.0)
-        if radius < SMALLEST:
-            raise UncoveredAxisError(f"the motions about the frequency {covered * unit:.6g} lie too close to be told")
-        if begin <= covered:
-            covered = end
+    found: list[DampedMode] = []
+
+    def look(middle: complex) -> float:
+        """The radius about a point in which all that grows is found."""
+        disc = Disc.about(middle, *rough)
+        if disc.radius < SMALLEST:
+            raise UncoveredAxisError(f"the motions about s = {middle * unit:.6g} lie too close to be told")
         for k in disc.near_axis:
             x = np.zeros(pencil.stiffness.shape[0], complex)
             x[active] = disc.vectors[:, k] / np.linalg.norm(disc.vectors[:, k])
-            found += _solve(pencil, x, complex(disc.values[k]) * unit, abs(disc.values[k] - disc.middle) * unit)
+            found.extend(_solve(pencil, x, complex(disc.values[k]) * unit, abs(disc.values[k] - middle) * unit))
+        return disc.radius
+
+    covered, radius = 0.0, 0.05
+    beside: list[tuple[complex, complex]] = []  # lower left and upper right corners
+    while covered < 1:
+        middle = covered + AHEAD * radius
+        reach = look(1j * middle)
+        if middle - TOUCH * reach > covered:
+            radius = min(reach, 0.8 * radius)
+            continue
+        begin, covered, radius = covered, middle + TOUCH * reach, min(reach, 1.0)
+        height, fastest = np.sqrt(1 - TOUCH**2) * reach, min(np.sqrt(2), beta / (2 * begin) if begin else np.inf)
+        if height < fastest:
+            beside.append((complex(height, begin), complex(fastest, covered)))
+    while beside:
+        low, high = beside.pop()
+        size = high - low
+        if look(0.5 * (low + high)) < 0.5 * abs(size):
+            half = 0.5 * size.real if size.real > size.imag else 0.5j * size.imag
+            beside += [(low, high - half), (low + half, high)]
     return drop_duplicates([mode for mode in found if mode.growing and mode.rate.imag >= 0])
 
 

@@ -135,6 +135,8 @@ class Limits:
     """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision."""
     ahead: int = 2
     """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
+    lapack: int = 5000
+    """Coordinates up to which all eigenvalues at the first load are asked for: half a minute, and as their cube."""
     axis: int = 10_000
     """Coordinates up to which all motions that grow at a load are looked for along the imaginary axis, where clusters
     miss some: 6 s for 3,000, and as their square."""

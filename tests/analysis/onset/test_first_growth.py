@@ -1,5 +1,7 @@
 """The first window of growing motion in slices of the spectrum: against all modes, cut off, and on several ranks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from families import OTHERS
@@ -9,9 +11,11 @@ from test_found import PASSING, cut_off
 from test_slicing import FEW, on_ranks
 
 from faultgouge.analysis.damped_onset.first_window import SlicedGrowing, first_growing
-from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, fastest_growing, find_growing_near, nearest_mode
+from faultgouge.analysis.damped_onset.imaginary_axis import growing_modes
+from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, find_growing_near, nearest_mode
 from faultgouge.analysis.damped_onset.window_edges import DampedWindow
 from faultgouge.analysis.damped_onset.windows import damped_windows, without_dissipation
+from faultgouge.analysis.onset.limits import LIMITS
 from faultgouge.analysis.onset.slice_store import Candidate
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.onset.damped import ramp_scene
@@ -90,6 +94,36 @@ def test_slices_that_bear_more_are_left_out_until_they_do_not(loads):
     assert first_growing(oscillators([1] * 6), loads) == (None, ())
 
 
+def dashpot_on_all(fx):
+    """400 oscillators that one strong dashpot couples; the load feeds neighbours a little, and two far from each other.
+
+    The two are the 61st and the 201st: no slice of the spectrum has both.
+    """
+    stiffness = np.diag(100 + 0.5 * np.arange(400))
+    even = np.arange(0, 400, 2)
+    for first, second, feed in ((even, even + 1, 0.2), (60, 200, 50.0)):
+        stiffness[first, second] += feed * fx
+        stiffness[second, first] -= feed * fx
+    damping = 0.01 * np.eye(400) + 40.0 / 400
+    return Pencil(fx, csr_array(stiffness), csr_array(damping))
+
+
+@pytest.mark.slow
+def test_a_motion_that_clusters_miss_is_followed_back_to_its_onset():
+    """All eigenvalues tell that the motion grows fast at 0.75 already, and begins to a little above 0.7."""
+    loads, slices = np.array([0.5, 0.625, 0.75, 1.0]), replace(LIMITS, one_basis=300)
+    window, doubtful = first_growing(dashpot_on_all, loads, limits=slices)
+    assert doubtful == ()
+
+    def fastest(fx):
+        return np.linalg.eigvals(dashpot_on_all(fx).system.matrix).real.max()
+
+    assert fastest(window.fx_onset * (1 - 1e-6)) < 0 < fastest(window.fx_onset * (1 + 1e-6))
+    assert window.fx_onset == pytest.approx(0.7, abs=0.02)
+    # where all motions are too many to be looked for, clusters find nothing, and the loads are in doubt
+    assert first_growing(dashpot_on_all, loads[:2], limits=replace(slices, axis=0)) == (None, ((0.5, 0.5),))
+
+
 @pytest.mark.slow
 def test_modes_near_a_frequency_are_those_of_all(path):
     damped = without_dissipation(path, cn=0.1)
@@ -102,8 +136,9 @@ def test_modes_near_a_frequency_are_those_of_all(path):
         found = [mode.rate for mode in find_growing_near(modes.pencil, 1.001j * rate.imag, 12)]
         assert min(abs(each - rate) for each in found) < 1e-9 * abs(rate)
         assert find_growing_near(Pencil.of(damped(0.02)), 1j * rate.imag, 12) == []
-    assert fastest_growing(modes.pencil).rate == pytest.approx(max(modes.rates, key=lambda s: s.real), rel=1e-9)
-    assert fastest_growing(Pencil.of(damped(0.02))) is None
+    found = sorted((mode.rate for mode in growing_modes(modes.pencil)), key=lambda s: s.imag)
+    assert found == pytest.approx(modes.rates[modes.growing], rel=1e-9)
+    assert growing_modes(Pencil.of(damped(0.02))) == []
 
 
 @pytest.mark.long
