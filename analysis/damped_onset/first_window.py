@@ -11,9 +11,10 @@ looked at again.
 
 **Strong dashpots** couple more modes than a cluster can have, and clusters may miss a motion. From the load on at which
 that is so, all motions that grow are looked for with the operator itself
-(:mod:`~faultgouge.analysis.damped_onset.imaginary_axis`), at loads whose numbers on the ramp grow by `FARTHER`. Those
-that grow are followed back to where they begin to, and all are looked for again at the last load of the ramp before the
-first onset, until none grows there. A window that lies between two of these loads is not excluded.
+(:mod:`~faultgouge.analysis.damped_onset.imaginary_axis`), at loads whose numbers on the ramp grow by
+`FARTHER`. Those that grow are followed back to where they begin to, and all are looked for again at the last load of the ramp
+before the first onset, until none grows there. A window that lies between two of these loads is not excluded. Of more
+than `Limits.axis` coordinates clusters alone are searched, and all loads before the window are named as in doubt.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -56,7 +57,7 @@ NEAREST = 12
 """Modes about a frequency among which one that grows is looked for where a cluster does not know its shape."""
 
 FARTHER = 2
-"""Ratio of the numbers of two loads at which all motions are looked for: each takes as long as two passes over slices."""
+"""Ratio of the numbers of two loads at which all motions are looked for: a look takes as long as two passes or more."""
 
 SETTLED = 0.02
 """Share of an increment by which the place of the largest growth may still move."""
@@ -233,7 +234,7 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
         return sorted(growing_modes(place), key=lambda mode: -mode.rate.real)
 
     def _earliest_of(self, growing: list[DampedMode], first: DampedWindow | None, known: float) -> DampedWindow | None:
-        """The first window, once each of some motions that grow is followed back; `known` is a load at which none does."""
+        """The first window, once all motions that grow at a load are followed back; at the load `known` none grows."""
         below = [each for each in self._passed if each.fx < growing[0].fx]
         lost: FaultgougeError | None = None
         for mode in growing:
