@@ -11,10 +11,10 @@ looked at again.
 
 **Strong dashpots** couple more modes than a cluster can have, and clusters may miss a motion. From the load on at which
 that is so, all motions that grow are looked for with the operator itself
-(:mod:`~faultgouge.analysis.damped_onset.imaginary_axis`), at loads whose numbers on the ramp grow by
-`FARTHER`. Those that grow are followed back to where they begin to, and all are looked for again at the last load of the ramp
-before the first onset, until none grows there. A window that lies between two of these loads is not excluded. Of more
-than `Limits.axis` coordinates clusters alone are searched, and all loads before the window are named as in doubt.
+(:mod:`~faultgouge.analysis.damped_onset.imaginary_axis`), at loads whose numbers on the ramp grow by `FARTHER`. Those
+that grow are followed back to where they begin to, and all are looked for again at the last load of the ramp before the
+first onset, until none grows there. A window that lies between two of these loads is not excluded. Of more than
+`Limits.axis` coordinates clusters alone are searched, and all loads before the window are named as in doubt.
 """
 
 from collections.abc import Callable, Iterator, Sequence
