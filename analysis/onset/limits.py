@@ -139,7 +139,7 @@ class Limits:
     """Coordinates up to which all eigenvalues at the first load are asked for: half a minute, and as their cube."""
     axis: int = 10_000
     """Coordinates up to which all motions that grow at a load are looked for along the imaginary axis, where clusters
-    miss some: 6 s for 3,000, and as their square."""
+    miss some: the time grows as their square."""
     wait: float = 2.0
     """Seconds between two looks at what other searches have found, where these have taken all that is left."""
     chunk: int = 1024
