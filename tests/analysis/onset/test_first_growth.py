@@ -108,7 +108,7 @@ def dashpot_on_all(fx):
     return Pencil(fx, csr_array(stiffness), csr_array(damping))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_motion_that_clusters_miss_is_followed_back_to_its_onset():
     """All eigenvalues tell that the motion grows fast at 0.75 already, and begins to a little above 0.7."""
     loads, slices = np.array([0.5, 0.625, 0.75, 1.0]), replace(LIMITS, one_basis=300)
