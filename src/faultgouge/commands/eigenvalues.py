@@ -45,8 +45,8 @@ Slices = Annotated[
     Path | None,
     typer.Option(
         metavar="FOLDER",
-        help="Keep what a long search finds in this folder, and go on from what is there: jobs that name the same "
-        "folder share the search. By default -o FILE has its own, until it is done.",
+        help="Folder for the results of a long search, which continues from the results there. Jobs that name the "
+        "same folder share the search. By default -o FILE has its own folder until the search is done.",
     ),
 ]
 
@@ -56,11 +56,11 @@ def spectrum(
     file: PackingFile,
     frame: Frame = -1,
     values: Annotated[
-        bool, typer.Option("--values", help="Eigenvalues alone: of a thousand disks in a third of the time.")
+        bool, typer.Option("--values", help="Only the eigenvalues: for a thousand disks in a third of the time.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Eigenvalues of a stored packing, its complex pairs and its rattlers."""
+    """Compute the eigenvalues, complex pairs and rattlers of a stored packing."""
     from faultgouge.analysis import Snapshot, solid_fraction
     from faultgouge.analysis import spectrum as eigenvalues_of
 
@@ -197,28 +197,29 @@ def onset(
     scene: ScenePath,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Also write the JSON to this file; a long search that is cut off goes on."),
+        typer.Option("-o", "--output", help="Also write the JSON to this file; a long interrupted search continues."),
     ] = None,
     modes: Annotated[
         str | None,
         typer.Option(
             metavar="FIRST:STOP",
-            help="Search these modes alone, counted by frequency from 0: of 100,000 disks a part is what one has time "
-            "for. 0:600 are the 600 lowest.",
+            help="Search only these modes, counted by frequency from 0, since all modes of 100,000 disks take hours. "
+            "0:600 are the 600 lowest.",
         ),
     ] = None,
     slices: Slices = None,
     every: Annotated[
         bool,
-        typer.Option("--all", help="All windows up to ramp.until, of a packing of up to 300 disks: takes longer."),
+        typer.Option("--all", help="All windows up to ramp.until, for up to 300 disks; takes longer."),
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """The onset F_x^c, for each friction coefficient of the scene. The ramp ends there.
+    """Compute the onset F_x^c for each friction coefficient of the scene. The ramp ends there.
 
-    Two eigenvalues become complex at F_x^c. With a section [damping], some motion
-    grows from F_x^c on in spite of the dissipation, or because of it; the
-    undamped onset stands beside. --all gives all windows up to the ramp's end.
+    Two eigenvalues become complex at F_x^c. With a section [damping], F_x^c is the
+    load beyond which some motion grows in spite of the dissipation, or because of
+    it; the command then also prints the undamped onset. --all gives all windows up
+    to the end of the ramp.
     """
     from faultgouge.pywrap.settling.settle import shared_bed
 
