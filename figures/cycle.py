@@ -17,7 +17,7 @@ from .style import figure_of, styled
 
 @styled
 def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
-    """F_x over the mean displacement of the upper layer along x: a path that closes, or does not.
+    """Draw F_x over the mean displacement of the upper layer along x, a path that may close or not.
 
     Parameters
     ----------

@@ -225,7 +225,7 @@ class PackingArtist:
 
 @styled
 def draw_packing(packing: Packing, axes: Axes | None = None, color: str = "mobilised", caption: bool = False) -> Figure:
-    """A packing with its force chains (the paper's figure 1).
+    """Draw a packing with its force chains (the paper's figure 1).
 
     Parameters
     ----------
@@ -236,12 +236,12 @@ def draw_packing(packing: Packing, axes: Axes | None = None, color: str = "mobil
     color : {"mobilised", "slip", "force", "none"}
         What the colour of a contact shows, see the module. Arrows show where the load acts, not its size.
     caption : bool
-        Whether load and numbers of contacts stand above, in a figure of its own.
+        Whether to print load and numbers of contacts above, in a new figure.
 
     Returns
     -------
     Figure
-        The one that holds the axes.
+        The figure of the axes.
     """
     if color != "none" and color not in COLOURS:
         raise ValueError(f"color = {color!r} is none of {', '.join(COLOURS)}, none.")

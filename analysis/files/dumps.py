@@ -104,13 +104,13 @@ def read_dump(
     disks : path
         The dump of disks.
     contacts : path, optional
-        The dump of contacts; by default of the name of the disks' dump with the suffix ".contacts".
+        The dump of contacts; by default the file with the name of the dump of disks and the suffix ".contacts".
     frame : int
-        Which snapshot; negative ones count from the end. The contacts' snapshot is that of the same time
-        step.
+        Number of the snapshot; negative numbers count from the end. Contacts are read from the snapshot of the same
+        time step.
     law, fx, fy, inertia_factor
-        As in :class:`~faultgouge.analysis.Packing`; by default those of the sidecar file, and failing that no
-        load and inertia factor 1. The law has no default of its own.
+        As in :class:`~faultgouge.analysis.Packing`; by default those of the file ``.params``; without this file, no
+        load and inertia factor 1. The law then has no default.
 
     Returns
     -------
@@ -119,8 +119,7 @@ def read_dump(
     Raises
     ------
     PackingFileError
-        If a file is missing or broken, a column is not there, the snapshots do not fit, or the law is nowhere
-        given.
+        If a file is missing or broken, a column is missing, the snapshots do not match, or no law is given.
     """
     disks = Path(disks)
     contacts = disks.with_suffix(".contacts") if contacts is None else Path(contacts)

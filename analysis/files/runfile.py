@@ -118,7 +118,7 @@ class RunFile(SealedFile):
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """Names of everything that is stored with a frame beside positions."""
+        """Names of the observables stored with a frame, besides positions."""
         return tuple(name for name in self._file["observables"] if name != "position")
 
     def observable(self, name: str) -> NDArray:
@@ -127,12 +127,12 @@ class RunFile(SealedFile):
         Raises
         ------
         KeyError
-            If it is not stored.
+            If the observable is not stored.
         """
         return self._file["observables"][name]["value"][: len(self)]
 
     def append(self, packing: Packing, **scalars: float) -> None:
-        """Add a frame and see that it reaches the disk.
+        """Add a frame and make sure that it is on the storage device.
 
         Parameters
         ----------
@@ -193,7 +193,7 @@ class RunFile(SealedFile):
         self._step[count] = count
 
     def packing(self, frame: int = -1) -> Packing:
-        """The packing of a frame, bit for bit.
+        """The packing of a frame, bitwise as it was stored.
 
         Parameters
         ----------
@@ -252,7 +252,7 @@ class RunFile(SealedFile):
         Parameters
         ----------
         time : array_like, shape (S,)
-            Since the begin of the run.
+            Since the beginning of the run.
         position : array_like, shape (S, N, 2)
             Centres, length.
         position_low : array_like, shape (S, N, 2), optional
@@ -286,7 +286,7 @@ class RunFile(SealedFile):
         name : str
             Name of the series.
         **columns : array_like, shape (R, ...)
-            Columns by name, all of one length: always the same names.
+            Columns by name, all of the same length; each call must give the same names.
 
         Raises
         ------

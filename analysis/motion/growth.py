@@ -76,7 +76,7 @@ class Growth:
     decades : float
         Decades of D between the first and the last stretch.
     start, end : float
-        Times between which D was used.
+        First and last time of the fit.
     """
 
     rate: float
@@ -117,17 +117,17 @@ def mean_square_displacement(
 
 
 def fit_growth(time: ArrayLike, msd: ArrayLike, lower: float, upper: float) -> Growth:
-    """Rate of exponential growth of D between a noise floor and a nonlinear ceiling.
+    """Fit the rate of exponential growth of D between a noise floor and a nonlinear ceiling.
 
     Parameters
     ----------
     time : array_like, shape (T,)
-        Increasing times, at any distances: those of `faultgouge perturb` are dense at first.
+        Increasing times with any spacing: the times of `faultgouge perturb` are dense at first.
     msd : array_like, shape (T,)
         D at these times, length^2.
     lower, upper : float
-        D is used from when it first reaches `lower`, well above the noise, until it first reaches `upper`,
-        well below the square of the overlaps.
+        The fit begins when D first reaches `lower`, well above the noise, and ends when D first reaches `upper`, well
+        below the square of the overlaps.
 
     Returns
     -------
@@ -259,9 +259,9 @@ class GrowthOfRun:
 def growth_of_run(
     packing: Packing, time: ArrayLike, msd: ArrayLike, friction: ArrayLike | None = None, dt: float | None = None
 ) -> GrowthOfRun:
-    """Measure the growth of D in a run from rest at an equilibrium, beside the prediction of the spectrum.
+    """Compare the growth of D, in a run from rest at an equilibrium, with the prediction of the spectrum.
 
-    No rate is fitted where the spectrum says that nothing grows.
+    No rate is fitted if nothing grows according to the spectrum.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def growth_of_run(
     friction : array_like, shape (T,), optional
         Friction coefficient at these times; constant by default.
     dt : float, optional
-        Time step of velocity Verlet, whose dispersion is then taken into account.
+        Time step of velocity Verlet, to include its dispersion.
     """
     t, d = np.asarray(time, dtype=np.float64), np.asarray(msd, dtype=np.float64)
     mu = np.full(len(t), packing.law.mu) if friction is None else np.asarray(friction, dtype=np.float64)

@@ -59,7 +59,7 @@ CHUNK = 4096
 
 
 class NoGainError(FaultgougeError):
-    """A packing without a transient gain: it is unstable, or has no energy."""
+    """The packing has no transient gain: it is unstable, or has no energy."""
 
 
 def stable_motion(packing: Packing | Snapshot) -> LinearMotion:

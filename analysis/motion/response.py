@@ -147,9 +147,9 @@ def linear_response(
     initial: ArrayLike | None = None,
     dt: float | None = None,
 ) -> Response:
-    """Motion of the linearised packing from rest, with its dashpots and drag.
+    """Compute the motion of the linearised packing from rest, with its dashpots and drag.
 
-    To ask for many motions of one packing, decompose it once: :class:`LinearMotion`.
+    To compute many motions of one packing, decompose it once: :class:`LinearMotion`.
 
     Parameters
     ----------
@@ -158,13 +158,13 @@ def linear_response(
     times : array_like, shape (T,)
         Times, in any order, not negative.
     force : array_like, shape (3N,), or (6N,) of spheres, optional
-        f of the force f cos(omega t) on (x.., y.., R theta..), force, as of `layer_force`; none by default.
+        Amplitude f of the force f cos(omega t) on (x.., y.., R theta..), as from `layer_force`; none by default.
     omega : float
         Angular frequency of the force, radian / time.
     initial : array_like, shape (3N,), optional
         Displacement at t = 0, length; none by default.
     dt : float, optional
-        Time step of the undamped velocity Verlet run to be met; exact dynamics by default.
+        Time step of the undamped velocity Verlet run to compare with; exact dynamics by default.
 
     Returns
     -------
@@ -182,19 +182,19 @@ def linear_response(
 
 
 def layer_force(packing: Packing, amplitude: float) -> Floats:
-    """A force along x on the upper layer.
+    """Force vector for a force along x on the upper layer.
 
     Parameters
     ----------
     packing : Packing
         The configuration.
     amplitude : float
-        a, force on each of its disks.
+        Force a on each disk of the layer.
 
     Returns
     -------
     ndarray, shape (3N,)
-        On (x.., y.., R theta..).
+        Force on the coordinates (x.., y.., R theta..).
     """
     force = np.zeros(packing.coordinates)
     force[: len(packing)] = amplitude * packing.top

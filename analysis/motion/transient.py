@@ -74,19 +74,20 @@ class TransientGain:
     gain : float
         |q(time)|^2 / |q(0)|^2, or the ratio of the energies.
     time : float
-        When it is reached.
+        Time of the largest gain.
     start : ndarray, shape (3N,)
-        The displacement (x.., y.., R theta..) that reaches it. Of norm 1, or with the velocity of energy 1/2.
+        The initial displacement (x.., y.., R theta..) with this gain. Its norm is 1, or its energy with the velocity is
+        1/2.
     velocity : ndarray, shape (3N,)
-        Its velocity at the start; zero for the displacement.
+        The initial velocity; zero for the norm "displacement".
     norm : {"displacement", "energy"}
-        What has grown.
+        Norm of which the gain is computed.
     window : float
-        The times from 0 to this were searched.
+        The search covers the times from 0 to this time.
     bound : float
-        No later time has a larger gain; inf where no bound is known.
+        No later time has a gain larger than this; inf if no bound is known.
     dimension : int
-        2 of disks, 3 of spheres.
+        2 for disks, 3 for spheres.
     """
 
     gain: float
@@ -104,12 +105,12 @@ class TransientGain:
 
     @property
     def disk(self) -> int:
-        """The worst disk to push: that which the start displaces farthest."""
+        """The worst disk to push: the disk with the largest initial displacement."""
         return int(np.argmax(np.linalg.norm(self._translations, axis=0)))
 
     @property
     def direction(self) -> Floats:
-        """In which direction, a unit vector (x, y) or (x, y, z)."""
+        """Direction of the displacement of this disk, a unit vector (x, y) or (x, y, z)."""
         push = self._translations[:, self.disk]
         return np.asarray(push / np.linalg.norm(push))
 
@@ -131,7 +132,7 @@ def transient_gain(packing: Packing | Snapshot, norm: Norm = "displacement") -> 
     Raises
     ------
     NoGainError
-        If some motion grows for ever, or the norm is the energy and K has none that is positive.
+        If some motion grows for ever, or the norm is the energy and the energy of K is not positive.
     numpy.linalg.LinAlgError
         If more than two eigenvalues coalesce.
     """

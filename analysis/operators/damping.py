@@ -40,14 +40,13 @@ def damping_matrix(packing: Packing | Snapshot, sliding: ArrayLike = False) -> c
     packing : Packing or Snapshot
         The configuration, with dashpots ``law.cn`` and ``law.ct`` and with ``drag_time``; any of them may be absent.
     sliding : array_like of bool, shape () or (C,)
-        As of `stiffness_matrix`: contacts that slide on have no tangential dashpot.
+        As in `stiffness_matrix`: contacts that continue to slide have no tangential dashpot.
 
     Returns
     -------
     scipy.sparse.csr_array, shape (3N, 3N), or (6N, 6N) of spheres
-        Force time / length, in the order (x.., y.., R theta..), or as of
-        :mod:`~faultgouge.analysis.packing.snapshot`; of a Packing symmetric and positive semidefinite. Empty without
-        dashpots and drag.
+        Force time / length, in the order (x.., y.., R theta..), or as in :mod:`~faultgouge.analysis.packing.snapshot`.
+        For a Packing, C is symmetric and positive semidefinite. Without dashpots and drag, C is empty.
     """
     if isinstance(packing, Snapshot):
         return assembled_damping(packing)
@@ -65,7 +64,7 @@ def damping_matrix(packing: Packing | Snapshot, sliding: ArrayLike = False) -> c
 
 
 def largest_damping_rate(packing: Packing) -> float:
-    """Largest eigenvalue of M^-1 C of the dashpots, 1 / time: what limits the time step; drag does not.
+    """Largest eigenvalue of M^-1 C of the dashpots, 1 / time, which limits the time step; drag does not limit it.
 
     Parameters
     ----------

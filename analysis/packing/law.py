@@ -146,7 +146,7 @@ class Derivatives(NamedTuple):
 class MindlinLaw:
     """The smooth Mindlin law; every method is vectorised over contacts.
 
-    A contact whose overlap is not positive is open and exerts nothing.
+    A contact whose overlap is not positive is open and exerts no force.
 
     Parameters
     ----------
@@ -163,13 +163,13 @@ class MindlinLaw:
     rescaled : bool
         Whether slips are rescaled while overlaps grow, which needs p = 3/2.
     coulomb : bool
-        Whether the tangential force is that of a spring behind Coulomb's slider, not smoothed, with rescaled slips.
+        Whether the tangential force is a spring in series with Coulomb's slider, not smoothed, with rescaled slips.
 
     Raises
     ------
     ValueError
-        If a parameter is not finite or has the wrong sign, the exponent is another one, nothing can be rescaled, or
-        there are two histories.
+        If a parameter is not finite or has the wrong sign, the exponent is neither 3/2 nor 1, slips cannot be rescaled,
+        or two histories are given.
     """
 
     kn: float
@@ -203,12 +203,12 @@ class MindlinLaw:
 
     @property
     def history(self) -> str:
-        """What contacts remember: "total", "rescaled" or "coulomb"."""
+        """Rule for the slip: "total", "rescaled" or "coulomb"."""
         return "coulomb" if self.coulomb else "rescaled" if self.rescaled else "total"
 
     @property
     def rescales(self) -> bool:
-        """Whether slips fall while overlaps grow, so that b depends on whether a contact closes or parts."""
+        """Whether slips fall while overlaps grow, so that b depends on whether a contact closes or opens."""
         return self.history != "total" and self.exponent == 1.5
 
     @property
@@ -233,22 +233,22 @@ class MindlinLaw:
         return overlap * self.mu * self.kn / self.kt if self.frictional else np.zeros_like(overlap)
 
     def at_bound(self, overlap: ArrayLike, slip: ArrayLike) -> NDArray[np.bool_]:
-        """Which contacts have reached Coulomb's bound, but for rounding; none without friction."""
+        """Which contacts have reached Coulomb's bound, within rounding; none without friction."""
         limit = self.slip_limit(overlap)
         return (np.abs(slip) >= AT_THE_BOUND * limit) & (limit > 0)
 
     def clamped(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
-        """Slip brought back into [-t*, t*], length: what a contact remembers after an increment."""
+        """Slip limited to [-t*, t*], length: the slip that a contact stores after an increment."""
         limit = self.slip_limit(overlap)
         return np.clip(np.asarray(slip, dtype=np.result_type(slip, np.float64)), -limit, limit)
 
     def remembered(self, slip: ArrayLike, before: ArrayLike, after: ArrayLike) -> Floats:
-        """Slip that a contact remembers when its overlap has changed steadily and nothing has slipped, length.
+        """Slip of a contact after a monotonic change of its overlap without slipping, length.
 
         Parameters
         ----------
         slip : array_like
-            The slip until then, length.
+            The slip before the change, length.
         before, after : array_like
             Overlaps, length, positive.
         """
@@ -281,7 +281,7 @@ class MindlinLaw:
         return float(self.kn ** (1 / p) * force ** ((p - 1) / p))
 
     def tangential_force(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
-        """Tangential force f_t along tau, force; at Coulomb's bound beyond the slip limit.
+        """Tangential force f_t along tau, force; beyond the slip limit it is Coulomb's bound.
 
         Parameters
         ----------
@@ -291,8 +291,8 @@ class MindlinLaw:
         Returns
         -------
         ndarray
-            f_t = -kt overlap^(p-1) (1 + x - x^2) slip, or without the bracket behind Coulomb's slider: it opposes the
-            slip.
+            f_t = -kt overlap^(p-1) (1 + x - x^2) slip, or without the bracket for Coulomb's slider. The force opposes
+            the slip.
         """
         overlap = _closed_overlap(overlap)
         slip = self.clamped(overlap, slip)
@@ -322,11 +322,11 @@ class MindlinLaw:
         overlap, slip : ndarray
             Overlap and slip of each contact, length.
         parting : array_like
-            Share of the derivative while the overlap falls in b; only rescaled slips have another one while the
-            overlap grows.
+            Weight in b of the derivative for a falling overlap. Only for rescaled slips does the derivative for a
+            growing overlap differ.
         sliding : array_like of bool
-            Which contacts slide on if they are at Coulomb's bound. Only Coulomb's slider has two derivatives there, and
-            by default sticks.
+            Which of the contacts at Coulomb's bound continue to slide. Only Coulomb's slider has two derivatives there;
+            by default it sticks.
         """
         overlap, p = np.maximum(overlap, 0.0), self.exponent
         root, rest_power = self._powers(overlap)
@@ -354,14 +354,14 @@ class MindlinLaw:
         )
 
     def dashpots(self, overlap: ArrayLike, slip: ArrayLike, sliding: ArrayLike = False) -> tuple[Floats, Floats]:
-        """Coefficients of the dashpots of small velocities, force time / length.
+        """Coefficients of the dashpots for small velocities, force time / length.
 
         Parameters
         ----------
         overlap, slip : array_like
             Overlap and slip of each contact, length.
         sliding : array_like of bool
-            As of `derivatives`.
+            As in `derivatives`.
 
         Returns
         -------
@@ -377,7 +377,7 @@ class MindlinLaw:
         return self.cn * power, self.ct * power * (self.frictional & ~slides)
 
     def growth(self, overlap: Floats) -> Floats:
-        """overlap^(p-1), with which stiffnesses and dashpots grow; of overlaps that are not negative, or complex."""
+        """overlap^(p-1), proportional to stiffnesses and dashpots; overlaps may be complex, but not negative."""
         return np.sqrt(overlap) if self.exponent != 1 else np.asarray(overlap != 0, dtype=overlap.dtype)
 
     def _powers(self, overlap: Floats) -> tuple[Floats, Floats]:

@@ -16,7 +16,7 @@ from .packing import Packing
 
 
 def solid_fraction(packing: Packing) -> float:
-    """Volume fraction phi of a layer below the mean height of its upper layer's centres.
+    """Volume fraction phi of a layer, up to the mean height of the centres of its upper layer.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def solid_fraction(packing: Packing) -> float:
     Returns
     -------
     float
-        NaN of disks whose centres are not above the floor y = 0.
+        NaN if the centres are not above the floor y = 0.
     """
     heights = packing.position[:, 1]
     return _solid_below(packing, float(heights[packing.top].mean() if packing.top.any() else heights.max()))

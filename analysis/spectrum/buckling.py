@@ -29,7 +29,7 @@ FIRST = 16
 def negative_eigenvalues(packing: Packing) -> Floats:
     """The real negative eigenvalues of a packing, beyond their rounding uncertainty.
 
-    Where the symmetric part of the operator is positive definite, a sparse factorisation shows that there are none.
+    If the symmetric part of the operator is positive definite, a sparse factorisation shows that there are none.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def negative_eigenvalues(packing: Packing) -> Floats:
     Returns
     -------
     ndarray, shape (B,)
-        The most negative first, 1 / time^2. Empty where nothing buckles; complex pairs are another matter.
+        The most negative first, 1 / time^2. Empty if the packing does not buckle. Complex pairs are not included.
     """
     matrix, _ = dynamical_matrix(packing)
     size, rounding = matrix.shape[0], unit_rounding(matrix.data)

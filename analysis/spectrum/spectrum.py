@@ -89,7 +89,7 @@ class ComplexPair:
     eigenvalue : complex
         The member with positive imaginary part, 1 / time^2.
     overlap : float
-        |y^H x| of its unit left and right vectors: it vanishes where the pair coalesces.
+        |y^H x| of the unit left and right vectors; zero at the coalescence of the pair.
     participation : float
         Participation ratio of the mode, from 1/N for one disk that moves alone to 1 for disks that move alike.
     rotation : float
@@ -113,7 +113,7 @@ class ComplexPair:
 
     @property
     def quality(self) -> float:
-        """|Re omega| / (2 |Im omega|): what dissipates with a lower quality factor stops the growth."""
+        """|Re omega| / (2 |Im omega|): dissipation with a lower quality factor stops the growth."""
         return self.frequency / self.growth_rate if self.growth_rate > 0 else np.inf
 
     @property
@@ -129,8 +129,8 @@ class Spectrum(Tabled):
     Attributes
     ----------
     eigenvalues : ndarray of complex, shape (E,)
-        Sorted by real part, then imaginary part; 1 / time^2. Rattlers and other coordinates that feel no
-        force at all are left out.
+        Sorted by real part, then imaginary part; 1 / time^2. Rattlers and other coordinates on which no force acts are
+        left out.
     pairs : tuple of ComplexPair
         The complex pairs that exceed their own rounding uncertainty, fastest growing first.
     negative : ndarray, shape (B,)
@@ -171,12 +171,12 @@ class Spectrum(Tabled):
 
     @property
     def is_stable(self) -> bool:
-        """Whether no motion grows: no believable complex pair, and no negative eigenvalue beyond noise."""
+        """Whether no motion grows: no complex pair and no negative eigenvalue beyond rounding noise."""
         return not self.pairs and not len(self.negative)
 
     @property
     def free(self) -> int:
-        """Number of eigenvalues that are zero within rounding: such a motion meets no force, and drifts."""
+        """Number of eigenvalues that are zero within rounding: no force opposes such a motion, which drifts."""
         return int(np.count_nonzero(np.abs(self.eigenvalues) <= SAFETY * self.rounding))
 
     @property
@@ -191,7 +191,7 @@ class Spectrum(Tabled):
 
     @property
     def unstable(self) -> Complexes:
-        """Eigenvalues whose motion grows: one of each believable pair, and the negative ones."""
+        """Eigenvalues whose motion grows: one of each complex pair beyond noise, and the negative eigenvalues."""
         return np.concatenate([[pair.eigenvalue for pair in self.pairs], self.negative]).astype(np.complex128)
 
     def growth_rate(self, dt: float | None = None) -> float:
@@ -200,8 +200,7 @@ class Spectrum(Tabled):
         Parameters
         ----------
         dt : float, optional
-            Time step of velocity Verlet, whose dispersion is then taken into account; exact dynamics by
-            default.
+            Time step of velocity Verlet, to include its dispersion; exact dynamics by default.
 
         Returns
         -------
@@ -255,8 +254,8 @@ def dynamical_matrix(packing: Packing | Snapshot, form: Form = "consistent") -> 
     matrix : scipy.sparse.csr_array, shape (E, E)
         1 / time^2.
     active : ndarray of int, shape (E,)
-        Which of the coordinates (x.., y.., R theta..) its rows are. A coordinate whose row of K is zero
-        feels no force: its eigenvalue is zero and says nothing.
+        The coordinates (x.., y.., R theta..) of the rows. Coordinates with a zero row of K are left out: no force acts
+        on them, and their eigenvalue is zero.
     """
     matrix = mass_weighted(stiffness_matrix(packing, form), packing)
     active = active_coordinates(matrix)
@@ -294,9 +293,9 @@ def mass_weighted(stiffness: csr_array, packing: Packing | Snapshot) -> csr_arra
 
 
 def eigenvalues(packing: Packing | Snapshot, form: Form = "consistent") -> Complexes:
-    """Every eigenvalue without vectors, by LAPACK's dense solver, in a third of the time of :func:`spectrum`.
+    """Compute every eigenvalue without vectors, by LAPACK's dense solver, in a third of the time of :func:`spectrum`.
 
-    Which of the complex pairs exceed their rounding uncertainty is not known without vectors.
+    Without vectors it is not known which complex pairs exceed their rounding uncertainty.
 
     Parameters
     ----------
@@ -319,12 +318,12 @@ def _sort_eigenvalues(values: Complexes) -> Complexes:
 
 
 def spectrum(packing: Packing | Snapshot, form: Form = "consistent") -> Spectrum:
-    """Every eigenvalue, by LAPACK's dense solver; left and right vectors only where complex pairs appear.
+    """Compute every eigenvalue by LAPACK's dense solver, and left and right vectors only if there are complex pairs.
 
     Parameters
     ----------
     packing : Packing or Snapshot
-        The configuration, in equilibrium if the result is to mean stability.
+        The configuration. The result describes stability only if it is in equilibrium.
     form : {"consistent", "paper"}
         As in :func:`~faultgouge.analysis.stiffness_matrix`.
 
@@ -430,8 +429,8 @@ class StableTimestep(float):
 def stable_timestep(of: float | Packing | Snapshot) -> StableTimestep:
     r"""The largest stable time step of velocity Verlet.
 
-    Without dissipation it is :math:`2/\omega_{max}`. Dashpots take the velocity of the half step, as in all granular
-    styles of LAMMPS: a motion begins to alternate in sign and to grow where :math:`4 M - 2\,dt\, C - dt^2 K` becomes
+    Without dissipation it is :math:`2/\omega_{max}`. Dashpots use the velocity of the half step, as in all granular
+    styles of LAMMPS: a motion begins to alternate in sign and to grow when :math:`4 M - 2\,dt\, C - dt^2 K` becomes
     singular, so that dt = 2/mu with the largest mu of :math:`\mu^2 M - \mu C - K`.
 
     Parameters
@@ -442,7 +441,7 @@ def stable_timestep(of: float | Packing | Snapshot) -> StableTimestep:
     Returns
     -------
     StableTimestep
-        Time, infinite for a packing without contacts; `error` is what Arnoldi's iteration leaves, 0 of omega_max.
+        Time, infinite for a packing without contacts; `error` is that of Arnoldi's iteration, 0 for a given omega_max.
 
     Raises
     ------

@@ -49,7 +49,7 @@ TRIED = (
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """An equilibrium and how well it is balanced.
+    """An equilibrium and the accuracy of its balance.
 
     Attributes
     ----------
@@ -60,9 +60,9 @@ class Equilibrium:
     floor : float
         Estimate of the residual that the rounding of coordinates leaves.
     evaluations : int
-        Force evaluations that it took from the equilibrium before.
+        Number of force evaluations since the previous equilibrium.
     way : str or None
-        In words, which of the ways of `TRIED` led here, and from where; None where halving the increment did.
+        In words, which of the methods in `TRIED` led here, and from where; None if halving the increment was enough.
     """
 
     packing: Packing
@@ -73,7 +73,7 @@ class Equilibrium:
 
     @classmethod
     def of(cls, packing: Packing) -> "Equilibrium":
-        """A packing as it stands, by its own forces: where to start from, balanced or not."""
+        """The record of a packing with its present forces: a starting point, balanced or not."""
         return cls(packing, packing.residual, rounding_floor(packing), 0)
 
     @property
@@ -99,24 +99,24 @@ def equilibrate(
     beside: Equilibrium | None = None,
     onward: bool = False,
 ) -> Equilibrium:
-    """The equilibrium at fx that follows from the last one.
+    """Compute the equilibrium at fx from the last equilibrium.
 
     Parameters
     ----------
     engine : Engine
         LAMMPS with this packing.
     last : Equilibrium
-        Where to start; its fx may be lower or higher.
+        Starting point; its fx may be lower or higher.
     fx : float
         Force along x on each disk of the upper layer.
     force_tolerance : float, optional
-        Residual to stop at. By default the iteration ends at the floor.
+        Residual at which the iteration stops. By default the iteration ends at the rounding floor.
     beside : Equilibrium, optional
-        Another one near the last, at another fx: its displacement is a better guess than none. It does not change what
-        is found, except for the rounding.
+        Another equilibrium near the last, at another fx, whose displacement gives the initial guess. It changes the
+        result only within rounding.
     onward : bool
-        Whether the ways of `TRIED` are taken where halving the increment leads nowhere. By default the branch of
-        equilibria ends there.
+        Whether to try the methods in `TRIED` if halving the increment fails. By default the branch of equilibria ends
+        there.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def equilibrate(
     Raises
     ------
     NoEquilibriumError
-        If no way that may be taken leads there.
+        If no permitted method finds an equilibrium.
     """
     guess = _response(engine, last, fx) if beside is None else _in_proportion(last, beside, fx)
     here = _halving(engine, last, fx, force_tolerance, guess)

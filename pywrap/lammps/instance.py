@@ -11,7 +11,7 @@ from .plain_file_names import plain_name
 
 
 class EngineError(FaultgougeError):
-    """LAMMPS could not do what was asked: one sentence with its reason."""
+    """LAMMPS failed to execute a command; the text is one sentence with the reason."""
 
 
 def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:

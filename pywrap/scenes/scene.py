@@ -38,7 +38,7 @@ from .validation import SceneError, Section, read_toml, refusal_sentence, requir
 
 
 class Scene(Keys):
-    """What is wanted, complete and consistent: `Keys` whose sections agree with each other."""
+    """A complete and consistent description of a computation: `Keys` whose sections agree with each other."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
@@ -78,9 +78,9 @@ class Scene(Keys):
         path : str or Path
             A TOML file. A relative packing.file in it counts from its folder.
         packing : mapping, optional
-            A section [packing] in place of the file's, whose own may name a file that is not there yet.
+            A section [packing] in place of that of the file, which may name a file that does not exist yet.
         command : str, optional
-            The command, or the task of a sweep, that the scene is for: it gets the sections that it reads
+            The command, or the task of a sweep, that reads the scene: the scene then has the sections that it reads
             (:mod:`faultgouge.pywrap.scenes.command_sections`). By default all.
 
         Returns
@@ -90,7 +90,7 @@ class Scene(Keys):
         Raises
         ------
         SceneError
-            If the file cannot be read, is no TOML, or does not describe a scene that can be run.
+            If the file cannot be read, is not TOML, or does not describe a scene that can be run.
         """
         path = Path(path)
         mapping = read_toml(path, "scene")
@@ -99,14 +99,14 @@ class Scene(Keys):
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any], folder: str | Path = ".", command: str | None = None) -> "Scene":
-        """Make a scene from what a TOML file would hold.
+        """Make a scene from a mapping with the contents of a TOML file.
 
         Parameters
         ----------
         mapping : mapping
             Sections by name, keys and values in them as in TOML; `resolved` gives such a mapping.
         folder : str or Path
-            The folder from which a relative packing.file counts.
+            The folder to which a relative packing.file refers.
         command : str, optional
             As in `from_toml`.
 

@@ -54,7 +54,7 @@ MISSING = {"friction.v_ss": ', and the paper gives no value: give a velocity, or
 
 
 class SceneError(BadInputError):
-    """A scene that cannot be run: one sentence that says what is wrong, where, and what to do."""
+    """The scene cannot be run; the text is one sentence: what is wrong, where, and what to do."""
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
