@@ -1,8 +1,8 @@
-"""The errors that a user is told in one sentence: what is wrong, where, and what to do.
+"""Errors with a sentence for the user: what is wrong, where, and what to do.
 
-Every such error is a `FaultgougeError`. A search for complex pairs may catch `NoEquilibriumError` and nothing above it:
-an engine that fails, a lost rank or a full disk always reaches the command. Any other exception that reaches the
-command is a mistake in this program.
+Every such error is a `FaultgougeError`. A search for complex pairs may catch `NoEquilibriumError` but no base class of
+it: the failure of an engine, a lost rank or a full disk must always reach the command. Any other exception that reaches
+the command is a bug in this program.
 """
 
 

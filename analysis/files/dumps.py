@@ -1,17 +1,17 @@
-r"""LAMMPS text dumps, as the input decks write them, read back into a packing.
+r"""Read the LAMMPS text dumps of the input decks into a packing.
 
-Two files make one packing. The disks' dump (``dump custom``) has one row per disk; its box line says whether
-x is periodic. The contacts' dump (``dump local``) has one row per pair, with the slip. Columns are found by
-name, under any of the names listed in `DISK` and `CONTACT`, in any order; further columns are ignored. With
-``%.17g`` everything comes back to the bit.
+Two files make one packing. The disks' dump (``dump custom``) has one row per disk; its box line says whether x is
+periodic. The contacts' dump (``dump local``) has one row per pair, with the slip. Columns are found by name, under any
+of the names listed in `DISK` and `CONTACT`, in any order; additional columns are ignored. With ``%.17g`` all numbers
+are read back bitwise.
 
-Disks of type 2 form the upper layer. The floor's slip stands in the disks' dump, for a floor contact belongs
-to one disk. Pairs that do not overlap, which LAMMPS lists up to its cutoff, are no contacts. Without friction
-there are neither slips nor angles, and their columns may be missing.
+Disks of type 2 form the upper layer. The slip on the floor is in the dump of disks, because a floor contact belongs to
+one disk. LAMMPS also lists pairs that do not overlap, up to its cutoff; these are not contacts. Without friction there
+are neither slips nor angles, and their columns may be missing.
 
-Law, load and inertia are no part of a dump. They are given by the caller or by a sidecar file of the same
-name with the suffix ".params", which has one ``key value`` a line out of kn, kt, mu, exponent, rescaled, coulomb,
-cn, ct, tau, fx, fy, inertia_factor; what the caller gives wins.
+Law, load and inertia are not part of a dump. They are given by the caller or by a file of the same name with the suffix
+".params", which has one ``key value`` per line from kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau, fx, fy,
+inertia_factor. Values from the caller take precedence.
 """
 
 import zlib

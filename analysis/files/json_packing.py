@@ -1,4 +1,4 @@
-"""Packings given by hand, as JSON: positions without contacts or history."""
+"""Packings as JSON, written by hand: positions without contacts or history."""
 
 import json
 import zlib

@@ -1,6 +1,6 @@
-r"""Growth of the mean square displacement, measured on an undamped run.
+r"""Growth of the mean square displacement, measured in an undamped run.
 
-The prediction to compare it with is :meth:`~faultgouge.analysis.Spectrum.growth_rate`.
+The prediction for comparison is :meth:`~faultgouge.analysis.Spectrum.growth_rate`.
 
 .. math:: D(t) = \frac1N \sum_i \left[\Delta x_i^2(t) + \Delta y_i^2(t)\right]
 
@@ -12,19 +12,20 @@ from the equilibrium. Above onset one complex pair takes over and
     D(t) = e^{2 |\mathrm{Im}\,\omega| t} \left[A + B \cos(2\, \mathrm{Re}\,\omega\, t + \varphi)\right],
     \qquad |B| \le A .
 
-Close to an exceptional point v is nearly real, the motion a standing wave, and B nearly A: D touches zero
-twice a period and a straight line through log D is at the mercy of those dips. The mean of D over stretches
-of several periods keeps the exponential and loses the modulation, whatever its frequency: the rate is the
-slope of the logarithm of these means, over stretches of equal duration.
+Close to an exceptional point v is nearly real, the motion is a standing wave, and B is nearly A: D touches zero twice a
+period, and these dips would spoil a straight line through log D. The mean of D over intervals of several periods keeps
+the exponential and removes the modulation, whatever its frequency: the rate is the slope of the logarithm of these
+means, over intervals of equal duration.
 
-**Noise.** All modes begin alike, excited by the rounding of the coordinates or by the perturbation, and D stays at that
-level, the noise, until the fastest growing motion stands out of it. Of n modes it begins with a share of `SHARE`/n or
-so. To be `ABOVE` the noise, and to be followed over a decade from there, takes a time of about
-:math:`\ln(10 \cdot 10^3\, n / 0.1) / (2 |\mathrm{Im}\,\omega|)`, some 17 e-foldings of 100 disks.
+**Noise.** All modes start with similar amplitudes, excited by the rounding of the coordinates or by the perturbation. D
+stays at this level, the noise, until the fastest growing motion exceeds the noise. With n modes, this motion starts
+with a share of about `SHARE`/n. To reach `ABOVE` times the noise, and to be followed over a decade from there, takes a
+time of about
+:math:`\ln(10 \cdot 10^3\, n / 0.1) / (2 |\mathrm{Im}\,\omega|)`, some 17 e-foldings for 100 disks.
 
-**Weakening.** Where friction falls with the velocity, the packing is another one from that moment on. D jumps, since
-the equilibrium is elsewhere, and grows if K with the weakened friction says so: prediction and fit are those of the
-weakened packing, and the fit begins at ten times the jump.
+**Weakening.** When friction falls with the velocity, the equilibrium of the packing changes. D jumps to the
+displacement of the new equilibrium, and then grows if K with the weakened friction is unstable. Prediction and fit are
+those of the weakened packing, and the fit begins at ten times the jump.
 """
 
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""The propagator of small motion by its modes, and where it is large (:mod:`.transient`)."""
+"""The propagator of small motion from its modes, and the times at which it is large (:mod:`.transient`)."""
 
 from dataclasses import dataclass, replace
 from typing import Literal

@@ -4,19 +4,19 @@ Small motion about an equilibrium, under a force f on the coordinates q and the 
 
 .. math:: M \ddot q + C \dot q + K q = f \cos\omega t .
 
-Without dissipation it is a function of one matrix, and of one oscillator
+Without dissipation the motion is a function of one matrix, that of one oscillator
 (:mod:`~faultgouge.analysis.motion.oscillator`).
 
 **Dissipation** (:mod:`~faultgouge.analysis.operators.damping`): dashpots have no modes in common with K. The motion is
 then that of the first-order system of :mod:`~faultgouge.analysis.motion.state_space`, whose eigenvalues s give
-:math:`e^{st}` and, under the force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. What is left of it in the end, if
-all Re s < 0, is the transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}` (`transfer` in
-:mod:`~faultgouge.analysis.motion.forcing`).
+:math:`e^{st}` and, under the force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. If all Re s < 0, the motion
+finally is the stationary response with the transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}`
+(`transfer` in :mod:`~faultgouge.analysis.motion.forcing`).
 
 Functions of the matrix of a packing close to a coalescence of two eigenvalues keep their digits
 (:mod:`~faultgouge.analysis.motion.matrix_functions`).
 
-Coordinates that feel no force, those of rattlers, are held still.
+Coordinates on which no force acts, those of rattlers, are held fixed.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 r"""The damping matrix :math:`C = -\partial F / \partial \dot q` of a packing.
 
-Coordinates and the vectors N and T of a contact are those of :mod:`~faultgouge.analysis.operators.stiffness`. A
-contact has a dashpot along its normal and one along its slip (:mod:`~faultgouge.analysis.packing.law`), and a disk
-may feel a drag
+Coordinates and the vectors N and T of a contact are those of :mod:`~faultgouge.analysis.operators.stiffness`. A contact
+has a dashpot along its normal and one along its slip (:mod:`~faultgouge.analysis.packing.law`), and there may be a drag
+on each disk,
 :math:`-(m/\tau)\,\mathbf v` and :math:`-(I/\tau)\,\omega`:
 
 .. math::
@@ -13,9 +13,9 @@ may feel a drag
 C is symmetric and positive semidefinite: the energy falls by :math:`\dot q^T C\, \dot q` per unit of time. Small motion
 about an equilibrium obeys :math:`M \ddot q + C \dot q + K q = 0`.
 
-A contact at Coulomb's bound has no term in T. There the tangential force is no differentiable function of the
-velocity: it stays at the bound if the contact slides on, and the dashpot acts if the contact slides back. C takes the
-first of the two, as the stability operator does where the slip of such a contact is concerned.
+A contact at Coulomb's bound has no term in T. At the bound the tangential force is not a differentiable function of the
+velocity: the force stays at the bound if the contact continues to slide, and the dashpot acts if the contact slides
+back. C uses the first case, as the stability operator does for the slip of such a contact.
 """
 
 from dataclasses import replace

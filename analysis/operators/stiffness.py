@@ -18,15 +18,14 @@ and with a and b of :mod:`~faultgouge.analysis.packing.law`,
     -K_c = -f_n'\, N N^T + \frac{f_n}{r}\, P P^T + a\, T T^T
     - b\, T N^T - \frac{f_t}{r}\, N P^T
 
-For the floor only the first three coordinates exist and P = 0. The last two terms are not symmetric: the
-tangential force depends on the overlap while the normal force does not depend on the slip, and the tangential
-force follows the turning contact. ``form="paper"`` leaves out the last term, as the operator published by
-Charan, Pomyalov and Procaccia does: there the slip vector is differentiated with
-:math:`\partial t/\partial r = 1 - \mathbf n \mathbf n^T` and the turning of the tangent is lost.
-``form="consistent"`` is the exact derivative of the integrated forces.
+For the floor only the first three coordinates exist and P = 0. The last two terms are not symmetric: the tangential
+force depends on the overlap but the normal force does not depend on the slip, and the tangential force rotates with the
+contact. ``form="paper"`` leaves out the last term, as does the operator published by Charan, Pomyalov and Procaccia.
+They differentiate the slip vector with :math:`\partial t/\partial r = 1 - \mathbf n \mathbf n^T`, and so lose the
+rotation of the tangent. ``form="consistent"`` is the exact derivative of the integrated forces.
 
-The 36 numbers of a contact are nine and their negatives. Translations of the two disks have opposite signs in N, P and
-T, and rotations the same sign:
+The 36 numbers of a contact are nine numbers and their negatives. Translations of the two disks have opposite signs in
+N, P and T, and rotations the same sign:
 
 .. math::
 
@@ -37,7 +36,7 @@ T, and rotations the same sign:
 with :math:`S = f_n' \mathbf n \mathbf n^T - (f_n/r + a) \boldsymbol\tau \boldsymbol\tau^T +
 b\, \boldsymbol\tau \mathbf n^T + (f_t/r)\, \mathbf n \boldsymbol\tau^T`. K is assembled from these (`contact_terms`).
 
-Without friction only N and P are left, and K is an operator on the 2N coordinates (x, y): rows and columns of rotations
+Without friction only N and P remain, and K is an operator on the 2N coordinates (x, y): rows and columns of rotations
 are empty.
 """
 

@@ -1,4 +1,4 @@
-"""Where contacts are and how they stand, in a box that may be periodic; definitions as of `packing`."""
+"""Positions and directions of contacts, in a box that may be periodic; definitions as in `packing`."""
 
 from __future__ import annotations
 

@@ -1,20 +1,19 @@
-r"""A packing of frictional disks, the one data type that everything passes on.
+r"""A packing of frictional disks, the data type that all parts exchange.
 
-Two disks touch when :math:`\delta = R_i + R_j - r > 0`, with :math:`r` the length of the branch vector
-:math:`\mathbf r_i - \mathbf r_j` (nearest image along x in a periodic box).
-:math:`\mathbf n = (\mathbf r_i - \mathbf r_j)/r` points to i and
-:math:`\boldsymbol\tau = \hat z \times \mathbf n = (-n_y, n_x)`. The history of a contact is one number, the
-slip s along :math:`\boldsymbol\tau`, and it is even under exchange of i and j: the normal, the relative
+Two disks touch when :math:`\delta = R_i + R_j - r > 0`, with :math:`r` the length of the branch vector :math:`\mathbf
+r_i - \mathbf r_j` (nearest image along x in a periodic box). :math:`\mathbf n = (\mathbf r_i - \mathbf r_j)/r` points
+to i and :math:`\boldsymbol\tau = \hat z \times \mathbf n = (-n_y, n_x)`. The history of a contact is one number, the
+slip s along :math:`\boldsymbol\tau`. The slip does not change under exchange of i and j: the normal, the relative
 motion and the tangent all change sign. The flat floor at y = 0 is a partner with :math:`\mathbf n = (0, 1)`,
 :math:`\boldsymbol\tau = (-1, 0)`, :math:`\delta = R - y` and a normal that never turns.
 
 With the coordinates :math:`q = (x_1..x_N, y_1..y_N, u_1..u_N)`, :math:`u_i = R_i \theta_i`, the forces are
 :math:`(F_x, F_y, T/R)`; a contact puts :math:`f_n \mathbf n + f_t \boldsymbol\tau` on i, the opposite on j,
-and :math:`-f_t` as T/R on both, because the lever arm is the full radius. Each disk of the upper layer
-carries :math:`(f_x, -f_y)` besides.
+and :math:`-f_t` as T/R on both, because the lever arm is the full radius. Each disk of the upper layer also carries the
+force :math:`(f_x, -f_y)`.
 
-Coordinates and slips are doubles, or doubles with low parts (:mod:`~faultgouge.analysis.packing.compensated`), if
-compensated arithmetic has found them.
+Coordinates and slips are doubles, or doubles with low parts (:mod:`~faultgouge.analysis.packing.compensated`) in
+compensated arithmetic.
 """
 
 from dataclasses import dataclass, replace

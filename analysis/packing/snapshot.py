@@ -1,17 +1,17 @@
-r"""A packing as some other code holds it, in two or three dimensions: what each contact does to first order.
+r"""A packing of another code, in two or three dimensions, with its contacts to first order.
 
-A contact law, whatever it is, enters the operators through a few numbers at each contact: the normal, the distance and
-the lever arms; the normal and the tangential force; and the derivatives of both. `LinearisedContacts` has them,
-`Snapshot` adds the particles, and :mod:`~faultgouge.analysis.operators.linearised_contacts` makes the operators.
+Any contact law enters the operators through a few numbers at each contact: the normal, the distance and the lever arms;
+the normal and the tangential force; and the derivatives of both. `LinearisedContacts` has them, `Snapshot` adds the
+particles, and :mod:`~faultgouge.analysis.operators.linearised_contacts` assembles the operators.
 
 **Coordinates** are translations and rotations as lengths, :math:`R\theta`, axis by axis:
 (x.., y.., R theta..) of disks and (x.., y.., z.., R theta_x.., R theta_y.., R theta_z..) of spheres. Vectors always
 have three components; those of disks lie in the plane, and disks turn about z.
 
-**Two derivatives.** Some laws have another derivative :math:`b = \partial \mathbf f_t / \partial \delta` while the
-overlap grows than while it falls (LAMMPS's mindlin_rescale). Both are kept; every operator takes the share of contacts
-that part (:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks on the way back and slides on
-the way on. `sliding` chooses.
+**Two derivatives.** For some laws (LAMMPS's mindlin_rescale) the derivative :math:`b = \partial \mathbf f_t / \partial
+\delta` differs between a growing and a falling overlap. Both are stored; every operator takes the weight of opening
+contacts (:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks if the motion reverses, and
+slides if the motion continues. `sliding` chooses.
 """
 
 from dataclasses import dataclass

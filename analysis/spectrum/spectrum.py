@@ -1,13 +1,12 @@
-r"""Eigenvalues of the stability operator, and which complex pairs among them are real physics.
+r"""Eigenvalues of the stability operator, and the test whether a complex pair is physical or rounding noise.
 
 Small motion about an equilibrium obeys :math:`M \ddot q = -K q` with :math:`M = \mathrm{diag}(m, m, I_0 m)`
 in the coordinates (x, y, R theta), so :math:`q \propto v e^{i\omega t}` with
 
 .. math:: K v = \lambda M v, \qquad \omega = \sqrt\lambda .
 
-All vectors here live in the mass-weighted coordinates :math:`M^{1/2} q`, where the operator is
-:math:`A = M^{-1/2} K M^{-1/2}`: it is symmetric whenever K is, and then every eigenvalue has condition number
-one.
+All vectors here are in the mass-weighted coordinates :math:`M^{1/2} q`, in which the operator is :math:`A = M^{-1/2} K
+M^{-1/2}`. A is symmetric if K is symmetric, and then every eigenvalue has condition number one.
 
 K is not symmetric, and real eigenvalues may coalesce and leave the axis as a pair
 :math:`\lambda = \lambda_R \pm i\lambda_I`. Then :math:`\omega = \pm\omega_R \pm i\omega_I`, one motion of
@@ -16,16 +15,15 @@ each pair grows as :math:`e^{|\omega_I| t}`, and the mean square displacement as
 
 **Negative eigenvalues.** A real :math:`\lambda < 0` is the classical instability (buckling): :math:`\omega` is
 imaginary, and the motion leaves the equilibrium without oscillation. A branch of equilibria passes through
-:math:`\lambda = 0` at a turning point; Newton's method can land beyond it, on equilibria that no packing reaches by
-itself. A packing is linearly stable only if it has neither complex pairs nor negative eigenvalues.
+:math:`\lambda = 0` at a turning point; Newton's method can land beyond the turning point, on equilibria that no packing
+reaches by itself. A packing is linearly stable only if it has neither complex pairs nor negative eigenvalues.
 
 **Noise.** A backward stable solver returns the eigenvalues of :math:`A + E` with :math:`|E| \sim u |A|`, u
 the unit roundoff, and a simple eigenvalue with unit right and left vectors x, y moves by :math:`\kappa |E|`,
 :math:`\kappa = 1/|y^H x|`. Close to a coalescence :math:`\kappa \to \infty` as one over the distance of the
-pair, so that a double real eigenvalue turns into a spurious complex pair of size :math:`(u |A| c)^{1/2}`, c
-the difference of the couplings of the two modes, far above :math:`u |A|`. A pair is therefore believed only
-if :math:`|\lambda_I|` exceeds a safety factor times its own :math:`\kappa u |A|`; the others are counted as
-noise.
+pair, so that a double real eigenvalue turns into a spurious complex pair of size :math:`(u |A| c)^{1/2}`, far above
+:math:`u |A|`; c is the difference of the couplings of the two modes. A pair is therefore accepted only if
+:math:`|\lambda_I|` exceeds a safety factor times its own :math:`\kappa u |A|`; the other pairs are counted as noise.
 
 **Time steps.** Velocity Verlet with step dt turns the frequency of a frozen K into :math:`\Omega`,
 
