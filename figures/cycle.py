@@ -1,4 +1,4 @@
-"""F_x over the displacement of the upper layer, on each way between two turning points."""
+"""F_x over the displacement of the upper layer, on each path between two turning points."""
 
 from collections.abc import Sequence
 from itertools import pairwise

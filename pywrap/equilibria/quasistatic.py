@@ -1,13 +1,14 @@
 r"""From equilibrium to equilibrium, by Newton's method (:mod:`~faultgouge.pywrap.equilibria.newton`).
 
-The first step needs no forces: at an equilibrium they are those of the increment on the upper layer, and the iteration
-starts from the linear response to these. Its factors of K serve the next iterations, too, as long as these converge
-fast: a small increment takes no others. Between equilibria q is nearly proportional to the increment: where a third one
-is known, its displacement in proportion is a better start. The ramp of an onset takes the equilibrium before the last;
-a ramp that is stored does not, so that it goes on to the bit where it was cut off.
+The first step needs no force evaluation: from an equilibrium, the unbalanced forces are the increment on the upper
+layer, and the iteration starts from the linear response to these forces. The factors of K also serve the next
+iterations as long as these converge fast: a small increment needs no other factors. Between equilibria q is nearly
+proportional to the increment: if a third equilibrium is known, its displacement in proportion is a better initial
+guess. The ramp of an onset uses the equilibrium before the last. A stored ramp does not, so that an interrupted ramp
+continues bitwise unchanged.
 
-Where Newton fails the increment is halved, since the path matters: friction remembers. Where that leads nowhere, other
-ways are tried (`TRIED`) before the packing is said to flow.
+If Newton's method fails, the increment is halved, because friction depends on the path. If this fails, other methods
+are tried (`TRIED`) before the packing is reported to flow.
 """
 
 from collections.abc import Iterable

@@ -1,8 +1,8 @@
-"""Disks as a file of another code has them, and the packing that they are under a law and a load.
+"""Disks from a file of another code, and the packing of these disks under a law and a load.
 
-Readers find columns; `of_columns` gives them their meaning, whatever the format calls them. What a file does not say
-is taken as follows: mass 1, angle 0, slips 0, open sides. Numbers that no packing has are refused here, once for all
-formats: disks out of the plane, below the floor, or with a centre inside of another disk.
+Readers find columns; `of_columns` interprets the columns, whatever their names in the format. If a file lacks masses,
+angles, slips or the period, the mass is 1, angles and slips are 0, and the sides are open. Impossible numbers are
+refused here, once for all formats: disks out of the plane, below the floor, or with a centre inside another disk.
 """
 
 from __future__ import annotations

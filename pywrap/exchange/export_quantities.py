@@ -1,8 +1,8 @@
-"""What files have of a packing: law and load by name, contacts as rows; and what exports show besides.
+"""Quantities of a packing in files: law and load by name, contacts as rows; and further quantities in exports.
 
-Law, load and inertia are names with numbers, and contacts rows (first ID, second ID, slip), where a second ID of 0 is
-the floor; low parts of compensated packings are a column more. `float.__repr__` is the shortest text that is the same
-double when it is read. Besides, exports show forces, mobilised friction and modes.
+Law, load and inertia are names with numbers. Contacts are rows (first ID, second ID, slip); a second ID of 0 is the
+floor. Low parts of compensated packings are an additional column. `float.__repr__` is the shortest text that gives the
+same double when it is read. Exports also show forces, mobilised friction and modes.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The formats of other codes: what reads and writes which file, and what a format has no room for.
+"""The formats of other codes: the module that reads and writes each format, and what a format cannot store.
 
-A module is imported when a file of its format is met.
+A module is imported only when a file of its format is used.
 """
 
 from __future__ import annotations

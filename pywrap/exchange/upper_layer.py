@@ -1,4 +1,4 @@
-"""Which disks are the upper layer: a count, a type, IDs, a group, or a region, in one line of text."""
+"""Select the upper layer by a number of disks, a type, IDs, a group, or a region, in one line of text."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""A LAMMPS instance that holds one packing.
+"""A LAMMPS instance that contains one packing.
 
-The instance is set up by the deck part ``system.in``, the same file that ``lmp -in`` runs, and driven by its
-companions (:mod:`~faultgouge.pywrap.lammps.decks`). A `Packing` goes in and a `Packing` comes out, bit for bit
+The instance is set up by the deck part ``system.in``, the same file that ``lmp -in`` runs, and driven by its companions
+(:mod:`~faultgouge.pywrap.lammps.decks`). A `Packing` is transferred into LAMMPS and back, bitwise
 (:mod:`~faultgouge.pywrap.lammps.lammps_state`). All methods are collective over the ranks of the communicator, and
 every rank sees the whole packing.
 """

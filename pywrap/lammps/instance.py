@@ -1,4 +1,4 @@
-"""A LAMMPS instance with the plugin in it, of whichever LAMMPS is installed."""
+"""A LAMMPS instance with the plugin, of the installed LAMMPS version."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""The path of equilibria of a scene: a ramp of F_x in steps, or the equilibrium at any F_x that is asked for.
+"""The path of equilibria of a scene: a ramp of F_x in steps, or the equilibrium at any given F_x.
 
 All functions are collective over the ranks of the communicator.
 """

@@ -1,4 +1,4 @@
-"""run.h5 of a scene: begun, or opened where a run was cut off."""
+"""Write the run.h5 of a scene: a new file, or the file of an interrupted run."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Undamped runs from an equilibrium: their time step, their perturbation and their time series.
 
-A run yields each sample as soon as it has it. It resumes its own state after every part, so that one that is continued
-from a checkpoint is the same to the bit. All functions are collective over the ranks of the communicator.
+A run yields each sample as soon as it is computed. The run resumes its own state after every part, so that a run
+continued from a checkpoint is bitwise the same. All functions are collective over the ranks of the communicator.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A scene: what is wanted, in TOML, checked in full before any work is done.
+"""A scene: description of a computation in TOML, checked in full before any work starts.
 
     precision = "double"          # of the coordinates
     [packing]   the disks and the box: generated from a seed, or read from a file
@@ -15,11 +15,11 @@
     [units]     what the numbers are in SI
     [output]    what is written beside the result
 
-packing, law and load are needed; of the others, one that is absent is a feature that is not in the run. A command
-takes the sections that it reads, and needs some of them (:mod:`faultgouge.pywrap.scenes.command_sections`). The
-units are the user's own: k_n and k_t are force / length^law.exponent, 3/2 by default, and the paper's numbers take
-the mass of a disk and the diameter of a small disk as units. Defaults are the paper's values where it gives one; the
-docstrings say where it does not.
+packing, law and load are required. Each other section switches on a feature; without the section, the run does not have
+the feature. A command reads only some sections, and requires some of those
+(:mod:`faultgouge.pywrap.scenes.command_sections`). The user chooses the units: k_n and k_t are force /
+length^law.exponent, 3/2 by default. The units of the paper are the mass of a disk and the diameter of a small disk.
+Defaults are the values of the paper if it gives them; the docstrings say where it does not.
 """
 
 from collections.abc import Mapping

@@ -1,6 +1,6 @@
-"""What a scene is refused for, in one sentence: what is wrong, where, and what to do.
+"""Errors of a scene in one sentence: what is wrong, where, and what to do.
 
-pydantic finds what is wrong with a section; `sentence` says so in words of the scene.
+pydantic finds the errors in a section; `sentence` describes them in the terms of the scene.
 """
 
 import reprlib
