@@ -20,7 +20,7 @@ Values = TypeVar("Values", Indices, Floats)
 
 
 def share(count: int, of: int) -> dict[str, Any]:
-    """count/of with Wilson's 95 % interval: {"count", "of", "share", "low", "high"}; the last three are None for of = 0."""
+    """count/of with Wilson's interval: {"count", "of", "share", "low", "high"}, the last three None for of = 0."""
     if of == 0:
         return {"count": 0, "of": 0, "share": None, "low": None, "high": None}
     from scipy.stats import binomtest  # half a second to import

@@ -222,7 +222,7 @@ class Record:
         file = self._file
         if file is None or not file.saved or len(file) == 0:
             return
-        goes_on = "is complete" if file.complete else "the same command goes on from there"
+        goes_on = "is complete" if file.complete else "the same command continues from there"
         count = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}{more}"
         self._said(f"{self.path} holds {count}; {goes_on}", self.path)
 

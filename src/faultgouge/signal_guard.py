@@ -41,7 +41,7 @@ SIGNALS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # `nohup` has a command go on without its terminal
     SIGNALS[signal.SIGHUP] = "the terminal or the connection was closed"
 
-NOTHING = "nothing was written, and the same command begins anew"
+NOTHING = "nothing was written, and the same command starts from the beginning"
 _shared = mmap.mmap(-1, 4096)
 """Shared by guard and work: what an interrupt leaves, as UTF-8, a place and words that each end with a zero, and
 `CLOSED`."""
@@ -179,7 +179,7 @@ def _end(status: int, now: float) -> NoReturn:
 def _kept() -> str:
     place, words, *_ = _shared[:CLOSED].decode(errors="replace").split("\0")
     if place and not os.path.exists(place):
-        return f"{place} is not there, and the same command begins anew"
+        return f"{place} is not there, and the same command starts from the beginning"
     return words
 
 

@@ -97,11 +97,11 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     if as_json:
         print_json({"equilibria": _equilibria(output), "hysteresis": None if left is None else asdict(left)})
         return
-    print_line(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")
+    print_line(f"F_x = {record.last.fx:g} reached; residual force {record.last.residual:.2g}; written to {output}")
     if left is not None:
         print_line(
-            f"F_x is back at {left.fx:g}: the upper layer has moved by {left.remaining:.4g} since it was there first, "
-            f"and the loads have done the work {left.work:.4g} on it"
+            f"F_x is back at {left.fx:g}: since F_x first had this value, the upper layer has moved by "
+            f"{left.remaining:.4g}, and the work of the loads is {left.work:.4g}"
         )
 
 
@@ -125,7 +125,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     settings = require_section(wanted.perturb, "perturb")
     mus = wanted.law.mus
     if len(mus) > 1:
-        say(f"mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene, is run")
+        say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
     with Record(output, wanted, task="perturb", saved=keeps) as record:
         if record.last is None:
             total = ceil(settings.fx / step_of(wanted) * (1 - 1e-9)) + 1

@@ -72,7 +72,7 @@ def reproduce(
     wanted = read_scene(scene or shipped / "paper.toml", "reproduce", "reproduce")
     from faultgouge.studies.reproduce import reproduce as run_protocol
 
-    keeps(f"what is in {output} so far is kept; the same command begins anew and replaces it", output)
+    keeps(f"what is in {output} so far is kept; the same command starts from the beginning and replaces it", output)
     triggered = read_scene(shipped / "triggered.toml", "reproduce") if scene is None else None
     with lock_folder(output):
         run_protocol(wanted, output, say, triggered)
@@ -87,7 +87,10 @@ def report(
     """Measure error against run time: which method to use when, for six tasks, with figures and numbers."""
     from faultgouge.assessment.work_precision import report as run_studies
 
-    keeps(f"{output} has the studies that were finished; the same command begins anew and replaces them", output)
+    keeps(
+        f"{output} has the studies that were finished; the same command starts from the beginning and replaces them",
+        output,
+    )
     with lock_folder(output):
         run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
     print_line(f"written: {output}/report.md")
@@ -103,7 +106,10 @@ def stability(
     from faultgouge.assessment.stability import check
     from faultgouge.assessment.stability import stability as try_cases
 
-    keeps(f"{output} has the cases that were finished; the same command begins anew and replaces them", output)
+    keeps(
+        f"{output} has the cases that were finished; the same command starts from the beginning and replaces them",
+        output,
+    )
     with lock_folder(output):
         result = try_cases(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
     counts = Counter(case["status"] for case in result.get("cases", ()))
@@ -146,7 +152,7 @@ def _into_folder(
 ) -> None:
     """Run a study of a scene that goes on in its folder; `what` is counted, and `kept` is what an interrupt leaves."""
     wanted = read_scene(scene, name)
-    keeps(f"{output}/{name}.jsonl has {kept}; the same command goes on from there", output)
+    keeps(f"{output}/{name}.jsonl has {kept}; the same command continues from there", output)
     with lock_folder(output):
         result = study(wanted, output, say, lambda results, count: progress(results, what, count))
     (say if as_json else print_line)(f"written: {output}/{name}.md")

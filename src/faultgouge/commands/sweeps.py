@@ -51,7 +51,7 @@ def sweep(
             for line in estimate(wanted.task, missing, known.values()):
                 print_line(line)
         return
-    keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there", output)
+    keeps(f"{output}/{LINES} has the scenes that have ended; the same command continues from there", output)
     rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count), workers)
     if is_root():
         failed = sum(row["says"] is not None for row in rows)
@@ -127,7 +127,7 @@ def modes(
             (print_line if dry_run else say)(line)
     if dry_run:
         return
-    keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there", output)
+    keeps(f"{output}/{LINES} has the scenes that have ended; the same command continues from there", output)
     result = count_modes(wanted, output, part, say, lambda rows, count: progress(rows, "scenes", count), workers)
     if is_root():
         _show_modes(result["rows"])

@@ -149,8 +149,8 @@ def report_fallback(equilibrium: Equilibrium) -> None:
     """Of an equilibrium that was not reached by halved increments, how it was."""
     if equilibrium.way is not None:
         say(
-            f"F_x = {equilibrium.fx:.10g} was reached by {equilibrium.way}, after smaller and smaller increments had "
-            "led nowhere: it may lie on another branch of equilibria"
+            f"F_x = {equilibrium.fx:.10g} was reached by {equilibrium.way}, after smaller increments had failed: the "
+            "equilibrium may lie on another branch"
         )
 
 
