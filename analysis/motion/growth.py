@@ -314,10 +314,10 @@ def _why_not(
     now = f"with the friction weakened to mu = {weakened:.6g}" if weakened is not None else f"at F_x = {packing.fx:g}"
     if rate is None:
         return (
-            f"D did not grow by a decade out of its noise; of more than {MOST_DISKS} disks no spectrum says if it will"
+            f"D did not grow by a decade above its noise; for more than {MOST_DISKS} disks the spectrum is not computed"
         )
     if rate == 0 or needed is None:
-        loss = ", and the dissipation takes away what moves" if damped else ""
+        loss = ", dissipation damps all motion" if damped else ""
         found = "no motion grows" if damped else "no complex pair and no negative eigenvalue"
         bounded = "D jumps to the new equilibrium and stays bounded" if weakened is not None else "D stays bounded"
         return (
@@ -330,8 +330,8 @@ def _why_not(
             f"leaves the noise, and can be followed over a decade, after about t = {needed:.4g}"
         )
     return (
-        f"{unstable}, but D did not rise by a decade out of its noise at one rate: it reached {msd.max():.2g} in "
-        f"t = {length:.4g}. The motion is small against what else moves, or has left the range in which K holds"
+        f"{unstable}, but D did not rise by a decade above its noise at one rate: it reached {msd.max():.2g} in "
+        f"t = {length:.4g}. The motion is small compared with other motion, or has left the range in which K holds"
     )
 
 

@@ -165,7 +165,7 @@ def _end(status: int, now: float) -> NoReturn:
     if code - 128 in set(SIGNALS):
         _interrupted(code - 128, now)
     if code == -signal.SIGKILL:
-        _say(f"killed from outside, for want of memory perhaps: {_kept()}")
+        _say(f"killed from outside, possibly for lack of memory: {_kept()}")
         os._exit(128 + signal.SIGKILL)
     if code == -signal.SIGXCPU:
         _say(f"the limit of CPU time (ulimit -t) is reached: {_kept()}")

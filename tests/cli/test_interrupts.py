@@ -119,7 +119,10 @@ def simulates(folder):
             "out has the cases that were finished; the same command starts from the beginning and replaces",
         ),
         ("eruptions scene.toml -o out", "out/eruptions.jsonl has the runs that were over; the same command continues"),
-        ("sweep sweep.toml -o out", "out/results.jsonl has the scenes that have ended; the same command continues from"),
+        (
+            "sweep sweep.toml -o out",
+            "out/results.jsonl has the scenes that have ended; the same command continues from",
+        ),
     ],
 )
 @pytest.mark.long
@@ -204,7 +207,7 @@ GUARDED = "import os, sys; from faultgouge.signal_guard import guarded; guarded(
         (IN_A_CLASS, 130, "Error: interrupted: nothing was written, and the same command starts from the beginning.\n"),
         (GUARDED.format("os.abort()"), 1, "a library has ended the command (SIGABRT)"),
         (GUARDED.format("os.kill(os.getpid(), 11)"), 1, "a library has ended the command (SIGSEGV)"),
-        (GUARDED.format("os.kill(os.getpid(), 9)"), 137, "killed from outside, for want of memory perhaps"),
+        (GUARDED.format("os.kill(os.getpid(), 9)"), 137, "killed from outside, possibly for lack of memory"),
         (GUARDED.format("sys.exit(3)"), 3, ""),
     ],
     ids=["interrupt while a class is made", "abort", "segmentation fault", "kill", "exit"],
