@@ -3,14 +3,14 @@
 The matrix leaves out contacts below the rounding floor, because their stiffness is noise, and coordinates that no
 contact then holds. A contact that has closed since the displacement began has no slip, however long the displacement:
 its tangential force does not depend on the displacement, and has no part in K. A small matrix is a band for LAPACK; a
-large matrix is sparse (:mod:`~faultgouge.analysis.factors.linear`).
+large matrix is sparse (:mod:`~faultgouge.analysis.factors.linear_solver`).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from ...analysis.factors.linear import Band, BandSolver, Booleans, Solver, SparseSolver
+from ...analysis.factors.linear_solver import Band, BandSolver, Booleans, Solver, SparseSolver
 from ...analysis.operators.stiffness import assemble_stiffness, contact_terms
 from ...analysis.packing.arrays import Floats, Indices
 from ..lammps.contact_graph import ContactGraph
