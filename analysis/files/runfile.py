@@ -24,9 +24,9 @@ the run: readers of H5MD step through both. fx and fy are those of the equilibri
 frame are nan, or 0 for integers. ``/faultgouge/trajectory`` has its times, so that it counts these frames, and low
 parts of its positions.
 
-The stored file is complete at any moment and has a checksum over all its bytes (:mod:`.checksummed_file`). The attribute
-``complete`` of the root is false until the run has ended; until then, an undamped run continues from the state in
-``/checkpoint``. The whole file is checked when it is opened (:mod:`.runfile_validation`).
+The stored file is complete at any moment and has a checksum over all its bytes (:mod:`.checksummed_file`). The
+attribute ``complete`` of the root is false until the run has ended; until then, an undamped run continues from the
+state in ``/checkpoint``. The whole file is checked when it is opened (:mod:`.runfile_validation`).
 
 Datasets depend on the scene alone. The circumstances of the run (resolved scene, versions, seed, ranks) are attributes
 of the root. One file contains one set of disks and one law.
