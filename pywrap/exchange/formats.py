@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...analysis import BadInputError, OutputError, Packing, PackingFileError
+from ...analysis import BadInputError, Packing, PackingFileError
 from ...analysis.files.atomic_write import BEGINNINGS
 from ...analysis.files.plain_file import open_plain, open_text
 from .disks import Disks
@@ -238,7 +238,4 @@ def write_packing(path: Path, packing: Packing, modes: Sequence[ModeVectors] = (
 
 
 def _write(format_: Format, path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
-    try:
-        return str(_import_module(format_, format_.writer)(path, frames, modes))
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror}.") from error
+    return str(_import_module(format_, format_.writer)(path, frames, modes))

@@ -17,7 +17,7 @@ from .terminal import (
     Frame,
     PackingFile,
     ScenePath,
-    check_output,
+    lock_output,
     print_json,
     print_line,
     read_scene,
@@ -194,6 +194,7 @@ def _gain_of(packing: Packing | Snapshot) -> dict[str, Any] | None:
 
 @app.command(epilog="Example: faultgouge onset paper.toml --json")
 def onset(
+    context: typer.Context,
     scene: ScenePath,
     output: Annotated[
         Path | None,
@@ -227,7 +228,7 @@ def onset(
     if part is not None and wanted.damping is not None:
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if output:
-        check_output(output, scene, *stored_files(wanted))
+        lock_output(context, output, scene, *stored_files(wanted))
     folder = _search_folder(slices, output)
     tell = say if as_json else print_line
     with status("settling") as show:

@@ -12,7 +12,7 @@ from ..ranks import is_root
 from .terminal import (
     Frame,
     PackingFile,
-    check_output,
+    lock_output,
     print_line,
     progress,
     refuse_snapshot,
@@ -54,6 +54,7 @@ WhichColour = Annotated[
 
 @app.command(epilog="Example: faultgouge draw run.h5 --mode pair -o mode.svg")
 def draw(
+    context: typer.Context,
     file: PackingFile,
     frame: Annotated[
         int | None,
@@ -76,7 +77,7 @@ def draw(
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
-    check_output(output, file)
+    lock_output(context, output, file)
     refuse_snapshot(file)
     packing, series, cycle = stored_packing(file, -1 if frame is None else frame), None, []
     if frame is None and mode is None:
@@ -109,6 +110,7 @@ def draw(
 
 @app.command(epilog="Example: faultgouge movie perturb.h5 -o eruption.gif")
 def movie(
+    context: typer.Context,
     file: PackingFile,
     mode: WhichMode = None,
     frame: Frame = -1,
@@ -134,7 +136,7 @@ def movie(
 
     check_name(output)
     refuse_snapshot(file)
-    check_output(output, file)
+    lock_output(context, output, file)
     count = max(2, round(seconds * rate))
     if not is_root():
         return
@@ -154,6 +156,7 @@ def movie(
 
 @app.command(epilog="Example: faultgouge view run.h5 -o page.html")
 def view(
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5 of a ramp, or perturb.h5.", show_default=False)],
     loads: Annotated[
         int | None,
@@ -180,7 +183,7 @@ def view(
 
     check_library()
     refuse_snapshot(file)
-    check_output(output, file)
+    lock_output(context, output, file)
     if not is_root():
         return
     with RunFile(file) as run:

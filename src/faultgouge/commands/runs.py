@@ -17,6 +17,7 @@ from .terminal import (
     Out,
     ScenePath,
     check_output,
+    lock_output,
     print_json,
     print_line,
     progress,
@@ -38,13 +39,17 @@ app = typer.Typer()
 
 @app.command(epilog="Example: faultgouge init -o scene.toml")
 def init(
+    context: typer.Context,
     output: Annotated[Path, typer.Option("-o", "--output", help="The scene to write.")] = Path("scene.toml"),
 ) -> None:
     """Write a scene with every section and key commented, to be changed."""
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
+    from faultgouge.analysis.files.atomic_write import write_text
+
+    lock_output(context, output)
     if is_root():
-        output.write_text((files("faultgouge") / "scenes" / "commented.toml").read_text())
+        write_text(output, (files("faultgouge") / "scenes" / "commented.toml").read_text())
         say(f"written to {output}; next: faultgouge onset {output}")
 
 

@@ -114,6 +114,15 @@ def check_output(output: Path, *inputs: Path) -> None:
     check(output, *inputs)
 
 
+def lock_output(context: typer.Context, output: Path, *inputs: Path) -> None:
+    """`check_output`, and keep other runs from the file until the command ends, on rank 0."""
+    from faultgouge.analysis.files.atomic_write import lock_output as lock
+
+    check_output(output, *inputs)
+    if is_root():
+        context.with_resource(lock(output))
+
+
 @contextmanager
 def lock_folder(folder: Path) -> Iterator[None]:
     """Make a folder for results, and keep other runs out of it, on rank 0."""
