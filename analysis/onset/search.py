@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
-from ..errors import FaultgougeError, TurningPointError
+from ..errors import FaultgougeError, NoEquilibriumError, TurningPointError
 from ..packing.packing import Floats, Packing
 from ..spectrum.buckling import negative_eigenvalues
 from ..spectrum.spectrum import Spectrum, spectrum
@@ -114,7 +114,17 @@ class Onset(Tabled):
     ends: float | None = None
 
     def __repr__(self) -> str:
-        return f"<Onset: F_x^c = {with_uncertainty(self.fx_c, self.error)}, {len(self.windows)} windows>"
+        return f"<Onset: {self.describe()}, {len(self.windows)} windows>"
+
+    def describe(self) -> str:
+        """F_x^c with its error, in words; or that, and why, the packing is unstable at the smallest load."""
+        first = self.windows[0]
+        if first.kind != "start":
+            return f"F_x^c = {with_uncertainty(self.fx_c, self.error)}"
+        negative = f"an eigenvalue is {first.eigenvalue:.6g}"
+        known = negative if first.eigenvalue < 0 else f"a pair of eigenvalues is complex about {first.eigenvalue:.6g}"
+        shear = "before any shear is added" if self.fx_c == 0 else "the smallest load"
+        return f"unstable at F_x = {self.fx_c:g}, {shear}: {known if self.at_start is None else self.at_start}"
 
     def _rows(self) -> dict[str, str]:
         return windows_rows(self.windows)
@@ -231,7 +241,7 @@ def find_onset(
     negative = negative_eigenvalues(force_bearing(start, limits))
     if len(negative):
         at_start = Unstable.of(start) if takes_all else None
-        window = Window(start.fx, None, float(negative[0]), load_error(start), None, 1.0, "start")
+        window = Window(start.fx, None, float(negative[0]), 0.0, None, 1.0, "start")
         return Onset((window,), False, (), modes, at_start, start.fx)
     unbalanced: dict[float, float] = {}
     states: dict[float, bytes] = {}
@@ -255,15 +265,14 @@ def find_onset(
         narrowest = _narrowest(loads, limits) if narrowest is None else narrowest
         try:
             windows = all_windows(Family(operator, narrowest, limits, states.__getitem__), loads, first=first)
-        except TurningPointError:
-            all_modes = _complex_at_start(start, limits)  # then the branch ends within the first increment
+        except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
+            all_modes = _complex_at_start(start, limits)
             if all_modes is None:
                 raise
             windows = (_fastest(start, all_modes),)
         windows = windows[:1] if first else windows
     elif modes is None and (all_modes := _complex_at_start(start, limits)):
         windows = (_fastest(start, all_modes),)
-        unbalanced[start.fx] = load_error(start)
     else:
         one, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks, folder)
         windows = (one,) if one else ()
@@ -296,7 +305,10 @@ def _fastest(start: Packing, found: Spectrum) -> Window:
 
 
 def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:
-    """A window whose errors have the imbalance of the equilibria next to its edges added, as a shift of the load."""
+    """A window whose errors have the imbalance of the equilibria next to its edges added, as a shift of the load.
+
+    The smallest load, at which a packing is unstable already, is given and has no error.
+    """
 
     def at(edge: float) -> float:
         return unbalanced[min(unbalanced, key=lambda known: abs(known - edge))]
@@ -304,6 +316,6 @@ def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:
     end = window.fx_end
     return replace(
         window,
-        error=window.error + at(window.fx_onset),
+        error=0.0 if window.kind == "start" else window.error + at(window.fx_onset),
         end_error=None if end is None else (window.end_error or 0.0) + at(end),
     )
