@@ -12,6 +12,7 @@ from ..ranks import is_root
 from .terminal import (
     Frame,
     PackingFile,
+    growth_in,
     lock_output,
     print_line,
     progress,
@@ -84,7 +85,6 @@ def draw(
         series, cycle = stored_series(file), _cycle(file)
     if not is_root():
         return
-    from faultgouge.analysis.motion.growth import growth_of_run
     from faultgouge.figures import draw_cycle, draw_packing
     from faultgouge.figures.mode import draw_modes
     from faultgouge.figures.packing import in_words
@@ -94,7 +94,7 @@ def draw(
     if cycle:
         figure = draw_cycle(cycle)
     elif series is not None:
-        growth = growth_of_run(packing, series["time"], series["msd"], series["friction"])
+        growth = growth_in(file, series)
         print_line(growth.says)
         figure = draw_growth(series["time"], series["msd"], growth.predicted, growth.measured)
     elif mode is None:

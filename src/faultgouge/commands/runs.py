@@ -17,6 +17,7 @@ from .terminal import (
     Out,
     ScenePath,
     check_output,
+    growth_in,
     lock_output,
     print_json,
     print_line,
@@ -119,10 +120,8 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     the first one is run.
     """
     from faultgouge.analysis import RunFile
-    from faultgouge.analysis.motion.growth import growth_of_run
     from faultgouge.pywrap import Record, reach
     from faultgouge.pywrap.runs.equilibrium_path import step_of
-    from faultgouge.pywrap.runs.undamped import sample_steps
     from faultgouge.pywrap.scenes.validation import require_section
 
     wanted = read_scene(scene, "perturb", "perturb")
@@ -149,8 +148,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         return
     with RunFile(output) as file:
         series, packing = file.series("undamped"), file.packing()
-    dt = sample_steps(settings, packing)[0]
-    growth = growth_of_run(packing, series["time"], series["msd"], series["friction"], dt)
+    growth = growth_in(output, series)
     if as_json:
         columns = {name: column.tolist() for name, column in series.items()}
         print_json({"mu": mus[0], "fx": packing.fx} | growth.as_dict() | columns)
