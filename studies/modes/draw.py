@@ -53,6 +53,7 @@ def over_load(courses: Mapping[str, Course], names: Sequence[str] = ("share", "g
         found = np.concatenate([np.ravel(np.array(course[name], dtype=float)) for course in courses.values()])
         if not np.any(np.isfinite(found) & (found > 0)):
             axes.text(0.5, 0.5, "no motion grows", transform=axes.transAxes, ha="center", color=INK)
+            axes.set_xlim(0.5 * min(seen), 2 * max(seen))
         elif name in ("growth_rate", "least_q"):
             axes.set_yscale("log")
         if name == "least_q":
