@@ -178,6 +178,7 @@ def view(
     if output.suffix.lower() != ".html":
         raise typer.BadParameter(f"-o {output}: a page is an .html")
     from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.hysteresis import turning_points
     from faultgouge.figures.browser_page import check_library, equally_spaced, loads_shown, write_view
     from faultgouge.figures.browser_pair import seconds
 
@@ -188,7 +189,8 @@ def view(
         return
     with RunFile(file) as run:
         most = loads_shown(len(run.packing(0))) if loads is None else loads
-        packings = [run.packing(k) for k in equally_spaced(len(run), most)]
+        chosen = {*equally_spaced(len(run), most), *turning_points(run.fx)}
+        packings = [run.packing(k) for k in sorted(chosen)]
         series = run.series("undamped") if "undamped" in run.names_of_series else None
     span = " to ".join(f"{fx:g}" for fx in dict.fromkeys((packings[0].fx, packings[-1].fx)))
     what = "undamped run" if series is not None else "equilibria"

@@ -106,8 +106,10 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     print_line(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")
     if left is not None:
         print_line(
-            f"F_x is back at {left.fx:g}: the upper layer has moved by {left.remaining:.4g} since it was there first, "
-            f"and the loads have done the work {left.work:.4g} on it"
+            f"F_x is back at {left.fx:g}, and so is the upper layer: the path closes, to rounding"
+            if left.closes
+            else f"F_x is back at {left.fx:g}: the upper layer has moved by {left.remaining:.4g} since it was there "
+            f"first, and the loads have done the work {left.work:.4g} on it"
         )
 
 
