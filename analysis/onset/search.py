@@ -171,7 +171,25 @@ def complex_windows(
     left out. All else is as in :func:`find_onset`.
     """
     loads = check_increasing(forces)
-    return all_windows(Family(operator, _narrowest(loads, limits) if narrowest is None else narrowest, limits), loads)
+    unit = unit_of(operator(float(loads[0])))
+    narrowest = _narrowest(loads, limits) if narrowest is None else narrowest
+    found = all_windows(Family(lambda fx: operator(fx) / unit, narrowest, limits), loads)
+    return tuple(_in_units(window, unit) for window in found)
+
+
+def unit_of(operator: Operator) -> float:
+    """A power of two of the size of a matrix's largest element: division by it changes no digit.
+
+    A search divides its operators by it, since what is rough in a search squares them in single precision, which goes
+    from 1e-38 to 1e38.
+    """
+    largest = float(abs(operator).max())
+    return 2.0 ** int(np.floor(np.log2(largest))) if largest > 0 else 1.0
+
+
+def _in_units(window: Window, unit: float) -> Window:
+    """A window of operators that were divided by a unit, 1 / time^2."""
+    return replace(window, eigenvalue=unit * window.eigenvalue)
 
 
 def _narrowest(loads: Floats, limits: Limits) -> float:
@@ -245,7 +263,7 @@ def find_onset(
         return Onset((window,), False, (), modes, at_start, start.fx)
     unbalanced: dict[float, float] = {}
     states: dict[float, bytes] = {}
-    given, ends = set(loads[1:].tolist()), np.inf
+    given, ends, unit = set(loads[1:].tolist()), np.inf, unit_of(full_operator(start, limits))
 
     def operator(fx: float) -> csr_array:
         nonlocal ends
@@ -257,14 +275,15 @@ def find_onset(
                 "stable equilibria ends before, at a turning point, and the packing leaves it without oscillation"
             )
         unbalanced[fx], states[fx] = load_error(packing), contact_states(packing, limits)
-        return full_operator(packing, limits)
+        return full_operator(packing, limits) / unit
 
     doubtful: Increments = ()
     all_modes: Spectrum | None = None
     if takes_all:
         narrowest = _narrowest(loads, limits) if narrowest is None else narrowest
         try:
-            windows = all_windows(Family(operator, narrowest, limits, states.__getitem__), loads, first=first)
+            found = all_windows(Family(operator, narrowest, limits, states.__getitem__), loads, first=first)
+            windows = tuple(_in_units(window, unit) for window in found)
         except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
             all_modes = _complex_at_start(start, limits)
             if all_modes is None:
@@ -275,7 +294,7 @@ def find_onset(
         windows = (_fastest(start, all_modes),)
     else:
         one, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks, folder)
-        windows = (one,) if one else ()
+        windows = (_in_units(one, unit),) if one else ()
     if not windows:
         raise OnsetError.among(modes, float(loads[-1]), doubtful)
     windows = tuple(_with_imbalance(window, unbalanced) for window in windows)
