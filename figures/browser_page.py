@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.colors import to_hex
 
 from faultgouge.analysis import BadInputError, Packing
+from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.analysis.motion.hysteresis import layer_displacement
 from faultgouge.analysis.packing.arrays import Floats
 
@@ -116,7 +117,7 @@ def write_view(
         template=(folder / "view.html.j2").read_text(),
         template_variables={"count": len(packings), "colours": (FIRST, SECOND), "others": others},
     )
-    path.write_text(page, encoding="utf-8")
+    write_text(path, page)
 
 
 def _frame(packing: Packing, course: RampEigenvalues, k: int) -> dict[str, Any]:

@@ -6,14 +6,14 @@ A .vtp is laid out as that of a Packing (:mod:`.vtp`): N centres, then two ends 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import BadInputError, OutputError, Snapshot
+from ...analysis import BadInputError, Snapshot
+from ...analysis.files.atomic_write import replace_whole
 from ...analysis.packing.arrays import Floats
-from .vtp import write_poly_data
+from .vtp import write_poly_data, write_xml
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,10 +74,7 @@ def write_snapshot_for_others(path: Path, snapshot: Snapshot, modes: Sequence[Sn
     writers = {".vtp": _write_vtp, ".xyz": _write_xyz}
     if path.suffix not in writers:
         raise BadInputError(f"-o {path}: a snapshot goes into {', '.join(writers)}; give it one of these suffixes.")
-    try:
-        writers[path.suffix](path, snapshot, modes)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror}.") from error
+    writers[path.suffix](path, snapshot, modes)
     return f"{len(snapshot)} particles, {len(snapshot.contacts)} contacts, {len(modes)} modes"
 
 
@@ -127,8 +124,7 @@ def _write_vtp(path: Path, snapshot: Snapshot, modes: Sequence[SnapshotMode]) ->
         "contact_mobilised": share,
     }
     ends = np.stack([first, first - reach[:, None] * c.normal], axis=1).reshape(-1, 3)
-    tree = write_poly_data(position, ends, numbers, _of_particles(snapshot, modes), on_contacts)
-    ElementTree.ElementTree(tree).write(path, xml_declaration=True, encoding="utf-8")
+    write_xml(path, write_poly_data(position, ends, numbers, _of_particles(snapshot, modes), on_contacts))
 
 
 def _write_xyz(path: Path, snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> None:
@@ -139,6 +135,6 @@ def _write_xyz(path: Path, snapshot: Snapshot, modes: Sequence[SnapshotMode]) ->
     sides = " ".join("T" if each else "F" for each in snapshot.periodic)
     origin = " ".join(repr(float(value)) for value in snapshot.origin)
     rows = np.column_stack([value if value.ndim == 2 else value[:, None] for value in columns.values()])
-    with path.open("w") as stream:
+    with replace_whole(path) as new, new.open("w") as stream:
         stream.write(f'{len(snapshot)}\nLattice="{lattice}" Origin="{origin}" pbc="{sides}" Properties={properties}\n')
         stream.writelines(" ".join(map(repr, row)) + "\n" for row in rows.tolist())

@@ -12,7 +12,8 @@ from ..mpi_rank import is_root
 from .terminal import (
     Frame,
     PackingFile,
-    check_output,
+    growth_in,
+    lock_output,
     print_line,
     progress,
     refuse_snapshot,
@@ -54,6 +55,7 @@ WhichColour = Annotated[
 
 @app.command(epilog="Example: faultgouge draw run.h5 --mode pair -o mode.svg")
 def draw(
+    context: typer.Context,
     file: PackingFile,
     frame: Annotated[
         int | None,
@@ -79,14 +81,13 @@ def draw(
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
-    check_output(output, file)
+    lock_output(context, output, file)
     refuse_snapshot(file)
     packing, series, cycle = stored_packing(file, -1 if frame is None else frame), None, []
     if frame is None and mode is None:
         series, cycle = stored_series(file), _cycle(file)
     if not is_root():
         return
-    from faultgouge.analysis.motion.growth import growth_of_run
     from faultgouge.figures import draw_cycle, draw_packing
     from faultgouge.figures.mode import draw_modes
     from faultgouge.figures.packing import in_words
@@ -96,7 +97,7 @@ def draw(
     if cycle:
         figure = draw_cycle(cycle)
     elif series is not None:
-        growth = growth_of_run(packing, series["time"], series["msd"], series["friction"])
+        growth = growth_in(file, series)
         print_line(growth.says)
         figure = draw_growth(series["time"], series["msd"], growth.predicted, growth.measured)
     elif mode is None:
@@ -112,6 +113,7 @@ def draw(
 
 @app.command(epilog="Example: faultgouge movie perturb.h5 -o eruption.gif")
 def movie(
+    context: typer.Context,
     file: PackingFile,
     mode: WhichMode = None,
     frame: Frame = -1,
@@ -137,7 +139,7 @@ def movie(
 
     check_name(output)
     refuse_snapshot(file)
-    check_output(output, file)
+    lock_output(context, output, file)
     count = max(2, round(seconds * rate))
     if not is_root():
         return
@@ -157,6 +159,7 @@ def movie(
 
 @app.command(epilog="Example: faultgouge view run.h5 -o page.html")
 def view(
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5 of a ramp, or perturb.h5.", show_default=False)],
     loads: Annotated[
         int | None,
@@ -177,17 +180,19 @@ def view(
     if output.suffix.lower() != ".html":
         raise typer.BadParameter(f"-o {output}: a page is an .html")
     from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.hysteresis import turning_points
     from faultgouge.figures.browser_page import check_library, equally_spaced, loads_shown, write_view
     from faultgouge.figures.browser_pair import seconds
 
     check_library()
     refuse_snapshot(file)
-    check_output(output, file)
+    lock_output(context, output, file)
     if not is_root():
         return
     with RunFile(file) as run:
         most = loads_shown(len(run.packing(0))) if loads is None else loads
-        packings = [run.packing(k) for k in equally_spaced(len(run), most)]
+        chosen = {*equally_spaced(len(run), most), *turning_points(run.fx)}
+        packings = [run.packing(k) for k in sorted(chosen)]
         series = run.series("undamped") if "undamped" in run.names_of_series else None
     span = " to ".join(f"{fx:g}" for fx in dict.fromkeys((packings[0].fx, packings[-1].fx)))
     what = "undamped run" if series is not None else "equilibria"
