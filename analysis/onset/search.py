@@ -190,9 +190,9 @@ def find_onset(
     Parameters
     ----------
     equilibrium : callable
-        fx -> Packing or Snapshot in equilibrium. It is called with the given loads in increasing order, and between calls for the
-        loads a and b with loads between these, in any order. There it may raise a NoEquilibriumError, and the search
-        goes around it. All other errors reach the caller.
+        fx -> Packing or Snapshot in equilibrium. It is called with the given loads in increasing order, and between
+        calls for the loads a and b with loads between these, in any order. There it may raise a NoEquilibriumError, and
+        the search goes around it. All other errors reach the caller.
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
     narrowest : float, optional
