@@ -335,6 +335,20 @@ def test_commands_that_are_not_those_of_the_instance():
     lmp.close()
 
 
+@pytest.mark.parametrize("law", ["mindlin", "gran/hertz/history"])
+def test_spheres_that_barely_touch(law):
+    """An overlap of 1e-10 has lost ten digits, from which no law can be measured."""
+    from faultgouge.pywrap import from_lammps
+
+    style, coefficients, _ = LAWS[law]
+    lmp, told = two(style.format(g="40"), ";".join(coefficients[:1]).format(g="40"), MOVES.strip())
+    lmp.numpy.extract_atom("x")[:2] = [[0, 0, 1.0], [0, 0, 2.0 - 1e-10]]
+    lmp.command("run 0")
+    (contact,) = from_lammps(lmp, told, balance=np.inf).contacts.overlap
+    assert contact == pytest.approx(1e-10, rel=1e-5)
+    lmp.close()
+
+
 def test_frozen_particles_and_inertia():
     """What fix freeze holds has no rows in K; LAMMPS's discs have another moment of inertia."""
     from faultgouge.pywrap import from_lammps
