@@ -337,15 +337,16 @@ def test_commands_that_are_not_those_of_the_instance():
 
 @pytest.mark.parametrize("law", ["mindlin", "gran/hertz/history"])
 def test_spheres_that_barely_touch(law):
-    """An overlap of 1e-10 has lost ten digits, from which no law can be measured."""
+    """An overlap of 1e-12 has lost twelve digits, from which no law can be measured."""
     from faultgouge.pywrap import from_lammps
 
     style, coefficients, _ = LAWS[law]
     lmp, told = two(style.format(g="40"), ";".join(coefficients[:1]).format(g="40"), MOVES.strip())
-    lmp.numpy.extract_atom("x")[:2] = [[0, 0, 1.0], [0, 0, 2.0 - 1e-10]]
+    lmp.numpy.extract_atom("radius")[:2] = 0.37, 0.41
+    lmp.numpy.extract_atom("x")[:2] = [[0, 0, 1.0], [0, 0, 1.78 - 1e-12]]
     lmp.command("run 0")
     (contact,) = from_lammps(lmp, told, balance=np.inf).contacts.overlap
-    assert contact == pytest.approx(1e-10, rel=1e-5)
+    assert contact == pytest.approx(1e-12, rel=1e-3)
     lmp.close()
 
 
