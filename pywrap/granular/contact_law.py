@@ -196,7 +196,8 @@ def measure_law(bench: Bench, state: State, types: tuple[int, int], who: str) ->
     SnapshotError
         If it is no power law of the kind above.
     """
-    state = state._replace(overlap=float(np.clip(state.overlap, *(share * state.radii[0] for share in MEASURED))))
+    least, most = (share * state.radii[0] for share in MEASURED)
+    state = state._replace(overlap=min(max(state.overlap, least), most))
     heavy = (3 * state.masses[0], state.masses[1] if bench.wall else 2 * state.masses[1])
     small = State((0.5 * state.radii[0], 0.8 * state.radii[1]), state.masses, state.overlap)
     states = [state, state._replace(overlap=0.5 * state.overlap), state._replace(masses=heavy), small]
