@@ -59,8 +59,8 @@ def from_lammps(
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
     The instance does not change: its next run is the same to the bit as without the look. (On several ranks, or with
-    threads, LAMMPS itself runs zero steps, which cuts the history of contacts at Coulomb's bound: where there are any,
-    a warning says so.)
+    threads, LAMMPS itself runs zero steps. It sorts particles, so that forces are then summed in another order, and it
+    cuts the history of contacts at Coulomb's bound: where there are any, a warning says so.)
 
     Parameters
     ----------
@@ -105,13 +105,13 @@ def _warn_of_cut(lmp: Any, snapshot: Snapshot) -> None:
     """Say that zero steps of the instance itself may have changed its next run.
 
     Setting up a run LAMMPS takes the force of each contact anew, and a slip beyond Coulomb's bound becomes that at the
-    bound, with the velocities of that moment. All else of a set-up is what the next run does, too.
+    bound, with the velocities of that moment. What else a set-up changes is the order of sums, a rounding.
     """
     at_bound = int(snapshot.contacts.at_bound.sum())
     if at_bound and not forked_look.can_copy(lmp) and forked_look.communicator(lmp).rank == 0:
         warnings.warn(
             f"{at_bound} contacts are at Coulomb's bound, and on several ranks, or with threads, the look cuts their "
-            "history there: the next run of this LAMMPS is not the same to the bit; look on one rank if it is to be.",
+            "history there: the next run of this LAMMPS is another one; look on one rank if it is to be the same.",
             stacklevel=3,
         )
 

@@ -448,13 +448,13 @@ def run(law, slope, steps, looks):
     lmp.close()
     return whole, found, said
 for law in ("gran/hertz/history", "mindlin"):
-    # particles that move, while no contact slides: the next run does not change
+    # particles that move, while no contact slides: the next run changes by the order of sums alone
     (there, found, said), (other, *_) = (run(law, 0.1, 3000, looks) for looks in (2, 0))
     assert len(found[0].contacts) > 5 and found[0].contacts.wall.any()
     assert not found[0].contacts.at_bound.any() and not said
     one, two = (np.sort(each.contacts.overlap) for each in found)
     assert np.abs(one - two).max() < 1e-14  # LAMMPS may list them in another order, and round images otherwise
-    assert np.array_equal(there, other)
+    assert np.abs(there - other).max() < 1e-11  # 200 steps of roundings of 1e-16, of an unstable motion
     # what is left of the forces without those of all contacts is the weight
     slope = np.array([0.1, 0, -1]) / np.hypot(0.1, 1)
     assert np.abs(found[0].load[:, 0] - found[0].mass[:, None] * slope).max() < 1e-9
