@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError, NoEquilibriumError, TurningPointError
 from ..packing.packing import Floats, Packing
+from ..packing.snapshot import Snapshot
 from ..spectrum.buckling import negative_eigenvalues
 from ..spectrum.spectrum import Spectrum, spectrum
 from ..table_display import TableDisplay
@@ -69,7 +70,7 @@ class Unstable:
     growth_rate: float
 
     @classmethod
-    def of(cls, packing: Packing) -> "Unstable":
+    def of(cls, packing: Packing | Snapshot) -> "Unstable":
         """Count what all eigenvalues of a packing show, without contacts whose force is unknown."""
         return cls.counted(spectrum(force_bearing(packing)))
 
@@ -153,7 +154,7 @@ class Onset(TableDisplay):
         }
 
 
-def takes_all_modes(packing: Packing, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
+def takes_all_modes(packing: Packing | Snapshot, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
     """Whether a packing is small enough for all of its modes to be searched, and for all windows to be found."""
     return modes is None and packing.coordinates <= 3 * limits.all_windows
 
@@ -197,7 +198,7 @@ def _narrowest(loads: Floats, limits: Limits) -> float:
 
 
 def find_onset(
-    equilibrium: Callable[[float], Packing],
+    equilibrium: Callable[[float], Packing | Snapshot],
     forces: ArrayLike,
     *,
     narrowest: float | None = None,
@@ -217,9 +218,9 @@ def find_onset(
     Parameters
     ----------
     equilibrium : callable
-        fx -> Packing in equilibrium. It is called with the given loads in increasing order, and between calls for the
-        loads a and b with loads between these, in any order. There it may raise a NoEquilibriumError, and the search
-        goes around it. All other errors reach the caller.
+        fx -> Packing or Snapshot in equilibrium. It is called with the given loads in increasing order, and between
+        calls for the loads a and b with loads between these, in any order. There it may raise a NoEquilibriumError, and
+        the search goes around it. All other errors reach the caller.
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
     narrowest : float, optional
@@ -305,19 +306,24 @@ def find_onset(
     return Onset(windows, complete, doubtful, modes, unstable, float(ends) if ends < np.inf else None)
 
 
-def _complex_at_start(start: Packing, limits: Limits) -> Spectrum | None:
+def _complex_at_start(start: Packing | Snapshot, limits: Limits) -> Spectrum | None:
     """The spectrum of a packing at the smallest load, if it has a complex pair.
 
-    None if it has none, or if the packing is too large for all eigenvalues to be asked for. Without tangential forces
-    the operator is symmetric, and nothing is computed.
+    None if it has none, or if the packing is too large for all eigenvalues to be asked for. Of a symmetric operator,
+    as without tangential forces, nothing is computed.
     """
-    if start.coordinates > limits.lapack or not start.contacts.slip.any():
+    if start.coordinates > limits.lapack or _symmetric(full_operator(start, limits)):
         return None
     found = spectrum(force_bearing(start, limits))
     return found if found.pairs else None
 
 
-def _fastest(start: Packing, found: Spectrum) -> Window:
+def _symmetric(matrix: csr_array) -> bool:
+    """Whether an operator is its transpose, but for the rounding of its entries, which are sums over contacts."""
+    return bool(abs(matrix - matrix.T).max() <= 1e-14 * abs(matrix).max())
+
+
+def _fastest(start: Packing | Snapshot, found: Spectrum) -> Window:
     """The window of the complex pair that grows fastest at the smallest load."""
     pair = max(found.pairs, key=lambda each: each.growth_rate)
     return Window(start.fx, None, pair.eigenvalue.real, 0.0, None, pair.overlap, "start")

@@ -34,22 +34,27 @@ def write_vtp(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
     """A .vtp file; what is in it, in words."""
     (frame,) = frames
     packing = frame.packing
-    write_xml(path, _page(frame, modes))
+    write_xml(path, _tree(frame, modes))
     return f"{len(packing)} disks and {len(packing.contacts)} contacts, in float64"
 
 
 def write_pvd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
     """A .pvd file, ParaView's list of frames, and a folder of its name with a .vtp for each."""
+    write_frame_list(path, ((float(frame.time), _tree(frame, modes)) for frame in frames))
+    return "displacements and what is known of forces"
+
+
+def write_frame_list(path: Path, frames: Iterable[tuple[float, Element]]) -> None:
+    """A .pvd file and its folder, of times and pages of VTK."""
     folder = path.with_suffix("")
     make_folder(folder)
     root = Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
     collection = ElementTree.SubElement(root, "Collection")
-    for number, frame in enumerate(frames):
+    for number, (time, page) in enumerate(frames):
         name = f"{folder.name}/{number:05d}.vtp"
-        write_xml(path.parent / name, _page(frame, modes))
-        ElementTree.SubElement(collection, "DataSet", timestep=repr(float(frame.time)), part="0", file=name)
+        write_xml(path.parent / name, page)
+        ElementTree.SubElement(collection, "DataSet", timestep=repr(time), part="0", file=name)
     write_xml(path, root)
-    return "displacements and what is known of forces"
 
 
 def write_xml(path: Path, page: Element) -> None:
@@ -57,7 +62,7 @@ def write_xml(path: Path, page: Element) -> None:
     write_whole(path, ElementTree.tostring(page, encoding="utf-8", xml_declaration=True))
 
 
-def _page(frame: Frame, modes: list[ModeVectors]) -> Element:
+def _tree(frame: Frame, modes: list[ModeVectors]) -> Element:
     packing = frame.packing
     numbers = export_quantities.scalars(packing) | (
         {} if packing.box_length is None else {"box_length": packing.box_length}

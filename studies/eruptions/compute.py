@@ -7,8 +7,8 @@ and more decades, and then levels off. The largest D is the size of the eruption
 **Over.** A run is over at time t when two conditions hold: the largest D of its second half, (t/2, t], is at most 1.5
 times that of the quarter before, (t/4, t/2]; and t is long enough for D to grow by `DECADES` decades at the rate of the
 spectrum. A stable packing is observed for `QUIET` units of time and then reported as stable, unless D *rises*
-nevertheless. A run that is not over in the time of the scene is cut off, and its size is a lower bound. A layer that has slid by the
-diameter of a disk *flows*.
+nevertheless. A run that is not over in the time of the scene is cut off, and its size is a lower bound. A layer that
+has slid by the diameter of a disk *flows*.
 
 **What ends the growth** is determined when D first reaches a tenth of its largest value. Each sample examines the
 contacts: *opens* if an initial contact has opened by then; *slides* if none has opened, but a contact slides at its

@@ -65,17 +65,23 @@ def stored_snapshot(file: Path) -> Snapshot | None:
     return read_snapshot(file) if holds_snapshot(file) else None
 
 
-def refuse_snapshot(file: Path) -> None:
-    """Say of a run.h5 that holds a snapshot what shows it."""
+def snapshot_of_disks(file: Path) -> Snapshot | None:
+    """The snapshot of a run.h5 that holds one of disks; None of all other files.
+
+    Raises
+    ------
+    BadInputError
+        If it is one of spheres: what shows these.
+    """
     from faultgouge.analysis import BadInputError
 
     snapshot = stored_snapshot(file)
-    if snapshot is not None:
-        what = "spheres" if snapshot.dimension == 3 else "disks of another law"
+    if snapshot is not None and snapshot.dimension == 3:
         raise BadInputError(
-            f"{file} holds {what} as LAMMPS left them: `faultgouge export {file} --mode 0 -o packing.vtp` shows them "
-            "in ParaView, and -o packing.xyz in OVITO."
+            f"{file} holds spheres: `faultgouge export {file} --mode 0 -o packing.vtp` shows them in ParaView, and "
+            f"-o packing.xyz in OVITO; `faultgouge movie {file} --mode 0 -o mode.xyz` moves a mode."
         )
+    return snapshot
 
 
 def stored_files(scene: Scene) -> list[Path]:
