@@ -98,7 +98,7 @@ def _of_arnoldi(scale: Floats, stiffness: csr_array, damping: csr_array | None) 
         def product(x: Floats, mu: float = mu) -> Floats:
             moved = scale * x.reshape(size)
             force = stiffness @ moved
-            if mu:
+            if damping is not None and mu:
                 force += mu * (damping @ moved)
             return np.asarray(scale * force)
 
