@@ -1,4 +1,4 @@
-"""What studies ask of a packing: its path of equilibria on this process alone, its contacts, and those that slide."""
+"""Tools of studies for a packing: its path of equilibria in this process alone, its contacts, its sliding contacts."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 r"""The largest stable time step of velocity Verlet.
 
-Without dissipation it is :math:`2/\omega_{max}`. Dashpots take the velocity of the half step, as in all granular styles
-of LAMMPS: a motion begins to alternate in sign and to grow where :math:`4 M - 2\,dt\, C - dt^2 K` becomes singular, so
+Without dissipation it is :math:`2/\omega_{max}`. Dashpots use the velocity of the half step, as in all granular styles
+of LAMMPS: a motion begins to alternate in sign and to grow when :math:`4 M - 2\,dt\, C - dt^2 K` becomes singular, so
 that dt = 2/mu with the largest mu of :math:`\mu^2 M - \mu C - K`.
 
 Of many coordinates mu is found by Arnoldi's iteration (ARPACK) with :math:`M^{-1/2} (K + \mu C) M^{-1/2}`, whose
@@ -56,7 +56,7 @@ def stable_timestep(
     Returns
     -------
     StableTimestep
-        Time, infinite for a packing without contacts; `error` is what Arnoldi's iteration leaves, 0 of omega_max.
+        Time, infinite for a packing without contacts; `error` is that of Arnoldi's iteration, 0 for a given omega_max.
 
     Raises
     ------
