@@ -10,9 +10,10 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import eigvals
+from scipy.linalg import eig, eigvals
 
 from faultgouge.analysis import Snapshot, damping_matrix, spectrum, stiffness_matrix
+from faultgouge.analysis.packing.arrays import Floats
 from faultgouge.analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from faultgouge.pywrap import compare_motion, from_lammps
 from faultgouge.pywrap.granular.forked_look import in_a_copy
@@ -208,16 +209,23 @@ def damping_needed(found: Snapshot) -> dict[str, float] | None:
 PUSHED = ("gran/hertz/history", 3, 50, 0.1)
 """Law, dimension, particles and tilt of the packings that are let go without loss, those of the seeds 1 to `LET_GO`."""
 
-LET_GO, PUSH = 12, 1e-10
+LET_GO, PUSH = 12, 1e-11
 """Packings, and standard deviation of the velocities with which they are let go."""
 
-FROM, TO, LONGEST, LOOK, STEP = 1e-17, 1e-11, 80.0, 0.1, 5e-4
-"""D between which growth is fitted, longest time, time between looks, time step: a fortieth of the shortest period. The
-push leaves D at 1e-20 to 1e-19, and below `FROM` it is made of many modes."""
+LONGEST, LOOK, STEP = 80.0, 0.1, 5e-4
+"""Longest time, time between looks, time step: a fortieth of the shortest period."""
+
+FROM, LINEAR, TO = 1e-22, 1e-18, 1e-11
+"""D from which growth is fitted, up to where, and at which a run ends. Beyond `LINEAR` contacts that are near the bound
+begin to slide, and D grows faster or more slowly than the linearised packing."""
 
 
 def let_go(seed: int) -> dict[str, Any]:
-    """Growth of D in LAMMPS beside that of the spectrum, of a packing without any dashpot, from rest with noise."""
+    """Growth of D in LAMMPS without any dashpot, from rest with noise, while D is below `LINEAR` and beyond ("late").
+
+    "linear" is the growth of the linearised packing after the same push in the same time, "predicted" the rate of its
+    fastest pair alone.
+    """
     law, d, count, tilt = PUSHED
     begin = time.process_time()
     row: dict[str, Any] = {"law": law, "d": d, "count": count, "mu": MU, "seed": seed, "tilt": tilt, "rests": False}
@@ -232,38 +240,66 @@ def let_go(seed: int) -> dict[str, Any]:
         row |= {"rests": True, "at_bound": said["at_bound"], "pairs": said["pairs"], "predicted": said["growth_rate"]}
         for name in ("drag", "spin"):
             lmp.command(f"unfix {name}")
-        row |= in_a_copy(lambda: _growth(lmp, seed))
+        push = PUSH * np.random.default_rng(seed).standard_normal((count, 3))
+        times, course = in_a_copy(lambda: _follow(lmp, push))
+        small = slice(int(np.flatnonzero(course < FROM)[-1]) + 1, int(np.flatnonzero(course < LINEAR)[-1]) + 1)
+        linear = linear_motion(found, push, times)
+        row |= {
+            "rate": fit_rate(times[small], course[small]),
+            "linear": fit_rate(times[small], linear[small]),
+            "late": fit_rate(times[small.stop :], course[small.stop :]),
+            "last": float(course[-1]),
+            "time": float(times[-1]),
+        }
         lmp.close()
     return row | {"cpu_seconds": time.process_time() - begin}
 
 
-def _growth(lmp: Any, seed: int) -> dict[str, Any]:
-    """Push all particles and follow D; the rate is None if D does not come to `TO`."""
+def _follow(lmp: Any, push: Floats) -> tuple[Floats, Floats]:
+    """Times and D of the particles after a push, up to `TO` or `LONGEST`."""
     lmp.commands_list(["log none", f"timestep {STEP}"])
-    count = lmp.extract_setting("nlocal")
     low, high, *_ = lmp.extract_box()
     size = np.subtract(high, low)
 
-    def places() -> Any:
-        order = np.argsort(lmp.numpy.extract_atom("id")[:count])
-        return lmp.numpy.extract_atom("x")[:count][order]
+    def by_id(name: str) -> tuple[Floats, Any]:
+        order = np.argsort(lmp.numpy.extract_atom("id")[: len(push)])
+        return lmp.numpy.extract_atom(name)[: len(push)], order
 
-    start = places()
-    lmp.numpy.extract_atom("v")[:count] += PUSH * np.random.default_rng(seed).standard_normal((count, 3))
-    times: list[float] = []
+    lmp.numpy.extract_atom("omega")[: len(push)] = 0.0  # what drag has left is of the size of the push
+    velocity, order = by_id("v")
+    velocity[order] = push
+    x, order = by_id("x")
+    start = x[order]
     squares: list[float] = []
-    while len(times) * LOOK < LONGEST and (not squares or squares[-1] < TO):
+    while len(squares) * LOOK < LONGEST and (not squares or squares[-1] < TO):
         lmp.command(f"run {round(LOOK / STEP)} post no")
-        away = places() - start
+        x, order = by_id("x")
+        away = x[order] - start
         away -= size * np.round(away / size)
-        times.append((len(times) + 1) * LOOK)
         squares.append(float(np.mean(np.sum(away**2, axis=1))))
-    course = np.array(squares)
-    rate = None
-    if course[-1] >= TO:
-        begin = int(np.flatnonzero(course < FROM)[-1]) + 1
-        rate = float(np.polyfit(times[begin:], np.log(course[begin:]), 1)[0])
-    return {"rate": rate, "last_over_first": float(course[-1] / course[0]), "time": times[-1]}
+    return LOOK * np.arange(1, len(squares) + 1), np.array(squares)
+
+
+def linear_motion(found: Snapshot, push: Floats, times: Floats) -> Floats:
+    """D of the linearised packing at some times after a push from rest, without dashpots."""
+    count = len(push)
+    root = np.sqrt(found.coordinate_mass)
+    start = np.zeros(found.coordinates)
+    start[: 3 * count] = push.T.ravel()
+    a = mass_weighted(stiffness_matrix(found), found)
+    active = active_coordinates(a)
+    squares, vectors = eig(a[active][:, active].toarray())
+    omega = np.sqrt(squares.astype(complex))
+    share = np.linalg.solve(vectors, (start * root)[active].astype(complex))
+    motion = np.zeros((found.coordinates, len(times)))
+    motion[active] = (vectors @ (share[:, None] * np.sin(np.outer(omega, times)) / omega[:, None])).real
+    motion = (motion / root[:, None])[: 3 * count]
+    return np.asarray(np.sum(motion**2, axis=0) / count)
+
+
+def fit_rate(times: Floats, course: Floats) -> float | None:
+    """Rate at which D grows, 1 / time; None of fewer than three looks."""
+    return float(np.polyfit(times, np.log(course), 1)[0]) if len(times) > 2 else None
 
 
 def compute(table: Path, cells: Iterable[Cell] = CELLS, watch: Any = print) -> None:

@@ -9,6 +9,7 @@ From the folder of the repository.
 """
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -18,7 +19,7 @@ import numpy as np
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.pages import render
 from faultgouge.studies.statistics import median, share
-from research.lammps_laws.compute import CELLS, LAWS, MU, TILTS, Cell, compute, compute_growth, let_go, read
+from research.lammps_laws.compute import CELLS, LAWS, MU, TILTS, TO, Cell, compute, compute_growth, let_go, read
 from research.lammps_laws.energy_cycle import energy_cycle
 
 HERE = Path(__file__).parent
@@ -31,6 +32,10 @@ USUAL = (50, MU)
 AGREES = 1e-6
 """Relative difference of numbers that are computed again: the motion of a packing that comes to rest is repeated to the
 bit on one machine, and its rounding ends at the balance of forces, 1e-8."""
+
+
+GROWN = TO / 10
+"""D beyond which a packing that has been let go has grown: a decade below the end of a run, twelve above the push."""
 
 
 def cell(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -91,9 +96,7 @@ def numbers(tables: Path = TABLES) -> dict[str, Any]:
 
 def full_seeds(rows: list[dict[str, Any]]) -> int:
     """The last seed that all laws have in both dimensions."""
-    return min(
-        max((row["seed"] for row in rows if row["law"] == law and row["d"] == d)) for law in LAWS for d in (2, 3)
-    )
+    return min(max(row["seed"] for row in rows if row["law"] == law and row["d"] == d) for law in LAWS for d in (2, 3))
 
 
 def other_cells(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -110,14 +113,10 @@ def other_cells(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return found
 
 
-def growth(rows: list[dict[str, Any]]) -> dict[str, Any] | None:
-    """Growth in LAMMPS over that of the spectrum, of packings with a pair, no contact at the bound apart from those."""
+def growth(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Packings that are let go: growth in LAMMPS over that of the linearised packing, and beyond small motion."""
     good = [row for row in rows if row["rests"]]
-    if not good:
-        return None
-    grown = [row for row in good if row["rate"] is not None]
-    ratios = sorted(row["rate"] / row["predicted"] for row in grown)
-    free = sorted(row["rate"] / row["predicted"] for row in grown if not row["at_bound"])
+    free = [row for row in good if not row["at_bound"]]
     return {
         "law": rows[0]["law"],
         "d": rows[0]["d"],
@@ -125,12 +124,18 @@ def growth(rows: list[dict[str, Any]]) -> dict[str, Any] | None:
         "packings": len(good),
         "restless": len(rows) - len(good),
         "pairs": sum(row["pairs"] > 0 for row in good),
-        "grown": len(grown),
-        "foreseen": sum(row["rate"] is not None for row in good if row["pairs"]),
-        "range": [ratios[0], ratios[-1]] if ratios else None,
+        "grown": sum(row["last"] > GROWN for row in good),
+        "rows": good,
         "free": len(free),
-        "free_range": [free[0], free[-1]] if free else None,
+        "ratio": [_middle(row["rate"] / row["linear"] for row in each) for each in (good, free)],
+        "late": _middle(row["late"] / row["predicted"] for row in good),
     }
+
+
+def _middle(values: Iterable[float]) -> list[float]:
+    """Median, least and largest."""
+    each = sorted(values)
+    return [float(np.median(each)), each[0], each[-1]]
 
 
 def wall_alone() -> dict[str, Any]:
@@ -164,9 +169,20 @@ def ranged(value: list[float] | None, digits: str = ".2g") -> str:
     return "-" if value is None else "{} ({} to {})".format(*(format(each, digits) for each in value))
 
 
+def three(value: list[float]) -> str:
+    """A median with its range, to hundredths."""
+    return ranged(value, ".2f")
+
+
+def signed(value: float) -> str:
+    """A number with its sign; what is zero to eight digits has none."""
+    return "0" if abs(value) < 1e-8 else f"{value:+.4g}"
+
+
 def write_page(folder: Path = HERE, tables: Path = TABLES) -> Path:
     """Write README.md of a folder from the tables."""
-    text = render("research.lammps_laws", "README.md.j2", **numbers(tables), ranged=ranged)
+    formats = {"ranged": ranged, "three": three, "signed": signed}
+    text = render("research.lammps_laws", "README.md.j2", **numbers(tables), **formats)
     write_text(folder / "README.md", text)
     return folder / "README.md"
 
@@ -185,8 +201,8 @@ def check() -> list[str]:
         if row["rests"] != known[_key(row)]["rests"]
         or not np.isclose(row.get("growth_rate", 0), known[_key(row)].get("growth_rate", 0), rtol=AGREES)
     ]
-    pushed = {row["seed"]: row for row in read(TABLES / GROWTH)}
-    if 1 in pushed and not np.isclose(let_go(1)["rate"] or 0, pushed[1]["rate"] or 0, rtol=AGREES):
+    first = read(TABLES / GROWTH)[0]
+    if not np.isclose(let_go(1)["rate"], first["rate"], rtol=AGREES):
         wrong.append("growth of seed 1")
     return wrong
 

@@ -26,6 +26,7 @@ pencil with its dashpots.
 
 import sys
 from collections.abc import Iterator, Sequence
+from functools import partial
 from math import isclose
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -260,7 +261,7 @@ def rows(seed: int) -> Iterator[dict[str, Any]]:
                 "at_bound": int(found.contacts.at_bound.sum()), "fastest": fastest, "moved": moved,
                 "residual": found.residual, "pairs": len(said.pairs), "undamped": said.growth_rate(),
                 "predicted": 2 * fastest_damped(found),
-                "draws": [in_a_copy(lambda draw=draw: let_go(lmp, bearing, draw)) for draw in range(DRAWS)],
+                "draws": [in_a_copy(partial(let_go, lmp, bearing, draw)) for draw in range(DRAWS)],
             }  # fmt: skip
             lmp.close()
 

@@ -196,8 +196,8 @@ def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Layers that the standard law has loaded, each with several draws of noise where a run decides.
 
     "runs" are by share of the static yield and restitution: packings; those whose spectrum has growth; those that end
-    in each way of `UNREST`, and those that rest elsewhere, in all draws and in any. "flows" are packings that flow in any
-    run, by restitution.
+    in each way of `UNREST`, and those that rest elsewhere, in all draws and in any. "flows" are packings that flow in
+    any run, by restitution.
     """
     losses = sorted({run["restitution"] for row in rows for run in row["dynamic"]}, reverse=True)
     runs = []

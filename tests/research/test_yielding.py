@@ -3,8 +3,8 @@
 import shutil
 from pathlib import Path
 
-from research.yielding.compute import CONTROLLED
 from faultgouge.studies.result_rows import read_rows
+from research.yielding.compute import CONTROLLED
 from research.yielding.page import UNREST, drawn_again, numbers, rows_of, standard, text, worst_ends, write_lasting
 
 YIELDING = Path(__file__).parents[2] / "research" / "yielding"
