@@ -242,7 +242,7 @@ def let_go(seed: int) -> dict[str, Any]:
             lmp.command(f"unfix {name}")
         push = PUSH * np.random.default_rng(seed).standard_normal((count, 3))
         times, course = in_a_copy(lambda: _follow(lmp, push))
-        small = slice(int(np.flatnonzero(course < FROM)[-1]) + 1, int(np.flatnonzero(course < LINEAR)[-1]) + 1)
+        small = slice(beyond(course, FROM), beyond(course, LINEAR))
         linear = linear_motion(found, push, times)
         row |= {
             "rate": fit_rate(times[small], course[small]),
@@ -295,6 +295,12 @@ def linear_motion(found: Snapshot, push: Floats, times: Floats) -> Floats:
     motion[active] = (vectors @ (share[:, None] * np.sin(np.outer(omega, times)) / omega[:, None])).real
     motion = (motion / root[:, None])[: 3 * count]
     return np.asarray(np.sum(motion**2, axis=0) / count)
+
+
+def beyond(course: Floats, bound: float) -> int:
+    """The look from which on D stays above a bound."""
+    below = np.flatnonzero(course < bound)
+    return int(below[-1]) + 1 if len(below) else 0
 
 
 def fit_rate(times: Floats, course: Floats) -> float | None:

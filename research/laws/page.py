@@ -69,7 +69,8 @@ def numbers(tables: dict[str, list[Row]]) -> dict[str, Any]:
     }
     growth = tables.get("growth_100", [])
     onsets = {name.split("_")[1]: first_windows(rows) for name, rows in tables.items() if name.startswith("onset_")}
-    return {"sets": sets, "runs": runs(growth), "grown": len(growth), "onsets": onsets}
+    packings = {name.replace("_", " "): len(rows) for name, rows in tables.items()}
+    return {"sets": sets, "packings": packings, "runs": runs(growth), "grown": len(growth), "onsets": onsets}
 
 
 def by_load(rows: Sequence[Row]) -> dict[float, dict[str, Any]]:

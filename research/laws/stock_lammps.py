@@ -37,7 +37,7 @@ from mpi4py import MPI
 from scipy.linalg import eigvals
 
 from faultgouge.analysis import Packing, Snapshot, damping_matrix, spectrum, stiffness_matrix
-from faultgouge.analysis.packing.arrays import Floats
+from faultgouge.analysis.packing.arrays import Floats, Indices
 from faultgouge.analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from faultgouge.pywrap import Scene, from_lammps, ramp, settle
 from faultgouge.pywrap.granular.forked_look import in_a_copy
@@ -156,7 +156,7 @@ def slip_velocities(packing: Packing, slip: Floats) -> tuple[Floats, Floats]:
     matrix[rows, 2 * count + c.i] = -packing.radius[c.i]
     matrix[rows[pairs], 2 * count + c.j[pairs]] = -packing.radius[c.j[pairs]]
     matrix[:, count + c.i[~pairs]] = 0.0  # the height of disks on the floor
-    found = np.linalg.lstsq(matrix, slip, rcond=None)[0]
+    found: Floats = np.linalg.lstsq(matrix, slip, rcond=None)[0]
     if np.abs(matrix @ found - slip).max() > 1e-12 * np.abs(slip).max():  # rounding of a well-conditioned T
         raise ValueError("no velocities give all contacts their forces")
     return found[: 2 * count].reshape(2, count).T, found[2 * count :]
@@ -219,20 +219,23 @@ def fastest_damped(found: Snapshot) -> float:
     return float(eigvals(np.block([[np.zeros((size, size)), np.eye(size)], [-a, -g]])).real.max())
 
 
-def let_go(lmp: Any, bearing: Floats, draw: int) -> dict[str, Any]:
+def let_go(lmp: Any, bearing: Indices, draw: int) -> dict[str, Any]:
     """D after the push, in a copy of the process: at the end over that of the first look, and its rate of growth."""
     lmp.command("log none")
     noise = PUSH * np.random.default_rng(draw).standard_normal((len(bearing), 2))
     (v, x) = arrays(lmp, "v", "x")
     start = x.copy()
     v[bearing, :2] += noise
-    steps, times, squares = round(LOOK / STEP), [], []
+    steps = round(LOOK / STEP)
+    times: list[float] = []
+    squares: list[float] = []
+    period = lmp.extract_box()[1][0]
     while len(times) * LOOK < TIME and (not squares or squares[-1] < TO):
         lmp.command(f"run {steps} post no")
         (x,) = arrays(lmp, "x")
         times.append((len(times) + 1) * steps * STEP)
         away = (x - start)[bearing, :2]
-        away[:, 0] -= lmp.extract_box()[1][0] * np.round(away[:, 0] / lmp.extract_box()[1][0])
+        away[:, 0] -= period * np.round(away[:, 0] / period)
         squares.append(float(np.mean(np.sum(away**2, axis=1))))
     course = np.array(squares)
     row: dict[str, Any] = {"last_over_first": float(course[-1] / course[0]), "time": times[-1], "rate": None}

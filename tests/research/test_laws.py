@@ -91,6 +91,16 @@ def test_pages_have_the_counts_of_the_tables():
     paper = (ROOT / "docs" / "paper.md").read_text()
     cells = " | ".join(f"{each['0.2']} / {each['0.3']}" for each in counts.values())
     assert f"| motion grows with the restitution 0.9 | {cells} |" in paper
+    units = " ".join((ROOT / "docs" / "units.md").read_text().split())
+    for depth, lead in (("10 MPa", "with the smoothed law, and in 0 of 7"), ("1 MPa", "and in 0 of 9")):
+        at = FOUND["sets"][f"quartz {depth}"]
+        said = {state: [at[load][state]["grows"]["0.9"] for load in ("0.2", "0.3")] for state in ("smooth", "same")}
+        assert all(each["count"] == each["of"] for each in said["smooth"])
+        assert all(each["count"] == 0 for each in said["same"])
+        assert lead in units
+        first, second = ("{count} of {of}".format(**each) for each in said["smooth"])
+        assert f"{first} packings at 0.2 and {second} at 0.3" in units or f"{first} and {second}," in units
+    assert FOUND["yielding"]["lossy"]["flows"]["count"] == FOUND["yielding"]["smoothed"]["lossy"]["flows"]["count"] == 0
     for page in ("README.md", "research/modes/referee.md", "paper/paper.md"):
         text = " ".join((ROOT / page).read_text().split())
         assert counts["smooth"]["0.2"] in text, page
