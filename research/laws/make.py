@@ -17,7 +17,7 @@ from faultgouge.studies.sweep.tasks import TASKS
 from research.laws.page import write_page
 from research.laws.sets import sets
 from research.modes.make import different
-from research.modes.packing_rows import condense, read_known
+from research.modes.packing_rows import condense, read_known, table_of
 
 HERE = Path(__file__).parent
 TABLES = HERE / "tables"
@@ -36,8 +36,8 @@ def compute(folder: Path, names: list[str], share: float = 1.0, tables: Path | N
 
 
 def check(folder: Path, names: list[str]) -> None:
-    """The first tenth of the packings of each set, compared with the tables: every number of every load."""
-    compute(folder, names, 0.1)
+    """The first tenth of the packings of each set that has a table, compared with it: every number of every load."""
+    compute(folder, names or [name for name in sets() if table_of(TABLES, name).exists()], 0.1)
     condense(folder, folder / "tables")
     compared, wrong = 0, []
     for path in sorted((folder / "tables").glob("*.jsonl")):

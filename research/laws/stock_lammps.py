@@ -81,7 +81,7 @@ atom_modify     map yes sort 0 0
 comm_modify     vel yes
 neighbor        0.1 bin
 neigh_modify    every 1 delay 0 check yes
-read_data       {data}
+read_data       "{data}"
 set             group all mass 1.0
 group           small type 1
 group           large type 2
@@ -156,7 +156,7 @@ def slip_velocities(packing: Packing, slip: Floats) -> tuple[Floats, Floats]:
     matrix[rows, 2 * count + c.i] = -packing.radius[c.i]
     matrix[rows[pairs], 2 * count + c.j[pairs]] = -packing.radius[c.j[pairs]]
     matrix[:, count + c.i[~pairs]] = 0.0  # the height of disks on the floor
-    found: Floats = np.linalg.lstsq(matrix, slip, rcond=None)[0]
+    found = np.asarray(np.linalg.lstsq(matrix, slip, rcond=None)[0], dtype=np.float64)
     if np.abs(matrix @ found - slip).max() > 1e-12 * np.abs(slip).max():  # rounding of a well-conditioned T
         raise ValueError("no velocities give all contacts their forces")
     return found[: 2 * count].reshape(2, count).T, found[2 * count :]
