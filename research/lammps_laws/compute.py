@@ -81,8 +81,8 @@ CELLS = (
 )
 """All cells, each of the seeds 1, 2, ..., M. M was set by what a packing costs, and not by what came out."""
 
-LARGE = 200
-"""Particles beyond which packings come after all others: the eigenvalues of one take a minute."""
+LARGE = 50
+"""Particles beyond which packings come after all others: one takes minutes."""
 
 
 def pour(law: str, d: int, count: int, mu: float, seed: int, log: Path, gamma: float = GAMMA) -> Any:

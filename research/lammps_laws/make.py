@@ -127,7 +127,7 @@ def growth(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "grown": sum(row["last"] > GROWN for row in good),
         "rows": good,
         "free": len(free),
-        "ratio": [_middle(row["rate"] / row["linear"] for row in each) for each in (good, free)],
+        "ratio": _middle(row["rate"] / row["linear"] for row in free),
         "late": _middle(row["late"] / row["predicted"] for row in good),
     }
 

@@ -152,6 +152,9 @@ def stock(rows: Sequence[Row]) -> dict[str, dict[str, Any]]:
             "ever": counted(map(any, grown)),
             "ratio": [float(np.median(ratios)), ratios[0], ratios[-1]] if ratios else None,
             "most": max((draw["last_over_first"] for _, draw in draws if draw["rate"] is None), default=None),
+            "unseen": max(
+                (row["predicted"] for row, grows in zip(each, grown, strict=True) if not any(grows)), default=0.0
+            ),
             "moved": max(row["moved"] for row in each),
             "bound": max(row["at_bound"] for row in each),
         }
