@@ -18,7 +18,7 @@ from faultgouge.figures.pages import render
 from faultgouge.figures.style import INK, save, styled
 from faultgouge.studies.result_rows import read_rows, row_columns
 from faultgouge.studies.statistics import interval, median, share
-from research.yielding.compute import CONTROLLED, LOADINGS, LOSSES, SHARES
+from research.yielding.compute import CONTROLLED, LOADINGS, LOSSES, SHARES, TIME
 
 UNREST = ("flows", "bursts", "fails at rest")
 """How a run ends after which the layer does not rest: it flows in the run; it throws a disk out of the box; or it finds
@@ -216,6 +216,10 @@ def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
             cell["elsewhere"] = [sum(map(all, which)), sum(map(any, which))]
             slips = [abs(run["slip"]) for draws in each for run in draws if run["ends"] not in UNREST]
             cell["slip"] = float(np.median(slips)) if slips else None
+            cell["largest"] = float(np.median([run["largest_D"] for draws in each for run in draws])) if each else None
+            cell["decades"] = (
+                float(np.median([draws[0]["rate"] for draws in each])) * TIME / np.log(10) if each else None
+            )
             runs.append(cell)
     flows = {
         loss: share(
