@@ -35,6 +35,10 @@ LOSS = 0.9
 DRAG = 2.0
 """1/tau of a drag that is strong for a deck that loads with it: pairs beyond it grow all the same."""
 
+FAST = 0.5
+"""Rate of D, 1 / time, beyond which a run of 50 units shows growth: nine decades need 0.41, and noise has only a share of
+the motion that grows."""
+
 MEDIANS = ("share", "growth_rate", "least_q", "drag_rate")
 
 
@@ -120,6 +124,7 @@ def runs(rows: Sequence[Row]) -> dict[str, dict[float, dict[str, Any]]]:
             ]
             found.setdefault(name, {})[e] = {
                 "predicted": counted(run["predicted"] > 2 * GROWS for run in chosen),
+                "fast": counted(run["predicted"] > FAST for run in chosen),
                 "always": counted(map(all, rates)),
                 "ever": counted(map(any, rates)),
                 "ratio": [float(np.median(ratios)), min(ratios), max(ratios)] if ratios else None,

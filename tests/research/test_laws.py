@@ -46,8 +46,9 @@ def test_lammps_grows_where_the_pencil_does_and_nowhere_else():
     for state, runs in FOUND["runs"].items():
         for run in runs.values():
             if state == "smooth":
-                assert run["always"]["count"] == run["predicted"]["count"] > 0
-                assert 0.8 < run["ratio"][1] <= run["ratio"][2] < 1.2
+                assert run["always"]["count"] == run["ever"]["count"] == run["fast"]["count"] > 0
+                assert run["predicted"]["count"] >= run["fast"]["count"]
+                assert 0.75 < run["ratio"][1] <= run["ratio"][2] < 1.2
             else:
                 assert run["ever"]["count"] == 0
 
