@@ -22,6 +22,12 @@ from research.modes.packing_rows import condense, read_known, table_of
 HERE = Path(__file__).parent
 TABLES = HERE / "tables"
 
+ALLOWED = {"draws": 1e-2, "error": 0.5, "overlap": 0.5}
+"""Relative difference of numbers whose name has one of these words. What a run measures: a coordinate is rounded by
+2e-15, which is 2e-4 of the push, and D is a square that beats; 2e-3 of D and 1e-5 of rates were seen when packings were
+computed again. And stated errors and the overlap y^H x at an onset, which say where rounding ends the search for a root:
+F_x^c itself agrees within its error."""
+
 
 def compute(folder: Path, names: list[str], share: float = 1.0, tables: Path | None = None) -> None:
     """A share of the packings of each set, on one process, but for those of the tables."""
@@ -43,12 +49,11 @@ def check(folder: Path, names: list[str]) -> None:
     for path in sorted((folder / "tables").glob("*.jsonl")):
         before = read_known(TABLES, path.stem)
         for seed, row in read_known(folder / "tables", path.stem).items():
-            for one, other in zip(row["loads"], before[seed]["loads"], strict=True):
-                compared += 1
-                wrong += [
-                    f"{path.stem}, seed {seed}, F_x/F_y = {one['fx_over_fy']}: {key}" for key in different(one, other)
-                ]
-    print("\n".join([f"{compared} loads compared, {len(wrong)} numbers of them differ", *wrong]))
+            compared += 1
+            one, other = ({key: each[key] for key in each if key != "cpu_seconds"} for each in (row, before[seed]))
+            wrong += [f"{path.stem}, seed {seed}: {key}" for key in different(one, other, allowed=ALLOWED)]
+    said = "the same" if not wrong else f"{len(wrong)} numbers differ"
+    print("\n".join([f"{compared} packings compared: {said}", *wrong]))
     sys.exit(len(wrong) > 0)
 
 

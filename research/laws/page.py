@@ -36,8 +36,8 @@ DRAG = 2.0
 """1/tau of a drag that is strong for a deck that loads with it: pairs beyond it grow all the same."""
 
 FAST = 0.5
-"""Rate of D, 1 / time, beyond which a run of 50 units shows growth: nine decades need 0.41, and noise has only a share of
-the motion that grows."""
+"""Rate of D, 1 / time, beyond which a run of 50 units shows growth: nine decades need 0.41, and noise has only a part
+of the motion that grows."""
 
 MEDIANS = ("share", "growth_rate", "least_q", "drag_rate")
 
