@@ -1,4 +1,4 @@
-"""Results that show themselves as a table, in a terminal and in a notebook."""
+"""Results that display themselves as a table, in a terminal and in a notebook."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-class Tabled:
+class TableDisplay:
     """A result that shows itself as a table of two columns: in a notebook, and when rich prints it."""
 
     def _rows(self) -> Mapping[str, str]:

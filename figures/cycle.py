@@ -1,4 +1,4 @@
-"""F_x over the displacement of the upper layer, on each way between two turning points."""
+"""F_x over the displacement of the upper layer, on each path between two turning points."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -17,7 +17,7 @@ from .style import figure_of, styled
 
 @styled
 def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
-    """F_x over the mean displacement of the upper layer along x: a path that closes, or does not.
+    """Draw F_x over the mean displacement of the upper layer along x, a path that may close or not.
 
     Parameters
     ----------
@@ -52,7 +52,8 @@ def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
         words = [
             f"{name} {_format_signed(value)}" for name, value in (("remains:", left.remaining), ("work:", left.work))
         ]
-        axes.set_title(f"back at $F_x = {left.fx:.4g}$: " + ", ".join(words), fontsize=7)
+        says = "the path closes, to rounding" if left.closes else ", ".join(words)
+        axes.set_title(f"back at $F_x = {left.fx:.4g}$: {says}", fontsize=7)
     return figure_of(axes)
 
 

@@ -1,11 +1,11 @@
 r"""Films: an undamped run with magnified displacements and D(t), the motion of a mode, and a ramp.
 
-What does not move is drawn once. For each frame the few artists that do move are drawn upon it, which takes a hundredth
+The fixed background is drawn once. For each frame only the few moving artists are drawn on top, which takes a hundredth
 of the time of a whole figure.
 
-**Magnification.** The displacements of an undamped run span ten decades and more, and none of them could be seen as
-they are. They are multiplied by a power of ten, which is written on the frame. The largest displacement so far decides
-it, so that the factor falls in steps while D grows.
+**Magnification.** The displacements of an undamped run span ten decades and more, and would be invisible at their true
+size. They are multiplied by a power of ten, which is printed on the frame. The largest displacement so far determines
+the factor, so that the factor falls in steps while D grows.
 """
 
 from abc import ABC, abstractmethod
@@ -21,7 +21,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from faultgouge.analysis import Packing, PackingFileError, RunFile, nearest_image
+from faultgouge.analysis import Packing, PackingFileError, RunFile, Snapshot, nearest_image
 from faultgouge.analysis.motion.hysteresis import layer_displacement
 from faultgouge.analysis.packing.arrays import Floats
 
@@ -218,7 +218,7 @@ class ModeFilm(Film):
 
     Parameters
     ----------
-    packing : Packing
+    packing : Packing or Snapshot
         The packing.
     modes : sequence of Mode
         Which.
@@ -230,7 +230,13 @@ class ModeFilm(Film):
 
     @styled
     def __init__(
-        self, packing: Packing, modes: Sequence[Mode], words: str, frames: int, periods: int, dots: int = DOTS
+        self,
+        packing: Packing | Snapshot,
+        modes: Sequence[Mode],
+        words: str,
+        frames: int,
+        periods: int,
+        dots: int = DOTS,
     ) -> None:
         figure, axes, points = side_by_side(packing, len(modes))
         self._artists = [

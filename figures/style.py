@@ -1,6 +1,6 @@
-"""One look for every figure: the style sheet, the colours that carry a meaning, and files that repeat to the byte.
+"""One style for all figures: the style sheet, the colours with a meaning, and files that are the same to the byte.
 
-Figures have a white ground of their own, also where the page around them is dark.
+Figures have a white background, also on a dark page.
 """
 
 from collections.abc import Callable, Iterator
@@ -12,6 +12,8 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+
+from faultgouge.analysis.files.atomic_write import replace_whole
 
 STYLE = str(files(__package__) / "faultgouge.mplstyle")
 
@@ -79,4 +81,5 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
 def save_as(figure: Figure, path: Path) -> None:
     """Write a figure in the format that its name ends in: png, svg or pdf; the same bytes for the same figure."""
     dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    figure.savefig(path, metadata=dates.get(path.suffix.lower()))
+    with replace_whole(path) as new:
+        figure.savefig(new, metadata=dates.get(path.suffix.lower()))

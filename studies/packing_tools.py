@@ -1,4 +1,4 @@
-"""What studies ask of a packing: its path of equilibria on this process alone, its contacts, and those that slide."""
+"""Tools of studies for a packing: its path of equilibria in this process alone, its contacts, its sliding contacts."""
 
 from __future__ import annotations
 
@@ -30,6 +30,11 @@ def path_from(rest: Equilibrium, scene: Scene) -> Iterator[EquilibriumPath]:
     """The equilibria of a scene over F_x from the settled packing on; LAMMPS closes in the end."""
     with Engine(rest.packing, MPI.COMM_SELF) as engine:
         yield EquilibriumPath(engine, rest, scene)
+
+
+def unit_of_time(packing: Packing) -> float:
+    """sqrt(3 m d/F_y) of the smallest and the lightest disk: 1 for m = d = 1 and the paper's F_y = 3."""
+    return float(np.sqrt(3 * packing.mass.min() * 2 * packing.radius.min() / packing.fy))
 
 
 def shake_disks(engine: Engine, packing: Packing, size: float, seed: int) -> None:

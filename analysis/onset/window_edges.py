@@ -83,7 +83,7 @@ class Window:
         time^2.
     error : float
         Uncertainty of fx_onset: twice the scatter of the discriminant over its slope for a coalescence, the bracket
-        otherwise; and the `load_error` of the equilibria; and `path_error`, if that is known.
+        otherwise; and the `load_error` of the equilibria; and `path_error`, if that is known. 0 at a "start".
     end_error : float or None
         The same for fx_end.
     overlap : float

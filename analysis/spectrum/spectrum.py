@@ -1,13 +1,12 @@
-r"""Eigenvalues of the stability operator, and which complex pairs among them are real physics.
+r"""Eigenvalues of the stability operator, and the test whether a complex pair is physical or rounding noise.
 
 Small motion about an equilibrium obeys :math:`M \ddot q = -K q` with :math:`M = \mathrm{diag}(m, m, I_0 m)`
 in the coordinates (x, y, R theta), so :math:`q \propto v e^{i\omega t}` with
 
 .. math:: K v = \lambda M v, \qquad \omega = \sqrt\lambda .
 
-All vectors here live in the mass-weighted coordinates :math:`M^{1/2} q`, where the operator is
-:math:`A = M^{-1/2} K M^{-1/2}`: it is symmetric whenever K is, and then every eigenvalue has condition number
-one.
+All vectors here are in the mass-weighted coordinates :math:`M^{1/2} q`, in which the operator is :math:`A = M^{-1/2} K
+M^{-1/2}`. A is symmetric if K is symmetric, and then every eigenvalue has condition number one.
 
 K is not symmetric, and real eigenvalues may coalesce and leave the axis as a pair
 :math:`\lambda = \lambda_R \pm i\lambda_I`. Then :math:`\omega = \pm\omega_R \pm i\omega_I`, one motion of
@@ -16,16 +15,15 @@ each pair grows as :math:`e^{|\omega_I| t}`, and the mean square displacement as
 
 **Negative eigenvalues.** A real :math:`\lambda < 0` is the classical instability (buckling): :math:`\omega` is
 imaginary, and the motion leaves the equilibrium without oscillation. A branch of equilibria passes through
-:math:`\lambda = 0` at a turning point; Newton's method can land beyond it, on equilibria that no packing reaches by
-itself. A packing is linearly stable only if it has neither complex pairs nor negative eigenvalues.
+:math:`\lambda = 0` at a turning point; Newton's method can land beyond the turning point, on equilibria that no packing
+reaches by itself. A packing is linearly stable only if it has neither complex pairs nor negative eigenvalues.
 
 **Noise.** A backward stable solver returns the eigenvalues of :math:`A + E` with :math:`|E| \sim u |A|`, u
 the unit roundoff, and a simple eigenvalue with unit right and left vectors x, y moves by :math:`\kappa |E|`,
 :math:`\kappa = 1/|y^H x|`. Close to a coalescence :math:`\kappa \to \infty` as one over the distance of the
-pair, so that a double real eigenvalue turns into a spurious complex pair of size :math:`(u |A| c)^{1/2}`, c
-the difference of the couplings of the two modes, far above :math:`u |A|`. A pair is therefore believed only
-if :math:`|\lambda_I|` exceeds a safety factor times its own :math:`\kappa u |A|`; the others are counted as
-noise.
+pair, so that a double real eigenvalue turns into a spurious complex pair of size :math:`(u |A| c)^{1/2}`, far above
+:math:`u |A|`; c is the difference of the couplings of the two modes. A pair is therefore accepted only if
+:math:`|\lambda_I|` exceeds a safety factor times its own :math:`\kappa u |A|`; the other pairs are counted as noise.
 
 **Time steps.** Velocity Verlet with step dt turns the frequency of a frozen K into :math:`\Omega`,
 
@@ -45,11 +43,11 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
-from ..operators.damping import coordinate_mass, damping_matrix
+from ..operators.damping import coordinate_mass
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
 from ..packing.snapshot import Snapshot
-from ..table_display import Tabled
+from ..table_display import TableDisplay
 
 Complexes = NDArray[np.complex128]
 
@@ -69,17 +67,6 @@ LIMIT = 1e-4
 resolve the fastest modes of a crystal, which lie close together, takes ten times as long."""
 
 
-FEW, MANY = 40, 10_000
-"""Coordinates up to which a time step is that of all eigenvalues, and from which on it has fewer digits."""
-
-LIMIT_OF_FEW, LIMIT_OF_MANY = 1e-8, 1e-3
-"""Relative errors of mu^2 for a time step. Packings have many modes near the fastest one: among 200,000 coordinates a
-digit more takes twice the time, and nobody runs within a thousandth of the limit."""
-
-LOOKS = 6
-"""Steps of the iteration for mu: each squares its error."""
-
-
 @dataclass(frozen=True)
 class ComplexPair:
     """A pair of complex eigenvalues.
@@ -89,7 +76,7 @@ class ComplexPair:
     eigenvalue : complex
         The member with positive imaginary part, 1 / time^2.
     overlap : float
-        |y^H x| of its unit left and right vectors: it vanishes where the pair coalesces.
+        |y^H x| of the unit left and right vectors; zero at the coalescence of the pair.
     participation : float
         Participation ratio of the mode, from 1/N for one disk that moves alone to 1 for disks that move alike.
     rotation : float
@@ -113,7 +100,7 @@ class ComplexPair:
 
     @property
     def quality(self) -> float:
-        """|Re omega| / (2 |Im omega|): what dissipates with a lower quality factor stops the growth."""
+        """|Re omega| / (2 |Im omega|): dissipation with a lower quality factor stops the growth."""
         return self.frequency / self.growth_rate if self.growth_rate > 0 else np.inf
 
     @property
@@ -123,14 +110,14 @@ class ComplexPair:
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum(Tabled):
+class Spectrum(TableDisplay):
     """All eigenvalues of a packing's stability operator.
 
     Attributes
     ----------
     eigenvalues : ndarray of complex, shape (E,)
-        Sorted by real part, then imaginary part; 1 / time^2. Rattlers and other coordinates that feel no
-        force at all are left out.
+        Sorted by real part, then imaginary part; 1 / time^2. Rattlers and other coordinates on which no force acts are
+        left out.
     pairs : tuple of ComplexPair
         The complex pairs that exceed their own rounding uncertainty, fastest growing first.
     negative : ndarray, shape (B,)
@@ -171,12 +158,12 @@ class Spectrum(Tabled):
 
     @property
     def is_stable(self) -> bool:
-        """Whether no motion grows: no believable complex pair, and no negative eigenvalue beyond noise."""
+        """Whether no motion grows: no complex pair and no negative eigenvalue beyond rounding noise."""
         return not self.pairs and not len(self.negative)
 
     @property
     def free(self) -> int:
-        """Number of eigenvalues that are zero within rounding: such a motion meets no force, and drifts."""
+        """Number of eigenvalues that are zero within rounding: no force opposes such a motion, which drifts."""
         return int(np.count_nonzero(np.abs(self.eigenvalues) <= SAFETY * self.rounding))
 
     @property
@@ -191,7 +178,7 @@ class Spectrum(Tabled):
 
     @property
     def unstable(self) -> Complexes:
-        """Eigenvalues whose motion grows: one of each believable pair, and the negative ones."""
+        """Eigenvalues whose motion grows: one of each complex pair beyond noise, and the negative eigenvalues."""
         return np.concatenate([[pair.eigenvalue for pair in self.pairs], self.negative]).astype(np.complex128)
 
     def growth_rate(self, dt: float | None = None) -> float:
@@ -200,8 +187,7 @@ class Spectrum(Tabled):
         Parameters
         ----------
         dt : float, optional
-            Time step of velocity Verlet, whose dispersion is then taken into account; exact dynamics by
-            default.
+            Time step of velocity Verlet, to include its dispersion; exact dynamics by default.
 
         Returns
         -------
@@ -255,8 +241,8 @@ def dynamical_matrix(packing: Packing | Snapshot, form: Form = "consistent") -> 
     matrix : scipy.sparse.csr_array, shape (E, E)
         1 / time^2.
     active : ndarray of int, shape (E,)
-        Which of the coordinates (x.., y.., R theta..) its rows are. A coordinate whose row of K is zero
-        feels no force: its eigenvalue is zero and says nothing.
+        The coordinates (x.., y.., R theta..) of the rows. Coordinates with a zero row of K are left out: no force acts
+        on them, and their eigenvalue is zero.
     """
     matrix = mass_weighted(stiffness_matrix(packing, form), packing)
     active = active_coordinates(matrix)
@@ -294,9 +280,9 @@ def mass_weighted(stiffness: csr_array, packing: Packing | Snapshot) -> csr_arra
 
 
 def eigenvalues(packing: Packing | Snapshot, form: Form = "consistent") -> Complexes:
-    """Every eigenvalue without vectors, by LAPACK's dense solver, in a third of the time of :func:`spectrum`.
+    """Compute every eigenvalue without vectors, by LAPACK's dense solver, in a third of the time of :func:`spectrum`.
 
-    Which of the complex pairs exceed their rounding uncertainty is not known without vectors.
+    Without vectors it is not known which complex pairs exceed their rounding uncertainty.
 
     Parameters
     ----------
@@ -319,12 +305,12 @@ def _sort_eigenvalues(values: Complexes) -> Complexes:
 
 
 def spectrum(packing: Packing | Snapshot, form: Form = "consistent") -> Spectrum:
-    """Every eigenvalue, by LAPACK's dense solver; left and right vectors only where complex pairs appear.
+    """Compute every eigenvalue by LAPACK's dense solver, and left and right vectors only if there are complex pairs.
 
     Parameters
     ----------
     packing : Packing or Snapshot
-        The configuration, in equilibrium if the result is to mean stability.
+        The configuration. The result describes stability only if it is in equilibrium.
     form : {"consistent", "paper"}
         As in :func:`~faultgouge.analysis.stiffness_matrix`.
 
@@ -413,85 +399,6 @@ def largest_frequency(packing: Packing | Snapshot) -> float:
     start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
     largest = eigs(matrix, 1, which="LM", v0=start, tol=LIMIT, return_eigenvectors=False)
     return float(np.sqrt(np.abs(largest).max()))
-
-
-class StableTimestep(float):
-    """A time step that is the limit of stability, a float with its `error`, both times."""
-
-    error: float
-
-    def __new__(cls, value: float, error: float = 0.0) -> "StableTimestep":
-        """The limit and its error."""
-        made = super().__new__(cls, value)
-        made.error = error
-        return made
-
-
-def stable_timestep(of: float | Packing | Snapshot) -> StableTimestep:
-    r"""The largest stable time step of velocity Verlet.
-
-    Without dissipation it is :math:`2/\omega_{max}`. Dashpots take the velocity of the half step, as in all granular
-    styles of LAMMPS: a motion begins to alternate in sign and to grow where :math:`4 M - 2\,dt\, C - dt^2 K` becomes
-    singular, so that dt = 2/mu with the largest mu of :math:`\mu^2 M - \mu C - K`.
-
-    Parameters
-    ----------
-    of : float, Packing or Snapshot
-        omega_max, radian / time, or a configuration with its dashpots.
-
-    Returns
-    -------
-    StableTimestep
-        Time, infinite for a packing without contacts; `error` is what Arnoldi's iteration leaves, 0 of omega_max.
-
-    Raises
-    ------
-    scipy.sparse.linalg.ArpackError
-        If the iteration does not converge.
-    """
-    if not isinstance(of, Packing | Snapshot):
-        return StableTimestep(2.0 / of)
-    stiffness = mass_weighted(stiffness_matrix(of), of)
-    active = active_coordinates(stiffness)
-    a = stiffness[active][:, active]
-    if not len(active):
-        return StableTimestep(np.inf)
-    damping = mass_weighted(damping_matrix(of), of)[active][:, active] if of.damped else None
-    return _largest_step(a, damping)
-
-
-def _largest_step(a: csr_array, damping: csr_array | None) -> StableTimestep:
-    """2/mu, by LAPACK for few coordinates, by Arnoldi's iteration for others, with the residual as its error."""
-    size = a.shape[0]
-    if size <= FEW:
-        if damping is None:
-            largest = np.sqrt(np.abs(eigvals(a.toarray())).max())
-        else:
-            pencil = np.block([[damping.toarray(), a.toarray()], [np.eye(size), np.zeros((size, size))]])
-            largest = eigvals(pencil).real.max()
-        return StableTimestep(2.0 / float(largest))
-    tolerance = LIMIT_OF_MANY if size > MANY else LIMIT_OF_FEW
-    vector = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
-    # mu^2 is an eigenvalue of A + mu G
-    mu, operator = 0.0, a
-    for loose in (True, *[False] * LOOKS):
-        if damping is None and loose:
-            continue
-        (value,), vectors = eigs(operator, 1, which="LM", v0=vector, tol=0.1 if loose else tolerance, ncv=12)
-        vector = np.ascontiguousarray(
-            vectors[:, 0].real if abs(value.imag) < abs(value) * 1e-3 else vectors.sum(axis=1).real
-        )
-        off = float(np.linalg.norm(operator @ vectors[:, 0] - value * vectors[:, 0]) / abs(value))
-        if damping is None:
-            mu = float(np.sqrt(abs(value)))
-            break
-        # mu^2 = lambda + c (mu - before), c being the slope of lambda in mu, but for what is not symmetric
-        c = float(vector @ (damping @ vector)) / float(vector @ vector)
-        before, mu = mu, 0.5 * (c + float(np.sqrt(c * c + 4 * abs(abs(value) - c * mu))))
-        if abs(mu - before) < tolerance * mu:
-            break
-        operator = a + mu * damping
-    return StableTimestep(2.0 / mu, 2.0 / mu * (0.5 * off + (0.0 if damping is None else abs(mu - before) / mu)))
 
 
 def unit_rounding(matrix: Floats) -> float:

@@ -1,26 +1,26 @@
 r"""Newton's method from one equilibrium, at one load.
 
 The unknown is the displacement q from the last equilibrium, :math:`q = (\Delta x.., \Delta y.., R \Delta\theta..)`.
-LAMMPS moves the disks by q along a straight path, advances the slips from their values at that equilibrium
-(never from an iterate), clamps them, and gives the forces F(q). With the consistent stiffness matrix K of
-the trial configuration,
+LAMMPS moves the disks by q along a straight path, advances the slips from their values at that equilibrium (never from
+an iterate), clamps them, and returns the forces F(q). With the consistent stiffness matrix K of the trial
+configuration,
 
 .. math:: K\, \Delta q = F(q), \qquad q \leftarrow q + \Delta q.
 
-K is the Jacobian of F up to the finite length of the path, a relative error of order :math:`|q|`, so the
-convergence is quadratic until it is linear with a factor of about 1e-4 or less. A contact that opens, closes,
-sticks or slides on the way changes K, and the iteration goes on with the new contacts.
+K is the Jacobian of F up to the finite length of the path, a relative error of order :math:`|q|`, so the convergence is
+quadratic until it is linear with a factor of about 1e-4 or less. A contact that opens, closes, sticks or slides changes
+K, and the iteration continues with the new contacts.
 
-Doubles bound what can be reached: a coordinate x is known to :math:`\epsilon |x|`, which changes the force of a
-contact of stiffness k by :math:`k \epsilon |x|`. The rounding floor sums this over the contacts of each disk. An
-equilibrium whose residual no longer falls and is of this order is at the floor. No further iteration is made where the
-last two residuals show that it would gain nothing. In compensated arithmetic a coordinate is known to 1e-23, and the
-next bound is the displacement itself, a double: :math:`k \epsilon |q|`. From there on displacements count from the
-iterate. What is left, :math:`q'`, is of order :math:`\epsilon |q|`, and that its slips start at an iterate changes them
-by :math:`|q| |q'|`, which is less than they can resolve.
+Doubles limit the residual: a coordinate x is accurate to :math:`\epsilon |x|`, which changes the force of a contact of
+stiffness k by :math:`k \epsilon |x|`. The rounding floor is the sum of these errors over the contacts of each disk. An
+equilibrium whose residual no longer falls and is of this order is at the floor. The iteration ends when the last two
+residuals show that another step would gain nothing. In compensated arithmetic a coordinate is accurate to 1e-23, and
+the next limit is the displacement itself, a double: :math:`k \epsilon |q|`. From there on displacements are measured
+from the iterate. The remaining displacement :math:`q'` is of order :math:`\epsilon |q|`. Its slips start at an iterate,
+which changes them by :math:`|q| |q'|`, less than they can resolve.
 
-A rattler that a neighbour runs into on the way is moved to the middle of its cage: it carries nothing, and where it
-lies is no matter (:mod:`~faultgouge.pywrap.equilibria.rattlers`).
+If a neighbour hits a rattler, the rattler is moved to the middle of its cage: it carries no force, and its position
+does not matter (:mod:`~faultgouge.pywrap.equilibria.rattlers`).
 """
 
 from collections.abc import Callable
@@ -136,16 +136,16 @@ def iterate_newton(
             return None, evaluations
         trial, evaluations = displaced(base, displacement), evaluations + 1
         # What a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved.
-        if course.ends_at(trial, result=guess is None or iteration > 0):
+        if course.is_finished(trial, result=guess is None or iteration > 0):
             return course.best, evaluations
-        if factors is None or not course.spares_factors(trial.residual, len(base)):
+        if factors is None or not course.may_reuse_factors(trial.residual, len(base)):
             course.floor = trial.floor
-            hit = rattlers.hit(trial)
+            hit = rattlers.find_hit(trial)
             if len(hit):
                 displacement = _out_of_the_way(trial.packing, hit, displacement)
                 trial, evaluations = displaced(base, displacement), evaluations + 1
             factors = factor_stiffness(trial, course.floor, since, factors)
-        course.goes_on(trial.residual)
+        course.go_on(trial.residual)
         step = None if factors is None else factors.solve(trial.force)
         if factors is None or step is None or too_long(step, base):
             return None, evaluations
@@ -178,7 +178,7 @@ class _Course:
         self._worse = 0  # iterations that gained nothing; changes of contacts cost some
         self._earlier, self._last = np.inf, answers  # residuals of the two iterations before
 
-    def ends_at(self, trial: Trial, result: bool) -> bool:
+    def is_finished(self, trial: Trial, result: bool) -> bool:
         """Whether nothing is left to gain, or to hope for; the best trial is the result then, None if it is none.
 
         Parameters
@@ -208,13 +208,13 @@ class _Course:
         factor = self._last / self._earlier if self._earlier < np.inf else GAIN
         return residual < self.floor and factor * self._last < 0.1 * self.floor
 
-    def spares_factors(self, residual: float, disks: int) -> bool:
+    def may_reuse_factors(self, residual: float, disks: int) -> bool:
         """Whether the factors of K at hand do for the next iteration."""
         if residual * (residual / self._last) ** SPARED < 0.1 * self.floor:
             return True
         return disks > SPARING and residual <= KEPT * self._last
 
-    def goes_on(self, residual: float) -> None:
+    def go_on(self, residual: float) -> None:
         """Another iteration is made from here."""
         self._earlier, self._last = self._last, residual
 
@@ -228,7 +228,7 @@ class _Rattlers:
         self._loose = (_carrying(start, nothing) == 0) & ~start.still.top
         self._moved = np.zeros(len(self._loose), dtype=np.int64)
 
-    def hit(self, trial: Trial) -> Indices:
+    def find_hit(self, trial: Trial) -> Indices:
         """Those that a neighbour ran into, and disks with one contact left, which become rattlers; to be moved."""
         count = _carrying(trial, trial.floor)
         hit = ((count == 1) & ~trial.still.top) | (self._loose & (count > 0))

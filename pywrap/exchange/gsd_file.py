@@ -1,8 +1,8 @@
 """GSD, HOOMD's format, in and out, by the library gsd.
 
-GSD keeps positions, diameters, masses and orientations in float32, too coarse for overlaps. An export has them in
-float64 besides, among the logged quantities (``log/particles/faultgouge/...``), which `import` prefers; other readers
-see float32. The y axis of a GSD box has its middle at zero; an export says where the floor is.
+GSD keeps positions, diameters, masses and orientations in float32, too coarse for overlaps. An export also has these
+numbers in float64, among the logged quantities (``log/particles/faultgouge/...``), which `import` prefers; other
+readers see float32. The y axis of a GSD box has its middle at zero; an export gives the height of the floor.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis import Packing, PackingFileError
+from ...analysis.files.atomic_write import replace_whole
 from ...analysis.files.plain_file import check_plain
 from . import export_quantities
 from .disks import Disks, of_columns
@@ -69,7 +70,7 @@ def _disks(path: Path, frame: Any) -> Disks:
 def write_gsd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
     """A GSD file of one frame or several; what is in it, in words."""
     hoomd = needed_library("gsd.hoomd", path)
-    with hoomd.open(str(path), "w") as file:
+    with replace_whole(path) as new, hoomd.open(str(new), "w") as file:
         for number, each in enumerate(frames):
             frame = _frame(hoomd, each.packing)
             frame.configuration.step = number

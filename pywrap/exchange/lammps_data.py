@@ -1,8 +1,8 @@
 """LAMMPS data files of atom style sphere, in and out.
 
-The mass of a disk is that of the sphere which LAMMPS takes it for: density times 4/3 pi R^3. What the format has no
-column for stands in comments, which LAMMPS skips: law and load in the first line, contacts in the header, and the mass
-and the angle of a disk behind its line, since no density may give a mass to the last bit.
+LAMMPS treats a disk as a sphere: its mass is density times 4/3 pi R^3. Quantities without a column are in comments,
+which LAMMPS skips: law and load in the first line, contacts in the header, and the mass and the angle of a disk at the
+end of its line, because there may be no density that gives the mass to the last bit.
 
     # faultgouge kn=200000.0 kt=57142.857142857145 mu=1.0 fx=0.01 fy=3.0 inertia_factor=1.0
     # contact 1 2 1.25e-05          first ID, second ID (0 is the floor), slip
@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis import PackingFileError
+from ...analysis.files.atomic_write import write_text
 from ..lammps.data_file import box_lines
 from . import export_quantities
 from .disks import Disks, of_columns, sphere_volume
@@ -100,7 +101,7 @@ def write_data(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) ->
     columns = [packing.top, 2 * packing.radius, density, *packing.position.T, *extra]
     for n, (top, d, rho, x, y, *more) in enumerate(zip(*(each.tolist() for each in columns), strict=True), 1):
         lines.append(f"{n} {1 + top} {d!r} {rho!r} {x!r} {y!r} 0.0 # " + " ".join(map(repr, more)))
-    path.write_text("\n".join(lines) + "\n")
+    write_text(path, "\n".join(lines) + "\n")
     exact = density * volume == packing.mass
     odd = "" if exact.all() else f" ({np.sum(~exact)} masses with a last bit of their own)"
     return f"LAMMPS reads places, radii, masses{odd} and types, and skips angles, slips, law and load in comments"

@@ -1,4 +1,4 @@
-"""The dynamics of the disks in LAMMPS from rest, undamped but for what damping the packing has.
+"""The dynamics of the disks in LAMMPS from rest, with only the damping of the packing.
 
 `Engine.undamped` starts it: deck part undamped.in with a force on some disks (push.in), a signal (signal.in), and
 friction that falls with velocity (weaken.in).
@@ -19,8 +19,8 @@ from ...analysis.files.signal_files import write_table
 from ...analysis.motion.signals import Signal
 from ...analysis.packing.arrays import Floats
 from .decks import Decks
+from .lammps_state import LammpsState
 from .plain_file_names import shared_folder
-from .state_transfer import Wire
 
 
 class Motion(NamedTuple):
@@ -73,19 +73,19 @@ class Dynamics:
     ----------
     decks : Decks
         LAMMPS.
-    wire : Wire
-        The state of its disks.
+    lammps_state : LammpsState
+        That of its disks.
     packing : Packing
         From which the run starts. Rattlers are held still: nothing would stop them.
     weakening : Weakening, optional
         Friction that falls with the velocity of the upper layer; constant by default.
     """
 
-    def __init__(self, decks: Decks, wire: Wire, packing: Packing, weakening: Weakening | None) -> None:
-        self._decks, self._wire, self._packing, self._weakening = decks, wire, packing, weakening
+    def __init__(self, decks: Decks, lammps_state: LammpsState, packing: Packing, weakening: Weakening | None) -> None:
+        self._decks, self._state, self._packing, self._weakening = decks, lammps_state, packing, weakening
 
     @contextmanager
-    def moving(self, time_step: float, drag_time: float | None) -> Iterator[None]:
+    def integrate(self, time_step: float, drag_time: float | None) -> Iterator[None]:
         """Velocity Verlet, and what damping there is (deck part undamped.in)."""
         still = self._packing.rattlers
         with ExitStack() as groups:
@@ -101,14 +101,14 @@ class Dynamics:
                 self._decks.command("fix_modify floor damping no")
 
     @contextmanager
-    def pushed(self, amplitude: float, omega: float, target: str) -> Iterator[None]:
+    def push_cosine(self, amplitude: float, omega: float, target: str) -> Iterator[None]:
         """The force a cos(omega t) along x on each disk of a group (deck part push.in)."""
         self._decks.include("push.in", amplitude=amplitude, omega=omega, target=target)
         yield
         self._decks.command("unfix push")
 
     @contextmanager
-    def forced(self, signal: Signal, on: str, target: str, communicator: MPI.Comm) -> Iterator[None]:
+    def apply_signal(self, signal: Signal, on: str, target: str, communicator: MPI.Comm) -> Iterator[None]:
         """A signal (deck part signal.in), as a table that all ranks can read."""
         with shared_folder(communicator) as folder:
             table = folder / "signal.txt"
@@ -135,7 +135,7 @@ class Dynamics:
         self._decks.command(f"run {steps} pre no post no")
         law = self._packing.law
         friction = law.mu if self._weakening is None else self._decks.lammps.extract_fix("weaken", 0, 0)
-        position, low, velocity = self._wire.motion()
+        position, low, velocity = self._state.motion()
         spin = velocity[:, 2] if law.frictional else np.zeros(len(velocity))
         return Motion(position, low, velocity[:, :2], spin, float(friction))
 
@@ -157,7 +157,7 @@ class Dynamics:
         return motion, (mean * steps + 0.5 * (first - last)) * float(lammps.extract_global("dt"))
 
     @contextmanager
-    def halted(self, velocity: float) -> Iterator[None]:
+    def halt_above(self, velocity: float) -> Iterator[None]:
         """End the run once the upper layer is faster than this, length / time (deck part halt.in)."""
         self._decks.include("halt.in", halt_velocity=float(velocity))
         self._decks.command("run 0 post no")
@@ -167,7 +167,7 @@ class Dynamics:
 
     def state(self) -> dict[str, Floats]:
         """All that the run has at this moment, by LAMMPS's names, for `resume`."""
-        return self._wire.checkpoint()
+        return self._state.checkpoint()
 
     def resume(self, step: int, state: Mapping[str, Floats]) -> None:
         """Go on from the state that a run had at a step, this one or that of another engine.
@@ -175,7 +175,7 @@ class Dynamics:
         Forces are computed anew. A run that is continued elsewhere is the same to the bit as one that resumes its own
         state at the same steps.
         """
-        self._wire.write_checkpoint(state)
+        self._state.write_checkpoint(state)
         self._weaken()  # anew: the fix would remember the friction that the last forces of this instance had
         self._decks.command(f"reset_timestep {step}")
         self._decks.command("run 0 post no")

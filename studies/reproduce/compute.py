@@ -1,8 +1,8 @@
 r"""The paper's protocol on one packing: ramps, onsets, growth, and the numbers of its summary.
 
-Settle, raise F_x from equilibrium to equilibrium for each friction coefficient, find the onset F_x^c where two real
+Settle, raise F_x from equilibrium to equilibrium for each friction coefficient, find the onset F_x^c at which two real
 eigenvalues coalesce; then start undamped dynamics from an equilibrium above the onset and compare the growth of the
-mean square displacement D(t), which starts from rounding noise, with the rate 2 |Im omega| of the spectrum. Where the
+mean square displacement D(t), which starts from rounding noise, with the rate 2 |Im omega| of the spectrum. If the
 scene asks for it, a minute perturbation just below the onset follows (`triggering`).
 """
 
@@ -86,7 +86,7 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
     )
     # exact but for the product's rounding
     weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
-    if weakened and fx <= weakened[0].onset.fx_c:
+    if weakened and weakened[0].onset.windows[0].kind != "start" and fx <= weakened[0].onset.fx_c:
         return (
             f"F_x = {fx:g} is below the onset {weakened[0].onset.fx_c:g} of the weakened friction, too: no "
             "window between the two, and nothing to erupt."

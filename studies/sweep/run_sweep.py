@@ -1,27 +1,26 @@
-"""Run a sweep: every point is a line of results.jsonl as soon as it has ended, and results.csv the table of all.
+"""Run a sweep: each point is a line of results.jsonl as soon as it ends, and results.csv is the table of all.
 
-Shards of a sweep, each with a folder of its own, are put together by `merge`.
+`merge` joins the shards of a sweep, each with its own folder.
 
-Points are handed out to workers (:mod:`.workers`), each with one thread. The table does not depend on the number of
-workers, on shards, or on where a run was cut off.
+Points are distributed to workers (:mod:`.workers`), each with one thread. The table does not depend on the number of
+workers, on shards, or on interruptions.
 
-A folder holds sweep.json (what was asked for), results.jsonl and results.csv. Lines of results.jsonl that are of a
-point of this sweep are not computed again. A last line that a kill has cut is computed again.
+A folder contains sweep.json (the request), results.jsonl and results.csv. Points of this sweep with a line in
+results.jsonl are not computed again. A last line that a kill has truncated is computed again.
 """
 
 from __future__ import annotations
 
-import fcntl
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
 
-from ...analysis.files.atomic_write import make_folder, write_json, write_text
+from ...analysis.files.atomic_write import lock_output, make_folder, write_json, write_text
 from ...analysis.files.plain_file import read_plain_text
 from ...pywrap import SceneError
 from .. import result_rows
@@ -31,7 +30,7 @@ from .table import Row, write_tables
 from .tasks import TASKS
 from .workers import compute_points
 
-LINES, ASKED, LOCK = "results.jsonl", "sweep.json", "sweep.lock"
+LINES, ASKED = "results.jsonl", "sweep.json"
 
 
 def run_sweep(
@@ -43,7 +42,7 @@ def run_sweep(
     workers: int | None = 1,
     executor: Executor | None = None,
 ) -> list[Row]:
-    """Compute what is missing of a sweep, and write its table.
+    """Compute the missing points of a sweep, and write its table.
 
     Parameters
     ----------
@@ -56,12 +55,13 @@ def run_sweep(
     say : callable
         Takes a line of words.
     progress : callable
-        Takes the rows that end and their number, and hands the rows on.
+        Called with the rows as they end and their number; it passes the rows on.
     workers : int or None
-        Processes that compute; None: as many as this process may use cores. Ranks of mpiexec take their place.
+        Number of processes; None: the number of cores that this process may use. Ranks of mpiexec replace these
+        processes.
     executor : concurrent.futures.Executor, optional
-        Computes in place of these, on other machines perhaps. Its workers have faultgouge and one thread each: LAMMPS
-        does not stand several threads in a process.
+        Replaces these processes, possibly on other machines. Its workers need faultgouge and one thread each: LAMMPS
+        cannot run in several threads of a process.
 
     Returns
     -------
@@ -70,17 +70,17 @@ def run_sweep(
 
     Raises
     ------
-    SceneError
+    OutputError
         If another process writes to the folder.
     WorkerError
-        If workers are killed again and again.
+        If workers are killed repeatedly.
     """
     points = shard(sweep.points, part)
     with open_executor(workers, executor) as pool:
         if MPI.COMM_WORLD.rank != 0:
             return []
         make_folder(output)
-        with _lock_folder(output):
+        with lock_output(output):
             write_json(output / ASKED, sweep.as_dict() | {"shard": list(part)})
             known = read_results(output / LINES)
             missing = [point for point in points if point.key not in known]
@@ -100,12 +100,12 @@ def read_results(path: Path) -> dict[str, Row]:
 
 
 def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep, list[Row]]:
-    """Merge folders of sweeps into one.
+    """Merge the folders of shards into one.
 
     Parameters
     ----------
     parts : sequence of Path
-        Folders that `sweep` has left.
+        Folders written by `sweep`.
     output : Path
         The folder, made if need be.
     say : callable
@@ -114,13 +114,13 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
     Returns
     -------
     sweep : Sweep
-        Which they are of.
+        The sweep of the parts.
     rows : list of dict
 
     Raises
     ------
     SceneError
-        If the parts do not belong together, or are no parts.
+        If the parts do not belong together, or are not parts of a sweep.
     """
     for part in parts:
         if not (part / ASKED).is_file():
@@ -139,9 +139,10 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
         known |= read_results(part / LINES)
     table = [known[point.key] for point in sweep.points if point.key in known]
     make_folder(output)
-    write_json(output / ASKED, sweep.as_dict() | {"shard": [1, 1]})
-    write_text(output / LINES, "".join(json.dumps(row) + "\n" for row in table))
-    write_tables(table, sweep.names, output)
+    with lock_output(output):
+        write_json(output / ASKED, sweep.as_dict() | {"shard": [1, 1]})
+        write_text(output / LINES, "".join(json.dumps(row) + "\n" for row in table))
+        write_tables(table, sweep.names, output)
     say(f"{len(table)} of {len(sweep.points)} scenes from {len(parts)} folders; written: {output}/results.csv")
     if len(table) < len(sweep.points):
         say(f"the other {len(sweep.points) - len(table)} are in none of them: `faultgouge sweep` goes on from here")
@@ -153,21 +154,8 @@ def _read(path: Path) -> dict[str, Any]:
         value = json.loads(read_plain_text(path))
     except OSError as error:
         raise SceneError(f"{path} cannot be read ({error.strerror}): correct its path") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise SceneError(f"{path} is not valid JSON ({error}): give a file that faultgouge has written") from None
     if not isinstance(value, dict):
         raise SceneError(f"{path} is no result of faultgouge: give a file that it has written")
     return value
-
-
-@contextmanager
-def _lock_folder(folder: Path) -> Iterator[None]:
-    """Keep other processes out of a folder; the lock goes with the process."""
-    with (folder / LOCK).open("w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise SceneError(
-                f"{folder}: another process writes to this folder: wait for its end, or give every shard its own folder"
-            ) from None
-        yield

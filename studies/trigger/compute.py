@@ -1,18 +1,19 @@
-r"""The critical amplitude: how strong a wave must be to trigger a layer of frictional disks.
+r"""The critical amplitude of a wave that triggers a layer of frictional disks.
 
-Friction weakens once the mean velocity v of the upper layer exceeds v_0. In the linear regime v is proportional to the
-amplitude a of the wave :math:`a \cos\omega t`, which begins at t = 0 on a packing at rest. So the wave triggers from
+Friction weakens as soon as the mean velocity v of the upper layer exceeds v_0. In the linear regime v is proportional
+to the amplitude a of the wave :math:`a \cos\omega t`, which begins at t = 0 on a packing at rest. The wave therefore
+triggers for amplitudes above
 
 .. math:: a_c(\omega, F_x) = \frac{v_0}{\max_{0 \le t \le T} |v(t)|}, \qquad v(t)\ \text{for}\ a = 1,
 
-on, T being the time for which the wave lasts. v(t) follows from K, and from C and M, alone
-(:mod:`~faultgouge.analysis.motion.forcing`), transient and all: without dissipation what the beginning of the wave
-has set off never dies, and where the wave is slow nearly all of v is such free motion.
+where T is the duration of the wave. v(t) follows from K, C and M alone (:mod:`~faultgouge.analysis.motion.forcing`),
+transient included: without dissipation the motion excited by the beginning of the wave never decays, and for a slow
+wave nearly all of v is such free motion.
 
-In LAMMPS, the same wave triggers or does not; a bisection in the amplitude finds where. Nothing of the linear theory is
-in these runs. The wave is a force on each disk of the upper layer, or an acceleration of the floor.
+In LAMMPS, the same wave triggers or does not; a bisection finds the critical amplitude. These runs use nothing of the
+linear theory. The wave is a force on each disk of the upper layer, or an acceleration of the floor.
 
-v_0 is the user's. The paper takes the largest velocity of the run that nobody perturbs, which is rounding noise.
+The user gives v_0. The paper uses the largest velocity of the unperturbed run, which is rounding noise.
 """
 
 from __future__ import annotations
@@ -131,9 +132,10 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
         layer is fastest, time.
     """
     if growth_rate(packing) > 0:
+        where = f"at F_x = {packing.fx:.10g}, below the onset," if packing.fx > 0 else "before any shear is added"
         raise SceneError(
-            f"at F_x = {packing.fx:.10g}, below the onset, the packing is unstable already (by another window, or a "
-            "negative eigenvalue): nothing is at rest there to be triggered; take other distances or another seed"
+            f"{where} the packing is unstable already: nothing is at rest there to be triggered; take other distances "
+            "or another seed"
         )
     wanted, v0 = settings(scene), threshold(scene)
     force = layer_force(packing, 1.0) if wanted.on == "layer" else floor_force(packing)
@@ -192,7 +194,12 @@ def _bracket(wave: Wave) -> tuple[float, float, int, float]:
         raise SceneError(f"no wave up to {above:.3g} triggers at omega = {wave.expected['omega']:g}: lower friction.v0")
     if below < predicted:
         runs += 1
-        while (time := _triggers(wave, below)) is not None and runs < MOST:
+        while (time := _triggers(wave, below)) is not None:
+            if runs >= MOST or _triggers(wave, 0.0) is not None:
+                raise SceneError(
+                    f"at F_x = {wave.packing.fx:.6g} the layer exceeds v_0 = {threshold(wave.scene):g} without a wave, "
+                    "by rounding noise, so that no amplitude is critical: raise friction.v0"
+                )
             below, above, reached, runs = below / WIDEN, below, time, runs + 1
     return below, above, runs, reached
 
@@ -205,7 +212,7 @@ def _triggers(wave: Wave, amplitude: float) -> float | None:
     with (
         Engine(wave.packing, MPI.COMM_SELF) as engine,
         engine.undamped(dt, amplitude, wave.expected["omega"], target) as dynamics,
-        dynamics.halted(threshold(wave.scene)),
+        dynamics.halt_above(threshold(wave.scene)),
     ):
         dynamics.advance(steps)
         return dynamics.steps * dt if dynamics.steps < steps else None

@@ -11,7 +11,7 @@ import pytest
 from reference_layer import BIN, LAYER, toml
 
 from faultgouge.analysis import RunFile
-from fuzz.kills import Work, start_command
+from fuzz.kills import CommandToKill, start_command
 
 ASKED = {"perturb": {"fx": 2e-5, "time": 1e4}, "eruptions": {"load": [0.02], "time": 1e3}}
 SCENE = LAYER + toml({"ramp": {"step": 1e-5, "until": 0.02}} | ASKED)
@@ -72,7 +72,7 @@ def equilibria(path):
 @pytest.mark.slow
 def test_a_run_says_what_is_kept(tmp_path, command, ranks, at, group, number):
     path = tmp_path / "run.h5"
-    running = start_command(Work(f"{command} scene.toml -o run.h5", SCENE, ranks), tmp_path)
+    running = start_command(CommandToKill(f"{command} scene.toml -o run.h5", SCENE, ranks), tmp_path)
     errors = interrupted(running, number, lambda: equilibria(path) >= at, group)
     (says,) = (line for line in errors.splitlines() if line.startswith("Error:"))
     with RunFile(path) as run:
@@ -80,13 +80,13 @@ def test_a_run_says_what_is_kept(tmp_path, command, ranks, at, group, number):
         assert not run.complete
     assert errors.startswith(f"{command}: about ")
     assert says.startswith(f"Error: {ENDS[number][1]}: run.h5 holds {held}")
-    assert says.endswith("the same command goes on from there.")
+    assert says.endswith("the same command continues from there.")
 
 
 @pytest.mark.slow
 def test_the_work_ends_with_its_guard(tmp_path):
     """The same command then goes on to the bit: fuzz/kills.py."""
-    running = start_command(Work("ramp scene.toml", SCENE), tmp_path)
+    running = start_command(CommandToKill("ramp scene.toml", SCENE), tmp_path)
     interrupted(running, signal.SIGKILL, lambda: equilibria(tmp_path / "run.h5") > 3)
 
 
@@ -104,19 +104,33 @@ def simulates(folder):
 @pytest.mark.parametrize(
     ("command", "says"),
     [
-        ("onset scene.toml -o onset.json", "nothing was written, and the same command begins anew"),
-        ("explain scene.toml", "nothing was written, and the same command begins anew"),
-        ("reproduce scene.toml -o out", "what is in out so far is kept; the same command begins anew and replaces it"),
-        ("report --quick -o out", "out has the studies that were finished; the same command begins anew and replaces"),
-        ("stability --quick -o out", "out has the cases that were finished; the same command begins anew and replaces"),
-        ("eruptions scene.toml -o out", "out/eruptions.jsonl has the runs that were over; the same command goes on"),
-        ("sweep sweep.toml -o out", "out/results.jsonl has the scenes that have ended; the same command goes on from"),
+        ("onset scene.toml -o onset.json", "nothing was written, and the same command starts from the beginning"),
+        ("explain scene.toml", "nothing was written, and the same command starts from the beginning"),
+        (
+            "reproduce scene.toml -o out",
+            "what is in out so far is kept; the same command starts from the beginning and replaces it",
+        ),
+        (
+            "report --quick -o out",
+            "out has the studies that were finished; the same command starts from the beginning and replaces",
+        ),
+        (
+            "stability --quick -o out",
+            "out has the cases that were finished; the same command starts from the beginning and replaces",
+        ),
+        ("eruptions scene.toml -o out", "out/eruptions.jsonl has the runs that were over; the same command continues"),
+        (
+            "sweep sweep.toml -o out",
+            "out/results.jsonl has the scenes that have ended; the same command continues from",
+        ),
     ],
 )
 @pytest.mark.long
 def test_what_is_kept_is_said(tmp_path, command, says):
     (tmp_path / "sweep.toml").write_text(SWEEP)
-    errors = interrupted(start_command(Work(command, SCENE), tmp_path), signal.SIGINT, lambda: simulates(tmp_path))
+    errors = interrupted(
+        start_command(CommandToKill(command, SCENE), tmp_path), signal.SIGINT, lambda: simulates(tmp_path)
+    )
     *ahead, last = errors.strip().splitlines()
     assert last.startswith(f"Error: interrupted: {says}")
     assert not any(line.startswith("Error") for line in ahead)
@@ -130,7 +144,7 @@ def test_a_long_search_goes_on_to_the_bit(faultgouge, tmp_path):
     """Killed, interrupted and continued on one process; and in one piece."""
     (tmp_path / "settle.toml").write_text(toml(LARGE))
     faultgouge("settle", "settle.toml")
-    onset = Work("onset scene.toml -o onset.json", toml(LARGE | {"packing": {"file": "run.h5"}}))
+    onset = CommandToKill("onset scene.toml -o onset.json", toml(LARGE | {"packing": {"file": "run.h5"}}))
     slices = tmp_path / "onset.json.slices"
 
     def known():
@@ -139,7 +153,7 @@ def test_a_long_search_goes_on_to_the_bit(faultgouge, tmp_path):
     interrupted(start_command(onset, tmp_path), signal.SIGKILL, lambda: known() >= 10, group=True)
     first = known()
     errors = interrupted(start_command(onset, tmp_path), signal.SIGINT, lambda: known() >= first + 10)
-    says = "Error: interrupted: onset.json.slices has what was found so far; the same command goes on from there."
+    says = "Error: interrupted: onset.json.slices has what was found so far; the same command continues from there."
     assert errors.splitlines()[-1] == says
     faultgouge(*onset.command.split())
     assert not slices.exists()
@@ -192,10 +206,10 @@ GUARDED = "import os, sys; from faultgouge.signal_guard import guarded; guarded(
 @pytest.mark.parametrize(
     ("script", "code", "says"),
     [
-        (IN_A_CLASS, 130, "Error: interrupted: nothing was written, and the same command begins anew.\n"),
+        (IN_A_CLASS, 130, "Error: interrupted: nothing was written, and the same command starts from the beginning.\n"),
         (GUARDED.format("os.abort()"), 1, "a library has ended the command (SIGABRT)"),
         (GUARDED.format("os.kill(os.getpid(), 11)"), 1, "a library has ended the command (SIGSEGV)"),
-        (GUARDED.format("os.kill(os.getpid(), 9)"), 137, "killed from outside, for want of memory perhaps"),
+        (GUARDED.format("os.kill(os.getpid(), 9)"), 137, "killed from outside, possibly for lack of memory"),
         (GUARDED.format("sys.exit(3)"), 3, ""),
     ],
     ids=["interrupt while a class is made", "abort", "segmentation fault", "kill", "exit"],

@@ -1,4 +1,4 @@
-"""What the commands share: their common options, and how they speak.
+"""The parts that commands share: common options, and output.
 
 Results go to files and to standard output, as JSON or in words; progress and messages go to standard error. Rank 0
 alone speaks.
@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from ..ranks import is_root
+from ..mpi_rank import is_root
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing, Snapshot
+    from faultgouge.analysis.motion.growth import GrowthOfRun
     from faultgouge.pywrap import Equilibrium, Scene
     from faultgouge.pywrap.scenes.estimate import Task
 
@@ -31,17 +32,17 @@ EVERY = 60.0
 """Seconds between two lines of progress off a terminal."""
 
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)]
-Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted one is continued.")]
-Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted one is continued.")]
+Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted run continues.")]
+Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted study continues.")]
 NewFolder = Annotated[Path, typer.Option("-o", "--output", help="The folder for numbers, pictures and page.")]
 Workers = Annotated[
     int | None,
-    typer.Option(min=1, metavar="N", show_default=False, help="Processes that compute; all cores unless given."),
+    typer.Option(min=1, metavar="N", show_default=False, help="Number of processes; all cores by default."),
 ]
 PackingFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.", show_default=False)
+    Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks from the dumps of a deck.", show_default=False)
 ]
-Frame = Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")]
+Frame = Annotated[int, typer.Option(help="Number of the equilibrium; negative numbers count from the last.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
@@ -64,17 +65,23 @@ def stored_snapshot(file: Path) -> Snapshot | None:
     return read_snapshot(file) if holds_snapshot(file) else None
 
 
-def refuse_snapshot(file: Path) -> None:
-    """Say of a run.h5 that holds a snapshot what shows it."""
+def snapshot_of_disks(file: Path) -> Snapshot | None:
+    """The snapshot of a run.h5 that holds one of disks; None of all other files.
+
+    Raises
+    ------
+    BadInputError
+        If it is one of spheres: what shows these.
+    """
     from faultgouge.analysis import BadInputError
 
     snapshot = stored_snapshot(file)
-    if snapshot is not None:
-        what = "spheres" if snapshot.dimension == 3 else "disks of another law"
+    if snapshot is not None and snapshot.dimension == 3:
         raise BadInputError(
-            f"{file} holds {what} as LAMMPS left them: `faultgouge export {file} --mode 0 -o packing.vtp` shows them "
-            "in ParaView, and -o packing.xyz in OVITO."
+            f"{file} holds spheres: `faultgouge export {file} --mode 0 -o packing.vtp` shows them in ParaView, and "
+            f"-o packing.xyz in OVITO; `faultgouge movie {file} --mode 0 -o mode.xyz` moves a mode."
         )
+    return snapshot
 
 
 def stored_files(scene: Scene) -> list[Path]:
@@ -107,11 +114,32 @@ def stored_series(file: Path) -> dict[str, Any] | None:
     return series if is_run and series is not None and len(series["time"]) > 1 else None
 
 
+def growth_in(file: Path, series: dict[str, Any]) -> GrowthOfRun:
+    """Growth of D in the undamped run of a perturb.h5, beside the spectrum's prediction at the time step of the run."""
+    from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.growth import growth_of_run
+    from faultgouge.pywrap.runs.undamped import time_step
+
+    with RunFile(file) as run:
+        packing, settings = run.packing(), json.loads(run.attributes.get("scene", "{}")).get("perturb") or {}
+    dt = time_step(packing, settings.get("time_step"))
+    return growth_of_run(packing, series["time"], series["msd"], series["friction"], dt)
+
+
 def check_output(output: Path, *inputs: Path) -> None:
     """Refuse a file that cannot be written, or is one of the inputs, before any work."""
     from faultgouge.analysis.files.atomic_write import check_output as check
 
     check(output, *inputs)
+
+
+def lock_output(context: typer.Context, output: Path, *inputs: Path) -> None:
+    """`check_output`, and keep other runs from the file until the command ends, on rank 0."""
+    from faultgouge.analysis.files.atomic_write import lock_output as lock
+
+    check_output(output, *inputs)
+    if is_root():
+        context.with_resource(lock(output))
 
 
 @contextmanager
@@ -149,8 +177,8 @@ def report_fallback(equilibrium: Equilibrium) -> None:
     """Of an equilibrium that was not reached by halved increments, how it was."""
     if equilibrium.way is not None:
         say(
-            f"F_x = {equilibrium.fx:.10g} was reached by {equilibrium.way}, after smaller and smaller increments had "
-            "led nowhere: it may lie on another branch of equilibria"
+            f"F_x = {equilibrium.fx:.10g} was reached by {equilibrium.way}, after smaller increments had failed: the "
+            "equilibrium may lie on another branch"
         )
 
 

@@ -31,6 +31,10 @@ from .granular_commands import Commands, SnapshotError, wall_plane
 EXACT = 1e-6
 """Distance of a measured exponent from a multiple of 1/4: rounding of forces and overlaps leaves 1e-9 or less."""
 
+MEASURED = 1e-3, 0.1
+"""Overlaps at which laws are measured, in units of a radius: an overlap of 1e-10, as of spheres that barely touch, has
+lost ten digits, and one beyond a tenth is that of no contact."""
+
 
 class State(NamedTuple):
     """One contact: radii, masses (of a wall 0 and infinite) and overlap."""
@@ -93,7 +97,7 @@ class MeasuredLaw:
     lever: float
 
 
-class Bench:
+class TwoParticleLammps:
     """A LAMMPS with two particles, or one and a wall, that knows the pair styles and walls of a deck."""
 
     def __init__(self, commands: Commands, units: str, types: int, size: float, wall: str | None = None) -> None:
@@ -173,15 +177,15 @@ class Bench:
         self.lammps.close()
 
 
-def measure_law(bench: Bench, state: State, types: tuple[int, int], who: str) -> MeasuredLaw:
+def measure_law(bench: TwoParticleLammps, state: State, types: tuple[int, int], who: str) -> MeasuredLaw:
     """The law of a contact, from its own overlap, radii and masses, and from others.
 
     Parameters
     ----------
-    bench : Bench
+    bench : TwoParticleLammps
         LAMMPS with the law.
     state : State
-        A contact of the packing.
+        A contact of the packing; its law is measured at an overlap that is neither minute nor large.
     types : tuple of (int, int)
         Types of the two particles.
     who : str
@@ -192,7 +196,8 @@ def measure_law(bench: Bench, state: State, types: tuple[int, int], who: str) ->
     SnapshotError
         If it is no power law of the kind above.
     """
-    state = state._replace(overlap=min(state.overlap, 0.1 * state.radii[0]))
+    least, most = (share * state.radii[0] for share in MEASURED)
+    state = state._replace(overlap=min(max(state.overlap, least), most))
     heavy = (3 * state.masses[0], state.masses[1] if bench.wall else 2 * state.masses[1])
     small = State((0.5 * state.radii[0], 0.8 * state.radii[1]), state.masses, state.overlap)
     states = [state, state._replace(overlap=0.5 * state.overlap), state._replace(masses=heavy), small]
@@ -257,7 +262,7 @@ class _Values(NamedTuple):
     lever: float
 
 
-def _measure(bench: Bench, wanted: State, types: tuple[int, int]) -> tuple[State, _Values]:
+def _measure(bench: TwoParticleLammps, wanted: State, types: tuple[int, int]) -> tuple[State, _Values]:
     """Forces of one contact at rest and in motion."""
     state = bench.place_at(wanted, types)
     fn, delta = bench.force()[0], state.overlap
@@ -299,7 +304,7 @@ def _measure(bench: Bench, wanted: State, types: tuple[int, int]) -> tuple[State
     return state, _Values(fn / delta, ft / slip, normal_dashpot, tangential_dashpot, closing, parting, mu, lever)
 
 
-def _push_contact(bench: Bench, state: State, types: tuple[int, int], speed: float) -> tuple[float, float]:
+def _push_contact(bench: TwoParticleLammps, state: State, types: tuple[int, int], speed: float) -> tuple[float, float]:
     """Forces at rest of a fresh contact that has slipped at a speed for one step."""
     bench.place_at(state, types)
     bench.move((0.0, speed))
@@ -309,7 +314,7 @@ def _push_contact(bench: Bench, state: State, types: tuple[int, int], speed: flo
     return bench.force()
 
 
-def _dashpot(bench: Bench, direction: tuple[float, float], scale: float, speed: float) -> float:
+def _dashpot(bench: TwoParticleLammps, direction: tuple[float, float], scale: float, speed: float) -> float:
     """Force per velocity of a contact without slip: first at some speed, then where the force is a tenth of scale."""
     tangential = int(direction[1])
     bench.move((0.0, 0.0))
@@ -334,14 +339,14 @@ def measure_laws(
     """The laws of pairs of types, by these, and of walls, by the IDs of their fixes."""
     found: dict[Any, MeasuredLaw] = {}
     if pairs:
-        bench = Bench(commands, units, types, max(max(state.radii) for state in pairs.values()))
+        bench = TwoParticleLammps(commands, units, types, max(max(state.radii) for state in pairs.values()))
         try:
             for kinds, state in pairs.items():
                 found[kinds] = measure_law(bench, state, kinds, f"the contact of types {kinds[0]} and {kinds[1]}")
         finally:
             bench.close()
     for name, state in walls:
-        bench = Bench(commands, units, types, state.radii[0], commands.fixes[name])
+        bench = TwoParticleLammps(commands, units, types, state.radii[0], commands.fixes[name])
         try:
             found[name] = measure_law(bench, state, (1, 1), f"the wall of fix {name}")
         finally:
