@@ -36,7 +36,7 @@ from ..packing.packing import Floats
 from ..spectrum.spectrum import active_coordinates
 from .all_windows import nearly_growing, search_cluster
 from .imaginary_axis import growing_modes
-from .modes import DampedMode, Pencil, find_growing_near
+from .modes import DampedMode, Pencil, find_growing_near, in_own_time
 from .perturbation_screening import LARGEST, Cluster, find_cores, group_clusters, may_grow, project_pencil, shift_load
 from .window_edges import Crossing, DampedWindow, solve_edge, window_of
 
@@ -97,9 +97,12 @@ def first_growing(
     UncoveredAxisError, LostPairError
         If clusters miss motions, and those of the operator cannot be told from each other or followed.
     """
-    oracle = SlicedGrowing(pencil, None, watch, ranks, folder, limits)
+    own, unit = in_own_time(pencil, float(loads[0]))
+    oracle = SlicedGrowing(own, None, watch, ranks, folder, limits)
     first, doubtful = search_along(oracle, loads)
-    return oracle.look_at_all(loads, doubtful) if oracle.crowded else (first, doubtful)
+    if oracle.crowded:
+        first, doubtful = oracle.look_at_all(loads, doubtful)
+    return None if first is None else first.in_time(unit), doubtful
 
 
 class SlicedGrowing(Sliced[Pencil, DampedWindow]):
@@ -405,8 +408,8 @@ def follow_mode(mode: DampedMode, pencil: Pencil) -> DampedMode:
             step *= 0.5
         else:
             raise LostPairError(
-                f"the motion of frequency {mode.rate.imag:.6g} cannot be told from its neighbours between F_x = "
-                f"{start.fx:.10g} and {pencil.fx:.10g}: take smaller increments"
+                f"a motion cannot be told from its neighbours between F_x = {start.fx:.10g} and {pencil.fx:.10g}: "
+                "take smaller increments"
             )
     return mode
 

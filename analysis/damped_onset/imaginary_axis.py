@@ -151,7 +151,7 @@ def growing_modes(pencil: Pencil) -> list[DampedMode]:
         """The radius about a point in which all that grows is found."""
         disc = Disc.about(middle, *rough)
         if disc.radius < SMALLEST:
-            raise UncoveredAxisError(f"the motions about s = {middle * unit:.6g} lie too close to be told")
+            raise UncoveredAxisError(f"motions at F_x = {pencil.fx:.10g} lie too close to be told from each other")
         for k in disc.near_axis:
             x = np.zeros(pencil.stiffness.shape[0], complex)
             x[active] = disc.vectors[:, k] / np.linalg.norm(disc.vectors[:, k])
@@ -187,7 +187,7 @@ def _solve(pencil: Pencil, x: Complexes, s: complex, distance: float) -> list[Da
     try:
         return find_growing_near(pencil, s, 1)
     except ArpackError as error:
-        raise UncoveredAxisError(f"the motion about s = {s:.6g} cannot be told from its neighbours") from error
+        raise UncoveredAxisError(f"a motion at F_x = {pencil.fx:.10g} cannot be told from its neighbours") from error
 
 
 def _factors(matrix: csc_array) -> Factors:

@@ -20,6 +20,7 @@ iteration: Neumaier, SIAM J. Numer. Anal. 22, 914 (1985)). Each step divides the
 :math:`\mathrm{gap}/|s - \sigma|`, and that of s by its square.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -32,6 +33,7 @@ from scipy.sparse.linalg import LinearOperator, SuperLU, eigs, splu
 from ..motion.state_space import StateSpace
 from ..onset import force_bearing
 from ..onset.modes import assign_columns
+from ..onset.search import unit_of
 from ..onset.window_edges import load_error
 from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix
@@ -104,6 +106,21 @@ class Pencil:
         """u |Z|_F, 1 / time: uncertainty of a perfectly conditioned s. W has the norm (tr A)^(1/2)."""
         squares = 2 * np.abs(self.stiffness.diagonal()).sum() + np.sum(self.damping.data**2)
         return unit_rounding(np.sqrt(squares))
+
+
+def in_own_time(pencil: Callable[[float], Pencil], fx: float) -> tuple[Callable[[float], Pencil], float]:
+    """Pencils of s / unit, and the unit: a power of two of the size of s at a load, which changes no digit.
+
+    Searches take these, as what is rough in a search multiplies matrices in single precision, which goes from 1e-38 to
+    1e38.
+    """
+    unit = 2.0 ** (np.log2(unit_of(pencil(fx).stiffness)) // 2)
+
+    def divided(fx: float) -> Pencil:
+        place = pencil(fx)
+        return Pencil(place.fx, place.stiffness / unit**2, place.damping / unit, place.balance)
+
+    return divided, float(unit)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """Windows of growing motion and their edges: a root of Re s, or a jump of the equilibrium."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -53,6 +53,10 @@ class DampedWindow:
     error: float
     kind: Kind
     path_error: float | None = None
+
+    def in_time(self, unit: float) -> "DampedWindow":
+        """The same of pencils of s / unit."""
+        return replace(self, frequency=unit * self.frequency)
 
     def as_dict(self) -> dict[str, Any]:
         """The keys of the JSON contract."""

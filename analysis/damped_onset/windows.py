@@ -34,7 +34,7 @@ from ..onset.march import check_increasing, march
 from ..onset.window_edges import LostTrackError
 from ..packing.packing import Floats, Packing
 from .all_windows import Growing
-from .modes import Pencil
+from .modes import Pencil, in_own_time
 from .perturbation_screening import Screen
 from .window_edges import DampedWindow
 
@@ -122,10 +122,18 @@ def growing_windows(
     """
     loads = check_increasing(forces)
     narrowest = LIMITS.narrowest * float(np.abs(loads).max())
+    own, unit = in_own_time(pencil, float(loads[0]))
+
+    def in_time(windows: tuple[DampedWindow, ...]) -> tuple[DampedWindow, ...]:
+        return tuple(each.in_time(unit) for each in windows)
+
+    def so_far(windows: tuple[DampedWindow, ...], fx: float) -> None:
+        known(in_time(windows), fx)
+
     try:
-        return march_along_ramp(Growing(pencil, narrowest, Screen()), loads, look, first, watch, known)
+        return in_time(march_along_ramp(Growing(own, narrowest, Screen()), loads, look, first, watch, so_far))
     except LostTrackError:
-        return march_along_ramp(Growing(pencil, narrowest, None), loads, look, first, watch, known)
+        return in_time(march_along_ramp(Growing(own, narrowest, None), loads, look, first, watch, so_far))
 
 
 def march_along_ramp(

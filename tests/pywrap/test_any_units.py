@@ -11,6 +11,7 @@ from reference_layer import SMALL
 from faultgouge.analysis import MindlinLaw, RunFile
 from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, perturb, ramp, settle
 from faultgouge.pywrap.equilibria.rattlers import middle_of_cage
+from faultgouge.pywrap.onset.damped import damped_onset_run
 from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.pywrap.settling.settle import own_units
 
@@ -115,8 +116,13 @@ def onset_in(length=1.0, force=1.0, mass=1.0, damped=False):
         "load": {"fy": 3.0 * force},
         "ramp": {"step": 5e-3 * force, "until": 0.025 * force},
     }
+    time = (mass * length / force) ** 0.5
+    if damped:
+        sections |= {"damping": {"cn": 10.0 * force / length**1.5 * time}}
+        found = damped_onset_run(Scene.from_mapping(sections), 0.5, first=True)
+        return found.fx_c / force, found.error / force, found.windows[0].frequency * time
     run = onset_run(Scene.from_mapping(sections), 0.5, first=True).onset
-    return run.fx_c / force, run.error / force, run.windows[0].eigenvalue * mass * length / force
+    return run.fx_c / force, run.error / force, run.windows[0].eigenvalue * time**2
 
 
 EXTREME = [(1e-9, 1.0, 1.0), (1e6, 1.0, 1.0), (1.0, 1e-9, 1.0), (1.0, 1e6, 1.0), (1.0, 1.0, 1e-9), (1.0, 1.0, 1e6)]
@@ -125,11 +131,12 @@ TOGETHER = [(1e-6, 1e-3, 1e-15), (1e6, 1e-6, 1e9)]
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("damped", [False, True])
 @pytest.mark.parametrize("units", [pytest.param(each, marks=pytest.mark.long) for each in EXTREME] + TOGETHER)
-def test_an_onset_is_the_same_in_any_units(units):
-    (fx, error, eigenvalue), (own, own_error, own_eigenvalue) = onset_in(*units), onset_in()
+def test_an_onset_is_the_same_in_any_units(units, damped):
+    (fx, error, motion), (own, own_error, own_motion) = onset_in(*units, damped), onset_in(damped=damped)
     assert abs(fx - own) <= error + own_error < 1e-9
-    assert eigenvalue == pytest.approx(own_eigenvalue, rel=1e-6)
+    assert motion == pytest.approx(own_motion, rel=1e-6)
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from faultgouge.analysis.damped_onset.first_window import SlicedGrowing, first_g
 from faultgouge.analysis.damped_onset.imaginary_axis import growing_modes
 from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, find_growing_near, nearest_mode
 from faultgouge.analysis.damped_onset.window_edges import DampedWindow
-from faultgouge.analysis.damped_onset.windows import damped_windows, without_dissipation
+from faultgouge.analysis.damped_onset.windows import damped_windows, growing_windows, without_dissipation
 from faultgouge.analysis.onset.limits import LIMITS
 from faultgouge.analysis.onset.slice_store import Candidate
 from faultgouge.pywrap import Scene
@@ -66,6 +66,24 @@ def test_ranks_find_the_same_with_bases_that_are_kept(search):
     expected = search("medium")()
     for each in on_ranks(2, lambda mine: search("medium")(ranks=mine)):
         assert each.result() == expected
+
+
+@pytest.mark.slow
+def test_windows_are_the_same_to_the_bit_in_another_unit_of_time(path):
+    """One in which single precision does not hold the squares of eigenvalues."""
+    damped, loads, unit = without_dissipation(path, cn=10.0), np.array(path.grid[21:24]), 2.0**36
+
+    def fast(fx):
+        own = Pencil.of(damped(fx))
+        return Pencil(fx, unit**2 * own.stiffness, unit * own.damping, own.balance)
+
+    def first(pencil):
+        return [first_growing(pencil, loads, limits=FEW)[0]]
+
+    for search in (first, lambda pencil: growing_windows(pencil, loads)):
+        expected = search(lambda fx: Pencil.of(damped(fx)))
+        assert len(expected)
+        assert list(search(fast)) == [replace(each, frequency=unit * each.frequency) for each in expected]
 
 
 def oscillators(feed):
