@@ -7,10 +7,11 @@ of them Arnoldi's iteration with :math:`(Z - \sigma)^{-1}` finds the eigenvalues
 disc reaches as far as these have converged.
 
 **What is covered** is the whole right half-plane. With :math:`s = p + i \omega` the imaginary part of
-:math:`x^H (s^2 + s G + A) x = 0` says that :math:`p \le \beta / 2 \omega`, as G takes energy, with the norm
-:math:`\beta` of the antisymmetric part of A; and the real part that p is no more than :math:`2^{1/2}` of the largest
-frequency. Where the discs on the axis do not reach as far to the right, rectangles are covered with further discs, and
-halved as long as a disc does not hold one of them.
+:math:`x^H (s^2 + s G + A) x = 0` says that 2 p is no more than the largest eigenvalue of :math:`-G - i A_a / \omega`,
+with the antisymmetric part of A: it falls with :math:`\omega`, as G takes energy. And the real part says that
+:math:`p^2` is no more than :math:`\omega^2` less the lowest eigenvalue of the symmetric part. Where the discs on the
+axis do not reach as far to the right, rectangles are covered with further discs, and halved as long as a disc does not
+hold one of them. Both bounds are Lanczos's, taken larger by as much as they may be wrong.
 
 A disc costs one sparse factorisation and `KRYLOV` solutions in single precision, which tell eigenvalues to 1e-3 of
 their distance from the middle. Whatever comes as close to the axis as that is solved for in double precision.
@@ -145,8 +146,21 @@ def growing_modes(pencil: Pencil) -> list[DampedMode]:
     if not len(active):
         return []
     a, g = (csr_array(each[active][:, active]) for each in pencil.matrices)
-    unit = float(np.sqrt(_norm(csr_array(0.5 * (a + a.T)))))  # no frequency is larger
-    beta = _norm(csr_array(0.5 * (a - a.T))) / unit**2
+    unit = float(np.sqrt(_largest_eigenvalue(csr_array(0.5 * (a + a.T)))))  # no frequency is larger
+    feed, loss = csr_array(0.5j * (a - a.T) / unit**2), csr_array(g / unit)
+    most_taken = float(np.abs(loss).sum(axis=1).max())
+
+    one = eye_array(len(active))
+    softening = _largest_eigenvalue(csr_array(one - 0.5 * (a + a.T) / unit**2)) - 1  # less the lowest eigenvalue
+
+    def fastest_growth(low: float, high: float) -> float:
+        """What Re s does not exceed between two frequencies."""
+        fastest = float(np.sqrt(high**2 + max(0.0, softening)))
+        if not low:
+            return fastest
+        form = csr_array(most_taken * one - loss - feed / low)
+        return min(fastest, 0.5 * (_largest_eigenvalue(form) - most_taken))
+
     rough = csr_array((a / unit**2).astype(np.float32)), csr_array((g / unit).astype(np.float32))
     found: list[DampedMode] = []
 
@@ -170,7 +184,7 @@ def growing_modes(pencil: Pencil) -> list[DampedMode]:
             radius = min(reach, 0.8 * radius)
             continue
         begin, covered, radius = covered, middle + TOUCH * reach, min(reach, 1.0)
-        height, fastest = np.sqrt(1 - TOUCH**2) * reach, min(np.sqrt(2), beta / (2 * begin) if begin else np.inf)
+        height, fastest = float(np.sqrt(1 - TOUCH**2) * reach), fastest_growth(begin, covered)
         if height < fastest:
             beside.append((complex(height, begin), complex(fastest, covered)))
     while beside:
@@ -193,13 +207,13 @@ def _solve(pencil: Pencil, x: Complexes, s: complex, distance: float) -> list[Da
         raise UncoveredAxisError(f"a motion at F_x = {pencil.fx:.10g} cannot be told from its neighbours") from error
 
 
-def _norm(matrix: csr_array) -> float:
-    """The 2-norm, which for these matrices is two thirds of the largest row sum: so much less is to be covered."""
-    if not (matrix.shape[0] > 2 and matrix.count_nonzero()):
-        return float(np.linalg.norm(matrix.toarray(), 2))
-    start = np.random.default_rng(0).standard_normal(matrix.shape[0])
-    square = eigsh(csr_array(matrix.T @ matrix), k=1, v0=start, tol=CLOSE, return_eigenvectors=False)[0]
-    return float((1 + CLOSE) * np.sqrt(square))
+def _largest_eigenvalue(matrix: csr_array) -> float:
+    """The largest eigenvalue of a Hermitian matrix, which is positive: much less than the largest sum of a row."""
+    if matrix.shape[0] < 3:
+        return float(np.linalg.eigvalsh(matrix.toarray())[-1])
+    start = np.random.default_rng(0).standard_normal(matrix.shape[0]).astype(matrix.dtype)
+    largest = eigsh(matrix, k=1, which="LA", v0=start, tol=CLOSE, return_eigenvectors=False)[0]
+    return float((1 + CLOSE) * largest)
 
 
 def _factors(matrix: csc_array) -> Factors:
