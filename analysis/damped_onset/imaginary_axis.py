@@ -118,7 +118,7 @@ class Disc:
         radius = np.inf
         if len(unknown):
             radius = 1 / (abs(inverse[count]) * (1 + min(1.0, float(residuals[count]))))
-        displacements = np.asarray(basis[:size, :steps] @ vectors[:, :count], complex)
+        displacements = (basis[:size, :steps] @ vectors[:, :count]).astype(np.complex128)
         return cls(middle, radius, middle + 1 / inverse[:count], displacements, residuals[:count])
 
     @property
