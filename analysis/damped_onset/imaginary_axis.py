@@ -118,8 +118,9 @@ class Disc:
         radius = np.inf
         if len(unknown):
             radius = 1 / (abs(inverse[count]) * (1 + min(1.0, float(residuals[count]))))
-        displacements = (basis[:size, :steps] @ vectors[:, :count]).astype(np.complex128)
-        return cls(middle, radius, middle + 1 / inverse[:count], displacements, residuals[:count])
+        values: Complexes = np.asarray(middle + 1 / inverse[:count], complex)
+        displacements = basis[:size, :steps] @ vectors[:, :count]
+        return cls(middle, radius, values, displacements, residuals[:count])
 
     @property
     def near_axis(self) -> list[int]:
