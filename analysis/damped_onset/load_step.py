@@ -23,7 +23,7 @@ PLACES = np.linspace(0, 1, 41)[1:-1]
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class GrowthStep:
     """Two neighbouring loads, which mode is which, and the modes' slopes."""
 
     here: DampedModes
@@ -31,7 +31,7 @@ class Step:
     forward: Indices
 
     @classmethod
-    def of(cls, here: DampedModes, there: DampedModes) -> "Step":
+    def of(cls, here: DampedModes, there: DampedModes) -> "GrowthStep":
         forward = here.assigned(there)
         grows = np.isin(np.arange(len(there)), there.growing)
         ends = [k for k in here.growing if forward[k] >= 0 and not grows[forward[k]]]

@@ -38,7 +38,7 @@ from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
 from ..spectrum.spectrum import SAFETY, Complexes, active_coordinates, mass_weighted, unit_rounding
 
-STEADY = 1e-3
+NEGLIGIBLE = 1e-3
 """Digits of an eigenvalue smaller than this share of |Z|_F are not asked for."""
 
 STEPS = 12
@@ -320,7 +320,7 @@ def refine_mode(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> Dampe
     """The mode nearest to some vectors and an eigenvalue, by the two-sided iteration; None if it does not converge."""
     a, g, unit = pencil.stiffness, pencil.damping, eye_array(len(x))
     mirror = a.T, g.T
-    floor = pencil.rounding / np.finfo(float).eps * STEADY  # of a steady mode s is zero
+    floor = pencil.rounding / np.finfo(float).eps * NEGLIGIBLE  # of a steady mode s is zero
     for _ in range(STEPS):
         factors = _factors(csc_array(a + s * g + s * s * unit))
         x = _normalise(factors.solve(2 * s * x + g @ x))

@@ -62,26 +62,17 @@ class DampedWindow:
 
 def solve_edge(mode: Callable[[float], DampedMode], below: float, above: float) -> Crossing:
     """The root of Re s, or a bracket where Re s jumps."""
-    ends = mode(below), mode(above)
-    if ends[0].rate.real * ends[1].rate.real >= 0:
-        # One end is within rounding of the crossing: that is there, to within Re s over its slope.
-        end = min(ends, key=lambda each: abs(each.rate.real))
-        slope = abs(ends[1].rate.real - ends[0].rate.real) / (above - below)
-        return _bracket_zero(end.fx, abs(end.rate.real) / slope, end)
     change = sign_change(lambda fx: mode(fx).rate.real, below, above)
     if change.smooth:
-        return _bracket_zero(change.fx, change.error, mode(change.loads[2]))
+        near = mode(change.loads[len(change.loads) // 2])
+        steady = near.rate.imag <= STEADY * float(np.sqrt(np.abs(near.pencil.stiffness).max()))
+        error = change.error + near.pencil.balance
+        return Crossing(change.fx, error, near.rate.imag, "steady" if steady else "hopf")
     left, right = (mode(fx) for fx in change.loads)
     across = left.at(right.pencil)
     if across is None or (across.rate.real > 0) != (right.rate.real > 0):
         raise LostPairError  # the equilibrium does not jump there: it is the mode that has become another one
     return Crossing(change.fx, change.error, right.rate.imag, "contact change")
-
-
-def _bracket_zero(fx: float, error: float, mode: DampedMode) -> Crossing:
-    """Where a mode crosses the axis, known at a load next to it."""
-    steady = mode.rate.imag <= STEADY * float(np.sqrt(np.abs(mode.pencil.stiffness).max()))
-    return Crossing(fx, error + mode.pencil.balance, mode.rate.imag, "steady" if steady else "hopf")
 
 
 def window_of(onset: Crossing, end: Crossing | None) -> DampedWindow:

@@ -29,7 +29,7 @@ import numpy as np
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing.packing import Floats
 from .all_windows import all_windows
-from .eigenbasis import Bases, Basis, Cluster, Levels, width_and_mixing
+from .eigenbasis import Bases, Basis, Levels, ModeCluster, width_and_mixing
 from .eigenvalue_pair import Pair, continue_pair
 from .limits import LIMITS, Limits
 from .march import march
@@ -251,7 +251,7 @@ class SlicedPairs(Sliced[Place, Window]):
             if np.any((named >= first) & (named <= last)):
                 yield from self._search_cluster(basis, cluster, here, there)
 
-    def _search_cluster(self, basis: Basis, cluster: Cluster, here: At, there: At) -> Iterator[Candidate]:
+    def _search_cluster(self, basis: Basis, cluster: ModeCluster, here: At, there: At) -> Iterator[Candidate]:
         """The windows of one cluster, with its blocks interpolated between two loads."""
         increment = there[0] - here[0]
         before, after = (levels.block(cluster) for _, levels in (here, there))

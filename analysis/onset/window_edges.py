@@ -225,7 +225,7 @@ class SignChange(NamedTuple):
     """Where a function of the load changes its sign: a root, or a jump.
 
     The error is twice the scatter over the slope of a root, and half of the bracket of a jump. Its loads are the five
-    that give the root, or the two on either side of the jump.
+    that give the root, or the one that is the root to within rounding, or the two on either side of the jump.
     """
 
     fx: float
@@ -235,7 +235,15 @@ class SignChange(NamedTuple):
 
 
 def sign_change(value: Callable[[float], float], below: float, above: float, limits: Limits = LIMITS) -> SignChange:
-    """Where a function of the load that has opposite signs at two loads goes through zero, or jumps."""
+    """Where a function of the load goes through zero, or jumps, between two loads at which it has opposite signs.
+
+    Where its signs there are the same, it is within rounding of zero at one of them: the root is that load, to within
+    the function over its slope.
+    """
+    ends = value(below), value(above)
+    if ends[0] * ends[1] >= 0:
+        fx = below if abs(ends[0]) <= abs(ends[1]) else above
+        return SignChange(fx, min(map(abs, ends)) / (abs(ends[1] - ends[0]) / (above - below)), [fx], smooth=True)
     known: dict[float, float] = {}
 
     def looked(fx: float) -> float:
@@ -295,11 +303,6 @@ def locate_edge(family: Family, here: Pair, there: Pair) -> tuple[Edge, Pair, Pa
 
     A LostPairError is raised if the ends are not one pair.
     """
-    if here.discriminant * there.discriminant >= 0:
-        # One end is within rounding of the coalescence: the edge is there, to within D over its slope.
-        end = min(here, there, key=lambda pair: abs(pair.discriminant))
-        slope = abs(there.discriminant - here.discriminant) / (there.fx - here.fx)
-        return Edge(end.fx, abs(end.discriminant) / slope, end.mean, end.overlap, "coalescence"), here, there
     pair = family.track({here.fx: here, there.fx: there})
     change = sign_change(lambda fx: pair(fx).discriminant, here.fx, there.fx, family.limits)
     points = [pair(fx) for fx in change.loads]

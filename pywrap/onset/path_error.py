@@ -271,8 +271,7 @@ def bearing_contacts(packing: Packing) -> frozenset[tuple[int, int, bool]]:
     """The contacts (i, j, whether it slides) that carry a force; j = -1 for the floor."""
     carrying = packing.loaded(CARRIES * packing.fy)
     contacts = carrying.contacts
-    slides = carrying.law.at_bound(carrying.geometry.overlap, contacts.slip)
-    return frozenset(zip(contacts.i.tolist(), contacts.j.tolist(), slides.tolist(), strict=True))
+    return frozenset(zip(contacts.i.tolist(), contacts.j.tolist(), carrying.sliding.tolist(), strict=True))
 
 
 def _thin_loads(loads: Floats, changed: NDArray[np.bool_]) -> Floats:
