@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..onset.window_edges import LostPairError, sign_change
+from ..onset.window_edges import GrowthWindow, LostPairError, sign_change
 from .modes import DampedMode
 
 STEADY = 1e-9
@@ -25,39 +25,25 @@ class Crossing:
     kind: Kind
 
 
-@dataclass(frozen=True)
-class DampedWindow:
-    """An interval of loads on which one motion grows.
+@dataclass(frozen=True, kw_only=True)
+class DampedWindow(GrowthWindow):
+    """An interval of loads on which Re s of one motion is positive; other attributes are those of `GrowthWindow`.
 
     Attributes
     ----------
-    fx_onset : float
-        Load at which Re s becomes positive, force per top disk.
-    fx_end : float or None
-        Load at which it is negative again; None if it grows at the largest load.
     frequency : float
         Im s at the onset, radian / time.
-    error : float
-        Uncertainty of fx_onset: twice the scatter of Re s over its slope, or the bracket, and what the residual of the
-        equilibria amounts to, as of :class:`~faultgouge.analysis.Window`.
     kind : {"hopf", "steady", "contact change", "start"}
-        What begins the window: Re s that goes through zero with Im s or without, a jump of the equilibrium, or nothing:
-        the motion grows at the smallest load.
-    path_error : float or None
-        As of :class:`~faultgouge.analysis.Window`.
+        Re s that goes through zero with Im s or without; a jump of the equilibrium; or nothing, as the motion grows at
+        the smallest load.
     """
 
-    fx_onset: float
-    fx_end: float | None
     frequency: float
-    error: float
     kind: Kind
-    path_error: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """The keys of the JSON contract."""
-        names = ("fx_onset", "fx_end", "frequency", "error", "kind")
-        return {name: getattr(self, name) for name in names} | {"error_of_path": self.path_error}
+        """The keys of the JSON contract: besides those of all windows, frequency."""
+        return super().as_dict() | {"frequency": self.frequency}
 
 
 def solve_edge(mode: Callable[[float], DampedMode], below: float, above: float) -> Crossing:
@@ -77,4 +63,10 @@ def solve_edge(mode: Callable[[float], DampedMode], below: float, above: float) 
 
 def window_of(onset: Crossing, end: Crossing | None) -> DampedWindow:
     """The window from one edge to another, or to none."""
-    return DampedWindow(onset.fx, None if end is None else end.fx, onset.frequency, onset.error, onset.kind)
+    return DampedWindow(
+        fx_onset=onset.fx,
+        fx_end=None if end is None else end.fx,
+        frequency=onset.frequency,
+        error=onset.error,
+        kind=onset.kind,
+    )

@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import chain, pairwise
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -41,6 +41,7 @@ from .window_edges import (
     DoubtError,
     Edge,
     Family,
+    GrowthWindow,
     LostPairError,
     Window,
     edge_from_inside,
@@ -57,16 +58,8 @@ Increments = tuple[tuple[float, float], ...]
 """From load to load."""
 
 
-class Begun(Protocol):
-    """A window: it begins at a load."""
-
-    @property
-    def fx_onset(self) -> float:
-        """The load, force per top disk."""
-
-
 P = TypeVar("P", bound=Looked)
-W = TypeVar("W", bound=Begun)
+W = TypeVar("W", bound=GrowthWindow)
 
 
 class Sliced(ABC, Generic[P, W]):

@@ -21,7 +21,7 @@ from .limits import LIMITS, Limits
 from .march import check_increasing
 from .modes import Operator, contact_states, force_bearing, full_operator
 from .ranks import ALONE, Ranks
-from .window_edges import Family, Window, load_error
+from .window_edges import Edge, Family, Window, load_error
 
 
 class OnsetError(FaultgougeError):
@@ -231,7 +231,7 @@ def find_onset(
     negative = negative_eigenvalues(force_bearing(start, limits))
     if len(negative):
         at_start = Unstable.of(start) if takes_all else None
-        window = Window(start.fx, None, float(negative[0]), load_error(start), None, 1.0, "start")
+        window = _at_start(start, float(negative[0]), load_error(start), 1.0)
         return Onset((window,), False, (), modes, at_start, start.fx)
     unbalanced: dict[float, float] = {}
     states: dict[float, bytes] = {}
@@ -292,7 +292,12 @@ def _complex_at_start(start: Packing, limits: Limits) -> Spectrum | None:
 def _fastest(start: Packing, found: Spectrum) -> Window:
     """The window of the complex pair that grows fastest at the smallest load."""
     pair = max(found.pairs, key=lambda each: each.growth_rate)
-    return Window(start.fx, None, pair.eigenvalue.real, 0.0, None, pair.overlap, "start")
+    return _at_start(start, pair.eigenvalue.real, 0.0, pair.overlap)
+
+
+def _at_start(start: Packing, eigenvalue: float, error: float, overlap: float) -> Window:
+    """A window that is open at the smallest load."""
+    return Window.between(Edge(start.fx, error, eigenvalue, overlap, "start"), None)
 
 
 def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:

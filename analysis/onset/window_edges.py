@@ -68,29 +68,21 @@ class Edge:
         return cls(0.5 * (one + other), half, pairs[-1].mean, overlap, "contact change")
 
 
-@dataclass(frozen=True)
-class Window:
-    """An interval of loads on which one pair of eigenvalues is complex.
+@dataclass(frozen=True, kw_only=True)
+class GrowthWindow:
+    """An interval of loads on which one motion grows.
 
     Attributes
     ----------
     fx_onset : float
-        Load at which the pair becomes complex, force per top disk.
+        Load at which the motion begins to grow, force per top disk.
     fx_end : float or None
-        Load at which it is real again; None if it is complex at the largest load that was looked at.
-    eigenvalue : float
-        The double eigenvalue at the onset (the real part of the pair if it does not coalesce there), 1 /
-        time^2.
+        Load at which it ends to; None if it grows at the largest load that was looked at.
     error : float
-        Uncertainty of fx_onset: twice the scatter of the discriminant over its slope for a coalescence, the bracket
-        otherwise; and the `load_error` of the equilibria; and `path_error`, if that is known.
-    end_error : float or None
-        The same for fx_end.
-    overlap : float
-        Smallest |y^H x| met at the onset; at an exceptional point it is the root of the rounding error.
-    kind : {"coalescence", "contact change", "start"}
-        What begins the window: two real eigenvalues that meet; a jump of the equilibrium; or nothing, as the pair is
-        complex at the smallest load.
+        Uncertainty of fx_onset: that of the root, twice the scatter over the slope, or the bracket of a jump; and the
+        `load_error` of the equilibria; and `path_error`, if that is known.
+    kind : str
+        What begins the window.
     path_error : float or None
         What of the error comes from the increments in which the path of equilibria was taken, force. One path cannot
         tell: None of a search, a number where another path was taken as well.
@@ -98,12 +90,38 @@ class Window:
 
     fx_onset: float
     fx_end: float | None
-    eigenvalue: float
     error: float
+    kind: str
+    path_error: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """The keys of the JSON contract that all windows have: fx_onset, fx_end, error, error_of_path, kind."""
+        names = ("fx_onset", "fx_end", "error", "kind")
+        return {name: getattr(self, name) for name in names} | {"error_of_path": self.path_error}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Window(GrowthWindow):
+    """An interval of loads on which one pair of eigenvalues is complex; further attributes are those of `GrowthWindow`.
+
+    Attributes
+    ----------
+    eigenvalue : float
+        The double eigenvalue at the onset (the real part of the pair if it does not coalesce there), 1 /
+        time^2.
+    end_error : float or None
+        Uncertainty of fx_end.
+    overlap : float
+        Smallest |y^H x| met at the onset; at an exceptional point it is the root of the rounding error.
+    kind : {"coalescence", "contact change", "start"}
+        Two real eigenvalues that meet; a jump of the equilibrium; or nothing, as the pair is complex at the smallest
+        load.
+    """
+
+    eigenvalue: float
     end_error: float | None
     overlap: float
     kind: Kind
-    path_error: float | None = None
 
     @classmethod
     def between(cls, onset: Edge, end: Edge | None) -> "Window":
@@ -119,15 +137,8 @@ class Window:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """The keys of the JSON contract: fx_onset, fx_end, lambda, error, error_of_path, kind."""
-        return {
-            "fx_onset": self.fx_onset,
-            "fx_end": self.fx_end,
-            "lambda": self.eigenvalue,
-            "error": self.error,
-            "error_of_path": self.path_error,
-            "kind": self.kind,
-        }
+        """The keys of the JSON contract: besides those of all windows, lambda."""
+        return super().as_dict() | {"lambda": self.eigenvalue}
 
 
 def load_error(packing: Packing | Snapshot) -> float:
