@@ -19,8 +19,8 @@ from ...analysis.files.signal_files import write_table
 from ...analysis.motion.signals import Signal
 from ...analysis.packing.arrays import Floats
 from .decks import Decks
+from .lammps_state import LammpsState
 from .plain_file_names import shared_folder
-from .state_transfer import Wire
 
 
 class Motion(NamedTuple):
@@ -78,16 +78,16 @@ class Dynamics:
     ----------
     decks : Decks
         LAMMPS.
-    wire : Wire
-        The state of its disks.
+    lammps_state : LammpsState
+        That of its disks.
     packing : Packing
         From which the run starts. Rattlers are held still: nothing would stop them.
     weakening : Weakening, optional
         Friction that falls with the velocity of the upper layer; constant by default.
     """
 
-    def __init__(self, decks: Decks, wire: Wire, packing: Packing, weakening: Weakening | None) -> None:
-        self._decks, self._wire, self._packing, self._weakening = decks, wire, packing, weakening
+    def __init__(self, decks: Decks, lammps_state: LammpsState, packing: Packing, weakening: Weakening | None) -> None:
+        self._decks, self._state, self._packing, self._weakening = decks, lammps_state, packing, weakening
 
     @contextmanager
     def moving(self, time_step: float, drag_time: float | None) -> Iterator[None]:
@@ -140,7 +140,7 @@ class Dynamics:
         self._decks.command(f"run {steps} pre no post no")
         law = self._packing.law
         friction = law.mu if self._weakening is None else self._decks.lammps.extract_fix("weaken", 0, 0)
-        position, low, velocity = self._wire.motion()
+        position, low, velocity = self._state.motion()
         spin = velocity[:, 2] if law.frictional else np.zeros(len(velocity))
         return Motion(position, low, velocity[:, :2], spin, float(friction))
 
@@ -172,7 +172,7 @@ class Dynamics:
 
     def state(self) -> dict[str, Floats]:
         """All that the run has at this moment, by LAMMPS's names, for `resume`."""
-        return self._wire.checkpoint()
+        return self._state.checkpoint()
 
     def resume(self, step: int, state: Mapping[str, Floats]) -> None:
         """Go on from the state that a run had at a step, this one or that of another engine.
@@ -180,7 +180,7 @@ class Dynamics:
         Forces are computed anew. A run that is continued elsewhere is the same to the bit as one that resumes its own
         state at the same steps.
         """
-        self._wire.write_checkpoint(state)
+        self._state.write_checkpoint(state)
         self._weaken()  # anew: the fix would remember the friction that the last forces of this instance had
         self._decks.command(f"reset_timestep {step}")
         self._decks.command("run 0 post no")

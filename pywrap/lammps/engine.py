@@ -2,7 +2,7 @@
 
 The instance is set up by the deck part ``system.in``, the same file that ``lmp -in`` runs, and driven by its
 companions (:mod:`~faultgouge.pywrap.lammps.decks`). A `Packing` goes in and a `Packing` comes out, bit for bit
-(:mod:`~faultgouge.pywrap.lammps.state_transfer`). All methods are collective over the ranks of the communicator, and
+(:mod:`~faultgouge.pywrap.lammps.lammps_state`). All methods are collective over the ranks of the communicator, and
 every rank sees the whole packing.
 """
 
@@ -23,11 +23,10 @@ from ...analysis.motion.signals import Signal
 from ...analysis.packing.arrays import Floats
 from .data_file import box_heights, data_file, sort_contacts
 from .decks import Decks
-from .displacement import Displacing
 from .dynamics import Dynamics, Weakening
 from .instance import lammps_instance
+from .lammps_state import LammpsState
 from .plain_file_names import decks_folder, move_files, shared_folder
-from .state_transfer import Wire
 from .trial_state import Trial
 
 LOOK = 1000
@@ -74,8 +73,7 @@ class Engine:
     def __init__(self, packing: Packing, communicator: MPI.Comm | None = None, log: Path | None = None) -> None:
         self.communicator = communicator or MPI.COMM_WORLD
         self._decks = Decks(lammps_instance(self.communicator, log))
-        self._displacing = Displacing(self._decks, packing)
-        self._wire = Wire(self._decks, self._displacing, packing)
+        self._state = LammpsState(self._decks, packing)
         self._kept: Trial | None = None
         self._load(packing)
 
@@ -90,27 +88,27 @@ class Engine:
     @property
     def lammps(self) -> Any:
         """The LAMMPS instance, for what it holds and for commands that the driver does not cover."""
-        self._displacing.end()
+        self._state.end_displacements()
         return self._decks.lammps
 
     @property
     def packing(self) -> Packing:
         """The configuration as it stands, with its slips and its load."""
-        return self._wire.read().packing
+        return self._state.read().packing
 
     @property
     def net_force(self) -> Floats:
         """Forces as LAMMPS has them, (Fx.., Fy.., T/R..), shape (3N,), load included."""
-        return self._wire.force(self._wire.state())
+        return self._state.net_force()
 
     def set_fx(self, fx: float) -> None:
         """Set the force along x on each disk of the upper layer."""
-        self._displacing.load(fx)
+        self._state.set_fx(fx)
 
     def restore(self, packing: Packing) -> None:
         """Put the disks, slips and load of a packing back, to the bit."""
-        self._displacing.end()
-        self._wire.write(packing)
+        self._state.end_displacements()
+        self._state.write(packing)
         self.set_fx(packing.fx)
 
     def settle(
@@ -129,7 +127,7 @@ class Engine:
         steps : int
             Time steps of each stage, at the most.
         """
-        self._displacing.end()
+        self._state.end_displacements()
         self._decks.variables(force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
         if viscosity is not None:
             self._decks.variables(viscosity=viscosity)
@@ -170,7 +168,7 @@ class Engine:
         steps : int
             Time steps at the most.
         """
-        self._displacing.end()
+        self._state.end_displacements()
         self._decks.command("variable relax_step delete")  # that of an earlier call
         if time_step is not None:
             self._decks.variables(relax_step=time_step)
@@ -207,15 +205,12 @@ class Engine:
 
     def displaced(self, base: Packing, displacement: Floats) -> Trial:
         """The same as a `Trial`, for many displacements in turn."""
-        self._displacing.begin()
-        self._wire.write(base, (displacement.reshape(3, -1) / self._wire.levers).T)
-        self._displacing.run()
-        return self._wire.read(displacement)
+        return self._state.displace(base, displacement)
 
     def keep(self, trial: Trial) -> Packing:
         """The packing of a trial, for displacements from there: LAMMPS is then given what it gave."""
         self._kept = trial
-        self._wire.keep(trial)
+        self._state.keep(trial)
         return trial.packing
 
     def kept(self, packing: Packing) -> Trial:
@@ -230,11 +225,11 @@ class Engine:
         What is written depends on the configuration alone, and not on what was before.
         """
         bottom, top = box_heights(self.packing)
-        self._displacing.end()
+        self._state.end_displacements()
         self._decks.command(f"change_box all y final {bottom!r} {top!r} units box")
         self._decks.command("reset_timestep 0")
         with shared_folder(self.communicator) as folder:
-            self._decks.include("write.in", name=folder / "dump", fx=self._displacing.fx)
+            self._decks.include("write.in", name=folder / "dump", fx=self._state.fx)
             self.communicator.barrier()
             if self.communicator.rank == 0:
                 sort_contacts(folder / "dump.contacts")
@@ -279,8 +274,8 @@ class Engine:
             To go on with. Rattlers are held still: nothing would stop them.
         """
         packing = self.packing
-        self._displacing.end()
-        dynamics = Dynamics(self._decks, self._wire, packing, weakening)
+        self._state.end_displacements()
+        dynamics = Dynamics(self._decks, self._state, packing, weakening)
         with dynamics.moving(time_step, packing.drag_time if drag_time is None else drag_time), ExitStack() as forces:
             pushed = "top" if target is None else forces.enter_context(self._decks.group("pushed", target))
             if amplitude != 0:
@@ -316,10 +311,10 @@ class Engine:
             if law.damped:
                 self._decks.variables(cn=law.cn, ct=law.ct)
             self._decks.include("system.in")
-        self._wire.write_masses()
+        self._state.write_masses()
         if law.frictional or packing.compensated:
-            self._displacing.begin()
+            self._state.begin_displacements()
             self._decks.command("run 0 post no")  # makes the fixes slips and low
             self.restore(packing)
         else:
-            self._wire.clear_forces()
+            self._state.clear_forces()
