@@ -32,7 +32,6 @@ from scipy.sparse.linalg import LinearOperator, SuperLU, eigs, splu
 from ..motion.state_space import StateSpace
 from ..onset import force_bearing
 from ..onset.modes import assign_columns
-from ..onset.window_edges import load_error
 from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
@@ -75,7 +74,7 @@ class Pencil:
         """That of a packing with dashpots or drag."""
         bearing = force_bearing(packing)
         a, g = (mass_weighted(each(bearing), bearing) for each in (stiffness_matrix, damping_matrix))
-        return cls(packing.fx, a, g, load_error(packing))
+        return cls(packing.fx, a, g, packing.load_error)
 
     @property
     def matrices(self) -> tuple[csr_array, csr_array]:

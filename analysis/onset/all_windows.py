@@ -28,7 +28,7 @@ from ..packing.packing import Floats, Indices
 from ..spectrum.spectrum import Complexes
 from .eigenvalue_pair import Pair, continue_pair, deepest_dip, dip_between
 from .march import look_between, march
-from .modes import Members, Modes, Place, assign_modes
+from .modes import Members, Modes, Place, assign_modes, neighbours
 from .perturbation_screening import PairScreen, Screening
 from .window_edges import DoubtError, Edge, Family, LostPairError, LostTrackError, Window, locate_edge, other_sign
 
@@ -344,12 +344,9 @@ class PairStep:
     def _neighbours(self, known: Indices, image: Indices) -> tuple[Indices, Indices]:
         """Two real modes each that can meet: neighbours at one end, and those that change order."""
         here, there = self.ends
-        p, q = np.triu_indices(len(known), 1)
-        rank = np.empty(len(known), int)
-        rank[np.argsort(there.values[image].real)] = np.arange(len(known))
-        near = (q - p == 1) | (np.abs(rank[q] - rank[p]) == 1) | (rank[q] < rank[p])
+        p, q = neighbours(here.values[known].real, there.values[image].real, 1)
         alone = (here.partner[known] < 0) & (there.partner[image] < 0)
-        kept = near & alone[p] & alone[q]
+        kept = alone[p] & alone[q]
         return p[kept], q[kept]
 
 

@@ -21,7 +21,7 @@ from .limits import LIMITS, Limits
 from .march import check_increasing
 from .modes import Operator, contact_states, force_bearing, full_operator
 from .ranks import ALONE, Ranks
-from .window_edges import Edge, Family, Window, load_error
+from .window_edges import Edge, Family, Window
 
 
 class OnsetError(FaultgougeError):
@@ -231,7 +231,7 @@ def find_onset(
     negative = negative_eigenvalues(force_bearing(start, limits))
     if len(negative):
         at_start = Unstable.of(start) if takes_all else None
-        window = _at_start(start, float(negative[0]), load_error(start), 1.0)
+        window = _at_start(start, float(negative[0]), start.load_error, 1.0)
         return Onset((window,), False, (), modes, at_start, start.fx)
     unbalanced: dict[float, float] = {}
     states: dict[float, bytes] = {}
@@ -246,7 +246,7 @@ def find_onset(
                 f"no pair of eigenvalues becomes complex before F_x = {fx:.10g}, where one is negative: the branch of "
                 "stable equilibria ends before, at a turning point, and the packing leaves it without oscillation"
             )
-        unbalanced[fx], states[fx] = load_error(packing), contact_states(packing, limits)
+        unbalanced[fx], states[fx] = packing.load_error, contact_states(packing, limits)
         return full_operator(packing, limits)
 
     doubtful: Increments = ()
@@ -263,7 +263,7 @@ def find_onset(
         windows = windows[:1] if first else windows
     elif modes is None and (all_modes := _complex_at_start(start, limits)):
         windows = (_fastest(start, all_modes),)
-        unbalanced[start.fx] = load_error(start)
+        unbalanced[start.fx] = start.load_error
     else:
         one, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks, folder)
         windows = (one,) if one else ()

@@ -16,8 +16,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError
-from ..packing.packing import Floats, Packing
-from ..packing.snapshot import Snapshot
+from ..packing.packing import Floats
 from .eigenvalue_pair import Pair, continue_pair, dip_between
 from .limits import LIMITS, Limits
 from .march import look_between
@@ -139,11 +138,6 @@ class Window(GrowthWindow):
     def as_dict(self) -> dict[str, Any]:
         """The keys of the JSON contract: besides those of all windows, lambda."""
         return super().as_dict() | {"lambda": self.eigenvalue}
-
-
-def load_error(packing: Packing | Snapshot) -> float:
-    """Error of the load that goes with what is out of balance."""
-    return packing.load_error
 
 
 Followed = TypeVar("Followed")
