@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 
 from faultgouge.analysis.onset import Family, Limits, LostPairError, Modes, Pair
 from faultgouge.analysis.onset.eigenvalue_pair import continue_pair
-from faultgouge.analysis.onset.window_edges import edge_from_inside, locate_edge
+from faultgouge.analysis.onset.window_edges import edge_from_inside, locate_edge, sign_change
 
 BASIS = np.eye(12) + 0.1 * np.random.default_rng(2).normal(size=(12, 12))
 INVERSE = np.linalg.inv(BASIS)
@@ -82,6 +82,14 @@ def test_edge_where_the_equilibrium_jumps():
     assert edge.kind == "contact change"
     assert edge.fx == pytest.approx(0.37, abs=2 * edge.error + 1e-12)
     assert edge.error < 1e-9
+
+
+def test_a_function_within_rounding_of_zero_at_an_end_has_its_root_there():
+    """Loads in either order of the two values; the slope is that between the ends."""
+    for small, large in ((0.0, 1.0), (1.0, 0.0)):
+        root = sign_change({small: 2e-12, large: 1.0 + 2e-12}.__getitem__, 0.0, 1.0)
+        assert (root.fx, root.loads, root.smooth) == (small, [small], True)
+        assert root.error == pytest.approx(2e-12, rel=1e-12)
 
 
 def test_forces_out_of_balance_at_random_are_an_error_of_the_load(path):
