@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-class Tabled:
+class TableDisplay:
     """A result that shows itself as a table of two columns: in a notebook, and when rich prints it."""
 
     def _rows(self) -> Mapping[str, str]:

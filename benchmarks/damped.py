@@ -50,7 +50,7 @@ from faultgouge.analysis.damped_onset.window_edges import DampedWindow
 from faultgouge.analysis.damped_onset.windows import damped_windows, march_along_ramp, without_dissipation
 from faultgouge.analysis.onset.limits import LIMITS
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset.damped import Ramped, loads_inside, ramp_scene
+from faultgouge.pywrap.onset.damped import RampPath, loads_inside, ramp_scene
 
 KINDS = ({"cn": 1.0}, {"cn": 10.0, "ct": 5.0}, {"ct": 0.1}, {"cn": 0.1, "drag_time": 300.0})
 """Dissipation, in turn."""
@@ -76,11 +76,11 @@ Row = dict[str, object]
 
 Kinds = Sequence[dict[str, float]]
 
-Case = tuple[int, Ramped, dict[str, float]]
+Case = tuple[int, RampPath, dict[str, float]]
 """The seed, the ramp and the dissipation of a packing."""
 
 
-def compare_searches(ramp: Ramped, kind: dict[str, float]) -> tuple[Row, bool]:
+def compare_searches(ramp: RampPath, kind: dict[str, float]) -> tuple[Row, bool]:
     """Both searches on a ramp, and whether they agree."""
     times = [time.process_time()]
     try:
@@ -117,7 +117,7 @@ def edges(few: tuple[DampedWindow, ...], every: tuple[DampedWindow, ...]) -> tup
     return differences, stated
 
 
-def against_all_eigenvalues(ramp: Ramped, kind: dict[str, float]) -> tuple[Row, bool]:
+def against_all_eigenvalues(ramp: RampPath, kind: dict[str, float]) -> tuple[Row, bool]:
     """The first window from slices, and whether all eigenvalues of the companion matrix agree with it."""
     path = without_dissipation(ramp.path, **kind)
     begin = time.process_time()

@@ -24,7 +24,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from faultgouge.analysis.factors import linear
+from faultgouge.analysis.factors import linear_solver
 from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 
 PACKING = Path(__file__).parents[1] / "tests" / "reference" / "packing7.json"
@@ -84,7 +84,7 @@ def main() -> None:
     start = settle(Scene.from_mapping(scene))
     solve, lammps = Stopwatch(), Stopwatch()
     for name in ("dgbtrf", "dgbtrs"):
-        setattr(linear, name, solve(getattr(linear, name)))
+        setattr(linear_solver, name, solve(getattr(linear_solver, name)))
     with Engine(start.packing) as engine:
         engine._decks.lammps = TimedLammps(engine.lammps, lammps)
         increments(engine, start, solve, lammps)  # the first ones load libraries and caches

@@ -110,7 +110,7 @@ def increments(engine: Engine, start: Equilibrium) -> Row:
             break
         times.append(time.perf_counter() - begin)
     packing = here.packing
-    trial = engine.displaced(packing, np.zeros(3 * len(packing)))
+    trial = engine.try_displacement(packing, np.zeros(3 * len(packing)))
     _ = packing.geometry, trial.packing.geometry, trial.branches  # computed once, and not part of what follows
     begin = time.perf_counter()
     stiffness_matrix(packing)

@@ -16,7 +16,7 @@ from faultgouge.analysis import BadInputError, Packing
 from faultgouge.analysis.motion.hysteresis import layer_displacement
 from faultgouge.analysis.packing.arrays import Floats
 
-from .browser_pair import LARGE, NEAREST, Followed, Progress, follow_eigenvalues
+from .browser_pair import LARGE, NEAREST, Progress, RampEigenvalues, follow_eigenvalues
 from .packing import LEAST_SHARE, PackingArtist, View
 from .style import EDGE, FLOOR, INK, MOBILIZATION
 
@@ -119,7 +119,7 @@ def write_view(
     path.write_text(page, encoding="utf-8")
 
 
-def _frame(packing: Packing, course: Followed, k: int) -> dict[str, Any]:
+def _frame(packing: Packing, course: RampEigenvalues, k: int) -> dict[str, Any]:
     """The arrays of one load, in float32."""
     view, contacts = View.of(packing, margin=0.5 * packing.radius.max()), packing.contacts
     force = packing.normal_force
@@ -192,7 +192,7 @@ def _packing_plot(packings: Sequence[Packing], sources: dict[str, Any]) -> "figu
     return plot
 
 
-def _plane(course: Followed, sources: dict[str, Any]) -> "figure":
+def _plane(course: RampEigenvalues, sources: dict[str, Any]) -> "figure":
     """The plane of eigenvalues about the pair, with the way of the pair."""
     known = course.pair[np.isfinite(course.pair).all(axis=1)]
     low, high = float(known.real.min()), float(known.real.max())
@@ -207,7 +207,7 @@ def _plane(course: Followed, sources: dict[str, Any]) -> "figure":
     return plot
 
 
-def _curves(packings: Sequence[Packing], course: Followed, sources: dict[str, Any]) -> list["figure"]:
+def _curves(packings: Sequence[Packing], course: RampEigenvalues, sources: dict[str, Any]) -> list["figure"]:
     """Real and imaginary parts of the pair over the load."""
     fx = np.array([packing.fx for packing in packings])
     plots: list[figure] = []

@@ -31,7 +31,7 @@ CANDIDATES = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Followed:
+class RampEigenvalues:
     """Eigenvalues of a ramp, and one pair of them.
 
     Attributes
@@ -51,7 +51,7 @@ class Followed:
 
 def follow_eigenvalues(
     packings: Sequence[Packing], progress: Progress = iter, everything: bool | None = None
-) -> Followed:
+) -> RampEigenvalues:
     """Eigenvalues of equilibria in order of their load.
 
     Parameters
@@ -85,7 +85,7 @@ def follow_eigenvalues(
         found[k] = own[order]
         for member, number in enumerate(order):
             modes[k, member] = displacement(packings[k], each.right @ vectors[:, number])
-    return Followed(values, found, modes)
+    return RampEigenvalues(values, found, modes)
 
 
 def seconds(packings: Sequence[Packing]) -> float:

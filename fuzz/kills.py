@@ -56,7 +56,7 @@ COMPENSATED = 'precision = "compensated"\n'
 
 
 @dataclass(frozen=True)
-class Work:
+class CommandToKill:
     """A command that is to be killed.
 
     Attributes
@@ -76,19 +76,21 @@ class Work:
 
 RUN = "scene.toml -o out/run.h5"
 WORKS = {
-    "settle": Work(f"settle {RUN}", SEEDED),
-    "ramp": Work(f"ramp {RUN}", SCENE + FINE),
-    "ramp on two ranks": Work(f"ramp {RUN}", SCENE + PAIRED, 2),
-    "ramp, compensated": Work(f"ramp {RUN}", COMPENSATED + SCENE + COARSE),
-    "perturb": Work(f"perturb {RUN}", SCENE + PUSHED + LONG),
-    "perturb, compensated, on two ranks": Work(f"perturb {RUN}", COMPENSATED + SCENE + PUSHED + "time = 0.5\n", 2),
-    "onset": Work("onset scene.toml -o out/onset.json", SCENE + COARSE),
-    "reproduce": Work("reproduce scene.toml -o out", SEEDED),
+    "settle": CommandToKill(f"settle {RUN}", SEEDED),
+    "ramp": CommandToKill(f"ramp {RUN}", SCENE + FINE),
+    "ramp on two ranks": CommandToKill(f"ramp {RUN}", SCENE + PAIRED, 2),
+    "ramp, compensated": CommandToKill(f"ramp {RUN}", COMPENSATED + SCENE + COARSE),
+    "perturb": CommandToKill(f"perturb {RUN}", SCENE + PUSHED + LONG),
+    "perturb, compensated, on two ranks": CommandToKill(
+        f"perturb {RUN}", COMPENSATED + SCENE + PUSHED + "time = 0.5\n", 2
+    ),
+    "onset": CommandToKill("onset scene.toml -o out/onset.json", SCENE + COARSE),
+    "reproduce": CommandToKill("reproduce scene.toml -o out", SEEDED),
 }
 """By their names in the report; each leaves its results in the folder out."""
 
 
-def start_command(work: Work, folder: Path) -> subprocess.Popen[str]:
+def start_command(work: CommandToKill, folder: Path) -> subprocess.Popen[str]:
     """The command, under way in a folder."""
     (folder / "out").mkdir(parents=True, exist_ok=True)
     (folder / "scene.toml").write_text(work.scene)
@@ -100,7 +102,7 @@ def start_command(work: Work, folder: Path) -> subprocess.Popen[str]:
     )
 
 
-def finish_command(work: Work, folder: Path, timeout: float = 600.0) -> tuple[float, str]:
+def finish_command(work: CommandToKill, folder: Path, timeout: float = 600.0) -> tuple[float, str]:
     """Run the command to its end; the seconds, and what is wrong, if something is."""
     begin = time.monotonic()
     running = start_command(work, folder)
@@ -109,7 +111,7 @@ def finish_command(work: Work, folder: Path, timeout: float = 600.0) -> tuple[fl
     return time.monotonic() - begin, says
 
 
-def kill_command(work: Work, folder: Path, number: int, after: float) -> str:
+def kill_command(work: CommandToKill, folder: Path, number: int, after: float) -> str:
     """Kill the command after so many seconds; what is wrong with how it ends."""
     running = start_command(work, folder)
     try:

@@ -71,7 +71,7 @@ def draw_scene(number: int) -> tuple[dict[str, Any], list[float]]:
 
 
 @dataclass(frozen=True, eq=False)
-class Climb:
+class RampRun:
     """One ramp.
 
     Attributes
@@ -95,7 +95,7 @@ class Climb:
     seconds: float
 
     @classmethod
-    def of(cls, scene: Scene, start: Equilibrium) -> "Climb":
+    def of(cls, scene: Scene, start: Equilibrium) -> "RampRun":
         """Ramp from an equilibrium on."""
         begin, ends = time.process_time(), None
         shared, ways = {round(start.fx / INCREMENTS[0]): start}, []
@@ -114,12 +114,12 @@ class Climb:
         """The increment, force."""
         return require_section(self.scene.ramp, "ramp").step
 
-    def agrees(self, other: "Climb") -> bool:
+    def agrees(self, other: "RampRun") -> bool:
         """Whether both reach the end, or end at nearly the same load."""
         mine, theirs = (END if each.ends is None else each.ends for each in (self, other))
         return abs(mine - theirs) <= NEAR * FY
 
-    def beside(self, reference: "Climb") -> Row:
+    def compare_with(self, reference: "RampRun") -> Row:
         """How far this ramp is from another one at the loads that both have reached."""
         common = sorted(self.shared.keys() & reference.shared.keys())
         pairs = [(self.shared[k].packing, reference.shared[k].packing) for k in common]
@@ -149,13 +149,13 @@ def packing_row(number: int) -> Row:
     climbs = []
     for precision, step in product(ARITHMETICS, increments):
         scene = Scene.from_mapping(mapping | {"precision": precision, "ramp": {"step": step, "until": END}})
-        climbs.append(Climb.of(scene, settle(scene)))
+        climbs.append(RampRun.of(scene, settle(scene)))
     reference = climbs[len(increments)]  # compensated, with the smallest increments
     ramps = [_compare_ramps(climb, reference) for climb in climbs]
     return {"draw": number} | mapping["packing"] | mapping["law"] | {"ramps": ramps}
 
 
-def _compare_ramps(climb: Climb, reference: Climb) -> Row:
+def _compare_ramps(climb: RampRun, reference: RampRun) -> Row:
     """What is found of a ramp; of one that does not agree, where its own equilibria end with other increments."""
     found = {
         "step": climb.step,
@@ -169,9 +169,9 @@ def _compare_ramps(climb: Climb, reference: Climb) -> Row:
     if not climb.agrees(reference):
         shorter, longer = sorted((climb, reference), key=lambda each: END if each.ends is None else each.ends)
         onward = shorter.scene.model_copy(update={"ramp": longer.scene.ramp})
-        again = Climb.of(onward, shorter.shared[max(shorter.shared)])
+        again = RampRun.of(onward, shorter.shared[max(shorter.shared)])
         found |= {"verdict": "path" if again.agrees(shorter) else "not found", "crossed": again.ends}
-    return found | climb.beside(reference)
+    return found | climb.compare_with(reference)
 
 
 def rows_of(path: Path, packings: int, workers: int) -> Iterator[Row]:

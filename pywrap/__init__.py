@@ -16,7 +16,7 @@ from .equilibria.quasistatic import Equilibrium, equilibrate
 from .granular.compare_motion import MotionComparison, compare_motion
 from .granular.from_lammps import from_lammps
 from .granular.granular_commands import SnapshotError
-from .granular.lammps_path import LammpsPath, lammps_path
+from .granular.lammps_equilibrium_path import LammpsPath, lammps_path
 from .lammps.engine import Engine
 from .lammps.instance import EngineError
 from .runs.equilibrium_path import ramp, reach

@@ -20,7 +20,7 @@ ROOT = Path(faultgouge.__file__).parent
 
 FLOORS = {
     "faultgouge": (
-        ("lammps_inputs", "parent_death", "plugin", "ranks"),
+        ("lammps_inputs", "parent_death", "plugin", "mpi_rank"),
         ("analysis",),
         ("figures", "pywrap"),
         ("assessment", "studies"),

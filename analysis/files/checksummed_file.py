@@ -1,4 +1,4 @@
-"""An HDF5 file that grows, sealed and whole at any moment (:mod:`.wholefile`).
+"""An HDF5 file that grows, sealed and whole at any moment (:mod:`.atomic_write`).
 
 The file is kept in memory. When it is saved, all of it replaces the stored file. Saving takes a share of the time
 at the most, so that a file that grows for long is not written over and over.

@@ -24,9 +24,9 @@ the run's own time: readers of H5MD step through both. fx and fy are theirs, all
 nan, or 0 if they are whole numbers. ``/faultgouge/trajectory`` has its times, so that it counts these frames, and low
 parts of its positions.
 
-The stored file is whole at any moment and has a checksum over all its bytes (:mod:`.sealedfile`). The attribute
+The stored file is whole at any moment and has a checksum over all its bytes (:mod:`.checksummed_file`). The attribute
 ``complete`` of the root is false until the run has come to its end; ``/checkpoint`` is then the state from which an
-undamped run goes on. A file is checked whole when it is opened (:mod:`.runfile_check`).
+undamped run goes on. A file is checked whole when it is opened (:mod:`.runfile_validation`).
 
 Datasets depend on the scene alone. What belongs to the circumstances (resolved scene, versions, seed, ranks)
 is an attribute of the root. One file holds one set of disks and one law.

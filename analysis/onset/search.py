@@ -13,7 +13,7 @@ from ..errors import FaultgougeError, TurningPointError
 from ..packing.packing import Floats, Packing
 from ..spectrum.buckling import negative_eigenvalues
 from ..spectrum.spectrum import Spectrum, spectrum
-from ..table_display import Tabled
+from ..table_display import TableDisplay
 from ..uncertain_digits import with_uncertainty
 from .all_windows import all_windows
 from .first_window import Increments, Watch, first_window
@@ -85,7 +85,7 @@ class Unstable:
 
 
 @dataclass(frozen=True)
-class Onset(Tabled):
+class Onset(TableDisplay):
     """The windows of complex eigenvalues along a ramp.
 
     Attributes

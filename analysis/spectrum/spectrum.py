@@ -49,7 +49,7 @@ from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
 from ..packing.snapshot import Snapshot
-from ..table_display import Tabled
+from ..table_display import TableDisplay
 
 Complexes = NDArray[np.complex128]
 
@@ -123,7 +123,7 @@ class ComplexPair:
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum(Tabled):
+class Spectrum(TableDisplay):
     """All eigenvalues of a packing's stability operator.
 
     Attributes

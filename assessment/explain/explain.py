@@ -32,9 +32,9 @@ from ...pywrap.runs.equilibrium_path import next_equilibrium, step_of
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.sections import Ramp
 from ...pywrap.settling.settle import settle
-from .parts import FEW, SHARE, TURNS, Cost, Part, same_motion
+from .cost_comparison import FEW, SHARE, TURNS, Cost, Part, same_motion
 from .processors import ranks, threads
-from .switches import UNREACHED, Feature, Loaded, Run, features
+from .switches import UNREACHED, Feature, InstanceContents, UndampedRun, features
 
 LARGEST = 400
 """Disks up to which a packing is settled to be explained: half a second. Of a larger one a strip of as many is, of the
@@ -54,7 +54,7 @@ class Explanation:
         Of the packing that was measured.
     remark : str
         What that packing is.
-    loaded : Loaded
+    loaded : InstanceContents
         What the scene's undamped run has in LAMMPS.
     imported, left_out : tuple of str
         Heavy packages that this process has imported after that run, and those that it has not.
@@ -67,7 +67,7 @@ class Explanation:
 
     disks: int
     remark: str
-    loaded: Loaded
+    loaded: InstanceContents
     imported: tuple[str, ...]
     left_out: tuple[str, ...]
     parts: tuple[Part, ...]
@@ -104,7 +104,7 @@ def explain(scene: Scene) -> Explanation:
     with temporary_folder() as name:
         folder = Path(name)
         with run.started(MPI.COMM_SELF, folder / "scene.log") as (engine, _):
-            loaded = Loaded.of(engine, folder / "scene.log")
+            loaded = InstanceContents.of(engine, folder / "scene.log")
         imported = tuple(package for package in HEAVY if package in sys.modules)
         bare = replace(run, motion={})
         with bare.started(MPI.COMM_SELF) as (_, dynamics):
@@ -125,13 +125,13 @@ def explain(scene: Scene) -> Explanation:
     )
 
 
-def _run_feature(feature: Feature, scene: Loaded, steps: int, folder: Path) -> Part:
+def _run_feature(feature: Feature, scene: InstanceContents, steps: int, folder: Path) -> Part:
     """Both runs of a feature: what it loads, what it costs, and whether they agree."""
     with ExitStack() as both:
         logs = folder / "without.log", folder / "with.log"
         without, plain = both.enter_context(feature.without.started(MPI.COMM_SELF, logs[0]))
         with_it, switched = both.enter_context(feature.with_it.started(MPI.COMM_SELF, logs[1]))
-        adds = Loaded.of(with_it, logs[1]).beyond(Loaded.of(without, logs[0]))
+        adds = InstanceContents.of(with_it, logs[1]).beyond(InstanceContents.of(without, logs[0]))
         others = ~np.isin(np.arange(len(feature.with_it.packing)), feature.touched)
         forces = without.net_force, with_it.net_force
         here, there = (force[: 2 * len(others)][np.tile(others, 2)] for force in forces)
@@ -172,7 +172,7 @@ def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
 
         # an equilibrium by damped dynamics takes half a second
         cost = Cost.of("equilibrium", lambda: reach(False), lambda: reach(True), turns=FEW)
-        parts = Loaded.of(engine, log).parts
+        parts = InstanceContents.of(engine, log).parts
     adds = [f"part {part}" for part in parts if part == "write.in"]
     adds += [f"file {path.name}" for path in sorted(files.iterdir())]
     identical = all(np.array_equal(each.position, reached[0].position) for each in reached)
@@ -180,7 +180,7 @@ def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
     return Part("dumps", wanted, reason, tuple(adds), cost, "positions of the equilibrium", identical)
 
 
-def _contact_output(scene: Scene, run: Run, loaded: Loaded, steps: int, folder: Path) -> Part:
+def _contact_output(scene: Scene, run: UndampedRun, loaded: InstanceContents, steps: int, folder: Path) -> Part:
     """The forces of each contact, every 100 steps."""
     wanted = scene.output is not None and scene.output.dumps
     reason = "in the dumps" if wanted else "no output.dumps"
@@ -189,7 +189,7 @@ def _contact_output(scene: Scene, run: Run, loaded: Loaded, steps: int, folder: 
     return replace(_run_feature(feature, loaded, steps, folder), included=wanted)
 
 
-def _trajectory(scene: Scene, start: Equilibrium, run: Run, steps: int, folder: Path) -> Part:
+def _trajectory(scene: Scene, start: Equilibrium, run: UndampedRun, steps: int, folder: Path) -> Part:
     """A sample of an undamped run, with and without its positions in run.h5."""
     wanted = scene.output is not None and scene.output.trajectory
     path = folder / "run.h5"
@@ -229,7 +229,7 @@ def _affordable(scene: Scene) -> tuple[Scene, str]:
     return scene.model_copy(update=update), remark
 
 
-def _run_of(scene: Scene, packing: Packing) -> Run:
+def _run_of(scene: Scene, packing: Packing) -> UndampedRun:
     """The scene's undamped run; friction that weakens does so beyond a threshold that is never reached."""
     perturb, motion = scene.perturb, dict[str, Any]()
     if perturb:
@@ -243,7 +243,7 @@ def _run_of(scene: Scene, packing: Packing) -> Run:
     if scene.friction:
         law = scene.friction
         motion["weakening"] = Weakening(B=law.B, w=law.w, mu_ss=law.mu_ss, v0=UNREACHED, v_ss=1.0)
-    return Run(packing, motion)
+    return UndampedRun(packing, motion)
 
 
 def _steps(dynamics: Dynamics) -> int:

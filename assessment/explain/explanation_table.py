@@ -4,8 +4,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from .cost_comparison import Cost
 from .explain import Explanation
-from .parts import Cost
 
 
 def in_words(explanation: Explanation) -> str:

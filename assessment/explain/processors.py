@@ -11,14 +11,14 @@ from mpi4py import MPI
 
 from ...analysis import Packing, dynamical_matrix
 from ...analysis.packing.packing import Floats
-from .parts import FEW, Cost, Part, same_motion
-from .switches import Run
+from .cost_comparison import FEW, Cost, Part, same_motion
+from .switches import UndampedRun
 
 DENSE = 400
 """Equations of the linear solve that threads are tried on, at the most."""
 
 
-def ranks(run: Run, steps: int, folder: Path) -> Part:
+def ranks(run: UndampedRun, steps: int, folder: Path) -> Part:
     """The same run on one rank and on two, in a process of its own."""
     size = MPI.COMM_WORLD.size
     reason = f"{size} rank{'s' * (size > 1)}"
@@ -44,7 +44,7 @@ def time_ranks(job: str) -> None:
     Parameters
     ----------
     job : str
-        File with a pickled pair of a `Run` and the steps of a turn; the result goes beside it.
+        File with a pickled pair of a `UndampedRun` and the steps of a turn; the result goes beside it.
     """
     world = MPI.COMM_WORLD
     run, steps = pickle.loads(Path(job).read_bytes())

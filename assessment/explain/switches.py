@@ -30,7 +30,7 @@ UNREACHED = 1e6
 
 
 @dataclass(frozen=True)
-class Loaded:
+class InstanceContents:
     """What a LAMMPS instance holds.
 
     Attributes
@@ -54,7 +54,7 @@ class Loaded:
     settings: tuple[str, ...]
 
     @classmethod
-    def of(cls, engine: Engine, log: Path) -> Loaded:
+    def of(cls, engine: Engine, log: Path) -> InstanceContents:
         """Read it from LAMMPS, and from its log, which ends here."""
         instance = engine.lammps
         instance.command("log none")
@@ -79,13 +79,13 @@ class Loaded:
         kinds = {"part": "parts", "fix": "fixes", "compute": "computes", "dump": "dumps", "array": "arrays"}
         return *(f"{kind} {name}" for kind, names in kinds.items() for name in getattr(self, names)), *self.settings
 
-    def beyond(self, other: Loaded) -> tuple[str, ...]:
+    def beyond(self, other: InstanceContents) -> tuple[str, ...]:
         """What is here and not there."""
         return tuple(each for each in self.everything if each not in other.everything)
 
 
 @dataclass(frozen=True)
-class Run:
+class UndampedRun:
     """An undamped run: the scene's, or one that differs from it in one feature.
 
     Attributes
@@ -124,7 +124,7 @@ class Run:
                 engine.lammps.command("run 0 post no")
             yield engine, dynamics
 
-    def of(self, **changes: Any) -> Run:
+    def of(self, **changes: Any) -> UndampedRun:
         """The same run of a packing that differs in these arguments."""
         return replace(self, packing=replace(self.packing, **changes))
 
@@ -153,13 +153,13 @@ class Feature:
 
     name: str
     reason: str
-    without: Run
-    with_it: Run
+    without: UndampedRun
+    with_it: UndampedRun
     touched: ArrayLike = ()
     moves: bool = True
 
 
-def features(run: Run) -> Iterator[Feature]:
+def features(run: UndampedRun) -> Iterator[Feature]:
     """The features of a run, each with two runs that differ in it and have no push, signal or weakening else."""
     bare = replace(run, motion={})
     law = run.packing.law
@@ -178,7 +178,7 @@ def features(run: Run) -> Iterator[Feature]:
     yield Feature("compensated coordinates", reason, plain, low)
 
 
-def _of_contacts(bare: Run, rough: Run) -> Iterator[Feature]:
+def _of_contacts(bare: UndampedRun, rough: UndampedRun) -> Iterator[Feature]:
     """Floor, friction and period."""
     packing, law, box = bare.packing, bare.packing.law, bare.packing.box_length
     on_floor = np.unique(packing.contacts.i[packing.contacts.floor])
@@ -194,7 +194,7 @@ def _of_contacts(bare: Run, rough: Run) -> Iterator[Feature]:
     yield Feature("periodicity", reason, opened, closed, across)
 
 
-def _of_damping(bare: Run) -> Iterator[Feature]:
+def _of_damping(bare: UndampedRun) -> Iterator[Feature]:
     """Dashpots and drag, each with what the scene has or else a hundredth of what is critical for one contact."""
     packing, law, tau = bare.packing, bare.packing.law, bare.packing.drag_time
     rate = np.sqrt(law.stiffness_scale(packing.fy) / packing.mass.mean())
@@ -206,7 +206,7 @@ def _of_damping(bare: Run) -> Iterator[Feature]:
     yield Feature("drag", reason, bare.of(drag_time=None), bare.of(drag_time=tau or 100 / rate))
 
 
-def _of_motion(run: Run, bare: Run) -> Iterator[Feature]:
+def _of_motion(run: UndampedRun, bare: UndampedRun) -> Iterator[Feature]:
     """What pushes the disks."""
     push, pushed = run.moved_by("amplitude", "omega", otherwise={"amplitude": 1e-9, "omega": 0.01})
     reason = f"amplitude {push['amplitude']:g}" if "amplitude" in run.motion else "no amplitude in [perturb]"
@@ -229,7 +229,7 @@ def _arrays(instance: Any, fixes: tuple[str, ...]) -> Iterator[str]:
         yield "d_theta"
 
 
-def _opened_and_closed(bare: Run) -> tuple[Run, Run, ArrayLike]:
+def _opened_and_closed(bare: UndampedRun) -> tuple[UndampedRun, UndampedRun, ArrayLike]:
     """The run with open sides and with a period, and the disks with a contact across it."""
     packing = bare.packing
     i, j, floor = packing.contacts.i, packing.contacts.j, packing.contacts.floor

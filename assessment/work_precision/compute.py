@@ -28,12 +28,12 @@ from ...pywrap import Scene, ramp
 from .draw import changing_figure, coverage_figure, figure_of
 from .methods.dumps import dumps
 from .methods.eigenvalues import far, near
-from .methods.frequency import frequency, growth
+from .methods.frequency_and_growth import frequency, growth
 from .methods.jacobian import jacobian
 from .methods.onset import onset
 from .methods.relaxation import relaxation
-from .methods.study import Settings, Study
 from .methods.trajectory import trajectory
+from .methods.work_precision_study import Settings, Study
 
 Say = Callable[[str], None]
 Ask = Callable[[Settings], Study]

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from ...figures.style import INK, styled
-from .coverage.changing import CoverageCase
-from .methods.study import Covered, Point, Study
+from .coverage.stated_errors import CoverageCase
+from .methods.work_precision_study import Point, StatedError, Study
 
 MARKERS = "osD^vP"
 DASHES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
@@ -140,7 +140,7 @@ def _label(text: str, width: int = 44) -> str:
 
 
 @styled
-def coverage_figure(cases: Sequence[Covered]) -> Figure:
+def coverage_figure(cases: Sequence[StatedError]) -> Figure:
     """Stated over true errors, doubly logarithmic, a colour an arithmetic; the line is where they are equal.
 
     A true error of zero stands at the left edge.

@@ -136,16 +136,16 @@ def iterate_newton(
             return None, evaluations
         trial, evaluations = displaced(base, displacement), evaluations + 1
         # What a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved.
-        if course.ends_at(trial, result=guess is None or iteration > 0):
+        if course.is_finished(trial, result=guess is None or iteration > 0):
             return course.best, evaluations
-        if factors is None or not course.spares_factors(trial.residual, len(base)):
+        if factors is None or not course.may_reuse_factors(trial.residual, len(base)):
             course.floor = trial.floor
-            hit = rattlers.hit(trial)
+            hit = rattlers.find_hit(trial)
             if len(hit):
                 displacement = _out_of_the_way(trial.packing, hit, displacement)
                 trial, evaluations = displaced(base, displacement), evaluations + 1
             factors = factor_stiffness(trial, course.floor, since, factors)
-        course.goes_on(trial.residual)
+        course.go_on(trial.residual)
         step = None if factors is None else factors.solve(trial.force)
         if factors is None or step is None or too_long(step, base):
             return None, evaluations
@@ -178,7 +178,7 @@ class _Course:
         self._worse = 0  # iterations that gained nothing; changes of contacts cost some
         self._earlier, self._last = np.inf, answers  # residuals of the two iterations before
 
-    def ends_at(self, trial: Trial, result: bool) -> bool:
+    def is_finished(self, trial: Trial, result: bool) -> bool:
         """Whether nothing is left to gain, or to hope for; the best trial is the result then, None if it is none.
 
         Parameters
@@ -208,13 +208,13 @@ class _Course:
         factor = self._last / self._earlier if self._earlier < np.inf else GAIN
         return residual < self.floor and factor * self._last < 0.1 * self.floor
 
-    def spares_factors(self, residual: float, disks: int) -> bool:
+    def may_reuse_factors(self, residual: float, disks: int) -> bool:
         """Whether the factors of K at hand do for the next iteration."""
         if residual * (residual / self._last) ** SPARED < 0.1 * self.floor:
             return True
         return disks > SPARING and residual <= KEPT * self._last
 
-    def goes_on(self, residual: float) -> None:
+    def go_on(self, residual: float) -> None:
         """Another iteration is made from here."""
         self._earlier, self._last = self._last, residual
 
@@ -228,7 +228,7 @@ class _Rattlers:
         self._loose = (_carrying(start, nothing) == 0) & ~start.still.top
         self._moved = np.zeros(len(self._loose), dtype=np.int64)
 
-    def hit(self, trial: Trial) -> Indices:
+    def find_hit(self, trial: Trial) -> Indices:
         """Those that a neighbour ran into, and disks with one contact left, which become rattlers; to be moved."""
         count = _carrying(trial, trial.floor)
         hit = ((count == 1) & ~trial.still.top) | (self._loose & (count > 0))

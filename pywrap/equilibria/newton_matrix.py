@@ -3,14 +3,14 @@
 Contacts below the rounding floor are left out, since their stiffness is noise, and so are the coordinates that nothing
 holds then. A contact that has closed since the displacement began has no slip, however long the displacement: its
 tangential force is no function of it, and has no part in K. A small matrix is a band and goes to LAPACK, a large one is
-sparse (:mod:`~faultgouge.analysis.factors.linear`).
+sparse (:mod:`~faultgouge.analysis.factors.linear_solver`).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from ...analysis.factors.linear import Band, BandSolver, Booleans, Solver, SparseSolver
+from ...analysis.factors.linear_solver import Band, BandSolver, Booleans, Solver, SparseSolver
 from ...analysis.operators.stiffness import assemble_stiffness, contact_terms
 from ...analysis.packing.arrays import Floats, Indices
 from ..lammps.contact_graph import ContactGraph

@@ -222,7 +222,7 @@ def _response(engine: Engine, last: Equilibrium, fx: float) -> Guess | None:
         return None
     push = np.zeros(3 * len(packing))
     push[: len(packing)][packing.top] = fx - packing.fx
-    trial = engine.kept(packing)
+    trial = engine.trial_of(packing)
     factors = factor_stiffness(trial, trial.floor)
     step = None if factors is None else factors.solve(push)
     return None if step is None or too_long(step, packing) else Guess(step, factors, abs(fx - packing.fx))
@@ -240,7 +240,7 @@ def _newton(
     engine: Engine, base: Packing, force_tolerance: float | None, guess: Guess | None, patient: bool = False
 ) -> tuple[Equilibrium | None, int]:
     """Newton's method from one base at the engine's fx; None where it does not converge."""
-    best, evaluations = iterate_newton(engine.displaced, engine.kept(base), force_tolerance, guess, patient)
+    best, evaluations = iterate_newton(engine.try_displacement, engine.trial_of(base), force_tolerance, guess, patient)
     if best is None:
         return None, evaluations
     return Equilibrium(engine.keep(best), best.residual, best.floor, evaluations), evaluations

@@ -123,7 +123,7 @@ def format_of(path: Path) -> Format:
         return DATA if begin == "data" else DUMP
     if is_hdf5(path):
         raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
-    from .mdanalysis_reader import has_parser
+    from .mdanalysis_import import has_parser
 
     own = path.suffix.lower() == ".h5"  # MDAnalysis has a parser of it once `mdanalysis` is imported
     if path.suffix and not own and has_parser(path):

@@ -2,7 +2,7 @@ r"""A Snapshot of a live LAMMPS with its own granular styles, or ours: any packi
 
 What LAMMPS says of each contact (compute pair/local, fix wall/gran ... contacts) is its normal, its overlap and both
 forces, without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.forked_look`). The laws are
-measured (:mod:`~faultgouge.pywrap.granular.contact_law`), with which
+measured (:mod:`~faultgouge.pywrap.granular.contact_law_measurement`), with which
 
 .. math::
 
@@ -34,7 +34,7 @@ from ...analysis import LinearisedContacts, MindlinLaw, Snapshot
 from ...analysis.packing.arrays import Floats, Indices
 from ...analysis.packing.snapshot import PER_CONTACT, WALL, linearise_contacts
 from . import forked_look
-from .contact_law import MeasuredLaw, State, measure_laws
+from .contact_law_measurement import MeasuredLaw, State, measure_laws
 from .granular_commands import OWN, Commands, SnapshotError, check_fixes, check_pair, read_commands, without_suffix
 
 BALANCE = 1e-4

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import FLOOR, Contacts
-from ...analysis.factors.linear import Band, Booleans, band
+from ...analysis.factors.linear_solver import Band, Booleans, band
 from ...analysis.packing.arrays import Floats, Indices
 
 

@@ -90,7 +90,7 @@ class Dynamics:
         self._decks, self._state, self._packing, self._weakening = decks, lammps_state, packing, weakening
 
     @contextmanager
-    def moving(self, time_step: float, drag_time: float | None) -> Iterator[None]:
+    def integrate(self, time_step: float, drag_time: float | None) -> Iterator[None]:
         """Velocity Verlet, and what damping there is (deck part undamped.in)."""
         still = self._packing.rattlers
         with ExitStack() as groups:
@@ -106,14 +106,14 @@ class Dynamics:
                 self._decks.command("fix_modify floor damping no")
 
     @contextmanager
-    def pushed(self, amplitude: float, omega: float, target: str) -> Iterator[None]:
+    def push_cosine(self, amplitude: float, omega: float, target: str) -> Iterator[None]:
         """The force a cos(omega t) along x on each disk of a group (deck part push.in)."""
         self._decks.include("push.in", amplitude=amplitude, omega=omega, target=target)
         yield
         self._decks.command("unfix push")
 
     @contextmanager
-    def forced(self, signal: Signal, on: str, target: str, communicator: MPI.Comm) -> Iterator[None]:
+    def apply_signal(self, signal: Signal, on: str, target: str, communicator: MPI.Comm) -> Iterator[None]:
         """A signal (deck part signal.in), as a table that all ranks can read."""
         with shared_folder(communicator) as folder:
             table = folder / "signal.txt"
@@ -162,7 +162,7 @@ class Dynamics:
         return motion, (mean * steps + 0.5 * (first - last)) * float(lammps.extract_global("dt"))
 
     @contextmanager
-    def halted(self, velocity: float) -> Iterator[None]:
+    def halt_above(self, velocity: float) -> Iterator[None]:
         """End the run once the upper layer is faster than this, length / time (deck part halt.in)."""
         self._decks.include("halt.in", halt_velocity=float(velocity))
         self._decks.command("run 0 post no")

@@ -201,9 +201,9 @@ class Engine:
         Packing
             The configuration at the end of the path; `net_force` has its forces.
         """
-        return self.displaced(base, displacement).packing
+        return self.try_displacement(base, displacement).packing
 
-    def displaced(self, base: Packing, displacement: Floats) -> Trial:
+    def try_displacement(self, base: Packing, displacement: Floats) -> Trial:
         """The same as a `Trial`, for many displacements in turn."""
         return self._state.displace(base, displacement)
 
@@ -213,7 +213,7 @@ class Engine:
         self._state.keep(trial)
         return trial.packing
 
-    def kept(self, packing: Packing) -> Trial:
+    def trial_of(self, packing: Packing) -> Trial:
         """The trial that `keep` was given with this packing; otherwise a trial of the packing without forces."""
         if self._kept is None or self._kept.packing is not packing:
             self._kept = Trial.of(packing)
@@ -276,12 +276,15 @@ class Engine:
         packing = self.packing
         self._state.end_displacements()
         dynamics = Dynamics(self._decks, self._state, packing, weakening)
-        with dynamics.moving(time_step, packing.drag_time if drag_time is None else drag_time), ExitStack() as forces:
+        with (
+            dynamics.integrate(time_step, packing.drag_time if drag_time is None else drag_time),
+            ExitStack() as forces,
+        ):
             pushed = "top" if target is None else forces.enter_context(self._decks.group("pushed", target))
             if amplitude != 0:
-                forces.enter_context(dynamics.pushed(amplitude, omega, pushed))
+                forces.enter_context(dynamics.push_cosine(amplitude, omega, pushed))
             if signal is not None:
-                forces.enter_context(dynamics.forced(signal, on, pushed, self.communicator))
+                forces.enter_context(dynamics.apply_signal(signal, on, pushed, self.communicator))
             dynamics.begin()
             yield dynamics
 

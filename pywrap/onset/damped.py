@@ -93,7 +93,7 @@ class DampedOnset:
 
 
 @dataclass(frozen=True, eq=False)
-class Ramped:
+class RampPath:
     """A ramp, and the equilibria between its loads.
 
     Attributes
@@ -141,7 +141,7 @@ def ramp_scene(
     watch: Watch = lambda says: None,
     first: bool = False,
     bed: Packing | None = None,
-) -> Iterator[Ramped]:
+) -> Iterator[RampPath]:
     """Ramp a scene to its end, or to where the packing flows; its equilibria have no dissipation.
 
     The ramp of a packing of which the `first` window alone is sought goes as far as somebody asks for equilibria; so
@@ -166,7 +166,7 @@ def ramp_scene(
             for _ in path.climb(wanted[1:]):
                 pass
             forces = np.array([each.fx for each in path.kept])
-        yield Ramped(path, forces, all_modes, whole, len(forces) < len(wanted))
+        yield RampPath(path, forces, all_modes, whole, len(forces) < len(wanted))
 
 
 Dissipation = Callable[[Packing], Packing]
@@ -232,7 +232,7 @@ def damped_onset_run(
         return replace(found, windows=windows, undamped=undamped, equilibria=equilibria)
 
 
-def _all_windows(ramp: Ramped, mu: float, dissipation: Dissipation, watch: Watch, known: Known) -> DampedOnset:
+def _all_windows(ramp: RampPath, mu: float, dissipation: Dissipation, watch: Watch, known: Known) -> DampedOnset:
     """All windows of a ramp that is solved for, without the errors of the path."""
     watch(f"pairs that become complex without dissipation, up to F_x = {ramp.forces[-1]:.6g}")
     undamped = ramp.undamped()
@@ -249,7 +249,7 @@ def _all_windows(ramp: Ramped, mu: float, dissipation: Dissipation, watch: Watch
     return DampedOnset(mu, found, undamped, last if ramp.flows else None)
 
 
-def _first_of_all_modes(ramp: Ramped, mu: float, dissipation: Dissipation, watch: Watch) -> DampedOnset:
+def _first_of_all_modes(ramp: RampPath, mu: float, dissipation: Dissipation, watch: Watch) -> DampedOnset:
     """The first window of either kind of a packing whose modes are all searched, without the errors of the path."""
     watch("the first pair that becomes complex without dissipation")
     undamped = ramp.undamped()
@@ -272,13 +272,13 @@ class Undamped:
 
     Parameters
     ----------
-    ramp : Ramped
+    ramp : RampPath
         Of a packing whose modes are all searched.
     first : float
         The first undamped onset, force; infinite if there is none.
     """
 
-    def __init__(self, ramp: Ramped, first: float) -> None:
+    def __init__(self, ramp: RampPath, first: float) -> None:
         loads = ramp.forces
         begin = int(np.searchsorted(loads, first, side="right")) - 1
         narrowest = LIMITS.narrowest * float(np.abs(loads).max())
@@ -309,7 +309,7 @@ class Undamped:
 
 
 def _first_in_slices(
-    ramp: Ramped, mu: float, dissipation: Dissipation, watch: Watch, known: Known, folder: Path | None
+    ramp: RampPath, mu: float, dissipation: Dissipation, watch: Watch, known: Known, folder: Path | None
 ) -> DampedOnset:
     """The first window of either kind of a large packing, without the errors of the path; all ranks search."""
 

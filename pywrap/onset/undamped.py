@@ -14,7 +14,7 @@ from ...analysis.onset import full_operator, takes_all_modes
 from ...analysis.onset.search import windows_rows
 from ...analysis.packing.arrays import Floats
 from ...analysis.spectrum.spectrum import active_coordinates
-from ...analysis.table_display import Tabled
+from ...analysis.table_display import TableDisplay
 from ...analysis.uncertain_digits import with_uncertainty
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
@@ -28,7 +28,7 @@ from .search_ranks import search_ranks
 
 
 @dataclass(frozen=True, eq=False)
-class OnsetRun(Tabled):
+class OnsetRun(TableDisplay):
     """A ramp and what it shows.
 
     Attributes

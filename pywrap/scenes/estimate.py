@@ -20,7 +20,7 @@ from typing import Literal, TypeAlias
 
 from ...analysis import MindlinLaw
 from .packing_section import GeneratedPacking
-from .scene_keys import Keys
+from .scene_keys import SceneKeys
 from .validation import SceneError
 
 Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "onset --all", "reproduce"]
@@ -131,7 +131,7 @@ class Estimate:
         return f"about {_duration(self.seconds)}: {', '.join(parts)}"
 
 
-def estimate_work(scene: Keys, task: Task) -> Estimate:
+def estimate_work(scene: SceneKeys, task: Task) -> Estimate:
     """What a command does for a scene.
 
     Parameters
@@ -183,7 +183,7 @@ def estimate_work(scene: Keys, task: Task) -> Estimate:
     return Estimate(disks, steps, increments, memory, written, seconds)
 
 
-def describe_work(scene: Keys, task: Task) -> str:
+def describe_work(scene: SceneKeys, task: Task) -> str:
     """What a command will do and how long that takes, in a line; empty where it takes no time.
 
     Parameters
@@ -210,7 +210,7 @@ def describe_work(scene: Keys, task: Task) -> str:
     raise SceneError(f"the scene asks {task} for {what} ({work}): {_remedy(scene, task)}")
 
 
-def refuse_impossible(scene: Keys) -> tuple[str, str] | None:
+def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
     """What in the numbers of a scene no packing can bear: the key, and the rest of the sentence; None if nothing is."""
     packing, law, fy = scene.packing, scene.law, scene.load.fy
     if not isinstance(packing, GeneratedPacking):
@@ -248,7 +248,7 @@ def refuse_impossible(scene: Keys) -> tuple[str, str] | None:
     return None
 
 
-def _search_seconds(scene: Keys, increments: float, damped: bool) -> float:
+def _search_seconds(scene: SceneKeys, increments: float, damped: bool) -> float:
     """Time of the search for the onset, on one core."""
     disks = scene.packing.disks
     step = scene.ramp.step if scene.ramp is not None else 0.0
@@ -273,17 +273,17 @@ def _searched_bytes(disks: int) -> float:
     return disks * BYTES_SEARCHED + (bases if bases < BYTES_OF_BASES[1] else 0.0)
 
 
-def _stiffness(scene: Keys, force: float) -> float:
+def _stiffness(scene: SceneKeys, force: float) -> float:
     law = _law(scene)
     return float(law.normal_stiffness(law.overlap_of_force(force)))
 
 
-def _law(scene: Keys) -> MindlinLaw:
+def _law(scene: SceneKeys) -> MindlinLaw:
     """The repulsion alone."""
     return MindlinLaw(scene.law.kn, kt=0.0, mu=0.0, exponent=scene.law.exponent)
 
 
-def _settling_steps(scene: Keys) -> float:
+def _settling_steps(scene: SceneKeys) -> float:
     assert isinstance(scene.packing, GeneratedPacking)
     stiff = _stiffness(scene, FORCE_CHAINS * scene.load.fy) * 2 * min(scene.packing.radii) / scene.load.fy
     if scene.packing.settle_friction:
@@ -291,22 +291,22 @@ def _settling_steps(scene: Keys) -> float:
     return SETTLING * math.sqrt(8 * stiff) / 0.8
 
 
-def _overdamped_step(scene: Keys) -> float:
+def _overdamped_step(scene: SceneKeys) -> float:
     return scene.relax.damping / (4 * _stiffness(scene, FORCE_CHAINS * scene.load.fy))
 
 
-def _overdamped_steps(scene: Keys) -> float:
+def _overdamped_steps(scene: SceneKeys) -> float:
     step = scene.relax.time_step
     return OVERDAMPED if step is None else OVERDAMPED * _overdamped_step(scene) / step
 
 
-def _undamped_step(scene: Keys) -> float:
+def _undamped_step(scene: SceneKeys) -> float:
     packing = scene.packing
     lightest = min(1.0, scene.inertia_factor) * ((isinstance(packing, GeneratedPacking) and packing.mass) or 1.0)
     return 0.1 * math.sqrt(lightest / (6 * _stiffness(scene, scene.load.fy)))
 
 
-def _remedy(scene: Keys, task: Task) -> str:
+def _remedy(scene: SceneKeys, task: Task) -> str:
     if task == "perturb":
         return "lower perturb.time, or raise perturb.time_step"
     return (

@@ -31,14 +31,14 @@ from pydantic_core import InitErrorDetails
 
 from .command_sections import COMMANDS, Command
 from .estimate import refuse_impossible
-from .scene_keys import Keys
+from .scene_keys import SceneKeys
 from .sections import Inertia
 from .units import real_units
 from .validation import SceneError, Section, read_toml, refusal_sentence, require_section, sentence
 
 
-class Scene(Keys):
-    """What is wanted, complete and consistent: `Keys` whose sections agree with each other."""
+class Scene(SceneKeys):
+    """What is wanted, complete and consistent: `SceneKeys` whose sections agree with each other."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
@@ -163,7 +163,7 @@ def _check_keys(mapping: Mapping[str, Any]) -> None:
     for name, section in mapping.items():
         keys = section if isinstance(section, Mapping) else {}
         known = {key for model in SECTIONS.get(name, ()) for key in model.model_fields}
-        if name not in Keys.model_fields:
+        if name not in SceneKeys.model_fields:
             errors.append({"type": "extra_forbidden", "loc": (name,), "input": section})
         elif name in SECTIONS and keys is not section:
             errors.append({"type": "dict_type", "loc": (name,), "input": section})
@@ -180,7 +180,7 @@ def _models(annotation: Any) -> tuple[type[Section], ...]:
     return tuple(model for part in get_args(annotation) for model in _models(part))
 
 
-SECTIONS = {name: models for name, field in Keys.model_fields.items() if (models := _models(field.annotation))}
+SECTIONS = {name: models for name, field in SceneKeys.model_fields.items() if (models := _models(field.annotation))}
 
-ALL = Command(tuple(Keys.model_fields))
+ALL = Command(tuple(SceneKeys.model_fields))
 """Every section."""

@@ -15,7 +15,7 @@ STEPS = 3e4
 """Increments of F_x up to F_y where a scene does not say: the paper's 1e-4 of 3."""
 
 
-class Keys(Section):
+class SceneKeys(Section):
     """What a scene says.
 
     Attributes

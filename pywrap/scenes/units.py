@@ -36,7 +36,7 @@ import numpy as np
 
 from ...analysis import MindlinLaw, PackingFileError
 from .packing_section import GeneratedPacking
-from .scene_keys import Keys
+from .scene_keys import SceneKeys
 from .validation import refusal_sentence
 
 HERTZ = 1.5
@@ -126,7 +126,7 @@ class RealUnits:
         }
 
 
-def real_units(scene: Keys) -> RealUnits | None:
+def real_units(scene: SceneKeys) -> RealUnits | None:
     """The units of a scene; None if it does not say them.
 
     Raises
@@ -167,7 +167,7 @@ def real_units(scene: Keys) -> RealUnits | None:
     return real
 
 
-def _layer(scene: Keys) -> tuple[float, float, float | None, int]:
+def _layer(scene: SceneKeys) -> tuple[float, float, float | None, int]:
     """What a scene says of its layer, in its own units: smallest diameter and its mass, width, disks on top."""
     section = scene.packing
     if isinstance(section, GeneratedPacking):

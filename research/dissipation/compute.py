@@ -20,7 +20,7 @@ from faultgouge.analysis import OnsetError, Packing, Window
 from faultgouge.analysis.damped_onset.weak_dissipation import drag_onset, weak_limit
 from faultgouge.analysis.damped_onset.windows import damped_windows, without_dissipation
 from faultgouge.analysis.motion.transient import NoGainError, transient_gain
-from faultgouge.pywrap.onset.damped import Ramped
+from faultgouge.pywrap.onset.damped import RampPath
 
 Row = dict[str, Any]
 
@@ -31,7 +31,7 @@ WEAK = 1e-4
 """C_N and C_T of dashpots that count as weak, times their shares: the onset differs from its limit by their square."""
 
 
-def weak_cases(ramp: Ramped, ratios: Iterable[tuple[float, float]] = RATIOS) -> Iterator[Row]:
+def weak_cases(ramp: RampPath, ratios: Iterable[tuple[float, float]] = RATIOS) -> Iterator[Row]:
     """The limit of weak dashpots for the first undamped pair of a ramp, for several ratios C_N : C_T.
 
     The damped onset is solved for among all modes, from the ramp's last load below the prediction to a little beyond
@@ -67,12 +67,12 @@ def _around(forces: ArrayLike, predicted: float, window: Window) -> list[float]:
     return [*below, window.fx_onset + 1e-3 * width]
 
 
-def over_strength(ramp: Ramped, kind: str, strengths: Iterable[float], start: float = 0.0) -> Iterator[Row]:
+def over_strength(ramp: RampPath, kind: str, strengths: Iterable[float], start: float = 0.0) -> Iterator[Row]:
     """The damped onset over the strength of normal dashpots, or of drag.
 
     Parameters
     ----------
-    ramp : Ramped
+    ramp : RampPath
         The packing along its loads.
     kind : {"cn", "drag"}
         Which dissipation.
@@ -104,7 +104,7 @@ def over_strength(ramp: Ramped, kind: str, strengths: Iterable[float], start: fl
 
 
 def over_distance(
-    ramp: Ramped, distances: Iterable[float], dissipations: Iterable[tuple[float, float]]
+    ramp: RampPath, distances: Iterable[float], dissipations: Iterable[tuple[float, float]]
 ) -> Iterator[Row]:
     """The transient gain over the distance from the first undamped onset, for several (C_N, 1/tau).
 
@@ -130,7 +130,7 @@ def _gain(packing: Packing, cn: float, drag: float) -> Row:
     return {"gain": found.gain, "time": found.time, "bound": found.bound if np.isfinite(found.bound) else None}
 
 
-def _first_window(ramp: Ramped) -> Window:
+def _first_window(ramp: RampPath) -> Window:
     window = ramp.first_window()
     if window is None:
         raise OnsetError(f"No pair of eigenvalues is complex up to F_x = {ramp.forces[-1]:.10g}: raise ramp.until.")

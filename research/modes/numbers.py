@@ -221,7 +221,7 @@ def histories(tables: Mapping[str, Table]) -> dict[str, Any]:
     if not all(name in tables for name in HISTORIES.values()):
         return {}
     seeds = set.intersection(*({row["seed"] for row in tables[name].rows} for name in HISTORIES.values()))
-    matched = {law: tables[name].of_seeds(seeds) for law, name in HISTORIES.items()}
+    matched = {law: tables[name].with_seeds(seeds) for law, name in HISTORIES.items()}
     return {
         law: medians_over_load(table, ("share", "least_q"))
         | {"with_pairs": [int(np.sum(table.at(load, "pairs") > 0)) for load in table.loads]}
@@ -231,7 +231,7 @@ def histories(tables: Mapping[str, Table]) -> dict[str, Any]:
 
 def against_random(table: Table, by_size: Mapping[int, Table]) -> dict[str, Any]:
     """Shares of complex modes: measured, of random matrices, and by the formula, of the same packings at each load."""
-    own = by_size[table.disks].of_seeds({row["seed"] for row in table.rows})
+    own = by_size[table.disks].with_seeds({row["seed"] for row in table.rows})
     return {
         "packings": len(table.rows),
         "loads": table.loads,

@@ -26,7 +26,7 @@ from scipy.special import erf
 from faultgouge.analysis import Packing, dynamical_matrix
 from faultgouge.analysis.packing.packing import Floats
 from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.studies.modes.count_pairs import Counted, along_ramp
+from faultgouge.studies.modes.count_pairs import PairCounts, along_ramp
 from research.genericity.levels import Pencil, local_mean
 from research.genericity.surrogates import randomise_pencil
 
@@ -67,7 +67,7 @@ def predict_shares(packing: Packing) -> dict[str, Any]:
     ratios = np.minimum(gaps[1:], gaps[:-1]) / np.maximum(gaps[1:], gaps[:-1])
     pencil = Pencil(values, np.zeros_like(couplings), couplings, basis)
     generator = np.random.default_rng(SEED)
-    drawn = [Counted.of(eigvals(randomise_pencil(pencil, generator).at(1.0))).as_dict() for _ in range(DRAWS)]
+    drawn = [PairCounts.of(eigvals(randomise_pencil(pencil, generator).at(1.0))).as_dict() for _ in range(DRAWS)]
     least = [each["least_q"] for each in drawn if each["least_q"] is not None]
     return {
         "ratio": float(np.mean(ratios)),

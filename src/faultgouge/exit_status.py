@@ -15,7 +15,7 @@ import traceback
 from pathlib import Path
 from typing import NoReturn
 
-from .ranks import is_root, size
+from .mpi_rank import is_root, size
 
 MEETING = 3.0
 """Seconds within which all ranks come to an error that all of them meet."""

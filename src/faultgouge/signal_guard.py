@@ -28,7 +28,7 @@ from types import FrameType
 from typing import NoReturn
 
 from . import parent_death
-from .ranks import is_root, size
+from .mpi_rank import is_root, size
 
 GRACE = 0.8
 """Seconds that the work has after a signal to close files and to end other processes."""

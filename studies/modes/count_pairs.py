@@ -87,7 +87,7 @@ DIGITS = 7
 
 
 @dataclass(frozen=True)
-class Counted:
+class PairCounts:
     """The complex pairs of one packing.
 
     Attributes
@@ -108,7 +108,7 @@ class Counted:
     negative: tuple[float, ...] = ()
 
     @classmethod
-    def of(cls, values: Complexes) -> Counted:
+    def of(cls, values: Complexes) -> PairCounts:
         """Those of some eigenvalues, of which all with positive imaginary part count."""
         omega = np.sqrt(values[values.imag > 0])
         return cls(omega[np.argsort(-omega.imag)], len(values))
@@ -127,7 +127,7 @@ class Counted:
         }
 
 
-def count_pairs(packing: Packing) -> Counted:
+def count_pairs(packing: Packing) -> PairCounts:
     """The complex pairs of a packing that exceed their rounding uncertainty.
 
     Parameters
@@ -138,7 +138,7 @@ def count_pairs(packing: Packing) -> Counted:
     if len(packing) > ALL:
         found, error = count_in_slices(packing)
         size, negative = dynamical_matrix(packing)[0].shape[0], tuple(negative_eigenvalues(packing).tolist())
-        return replace(Counted.of(found), modes=size, error=error, negative=negative)
+        return replace(PairCounts.of(found), modes=size, error=error, negative=negative)
     values = eigenvalues(packing)
     rounding = unit_rounding(dynamical_matrix(packing)[0].data)
     surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))
@@ -146,7 +146,7 @@ def count_pairs(packing: Packing) -> Counted:
     noise = [k for k in doubtful if not _is_real(packing, values[k], rounding)]
     values = values.copy()
     values[noise] = values[noise].real
-    return replace(Counted.of(values), negative=tuple(negative_eigenvalues(packing).tolist()))
+    return replace(PairCounts.of(values), negative=tuple(negative_eigenvalues(packing).tolist()))
 
 
 def _is_real(packing: Packing, value: complex, rounding: float) -> bool:
@@ -170,7 +170,7 @@ def count_with_part_of_b(packing: Packing) -> dict[str, dict[str, Any]]:
     """The complex pairs with b of sticking contacts alone, of sliding contacts alone, and of none."""
     slides = packing.sliding
     return {
-        name: Counted.of(_values(packing, coupled)).as_dict()
+        name: PairCounts.of(_values(packing, coupled)).as_dict()
         for name, coupled in (("sticking", ~slides), ("sliding", slides), ("none", np.zeros_like(slides)))
     }
 
@@ -178,7 +178,7 @@ def count_with_part_of_b(packing: Packing) -> dict[str, dict[str, Any]]:
 def parting(packing: Packing) -> dict[str, dict[str, Any]]:
     """The complex pairs of a law with rescaled slips while all contacts close, and while all part."""
     return {
-        name: Counted.of(_values(packing, parting=share)).as_dict()
+        name: PairCounts.of(_values(packing, parting=share)).as_dict()
         for name, share in (("closing", 0.0), ("parting", 1.0))
     }
 

@@ -48,7 +48,7 @@ class Table:
         """A number of every packing that has borne a load, shape (n,): least Q is inf where there is no pair."""
         return np.array([np.inf if load[key] is None else load[key] for load in self.borne(fx_over_fy)], dtype=float)
 
-    def of_seeds(self, seeds: Collection[int]) -> Table:
+    def with_seeds(self, seeds: Collection[int]) -> Table:
         """The packings of these seeds."""
         return Table(self.name, tuple(row for row in self.rows if row["seed"] in seeds))
 

@@ -205,7 +205,7 @@ def _triggers(wave: Wave, amplitude: float) -> float | None:
     with (
         Engine(wave.packing, MPI.COMM_SELF) as engine,
         engine.undamped(dt, amplitude, wave.expected["omega"], target) as dynamics,
-        dynamics.halted(threshold(wave.scene)),
+        dynamics.halt_above(threshold(wave.scene)),
     ):
         dynamics.advance(steps)
         return dynamics.steps * dt if dynamics.steps < steps else None

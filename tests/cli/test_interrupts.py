@@ -11,7 +11,7 @@ import pytest
 from reference_layer import BIN, LAYER, toml
 
 from faultgouge.analysis import RunFile
-from fuzz.kills import Work, start_command
+from fuzz.kills import CommandToKill, start_command
 
 ASKED = {"perturb": {"fx": 2e-5, "time": 1e4}, "eruptions": {"load": [0.02], "time": 1e3}}
 SCENE = LAYER + toml({"ramp": {"step": 1e-5, "until": 0.02}} | ASKED)
@@ -72,7 +72,7 @@ def equilibria(path):
 @pytest.mark.slow
 def test_a_run_says_what_is_kept(tmp_path, command, ranks, at, group, number):
     path = tmp_path / "run.h5"
-    running = start_command(Work(f"{command} scene.toml -o run.h5", SCENE, ranks), tmp_path)
+    running = start_command(CommandToKill(f"{command} scene.toml -o run.h5", SCENE, ranks), tmp_path)
     errors = interrupted(running, number, lambda: equilibria(path) >= at, group)
     (says,) = (line for line in errors.splitlines() if line.startswith("Error:"))
     with RunFile(path) as run:
@@ -86,7 +86,7 @@ def test_a_run_says_what_is_kept(tmp_path, command, ranks, at, group, number):
 @pytest.mark.slow
 def test_the_work_ends_with_its_guard(tmp_path):
     """The same command then goes on to the bit: fuzz/kills.py."""
-    running = start_command(Work("ramp scene.toml", SCENE), tmp_path)
+    running = start_command(CommandToKill("ramp scene.toml", SCENE), tmp_path)
     interrupted(running, signal.SIGKILL, lambda: equilibria(tmp_path / "run.h5") > 3)
 
 
@@ -116,7 +116,9 @@ def simulates(folder):
 @pytest.mark.long
 def test_what_is_kept_is_said(tmp_path, command, says):
     (tmp_path / "sweep.toml").write_text(SWEEP)
-    errors = interrupted(start_command(Work(command, SCENE), tmp_path), signal.SIGINT, lambda: simulates(tmp_path))
+    errors = interrupted(
+        start_command(CommandToKill(command, SCENE), tmp_path), signal.SIGINT, lambda: simulates(tmp_path)
+    )
     *ahead, last = errors.strip().splitlines()
     assert last.startswith(f"Error: interrupted: {says}")
     assert not any(line.startswith("Error") for line in ahead)
@@ -130,7 +132,7 @@ def test_a_long_search_goes_on_to_the_bit(faultgouge, tmp_path):
     """Killed, interrupted and continued on one process; and in one piece."""
     (tmp_path / "settle.toml").write_text(toml(LARGE))
     faultgouge("settle", "settle.toml")
-    onset = Work("onset scene.toml -o onset.json", toml(LARGE | {"packing": {"file": "run.h5"}}))
+    onset = CommandToKill("onset scene.toml -o onset.json", toml(LARGE | {"packing": {"file": "run.h5"}}))
     slices = tmp_path / "onset.json.slices"
 
     def known():

@@ -58,8 +58,8 @@ def test_increments_that_meet_a_contact_that_hardly_opens_reach_the_end():
 class Overhanging(Engine):
     """LAMMPS with a load that Newton's method reaches from above alone."""
 
-    def displaced(self, base, displacement):
-        trial = super().displaced(base, displacement)
+    def try_displacement(self, base, displacement):
+        trial = super().try_displacement(base, displacement)
         from_below = trial.fx == 2e-3 and base.fx < 2e-3
         return replace(trial, force=np.full(3 * len(base), 1e3)) if from_below else trial
 

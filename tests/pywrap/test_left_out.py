@@ -11,8 +11,8 @@ from reference_layer import LAYER, toml
 
 from faultgouge.analysis import MindlinLaw, PackingFileError, RunFile, read_dump
 from faultgouge.analysis.files.dumps import dump_frames
-from faultgouge.assessment.explain.parts import same_motion
-from faultgouge.assessment.explain.switches import Loaded
+from faultgouge.assessment.explain.cost_comparison import same_motion
+from faultgouge.assessment.explain.switches import InstanceContents
 from faultgouge.pywrap import Engine
 from faultgouge.pywrap.lammps.decks import DECKS
 
@@ -35,7 +35,7 @@ ROUGH |= {"velocities of ghosts"}
 def test_a_run_holds_what_it_needs_and_nothing_else(reference_packing, tmp_path, law, holds):
     packing, log = with_law(reference_packing(1.0), **law), tmp_path / "log"
     with Engine(packing, log=log) as engine, engine.undamped(1e-4):
-        assert set(Loaded.of(engine, log).everything) == holds
+        assert set(InstanceContents.of(engine, log).everything) == holds
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_what_dynamics_need_is_taken_away_again(reference_packing, tmp_path, mu,
     log = tmp_path / "log"
     with Engine(reference_packing(mu), log=log) as engine:
         work(engine)
-        here = Loaded.of(engine, log)
+        here = InstanceContents.of(engine, log)
     assert (set(here.parts), set(here.fixes), here.computes) == ({"system.in", "balance.in"} | parts, fixes, ())
 
 

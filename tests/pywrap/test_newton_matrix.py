@@ -12,7 +12,7 @@ from scipy.sparse import coo_array, csc_array, csr_array, triu
 from scipy.sparse.linalg import splu
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix, touching
-from faultgouge.analysis.factors.linear import ACCURATE, SparseSolver, elimination_order
+from faultgouge.analysis.factors.linear_solver import ACCURATE, SparseSolver, elimination_order
 from faultgouge.assessment.stability.cases.packings import crystal
 from faultgouge.pywrap import Engine
 from faultgouge.pywrap.equilibria.newton import iterate_newton
@@ -92,13 +92,13 @@ def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
     rng = np.random.default_rng(3)
     displacement, step = 1e-4 * rng.standard_normal(300), 1e-7
     with Engine(base) as engine:
-        trial = engine.displaced(base, displacement)
-        since = engine.kept(base).graph
+        trial = engine.try_displacement(base, displacement)
+        since = engine.trial_of(base).graph
         new = ~trial.graph.old(since)
         disk = int(trial.graph.i[new][0])
         change = np.zeros(300)
         change[[disk, 100 + disk, 200 + disk]] = rng.standard_normal(3)
-        forces = [engine.displaced(base, displacement + sign * step * change).force for sign in (1, -1)]
+        forces = [engine.try_displacement(base, displacement + sign * step * change).force for sign in (1, -1)]
     softening = (forces[1] - forces[0]) / (2 * step)
     errors = [
         np.abs(factor_stiffness(trial, trial.floor, start).solve(softening) - change).max() for start in (since, None)
@@ -139,14 +139,14 @@ def test_a_disk_between_two_new_contacts_takes_a_longer_step(reference_packing):
     trial = trial_of(there, 1e-6 * np.random.default_rng(8).standard_normal(300))
     asked = []
 
-    def displaced(base, displacement):
+    def try_displacement(base, displacement):
         asked.append(displacement)
         if len(asked) > 1:
             raise _Seen
         return trial
 
     with pytest.raises(_Seen):
-        iterate_newton(displaced, Trial.of(start))
+        iterate_newton(try_displacement, Trial.of(start))
     expected = factor_stiffness(trial, trial.floor, ContactGraph(start.contacts, start.radius)).solve(trial.force)
     expected[[disk, 100 + disk, 200 + disk]] *= 1.5
     np.testing.assert_array_equal(asked[1], expected)

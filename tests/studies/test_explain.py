@@ -10,10 +10,10 @@ import pytest
 from mpi4py import MPI
 from reference_layer import SMALL
 
+from faultgouge.assessment.explain.cost_comparison import Cost, Part
 from faultgouge.assessment.explain.explain import _affordable, _run_feature, explain
 from faultgouge.assessment.explain.explanation_table import in_words
-from faultgouge.assessment.explain.parts import Cost, Part
-from faultgouge.assessment.explain.switches import Feature, Loaded, Run, features
+from faultgouge.assessment.explain.switches import Feature, InstanceContents, UndampedRun, features
 from faultgouge.pywrap import Scene, settle
 
 SCENES = files("faultgouge") / "scenes"
@@ -125,14 +125,14 @@ def test_of_a_large_packing_a_strip_is_explained():
 
 @pytest.fixture(scope="module")
 def run():
-    return Run(settle(Scene.from_toml(SCENES / "minimal.toml"), communicator=MPI.COMM_SELF).packing)
+    return UndampedRun(settle(Scene.from_toml(SCENES / "minimal.toml"), communicator=MPI.COMM_SELF).packing)
 
 
 def test_a_wrong_claim_is_found_out(run, tmp_path):
     """A push that is said to touch nobody, and one that is said to leave the motion."""
     pushed = replace(run, motion={"amplitude": 1.0, "omega": 1.0})
     with run.started(MPI.COMM_SELF, tmp_path / "log") as (engine, _):
-        loaded = Loaded.of(engine, tmp_path / "log")
+        loaded = InstanceContents.of(engine, tmp_path / "log")
     top = np.flatnonzero(run.packing.top)
     for touched, moves in (((), True), (top, False)):
         part = _run_feature(Feature("push", "", run, pushed, touched, moves), loaded, 50, tmp_path)

@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
-from faultgouge.assessment.work_precision.coverage.changing import FINER, draw_scene, read, restate_case
+from faultgouge.assessment.work_precision.coverage.stated_errors import FINER, draw_scene, read, restate_case
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.onset.damped import damped_onset_run
 from faultgouge.pywrap.onset.path_error import OtherPaths, PathError, meeting, with_path_error

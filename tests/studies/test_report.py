@@ -10,8 +10,8 @@ from faultgouge.analysis import discrete_frequency, spectrum
 from faultgouge.assessment import work_precision as page
 from faultgouge.assessment.work_precision.methods import dumps, relaxation
 from faultgouge.assessment.work_precision.methods.extended import refine_eigenvalue
-from faultgouge.assessment.work_precision.methods.frequency import FastestMode, correct_dispersion
-from faultgouge.assessment.work_precision.methods.study import Settings, compensate
+from faultgouge.assessment.work_precision.methods.frequency_and_growth import FastestMode, correct_dispersion
+from faultgouge.assessment.work_precision.methods.work_precision_study import Settings, compensate
 from faultgouge.pywrap import Engine, Scene, ramp
 
 

@@ -20,7 +20,7 @@ from ....analysis import Packing, RunFile, read_dump, stiffness_matrix, touching
 from ....analysis.operators.damping import coordinate_mass
 from ....analysis.spectrum.spectrum import Complexes
 from ....pywrap import Engine
-from .study import Run, Settings, Study, Theory, study_of, timed_points
+from .work_precision_study import Run, Settings, Study, Theory, study_of, timed_points
 
 TEXT, HDF5 = "text", "HDF5 (run.h5)"
 SINGLE, NO_SLIPS = "float32 trajectory, slips kept", "positions in doubles, slips lost"

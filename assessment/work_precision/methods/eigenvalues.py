@@ -20,8 +20,8 @@ from ....analysis import Packing, dynamical_matrix, eigenpairs
 from ....analysis.spectrum.spectrum import Complexes
 from ....pywrap import Engine, equilibrate
 from .extended import refined_near
-from .onset import Ways
-from .study import Run, Settings, Study, Theory, study_of, timed_points
+from .onset import OnsetMethods
+from .work_precision_study import Run, Settings, Study, Theory, study_of, timed_points
 
 COUNT = 6
 """Eigenvalues that shift-invert is asked for: the pair and its neighbours."""
@@ -127,7 +127,7 @@ def _near(settings: Settings) -> tuple[Packing, float]:
     """The packing just below the onset, and the pair there, 1 / time^2."""
     start = settings.ramp[0]
     with Engine(start.packing) as engine:
-        onset, _ = Ways(engine, start, settings.scene).bisect(1e-3, 30)
+        onset, _ = OnsetMethods(engine, start, settings.scene).bisect(1e-3, 30)
         below = max((each for each in settings.ramp if each.fx < onset - APART), key=lambda each: each.fx)
         packing = equilibrate(engine, below, onset - APART).packing
     values, left, right = eig(dynamical_matrix(packing)[0].toarray(), left=True, right=True)

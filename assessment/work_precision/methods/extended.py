@@ -27,7 +27,7 @@ ITERATIONS = 30
 """At the most. Near an exceptional point the bordered system is nearly singular and a step gains only a few digits."""
 
 
-class Refined(NamedTuple):
+class RefinedEigenvalue(NamedTuple):
     """A refined eigenvalue.
 
     Attributes
@@ -45,7 +45,7 @@ class Refined(NamedTuple):
     steps: int
 
 
-def refine_eigenvalue(matrix: Floats, value: complex, vector: Complexes, condition: float) -> Refined:
+def refine_eigenvalue(matrix: Floats, value: complex, vector: Complexes, condition: float) -> RefinedEigenvalue:
     """The eigenvalue of a matrix of doubles, taken as exact, next to an approximation.
 
     Parameters
@@ -73,19 +73,19 @@ def refine_eigenvalue(matrix: Floats, value: complex, vector: Complexes, conditi
         change = np.linalg.solve(bordered, np.append(residual, 0).astype(np.complex128))
         before, moved = moved, float(abs(change[n]))
         if moved > 0.5 * before:
-            return Refined(lam, before + rounding, steps)
+            return RefinedEigenvalue(lam, before + rounding, steps)
         x, lam, steps = x + change[:n], lam + change[n], steps + 1
         if moved < rounding:
             break
-    return Refined(lam, moved + rounding, steps)
+    return RefinedEigenvalue(lam, moved + rounding, steps)
 
 
-def refined_near(packing: Packing, shift: float, count: int) -> tuple[list[Refined], float, float]:
+def refined_near(packing: Packing, shift: float, count: int) -> tuple[list[RefinedEigenvalue], float, float]:
     """The eigenvalues of a packing's operator that are nearest to a shift.
 
     Returns
     -------
-    eigenvalues : list of Refined
+    eigenvalues : list of RefinedEigenvalue
         By their distance from the shift.
     condition : float
         The largest kappa of them.

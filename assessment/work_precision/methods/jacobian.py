@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ....analysis import Packing, stiffness_matrix
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine
-from .study import Run, Settings, Study, Theory, best_of, study_of, timed_points
+from .work_precision_study import Run, Settings, Study, Theory, best_of, study_of, timed_points
 
 ANALYTIC, PAPER, COMPLEX = "analytic", "analytic, paper's form", "complex step"
 DIFFERENCES, LAMMPS = "central differences", "central differences in LAMMPS"

@@ -22,8 +22,8 @@ from ....analysis.spectrum.spectrum import SAFETY
 from ....pywrap import Engine, Equilibrium, Scene
 from ....pywrap.onset.path_error import with_path_error
 from ....pywrap.runs.equilibrium_path import EquilibriumPath
-from ..coverage.changing import read, restate_case
-from .study import Covered, Run, Settings, Study, Theory, compensate, study_of, timed_points
+from ..coverage.stated_errors import read, restate_case
+from .work_precision_study import Run, Settings, StatedError, Study, Theory, compensate, study_of, timed_points
 
 OVERDAMPED, SCAN = "scan, overdamped", "scan, Newton"
 BISECTION, ROOT = "bisection", "root of the discriminant"
@@ -38,7 +38,7 @@ SMALL = 20
 """Disks of the scenes with contacts that change which are computed anew: each takes a second or two."""
 
 
-class Ways:
+class OnsetMethods:
     """The ways from one settled packing to its onset.
 
     Parameters
@@ -118,11 +118,11 @@ def onset(settings: Settings) -> Study:
     start = settings.ramp[0]
     exact_start = compensate(start)
     with Engine(start.packing) as engine, Engine(exact_start.packing) as exact_engine:
-        reference = Ways(exact_engine, exact_start, settings.scene)
-        return _study(settings, Ways(engine, start, settings.scene), reference)
+        reference = OnsetMethods(exact_engine, exact_start, settings.scene)
+        return _study(settings, OnsetMethods(engine, start, settings.scene), reference)
 
 
-def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
+def _study(settings: Settings, ways: OnsetMethods, reference: OnsetMethods) -> Study:
     quick = settings.quick
     check, finest = (2e-3, 1e-3) if quick else (5e-4, 2.5e-4)
     guess = ways.scan(1e-3)[0] + 0.5e-3
@@ -160,7 +160,7 @@ def _study(settings: Settings, ways: Ways, reference: Ways) -> Study:
     )
 
 
-def _runs(ways: Ways, quick: bool, exact: float) -> list[Run[float]]:
+def _runs(ways: OnsetMethods, quick: bool, exact: float) -> list[Run[float]]:
     """What finds the onset, by increments."""
     coarse = (4e-3,) if quick else (4e-3, 2e-3, 1e-3)
     fine = (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4)
@@ -173,7 +173,9 @@ def _runs(ways: Ways, quick: bool, exact: float) -> list[Run[float]]:
     ]
 
 
-def _compare_errors(ways: Mapping[str, Ways], increments: Sequence[float], beyond: float) -> tuple[Covered, ...]:
+def _compare_errors(
+    ways: Mapping[str, OnsetMethods], increments: Sequence[float], beyond: float
+) -> tuple[StatedError, ...]:
     """Stated and true errors of the onset over arithmetics and increments.
 
     The last arithmetic, with half of the last increment, is the truth; its own error counts as covered.
@@ -184,7 +186,7 @@ def _compare_errors(ways: Mapping[str, Ways], increments: Sequence[float], beyon
     for arithmetic, those in ways.items():
         for increment in increments:
             found = those.whole(increment, beyond)
-            cases.append(Covered(arithmetic, increment, abs(found.fx_c - truth.fx_c), found.error + truth.error))
+            cases.append(StatedError(arithmetic, increment, abs(found.fx_c - truth.fx_c), found.error + truth.error))
     return tuple(cases)
 
 

@@ -23,7 +23,7 @@ from ....analysis import Packing, dynamical_matrix
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium, equilibrate
 from ....pywrap.equilibria.quasistatic import rounding_floor
-from .study import Run, Settings, Study, Theory, compensate, study_of, timed_points
+from .work_precision_study import Run, Settings, Study, Theory, compensate, study_of, timed_points
 
 FROM, TO = 0.010, 0.011
 """F_x before and after: an increment far from the onset."""

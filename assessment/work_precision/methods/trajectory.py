@@ -28,7 +28,7 @@ import numpy as np
 from ....analysis import MindlinLaw, Packing, touching
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine
-from .study import Point, Settings, Study, Theory, fit_order, study_of, time_jobs
+from .work_precision_study import Point, Settings, Study, Theory, fit_order, study_of, time_jobs
 
 TIME = 2.0
 """Length of the run: two swings of the overlaps."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..ranks import is_root
+from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .pictures import modes_of
 from .terminal import (

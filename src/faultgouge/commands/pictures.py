@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..ranks import is_root
+from ..mpi_rank import is_root
 from .terminal import (
     Frame,
     PackingFile,

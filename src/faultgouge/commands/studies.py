@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..ranks import is_root
+from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .terminal import (
     AsJson,

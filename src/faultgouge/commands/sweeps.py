@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..ranks import is_root
+from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .terminal import Folder, Workers, print_line, progress, say, table_of
 

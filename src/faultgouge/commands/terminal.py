@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from ..ranks import is_root
+from ..mpi_rank import is_root
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing, Snapshot

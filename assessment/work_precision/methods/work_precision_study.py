@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from ....analysis.motion.power_law import fit_power_law
 from ....pywrap import Engine, Equilibrium, Scene, equilibrate
 from ...timing import Progress, in_turns
-from ..coverage.changing import CoverageCase
+from ..coverage.stated_errors import CoverageCase
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -132,7 +132,7 @@ class Theory:
 
 
 @dataclass(frozen=True)
-class Covered:
+class StatedError:
     """The error that an onset states, and the one that it has.
 
     Attributes
@@ -184,7 +184,7 @@ class Study:
         Floors and curves to compare with.
     remarks : tuple of str
         What else the reader has to know, one sentence each.
-    covered : tuple of Covered
+    covered : tuple of StatedError
         Stated against true errors, where the result states one.
     changing : tuple of CoverageCase
         The same of many scenes in which contacts change before the onset.
@@ -205,7 +205,7 @@ class Study:
     orders: tuple[Order, ...] = ()
     theory: tuple[Theory, ...] = ()
     remarks: tuple[str, ...] = ()
-    covered: tuple[Covered, ...] = ()
+    covered: tuple[StatedError, ...] = ()
     changing: tuple[CoverageCase, ...] = ()
     again: tuple[CoverageCase, ...] = ()
 

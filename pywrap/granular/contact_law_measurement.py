@@ -93,7 +93,7 @@ class MeasuredLaw:
     lever: float
 
 
-class Bench:
+class TwoParticleLammps:
     """A LAMMPS with two particles, or one and a wall, that knows the pair styles and walls of a deck."""
 
     def __init__(self, commands: Commands, units: str, types: int, size: float, wall: str | None = None) -> None:
@@ -173,12 +173,12 @@ class Bench:
         self.lammps.close()
 
 
-def measure_law(bench: Bench, state: State, types: tuple[int, int], who: str) -> MeasuredLaw:
+def measure_law(bench: TwoParticleLammps, state: State, types: tuple[int, int], who: str) -> MeasuredLaw:
     """The law of a contact, from its own overlap, radii and masses, and from others.
 
     Parameters
     ----------
-    bench : Bench
+    bench : TwoParticleLammps
         LAMMPS with the law.
     state : State
         A contact of the packing.
@@ -257,7 +257,7 @@ class _Values(NamedTuple):
     lever: float
 
 
-def _measure(bench: Bench, wanted: State, types: tuple[int, int]) -> tuple[State, _Values]:
+def _measure(bench: TwoParticleLammps, wanted: State, types: tuple[int, int]) -> tuple[State, _Values]:
     """Forces of one contact at rest and in motion."""
     state = bench.place_at(wanted, types)
     fn, delta = bench.force()[0], state.overlap
@@ -299,7 +299,7 @@ def _measure(bench: Bench, wanted: State, types: tuple[int, int]) -> tuple[State
     return state, _Values(fn / delta, ft / slip, normal_dashpot, tangential_dashpot, closing, parting, mu, lever)
 
 
-def _push_contact(bench: Bench, state: State, types: tuple[int, int], speed: float) -> tuple[float, float]:
+def _push_contact(bench: TwoParticleLammps, state: State, types: tuple[int, int], speed: float) -> tuple[float, float]:
     """Forces at rest of a fresh contact that has slipped at a speed for one step."""
     bench.place_at(state, types)
     bench.move((0.0, speed))
@@ -309,7 +309,7 @@ def _push_contact(bench: Bench, state: State, types: tuple[int, int], speed: flo
     return bench.force()
 
 
-def _dashpot(bench: Bench, direction: tuple[float, float], scale: float, speed: float) -> float:
+def _dashpot(bench: TwoParticleLammps, direction: tuple[float, float], scale: float, speed: float) -> float:
     """Force per velocity of a contact without slip: first at some speed, then where the force is a tenth of scale."""
     tangential = int(direction[1])
     bench.move((0.0, 0.0))
@@ -334,14 +334,14 @@ def measure_laws(
     """The laws of pairs of types, by these, and of walls, by the IDs of their fixes."""
     found: dict[Any, MeasuredLaw] = {}
     if pairs:
-        bench = Bench(commands, units, types, max(max(state.radii) for state in pairs.values()))
+        bench = TwoParticleLammps(commands, units, types, max(max(state.radii) for state in pairs.values()))
         try:
             for kinds, state in pairs.items():
                 found[kinds] = measure_law(bench, state, kinds, f"the contact of types {kinds[0]} and {kinds[1]}")
         finally:
             bench.close()
     for name, state in walls:
-        bench = Bench(commands, units, types, state.radii[0], commands.fixes[name])
+        bench = TwoParticleLammps(commands, units, types, state.radii[0], commands.fixes[name])
         try:
             found[name] = measure_law(bench, state, (1, 1), f"the wall of fix {name}")
         finally:

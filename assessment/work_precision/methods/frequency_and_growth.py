@@ -27,7 +27,7 @@ from ....analysis.packing.packing import Floats
 from ....analysis.spectrum.spectrum import Complexes, unit_rounding
 from ....pywrap import Engine, Equilibrium
 from .extended import refine_eigenvalue
-from .study import Point, Settings, Study, Theory, compensate, fit_order, study_of, time_jobs
+from .work_precision_study import Point, Settings, Study, Theory, compensate, fit_order, study_of, time_jobs
 
 SHARES = (0.8, 0.4, 0.2, 0.1, 0.05, 0.025)
 """Time steps in units of the limit 2/omega_max."""

@@ -1,6 +1,6 @@
 """Stated and true errors of onsets before which contacts slide, stick, close or open, undamped and damped.
 
-    python -m faultgouge.assessment.work_precision.coverage.changing [--rows table.jsonl] [--scenes 60] [--restate]
+    python -m faultgouge.assessment.work_precision.coverage.stated_errors [--rows table.jsonl] [--scenes 60] [--restate]
 
 Scenes are drawn at random: seeds, numbers of disks, friction, stiffness and exponent of the law, dashpots, increments,
 both arithmetics. Those count that have an onset on their ramp and contacts that change before it. The truth is the
