@@ -1,9 +1,9 @@
-"""A configuration of frictional disks in; its stability operator, spectrum, onset and growth out.
+"""The stability operator, spectrum, onset and growth of a packing of frictional disks.
 
-Everything takes a :class:`Packing`; the operators, and what follows from them, take a :class:`Snapshot` as well. The
-physics is in the docstrings of the modules: `law` (the contact law), `contacts`, `geometry`, `packing` (forces),
+All functions take a :class:`Packing`; operators, spectra and functions based on these also take a :class:`Snapshot`.
+The physics is in the docstrings of the modules: `law` (the contact law), `contacts`, `geometry`, `packing` (forces),
 `stiffness` and `linearised_contacts` (the stability operator), `spectrum` (its eigenvalues), `damping` (the damping
-matrix), `onset` (where they become complex), `growth` (what a run shows of it). `runfile`, `dumps` and `files` read and
+matrix), `onset` (where eigenvalues become complex), `growth` (growth in a run). `runfile`, `dumps` and `files` read and
 write packings.
 """
 

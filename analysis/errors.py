@@ -1,18 +1,18 @@
-"""The errors that a user is told in one sentence: what is wrong, where, and what to do.
+"""Errors with a sentence for the user: what is wrong, where, and what to do.
 
-Every such error is a `FaultgougeError`. A search for complex pairs may catch `NoEquilibriumError` and nothing above it:
-an engine that fails, a lost rank or a full disk always reaches the command. Any other exception that reaches the
-command is a mistake in this program.
+Every such error is a `FaultgougeError`. A search for complex pairs may catch `NoEquilibriumError` but no base class of
+it: the failure of an engine, a lost rank or a full disk must always reach the command. Any other exception that reaches
+the command is a bug in this program.
 """
 
 
 class FaultgougeError(Exception):
-    """The root of the family; its text is the sentence.
+    """Base class of all errors of the package; its text is the sentence for the user.
 
     Attributes
     ----------
     exit_code : int
-        What the command exits with: 1 for a computation that failed, 2 for bad input.
+        Exit code of the command: 1 for a computation that failed, 2 for bad input.
     one_rank : bool
         Whether one MPI rank alone knows of the error. The other ranks wait, and only MPI's Abort ends them.
     """
@@ -22,17 +22,17 @@ class FaultgougeError(Exception):
 
 
 class BadInputError(FaultgougeError, ValueError):
-    """What the user gave cannot be used: a scene, a file, an option."""
+    """The input of the user (a scene, a file, an option) cannot be used."""
 
     exit_code = 2
 
 
 class PackingFileError(BadInputError):
-    """A file is missing, broken, or not what it should be; the message names the file."""
+    """A file is missing, broken, or of the wrong kind; the message names the file."""
 
 
 class OutputError(FaultgougeError):
-    """A result cannot be written: a full disk, a folder without permission. Rank 0 alone writes, and knows."""
+    """A result cannot be written: a full disk, a folder without permission. Only rank 0 writes and has the error."""
 
     one_rank = True
 
@@ -45,7 +45,7 @@ class NoEquilibriumError(FaultgougeError):
     says : str
         The sentence.
     beyond : float, optional
-        The largest F_x that had an equilibrium, where a ramp tells.
+        The largest F_x with an equilibrium, if a ramp has found it.
     """
 
     def __init__(self, says: str, beyond: float | None = None) -> None:

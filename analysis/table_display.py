@@ -1,4 +1,4 @@
-"""Results that show themselves as a table, in a terminal and in a notebook."""
+"""Results that display themselves as a table, in a terminal and in a notebook."""
 
 from __future__ import annotations
 

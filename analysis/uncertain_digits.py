@@ -1,4 +1,4 @@
-"""Numbers with as many digits as their uncertainty allows."""
+"""Format numbers with as many digits as their uncertainty allows."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The product's judgement of itself: its errors against run time, its stiff and extreme cases, what a scene leaves out.
+"""Tests of the program itself: errors against run time, stiff and extreme cases, the features that a scene leaves out.
 
-May import: everything below the studies; a study never.
+May import: everything below the studies, but no study.
 """

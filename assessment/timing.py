@@ -1,7 +1,7 @@
-"""Times that can be compared: every job in turn, over several turns.
+"""Comparable times: jobs run in turn, over several turns.
 
-Jobs that are compared are run in turn and not one after the other, so that whatever else the machine does meets all of
-them alike, and every other turn begins with the last of them.
+Jobs to be compared run in turn and not one after the other, so that other load of the machine affects all of them
+alike. Every other turn begins with the last job.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Pictures of packings, pairs of eigenvalues and runs: for notebooks, commands and reports alike.
+"""Pictures of packings, pairs of eigenvalues and runs, for notebooks, commands and reports.
 
-A function takes a packing or arrays, and axes if it is to draw into a figure that exists; it returns the figure. No
-window is opened, and no setting of matplotlib is changed. Lengths, forces and times carry no unit in the labels:
-a scene is free to choose them.
+A function takes a packing or arrays, and optionally axes of an existing figure; it returns the figure. The functions
+open no window and change no setting of matplotlib. Labels of lengths, forces and times have no units, because a scene
+may have any units.
 """
 
 from .cycle import draw_cycle

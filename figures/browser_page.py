@@ -1,7 +1,7 @@
 """A page that shows a ramp or an undamped run in a browser, without a network: `faultgouge view`.
 
-Bokeh draws and its JavaScript is part of the page. Arrays are for drawing: float32, in base64. `view.js` hands them to
-Bokeh as the slider moves. `view_pair` has the pair of eigenvalues that the page follows.
+Bokeh draws and its JavaScript is part of the page. Arrays are for drawing: float32, in base64. `view.js` passes them to
+Bokeh as the slider moves. `browser_pair` finds the pair of eigenvalues that the page follows.
 """
 
 from collections.abc import Sequence

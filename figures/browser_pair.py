@@ -1,9 +1,9 @@
-"""The pair of eigenvalues that the page of `faultgouge view` follows, and what stands about the pair.
+"""The pair of eigenvalues that the page of `faultgouge view` follows, and the text about the pair.
 
-It is the pair that is the first of the ramp to be complex. If none is, it is the two real modes of the last equilibrium
-that are closest to meeting. All modes of a packing take time as the cube of its size. Of a large packing they are
-computed at the last load alone: the pairs that are complex there are followed back, and that which is complex from the
-smallest load on is taken. A pair that is complex in between alone is then not seen.
+The pair is the first of the ramp to become complex. If none becomes complex, it is the two real modes of the last
+equilibrium that are closest to merging. The time to compute all modes grows as the cube of the size. For a large
+packing they are computed at the last load alone: the pairs that are complex there are followed back, and the pair that
+is complex from the smallest load on is chosen. A pair that is complex only at earlier loads is then not found.
 """
 
 from collections.abc import Callable, Iterable, Sequence

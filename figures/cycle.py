@@ -1,4 +1,4 @@
-"""F_x over the displacement of the upper layer, on each way between two turning points."""
+"""F_x over the displacement of the upper layer, on each path between two turning points."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -17,7 +17,7 @@ from .style import figure_of, styled
 
 @styled
 def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
-    """F_x over the mean displacement of the upper layer along x: a path that closes, or does not.
+    """Draw F_x over the mean displacement of the upper layer along x, a path that may close or not.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
 r"""Films: an undamped run with magnified displacements and D(t), the motion of a mode, and a ramp.
 
-What does not move is drawn once. For each frame the few artists that do move are drawn upon it, which takes a hundredth
+The fixed background is drawn once. For each frame only the few moving artists are drawn on top, which takes a hundredth
 of the time of a whole figure.
 
-**Magnification.** The displacements of an undamped run span ten decades and more, and none of them could be seen as
-they are. They are multiplied by a power of ten, which is written on the frame. The largest displacement so far decides
-it, so that the factor falls in steps while D grows.
+**Magnification.** The displacements of an undamped run span ten decades and more, and would be invisible at their true
+size. They are multiplied by a power of ten, which is printed on the frame. The largest displacement so far determines
+the factor, so that the factor falls in steps while D grows.
 """
 
 from abc import ABC, abstractmethod

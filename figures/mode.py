@@ -1,8 +1,8 @@
 r"""A mode of a packing: arrows for the displacement of the disks, colour for their rotation.
 
-A real mode moves all disks along fixed lines, in phase. The disks of a complex mode go round ellipses, and two moments
-a quarter of a period apart show it. The phase of a vector is free: it is turned so that the first of the two moments is
-the one with the largest displacement.
+A real mode moves all disks along fixed lines, in phase. The disks of a complex mode move on ellipses, which two moments
+a quarter of a period apart show. The phase of a vector is arbitrary: it is chosen so that the first moment has the
+largest displacement.
 """
 
 from collections.abc import Sequence

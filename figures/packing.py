@@ -3,12 +3,12 @@ r"""A packing: disks to scale, force chains, load, floor and periodic images.
 The disks of the upper layer are yellow, rattlers hollow, the floor is red. A bar joins the centres of each contact; the
 width of the bar is proportional to the normal force :math:`f_n`, and its colour is one of
 
-- ``mobilised``, :math:`|f_t|/(\mu f_n)`: the share of Coulomb's bound that the contact uses, one where it slides,
-- ``slip``, :math:`|s|/t^*`: the share of the slip at which it slides,
+- ``mobilised``, :math:`|f_t|/(\mu f_n)`: the mobilised fraction of Coulomb's bound, one for a sliding contact,
+- ``slip``, :math:`|s|/t^*`: the slip over the slip limit,
 - ``force``, :math:`f_n` itself,
 - ``none``: ink.
 
-Most contacts of a stable packing are far below Coulomb's bound, so that both shares stand on a logarithmic scale.
+Most contacts of a stable packing are far below Coulomb's bound, so that both fractions have a logarithmic scale.
 """
 
 from collections.abc import Callable
@@ -225,7 +225,7 @@ class PackingArtist:
 
 @styled
 def draw_packing(packing: Packing, axes: Axes | None = None, color: str = "mobilised", caption: bool = False) -> Figure:
-    """A packing with its force chains (the paper's figure 1).
+    """Draw a packing with its force chains (the paper's figure 1).
 
     Parameters
     ----------
@@ -236,12 +236,12 @@ def draw_packing(packing: Packing, axes: Axes | None = None, color: str = "mobil
     color : {"mobilised", "slip", "force", "none"}
         What the colour of a contact shows, see the module. Arrows show where the load acts, not its size.
     caption : bool
-        Whether load and numbers of contacts stand above, in a figure of its own.
+        Whether to print load and numbers of contacts above, in a new figure.
 
     Returns
     -------
     Figure
-        The one that holds the axes.
+        The figure of the axes.
     """
     if color != "none" and color not in COLOURS:
         raise ValueError(f"color = {color!r} is none of {', '.join(COLOURS)}, none.")

@@ -1,4 +1,4 @@
-"""Pages that a study leaves: a Jinja template, which has the prose, filled with the numbers of the study."""
+"""Pages of studies: a Jinja template with the text, filled with the numbers of the study."""
 
 from __future__ import annotations
 

@@ -28,10 +28,10 @@ class PairCurve:
     fx : ndarray, shape (n,)
         Force on each disk of the upper layer, increasing.
     eigenvalues : ndarray of complex, shape (n, 2)
-        Both members of the pair, 1 / time^2: two real numbers, or two complex conjugates; nan where the pair is not
-        known.
+        Both members of the pair, 1 / time^2: two real numbers, or two complex conjugates; nan where the pair is
+        unknown.
     fx_c : float or None
-        Onset, the force at which they coalesce; None if they do not.
+        Onset, the force at which the two coalesce; None if they do not.
     """
 
     mu: float
@@ -52,12 +52,12 @@ class PairCurve:
 
 @styled
 def draw_pair(curves: Sequence[PairCurve]) -> Figure:
-    """Real parts that coalesce and imaginary parts that bifurcate as F_x grows.
+    """Draw the real parts, which coalesce, and the imaginary parts, which bifurcate, over F_x.
 
     Parameters
     ----------
     curves : sequence of PairCurve
-        One for each friction coefficient. The inset shows the first one about its onset, if it has one.
+        One curve for each friction coefficient. The inset shows the first curve around its onset, if there is one.
 
     Returns
     -------

@@ -29,9 +29,9 @@ def draw_series(
     label: str | None = None,
     color: str = "C1",
 ) -> Figure:
-    """A positive quantity over time, on a logarithmic axis; what is not positive is not drawn.
+    """Draw a positive quantity over time on a logarithmic axis; values that are not positive are left out.
 
-    A figure of its own leaves out the first steps, far below the noise from which the quantity grows.
+    Without `axes`, the first steps are left out, far below the noise from which the quantity grows.
 
     Parameters
     ----------

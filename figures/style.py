@@ -1,6 +1,6 @@
-"""One look for every figure: the style sheet, the colours that carry a meaning, and files that repeat to the byte.
+"""One style for all figures: the style sheet, the colours with a meaning, and files that are the same to the byte.
 
-Figures have a white ground of their own, also where the page around them is dark.
+Figures have a white background, also on a dark page.
 """
 
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""Films as files: GIF by Pillow, MP4 by the ffmpeg that imageio-ffmpeg brings."""
+"""Films as files: GIF by Pillow, MP4 by the ffmpeg of imageio-ffmpeg."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path

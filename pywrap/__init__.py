@@ -1,9 +1,9 @@
 """The driver: from a scene to equilibria and undamped runs, with LAMMPS.
 
-`scene` says what is wanted. `bed` brings its packing into equilibrium, `equilibria` follows the equilibrium along F_x,
-and `undamped` perturbs it; `recording` keeps all of this in run.h5 and goes on where a run was cut off. `engine` is
-LAMMPS with one packing in it, and `quasistatic` takes it from equilibrium to equilibrium. A ramp of one's own is a loop
-over `equilibrate`.
+`scenes` describes a computation. `settling` brings the packing of a scene to equilibrium, `equilibria` follows the
+equilibrium along F_x, and `runs` perturbs it. `runs.run_recorder` stores all results in run.h5 and continues an
+interrupted run. `lammps.engine` is a LAMMPS instance with one packing. To write a ramp of your own, loop over
+`equilibrate`.
 """
 
 from .lammps.two_mpi_libraries import load_own_mpi

@@ -1,4 +1,4 @@
-"""Who does the work of a study: this process, processes beside it, ranks of mpiexec, or anybody's executor."""
+"""Executors of the work of a study: this process, further processes, ranks of mpiexec, or an executor of the user."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What studies ask of a packing: its path of equilibria on this process alone, and its contacts."""
+"""Tools of studies for a packing: its path of equilibria in this process alone, and its contacts."""
 
 from __future__ import annotations
 

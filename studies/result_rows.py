@@ -1,4 +1,4 @@
-"""Results that are written as they come: a line of JSON each, in a file that an interrupted study goes on with."""
+"""Results written as lines of JSON, one after the other, to a file from which an interrupted study continues."""
 
 from __future__ import annotations
 

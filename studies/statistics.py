@@ -1,8 +1,8 @@
 r"""Shares and distributions of a sample, with intervals.
 
-Shares have Wilson's 95 % interval. Onsets that lie beyond what a ramp reached are right-censored; their distribution
-is that of Kaplan and Meier, in which a packing counts up to where it was seen. (That a packing that begins to flow is
-like the others is an assumption; how many there are is given with each result.)
+Shares have Wilson's 95 % interval. Onsets beyond the last load of a ramp are right-censored; their distribution is that
+of Kaplan and Meier, in which a packing counts up to its last load. (The assumption is that packings that begin to flow
+are like the others; their number is given with each result.)
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Values = TypeVar("Values", Indices, Floats)
 
 
 def share(count: int, of: int) -> dict[str, Any]:
-    """count/of with Wilson's 95 % interval: {"count", "of", "share", "low", "high"}, the last three None for of = 0."""
+    """count/of with Wilson's interval: {"count", "of", "share", "low", "high"}, the last three None for of = 0."""
     if of == 0:
         return {"count": 0, "of": 0, "share": None, "low": None, "high": None}
     from scipy.stats import binomtest  # half a second to import
@@ -114,7 +114,7 @@ def course(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def quartiles(reach: ArrayLike, found: ArrayLike) -> list[float | None]:
-    """Lower quartile, median and upper quartile of F_x^c; None where they lie beyond what the ramps reached."""
+    """Lower quartile, median and upper quartile of F_x^c; None if they lie beyond the last loads of the ramps."""
     fx, probability = distribution(reach, found)
     # 3/4 from products of shares may miss 3/4 by its rounding
     places = np.searchsorted(probability, np.array([0.25, 0.5, 0.75]) - 1e-12)

@@ -1,7 +1,7 @@
-"""The frame of studies: what every study leaves in its folder, and a study of one scene that goes on in its folder.
+"""The frame of studies: the files that every study writes, and the continuation of an interrupted study of one scene.
 
-What a study of one scene found is kept row by row in NAME.jsonl, and rows of the same scene are not computed again.
-NAME.json, pictures and NAME.md are written in the end.
+A study of one scene stores its results row by row in NAME.jsonl, and does not compute rows of the same scene again.
+NAME.json, pictures and NAME.md are written at the end.
 """
 
 from __future__ import annotations

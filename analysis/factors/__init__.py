@@ -1,6 +1,6 @@
-"""Factors of matrices, for all who solve with them: bands, sparse factors of symmetric matrices and of others.
+"""Factors of matrices, for linear solvers: bands, and sparse factors of symmetric and of other matrices.
 
-`linear` chooses for Newton's method, `sparse_lu` is the one place where sparse factors come from, `ldlt` has our own.
+`linear_solver` chooses for Newton's method, `sparse_lu` makes all sparse factors, `ldlt` factors symmetric matrices.
 
 May import: `packing`, `operators`.
 """

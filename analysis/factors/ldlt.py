@@ -1,10 +1,10 @@
 r"""Factors :math:`L D L^T` of a sparse symmetric matrix without pivoting, and solutions for many right sides.
 
 SuperLU makes :math:`L` and :math:`U` of any matrix. The library of `ldlt.cpp`, built with the plugin, uses the
-symmetry: U is :math:`D L^T`. Factors and solutions take two fifths of SuperLU's time. The method
-is multifrontal (Liu, SIAM Rev. 34, 82 (1992)). Neighbouring columns of one pattern, such as those of a disk, are
-eliminated together in a small dense matrix, their front. What the front leaves for other rows is added to the front
-of the parent in the elimination tree.
+symmetry: U is :math:`D L^T`. Factorisation and solution take two fifths of the time of SuperLU. The method is
+multifrontal (Liu, SIAM Rev. 34, 82 (1992)). Neighbouring columns of one pattern, such as those of a disk, are
+eliminated together in a small dense matrix, their front. The contribution of the front to other rows is added to the
+front of the parent in the elimination tree.
 """
 
 import ctypes

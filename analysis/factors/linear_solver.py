@@ -1,20 +1,20 @@
-r"""Linear solvers for Newton's method: a band for small packings, sparse factors for large ones, of one interface.
+r"""Linear solvers for Newton's method with one interface: a band for small packings, sparse factors for large packings.
 
 A packing is a few disks wide or high, and K couples neighbours only. With the disks in the order of reverse Cuthill and
-McKee, and the coordinates of a disk together, all entries lie within a band: of 100 disks with 285 coordinates, within
-44 places of the diagonal. LAPACK factors the band in a quarter of the time that it takes for the full matrix, and what
-it touches leaves Python and LAMMPS in the processor's caches.
+McKee, and the coordinates of a disk together, all entries lie within a band: for 100 disks with 285 coordinates, within
+44 places of the diagonal. LAPACK factors the band in a quarter of the time for the full matrix, and uses so little
+memory that Python and LAMMPS stay in the processor's caches.
 
-To factor K of 100,000 disks takes as long as thirty evaluations of the forces, and its symmetric part as long as ten.
-From one Newton iteration to the next K changes a little everywhere, with the load, and much at a few contacts, which
-close or open. Neither needs new factors: with those of a matrix nearby, or of the symmetric part, as preconditioner P,
-:math:`P^{-1} K` is the identity but for something small and for something of low rank, and GMRES reduces the residual a
-hundredfold in some five iterations. Where it does not, K itself is factored.
+The factorisation of K for 100,000 disks takes as long as thirty evaluations of the forces; that of its symmetric part
+takes as long as ten. From one Newton iteration to the next K changes a little everywhere, with the load, and much at a
+few contacts, which close or open. Neither change needs new factors. With the factors of a nearby matrix, or of the
+symmetric part, as preconditioner P, :math:`P^{-1} K` is the identity except for a small part and a part of low rank,
+and GMRES reduces the residual a hundredfold in some five iterations. If GMRES fails to do so, K itself is factored.
 
-A fill-reducing order of the matrix itself sees single entries, and those that happen to vanish, as on a crystal, spoil
-it: the coordinates of one disk then no longer count as one. So the order of elimination is found on the graph of disks
-and contacts, by minimum degree, and the coordinates of a disk stay together, which also gives the factorisation dense
-blocks.
+A fill-reducing order of the matrix itself depends on single entries. Entries that happen to vanish, as on a crystal,
+spoil this order: the coordinates of one disk are then separated. The order of elimination is therefore found by minimum
+degree on the graph of disks and contacts. The coordinates of a disk stay together, which also gives the factorisation
+dense blocks.
 """
 
 from dataclasses import dataclass

@@ -1,16 +1,16 @@
-"""Sparse factors of large matrices with a symmetric pattern, such as K: the one place where they are made.
+"""Sparse factors of large matrices with a symmetric pattern, such as K. All sparse factors are made here.
 
 **Symmetric matrices** in an order of elimination are factored by :mod:`~faultgouge.analysis.factors.ldlt`, without
 pivoting.
 
-**SuperLU**, which SciPy has, factors all others, and finds orders of elimination of minimum degree on the pattern. Its
-pivots are taken from the diagonal. SuperLU would also join small columns of the elimination tree to supernodes and fill
-them with zeros; without that the factors of 300,000 coordinates have three quarters of the entries, and take half of
-the time.
+**SuperLU**, which SciPy has, factors all others, and finds orders of elimination of minimum degree on the pattern.
+Pivots are taken from the diagonal. By default SuperLU joins small columns of the elimination tree to supernodes and
+fills these with zeros. Without this, the factors of 300,000 coordinates have three quarters of the entries, and take
+half of the time.
 
 **MUMPS**, if python-mumps is installed (``pip install faultgouge[mumps]``), from `MUMPS_FROM` coordinates on. Nested
-dissection gives its factors fewer entries, and pivots of two rows keep them accurate. It is not made for several
-threads at a time, so that threads that factor beside each other do not use it.
+dissection gives its factors fewer entries, and pivots of two rows keep them accurate. MUMPS cannot run in several
+threads at once, so that parallel threads do not use it.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Files: run.h5 and its checks, dumps of LAMMPS, packings by hand in JSON, signals; files that are whole or not there.
+"""Files: run.h5 and its checks, LAMMPS dumps, packings as JSON, signals; files are either complete or absent.
 
 May import: `packing`, `motion.signals`.
 """

@@ -1,11 +1,12 @@
-"""Files that are whole at any moment, and that tell damage.
+"""Files that are complete at any moment, and in which damage is detected.
 
-A file is written under another name and renamed, so that a reader, a kill or a full disk never meets half of one. The
-other name is one that nobody can foresee, of a file that is not there yet: a link that waits under it is not followed.
+A file is written under another name and renamed, so that a reader, a kill or a full disk never leaves half a file. The
+other name is unpredictable, and belongs to a file that does not exist yet: a link prepared under this name is not
+followed.
 
-A *sealed* file begins with a header of 512 bytes, in words: what the file is, the SHA-256 of everything behind it, and
-its length. One flipped byte anywhere is then noticed. HDF5 looks for its superblock at the bytes 0, 512, 1024, ...
-(the header is what HDF5 calls a user block), so that every reader of HDF5 opens a sealed file as it is.
+A *sealed* file begins with a text header of 512 bytes: a description of the file, the SHA-256 of all following bytes,
+and its length. A single flipped byte is then detected. HDF5 looks for its superblock at the bytes 0, 512, 1024, ...
+(the header is a user block in the terms of HDF5), so that every reader of HDF5 can open a sealed file.
 """
 
 import errno

@@ -1,7 +1,7 @@
-"""An HDF5 file that grows, sealed and whole at any moment (:mod:`.atomic_write`).
+"""A growing HDF5 file that is sealed and complete at any moment (:mod:`.atomic_write`).
 
-The file is kept in memory. When it is saved, all of it replaces the stored file. Saving takes a share of the time
-at the most, so that a file that grows for long is not written over and over.
+The file is kept in memory. When it is saved, all of it replaces the stored file. Saving takes at most a fixed share of
+the time, so that a file that grows for a long time is not written too often.
 """
 
 from collections.abc import Iterator

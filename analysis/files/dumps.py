@@ -1,17 +1,17 @@
-r"""LAMMPS text dumps, as the input decks write them, read back into a packing.
+r"""Read the LAMMPS text dumps of the input decks into a packing.
 
-Two files make one packing. The disks' dump (``dump custom``) has one row per disk; its box line says whether
-x is periodic. The contacts' dump (``dump local``) has one row per pair, with the slip. Columns are found by
-name, under any of the names listed in `DISK` and `CONTACT`, in any order; further columns are ignored. With
-``%.17g`` everything comes back to the bit.
+Two files make one packing. The disks' dump (``dump custom``) has one row per disk; its box line says whether x is
+periodic. The contacts' dump (``dump local``) has one row per pair, with the slip. Columns are found by name, under any
+of the names listed in `DISK` and `CONTACT`, in any order; additional columns are ignored. With ``%.17g`` all numbers
+are read back bitwise.
 
-Disks of type 2 form the upper layer. The floor's slip stands in the disks' dump, for a floor contact belongs
-to one disk. Pairs that do not overlap, which LAMMPS lists up to its cutoff, are no contacts. Without friction
-there are neither slips nor angles, and their columns may be missing.
+Disks of type 2 form the upper layer. The slip on the floor is in the dump of disks, because a floor contact belongs to
+one disk. LAMMPS also lists pairs that do not overlap, up to its cutoff; these are not contacts. Without friction there
+are neither slips nor angles, and their columns may be missing.
 
-Law, load and inertia are no part of a dump. They are given by the caller or by a sidecar file of the same
-name with the suffix ".params", which has one ``key value`` a line out of kn, kt, mu, exponent, rescaled, coulomb,
-cn, ct, tau, fx, fy, inertia_factor; what the caller gives wins.
+Law, load and inertia are not part of a dump. They are given by the caller or by a file of the same name with the suffix
+".params", which has one ``key value`` per line from kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau, fx, fy,
+inertia_factor. Values from the caller take precedence.
 """
 
 import zlib
@@ -104,13 +104,13 @@ def read_dump(
     disks : path
         The dump of disks.
     contacts : path, optional
-        The dump of contacts; by default of the name of the disks' dump with the suffix ".contacts".
+        The dump of contacts; by default the file with the name of the dump of disks and the suffix ".contacts".
     frame : int
-        Which snapshot; negative ones count from the end. The contacts' snapshot is that of the same time
-        step.
+        Number of the snapshot; negative numbers count from the end. Contacts are read from the snapshot of the same
+        time step.
     law, fx, fy, inertia_factor
-        As in :class:`~faultgouge.analysis.Packing`; by default those of the sidecar file, and failing that no
-        load and inertia factor 1. The law has no default of its own.
+        As in :class:`~faultgouge.analysis.Packing`; by default those of the file ``.params``; without this file, no
+        load and inertia factor 1. The law then has no default.
 
     Returns
     -------
@@ -119,8 +119,7 @@ def read_dump(
     Raises
     ------
     PackingFileError
-        If a file is missing or broken, a column is not there, the snapshots do not fit, or the law is nowhere
-        given.
+        If a file is missing or broken, a column is missing, the snapshots do not match, or no law is given.
     """
     disks = Path(disks)
     contacts = disks.with_suffix(".contacts") if contacts is None else Path(contacts)

@@ -1,4 +1,4 @@
-"""Packings given by hand, as JSON: positions without contacts or history."""
+"""Packings as JSON, written by hand: positions without contacts or history."""
 
 import json
 import zlib
@@ -22,7 +22,7 @@ def read_packing(
     inertia_factor: float = 1.0,
     fy: float = 0.0,
 ) -> Packing:
-    """Read a packing from JSON; everything that touches is in contact, with zero slip.
+    """Read a packing from JSON; all disks that touch are in contact, with zero slip.
 
     Parameters
     ----------

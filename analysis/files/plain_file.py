@@ -1,6 +1,6 @@
-"""Files that users name, opened for reading: plain files alone.
+"""Open files that users name for reading: only plain files.
 
-A pipe or a device has no end that is certain to come, and no second reading: a program that opens it may wait for ever.
+A pipe or a device may never end and cannot be read twice: a program that opens it may wait for ever.
 """
 
 import errno

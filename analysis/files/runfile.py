@@ -1,4 +1,4 @@
-"""run.h5: the equilibria of a run, to the bit, written as they come.
+"""run.h5: the equilibria of a run, bitwise, written one after the other.
 
 The file is H5MD 1.1, which MDAnalysis opens after ``import faultgouge.pywrap.exchange.mdanalysis``::
 
@@ -11,25 +11,25 @@ The file is H5MD 1.1, which MDAnalysis opens after ``import faultgouge.pywrap.ex
     /observables/fx, fy            (T,)       force per top disk
     /observables/residual          (T,)       the largest net force on a disk that has a contact
     /observables/contacts          (T, C, 3)  rows (i, j, slip), j = -1 for the floor; unused rows are nan
-    /observables/<name>            (T,)       whatever scalars come with an equilibrium
-    /parameters/<name>             what never changes: radii, masses, top, law, inertia, box
+    /observables/<name>            (T,)       further scalars of an equilibrium
+    /parameters/<name>             constants: radii, masses, top, law, inertia, box
     /faultgouge/<name>/<column>    time series, such as D(t)
 
-Every element with a T is a group of ``value`` and of links to one common ``step`` (the number of the
-equilibrium) and ``time`` (the same number: equilibria have no time). A frame exists once ``step`` counts it,
-and ``step`` grows last.
+Every element with a T is a group of ``value`` and of links to one common ``step`` (the number of the equilibrium) and
+``time`` (the same number: equilibria have no time). ``step`` is written last: a frame exists only if ``step`` counts
+it.
 
-The trajectory of an undamped run stands behind the equilibrium from which it began, as further frames of position, with
-the run's own time: readers of H5MD step through both. fx and fy are theirs, all other observables of such a frame are
-nan, or 0 if they are whole numbers. ``/faultgouge/trajectory`` has its times, so that it counts these frames, and low
+The trajectory of an undamped run follows after its initial equilibrium, as further frames of position with the time of
+the run: readers of H5MD step through both. fx and fy are those of the equilibrium; all other observables of such a
+frame are nan, or 0 for integers. ``/faultgouge/trajectory`` has its times, so that it counts these frames, and low
 parts of its positions.
 
-The stored file is whole at any moment and has a checksum over all its bytes (:mod:`.checksummed_file`). The attribute
-``complete`` of the root is false until the run has come to its end; ``/checkpoint`` is then the state from which an
-undamped run goes on. A file is checked whole when it is opened (:mod:`.runfile_validation`).
+The stored file is complete at any moment and has a checksum over all its bytes (:mod:`.checksummed_file`). The
+attribute ``complete`` of the root is false until the run has ended; until then, an undamped run continues from the
+state in ``/checkpoint``. The whole file is checked when it is opened (:mod:`.runfile_validation`).
 
-Datasets depend on the scene alone. What belongs to the circumstances (resolved scene, versions, seed, ranks)
-is an attribute of the root. One file holds one set of disks and one law.
+Datasets depend on the scene alone. The circumstances of the run (resolved scene, versions, seed, ranks) are attributes
+of the root. One file contains one set of disks and one law.
 """
 
 from collections.abc import Mapping
@@ -118,7 +118,7 @@ class RunFile(SealedFile):
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """Names of everything that is stored with a frame beside positions."""
+        """Names of the observables stored with a frame, besides positions."""
         return tuple(name for name in self._file["observables"] if name != "position")
 
     def observable(self, name: str) -> NDArray:
@@ -127,12 +127,12 @@ class RunFile(SealedFile):
         Raises
         ------
         KeyError
-            If it is not stored.
+            If the observable is not stored.
         """
         return self._file["observables"][name]["value"][: len(self)]
 
     def append(self, packing: Packing, **scalars: float) -> None:
-        """Add a frame and see that it reaches the disk.
+        """Add a frame and make sure that it is on the storage device.
 
         Parameters
         ----------
@@ -193,7 +193,7 @@ class RunFile(SealedFile):
         self._step[count] = count
 
     def packing(self, frame: int = -1) -> Packing:
-        """The packing of a frame, bit for bit.
+        """The packing of a frame, bitwise as it was stored.
 
         Parameters
         ----------
@@ -252,7 +252,7 @@ class RunFile(SealedFile):
         Parameters
         ----------
         time : array_like, shape (S,)
-            Since the begin of the run.
+            Since the beginning of the run.
         position : array_like, shape (S, N, 2)
             Centres, length.
         position_low : array_like, shape (S, N, 2), optional
@@ -286,7 +286,7 @@ class RunFile(SealedFile):
         name : str
             Name of the series.
         **columns : array_like, shape (R, ...)
-            Columns by name, all of one length: always the same names.
+            Columns by name, all of the same length; each call must give the same names.
 
         Raises
         ------

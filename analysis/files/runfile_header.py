@@ -1,6 +1,6 @@
-"""What a run.h5 begins with, before its first frame: groups, parameters, and how datasets are stored.
+"""The beginning of a run.h5, before its first frame: groups, parameters, and the storage of datasets.
 
-The format is told in :mod:`~faultgouge.analysis.files.runfile`.
+The format is described in :mod:`~faultgouge.analysis.files.runfile`.
 """
 
 from dataclasses import MISSING, fields

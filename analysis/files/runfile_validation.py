@@ -1,6 +1,7 @@
-"""Whether a run.h5 is what it should be: names, shapes, types, finite numbers, lengths that agree, indices in range.
+"""Check a run.h5: names, shapes, types, finite numbers, lengths that agree, indices in range.
 
-`runfile` describes the format. A file is checked whole when it is opened, and nothing is appended to one that fails.
+`runfile` describes the format. The whole file is checked when it is opened, and nothing is appended to a file that
+fails.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Signals from files: two columns of numbers, or any format that ObsPy reads.
 
-ObsPy comes with ``pip install "faultgouge[seismic]"`` and is imported where a file is no table of numbers. A record's
-time counts from its first sample, in seconds.
+ObsPy comes with ``pip install "faultgouge[seismic]"`` and is imported only if the file is not a table of numbers. The
+time of a record counts from its first sample, in seconds.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""A run.h5 that holds a Snapshot, to the bit, in two or three dimensions.
+"""A run.h5 that contains a Snapshot, bitwise, in two or three dimensions.
 
-The file is sealed as every run.h5 is (:mod:`.checksummed_file`), and H5MD 1.1::
+The file is sealed like every run.h5 (:mod:`.checksummed_file`), and is H5MD 1.1::
 
     /h5md                             version, author, creator
     /particles/particles/position     (1, N, 3)  centres; z = 0 of disks

@@ -4,12 +4,12 @@ Small motion about an equilibrium under a force f s(t) obeys
 
 .. math:: M \ddot q + C \dot q + K q = f\, s(t) ,
 
-with the damping matrix C of the packing, which may be zero. Two ways to its solution are here.
+with the damping matrix C of the packing, which may be zero. This module solves the equation in two ways.
 
 **In time** (`sampled_response`). With z = (q, q') in mass-weighted coordinates the equation is :math:`\dot z = A z +
-b\, s(t)`. Where s is a straight line over a step h, the step is exact: it is the exponential of A with s and its slope
-as two further unknowns (C. F. Van Loan, IEEE Trans. Autom. Control 23, 395, 1978). Nothing is diagonalised, so that it
-holds at an exceptional point as anywhere.
+b\, s(t)`. If s is linear over a step h, the step is exact: it is the exponential of A with s and its slope as two
+further unknowns (C. F. Van Loan, IEEE Trans. Autom. Control 23, 395, 1978). No matrix is diagonalised, so that the
+method also works at an exceptional point.
 
 **In frequency** (`impulse_response`). One number matters for triggering: the mean velocity v of the upper layer, on
 which friction depends. A unit impulse gives :math:`v(t) = \sum_k c_k e^{s_k t}`, with the rates s_k of all motions
@@ -19,8 +19,9 @@ cos(omega t), from rest at t = 0, gives
 .. math:: v(t) = \mathrm{Re} \sum_k c_k \frac{e^{i\omega t} - e^{s_k t}}{i\omega - s_k} ,
 
 a stationary part, which is the transfer function :math:`H(\omega) = \sum_k c_k / (i\omega - s_k)`, and a transient,
-which in an undamped packing never dies. Its weights grow as the pair's condition towards the onset: that is the giant
-sensitivity. The largest |v| up to a time is what decides whether friction weakens, and it scales with the amplitude.
+which never decays in an undamped packing. Towards the onset the weights of the transient grow with the condition of the
+pair: this is the giant sensitivity. The largest |v| up to a given time decides whether friction weakens, and is
+proportional to the amplitude.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-r"""Growth of the mean square displacement, measured on an undamped run.
+r"""Growth of the mean square displacement, measured in an undamped run.
 
-The prediction to compare it with is :meth:`~faultgouge.analysis.Spectrum.growth_rate`.
+The prediction for comparison is :meth:`~faultgouge.analysis.Spectrum.growth_rate`.
 
 .. math:: D(t) = \frac1N \sum_i \left[\Delta x_i^2(t) + \Delta y_i^2(t)\right]
 
@@ -12,19 +12,20 @@ from the equilibrium. Above onset one complex pair takes over and
     D(t) = e^{2 |\mathrm{Im}\,\omega| t} \left[A + B \cos(2\, \mathrm{Re}\,\omega\, t + \varphi)\right],
     \qquad |B| \le A .
 
-Close to an exceptional point v is nearly real, the motion a standing wave, and B nearly A: D touches zero
-twice a period and a straight line through log D is at the mercy of those dips. The mean of D over stretches
-of several periods keeps the exponential and loses the modulation, whatever its frequency: the rate is the
-slope of the logarithm of these means, over stretches of equal duration.
+Close to an exceptional point v is nearly real, the motion is a standing wave, and B is nearly A: D touches zero twice a
+period, and these dips would spoil a straight line through log D. The mean of D over intervals of several periods keeps
+the exponential and removes the modulation, whatever its frequency: the rate is the slope of the logarithm of these
+means, over intervals of equal duration.
 
-**Noise.** All modes begin alike, excited by the rounding of the coordinates or by the perturbation, and D stays at that
-level, the noise, until the fastest growing motion stands out of it. Of n modes it begins with a share of `SHARE`/n or
-so. To be `ABOVE` the noise, and to be followed over a decade from there, takes a time of about
-:math:`\ln(10 \cdot 10^3\, n / 0.1) / (2 |\mathrm{Im}\,\omega|)`, some 17 e-foldings of 100 disks.
+**Noise.** All modes start with similar amplitudes, excited by the rounding of the coordinates or by the perturbation. D
+stays at this level, the noise, until the fastest growing motion exceeds the noise. With n modes, this motion starts
+with a share of about `SHARE`/n. To reach `ABOVE` times the noise, and to be followed over a decade from there, takes a
+time of about
+:math:`\ln(10 \cdot 10^3\, n / 0.1) / (2 |\mathrm{Im}\,\omega|)`, some 17 e-foldings for 100 disks.
 
-**Weakening.** Where friction falls with the velocity, the packing is another one from that moment on. D jumps, since
-the equilibrium is elsewhere, and grows if K with the weakened friction says so: prediction and fit are those of the
-weakened packing, and the fit begins at ten times the jump.
+**Weakening.** When friction falls with the velocity, the equilibrium of the packing changes. D jumps to the
+displacement of the new equilibrium, and then grows if K with the weakened friction is unstable. Prediction and fit are
+those of the weakened packing, and the fit begins at ten times the jump.
 """
 
 from dataclasses import dataclass, replace
@@ -76,7 +77,7 @@ class Growth:
     decades : float
         Decades of D between the first and the last stretch.
     start, end : float
-        Times between which D was used.
+        First and last time of the fit.
     """
 
     rate: float
@@ -117,17 +118,17 @@ def mean_square_displacement(
 
 
 def fit_growth(time: ArrayLike, msd: ArrayLike, lower: float, upper: float) -> Growth:
-    """Rate of exponential growth of D between a noise floor and a nonlinear ceiling.
+    """Fit the rate of exponential growth of D between a noise floor and a nonlinear ceiling.
 
     Parameters
     ----------
     time : array_like, shape (T,)
-        Increasing times, at any distances: those of `faultgouge perturb` are dense at first.
+        Increasing times with any spacing: the times of `faultgouge perturb` are dense at first.
     msd : array_like, shape (T,)
         D at these times, length^2.
     lower, upper : float
-        D is used from when it first reaches `lower`, well above the noise, until it first reaches `upper`,
-        well below the square of the overlaps.
+        The fit begins when D first reaches `lower`, well above the noise, and ends when D first reaches `upper`, well
+        below the square of the overlaps.
 
     Returns
     -------
@@ -259,9 +260,9 @@ class GrowthOfRun:
 def growth_of_run(
     packing: Packing, time: ArrayLike, msd: ArrayLike, friction: ArrayLike | None = None, dt: float | None = None
 ) -> GrowthOfRun:
-    """Measure the growth of D in a run from rest at an equilibrium, beside the prediction of the spectrum.
+    """Compare the growth of D, in a run from rest at an equilibrium, with the prediction of the spectrum.
 
-    No rate is fitted where the spectrum says that nothing grows.
+    No rate is fitted if nothing grows according to the spectrum.
 
     Parameters
     ----------
@@ -272,7 +273,7 @@ def growth_of_run(
     friction : array_like, shape (T,), optional
         Friction coefficient at these times; constant by default.
     dt : float, optional
-        Time step of velocity Verlet, whose dispersion is then taken into account.
+        Time step of velocity Verlet, to include its dispersion.
     """
     t, d = np.asarray(time, dtype=np.float64), np.asarray(msd, dtype=np.float64)
     mu = np.full(len(t), packing.law.mu) if friction is None else np.asarray(friction, dtype=np.float64)
@@ -313,10 +314,10 @@ def _why_not(
     now = f"with the friction weakened to mu = {weakened:.6g}" if weakened is not None else f"at F_x = {packing.fx:g}"
     if rate is None:
         return (
-            f"D did not grow by a decade out of its noise; of more than {MOST_DISKS} disks no spectrum says if it will"
+            f"D did not grow by a decade above its noise; for more than {MOST_DISKS} disks the spectrum is not computed"
         )
     if rate == 0 or needed is None:
-        loss = ", and the dissipation takes away what moves" if damped else ""
+        loss = ", dissipation damps all motion" if damped else ""
         found = "no motion grows" if damped else "no complex pair and no negative eigenvalue"
         bounded = "D jumps to the new equilibrium and stays bounded" if weakened is not None else "D stays bounded"
         return (
@@ -329,8 +330,8 @@ def _why_not(
             f"leaves the noise, and can be followed over a decade, after about t = {needed:.4g}"
         )
     return (
-        f"{unstable}, but D did not rise by a decade out of its noise at one rate: it reached {msd.max():.2g} in "
-        f"t = {length:.4g}. The motion is small against what else moves, or has left the range in which K holds"
+        f"{unstable}, but D did not rise by a decade above its noise at one rate: it reached {msd.max():.2g} in "
+        f"t = {length:.4g}. The motion is small compared with other motion, or has left the range in which K holds"
     )
 
 

@@ -1,15 +1,16 @@
-r"""Hysteresis of a layer that is loaded and unloaded: what is left when F_x comes back.
+r"""Hysteresis of a layer that is loaded and unloaded: the displacement that remains when F_x returns.
 
-Contacts that slide remember: F_x over the mean displacement u of the upper layer is another curve on the way back. Let
-F_x be at its last value for the first time at equilibrium a, and for the last time at equilibrium b, with a turning
-point in between. If all contacts came back to where they were, so would the layer. What is left is
+If contacts slide, the curve of F_x over the mean displacement u of the upper layer is different on the way back. Let
+F_x have its last value for the first time at equilibrium a, and for the last time at equilibrium b, with a turning
+point in between. If all contacts returned to their earlier state, so would the layer. The remainder is
 
 .. math:: \Delta u = u_b - u_a, \qquad
           W = \sum_{top} \int_a^b (F_x\, \mathrm d x_i - F_y\, \mathrm d y_i),
 
 the remaining displacement and the work of the loads, by the trapezoidal rule over the equilibria; F_y is constant, and
-its part is exact. Where the layer has come back, W is what friction has turned into heat, plus what contacts that have
-rearranged still hold, or minus what they have set free. The rule's error falls as the square of the increments.
+its part is exact. If the layer has returned, W is the heat produced by friction, plus the energy that rearranged
+contacts still store, or minus the energy that they have released. The error of the rule falls as the square of the
+increments.
 """
 
 from collections.abc import Sequence

@@ -8,10 +8,10 @@ therefore not diagonalised: an ordered Schur form puts such a pair first, a Sylv
 
 .. math:: f(B) = \tfrac12 [f(\lambda_1) + f(\lambda_2)] + f[\lambda_1, \lambda_2]\, N .
 
-The divided difference :math:`f[\lambda_1, \lambda_2]` is the quotient of the differences where the two motions
-have come apart, and Cauchy's integral on a circle about both where they have not, which is a sum of values of f.
-Stepping with ``expm`` of the first-order system would be as stable, but it takes a step for each time that is
-wanted, of a matrix of twice the size, and rounds in each of them.
+The divided difference :math:`f[\lambda_1, \lambda_2]` is the quotient of the differences if the two motions have
+separated. Otherwise it is Cauchy's integral on a circle around both eigenvalues, a sum of values of f. Stepping with
+``expm`` of the first-order system would be as stable, but it needs a step of a matrix of twice the size for each time,
+and rounds in each step.
 """
 
 from collections.abc import Callable, Iterator, Sequence

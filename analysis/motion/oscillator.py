@@ -1,9 +1,8 @@
-r"""One oscillator, driven: the function of a matrix that small motion without dissipation is.
+r"""A driven oscillator: the matrix function that describes small motion without dissipation.
 
-Small motion about an equilibrium, under a force f on the coordinates q, obeys
-:math:`M \ddot q = -K q + f \cos\omega t`. In mass-weighted coordinates :math:`z = M^{1/2} q` it is a function of one
-matrix A, and one oscillator :math:`\ddot x = -\lambda x + \cos\omega t` gives it. From rest, with
-:math:`\Omega = \sqrt\lambda`,
+Small motion about an equilibrium, under a force f on the coordinates q, obeys :math:`M \ddot q = -K q + f \cos\omega
+t`. In mass-weighted coordinates :math:`z = M^{1/2} q` the motion is a function of one matrix A. This function is the
+solution of one oscillator :math:`\ddot x = -\lambda x + \cos\omega t`. From rest, with :math:`\Omega = \sqrt\lambda`,
 
 .. math::
 
@@ -11,13 +10,13 @@ matrix A, and one oscillator :math:`\ddot x = -\lambda x + \cos\omega t` gives i
     \frac{\sin\tfrac12(\Omega + \omega) t}{\Omega + \omega}\,
     \frac{\sin\tfrac12(\Omega - \omega) t}{\Omega - \omega} ,
 
-whose last form cancels neither in resonance nor at small times; a start from x = 1 at rest gives
-:math:`\cos\Omega t`. Both are entire functions of :math:`\lambda`, so that f(A) exists whatever A is.
+where the last form has no cancellation, neither in resonance nor at small times. A start from x = 1 at rest gives
+:math:`\cos\Omega t`. Both are entire functions of :math:`\lambda`, so that f(A) exists for any A.
 
-**Time steps.** Velocity Verlet with step dt gives the same formulas with
-:math:`\sin\tfrac12\Omega\,dt = \tfrac12\sqrt\lambda\,dt` and with
-:math:`h \sin(Xt)/\sin(Xh)` for :math:`\sin(Xt)/X`, h = dt for a whole and dt/2 for a half angle: its
-positions at the steps are met exactly, and its velocities :math:`(x_{n+1} - x_{n-1})/2dt` as well.
+**Time steps.** Velocity Verlet with step dt gives the same formulas with :math:`\sin\tfrac12\Omega\,dt =
+\tfrac12\sqrt\lambda\,dt` and with :math:`h \sin(Xt)/\sin(Xh)` for :math:`\sin(Xt)/X`, h = dt for a whole and dt/2 for a
+half angle. The formulas give the positions at the steps exactly, and also the velocities :math:`(x_{n+1} -
+x_{n-1})/2dt`.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The propagator of small motion by its modes, and where it is large (:mod:`.transient`)."""
+"""The propagator of small motion from its modes, and the times at which it is large (:mod:`.transient`)."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -59,7 +59,7 @@ CHUNK = 4096
 
 
 class NoGainError(FaultgougeError):
-    """A packing without a transient gain: it is unstable, or has no energy."""
+    """The packing has no transient gain: it is unstable, or has no energy."""
 
 
 def stable_motion(packing: Packing | Snapshot) -> LinearMotion:

@@ -4,19 +4,19 @@ Small motion about an equilibrium, under a force f on the coordinates q and the 
 
 .. math:: M \ddot q + C \dot q + K q = f \cos\omega t .
 
-Without dissipation it is a function of one matrix, and of one oscillator
+Without dissipation the motion is a function of one matrix, that of one oscillator
 (:mod:`~faultgouge.analysis.motion.oscillator`).
 
 **Dissipation** (:mod:`~faultgouge.analysis.operators.damping`): dashpots have no modes in common with K. The motion is
 then that of the first-order system of :mod:`~faultgouge.analysis.motion.state_space`, whose eigenvalues s give
-:math:`e^{st}` and, under the force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. What is left of it in the end, if
-all Re s < 0, is the transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}` (`transfer` in
-:mod:`~faultgouge.analysis.motion.forcing`).
+:math:`e^{st}` and, under the force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. If all Re s < 0, the motion
+finally is the stationary response with the transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}`
+(`transfer` in :mod:`~faultgouge.analysis.motion.forcing`).
 
 Functions of the matrix of a packing close to a coalescence of two eigenvalues keep their digits
 (:mod:`~faultgouge.analysis.motion.matrix_functions`).
 
-Coordinates that feel no force, those of rattlers, are held still.
+Coordinates on which no force acts, those of rattlers, are held fixed.
 """
 
 from dataclasses import dataclass
@@ -147,9 +147,9 @@ def linear_response(
     initial: ArrayLike | None = None,
     dt: float | None = None,
 ) -> Response:
-    """Motion of the linearised packing from rest, with its dashpots and drag.
+    """Compute the motion of the linearised packing from rest, with its dashpots and drag.
 
-    To ask for many motions of one packing, decompose it once: :class:`LinearMotion`.
+    To compute many motions of one packing, decompose it once: :class:`LinearMotion`.
 
     Parameters
     ----------
@@ -158,13 +158,13 @@ def linear_response(
     times : array_like, shape (T,)
         Times, in any order, not negative.
     force : array_like, shape (3N,), or (6N,) of spheres, optional
-        f of the force f cos(omega t) on (x.., y.., R theta..), force, as of `layer_force`; none by default.
+        Amplitude f of the force f cos(omega t) on (x.., y.., R theta..), as from `layer_force`; none by default.
     omega : float
         Angular frequency of the force, radian / time.
     initial : array_like, shape (3N,), optional
         Displacement at t = 0, length; none by default.
     dt : float, optional
-        Time step of the undamped velocity Verlet run to be met; exact dynamics by default.
+        Time step of the undamped velocity Verlet run to compare with; exact dynamics by default.
 
     Returns
     -------
@@ -182,19 +182,19 @@ def linear_response(
 
 
 def layer_force(packing: Packing, amplitude: float) -> Floats:
-    """A force along x on the upper layer.
+    """Force vector for a force along x on the upper layer.
 
     Parameters
     ----------
     packing : Packing
         The configuration.
     amplitude : float
-        a, force on each of its disks.
+        Force a on each disk of the layer.
 
     Returns
     -------
     ndarray, shape (3N,)
-        On (x.., y.., R theta..).
+        Force on the coordinates (x.., y.., R theta..).
     """
     force = np.zeros(packing.coordinates)
     force[: len(packing)] = amplitude * packing.top

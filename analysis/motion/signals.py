@@ -1,15 +1,16 @@
-r"""Signals of time: what forces the upper layer, or moves the floor.
+r"""Time signals that force the upper layer, or move the floor.
 
-A signal is a table of (time, value), joined by straight lines, and zero before and after. A pulse is Ricker's wavelet,
-the second derivative of a Gaussian (N. Ricker, Geophysics 18, 10, 1953), whose spectrum peaks at omega,
+A signal is a table of (time, value) with linear interpolation; before the first row and after the last it is zero. A
+pulse is Ricker's wavelet, the second derivative of a Gaussian (N. Ricker, Geophysics 18, 10, 1953), whose spectrum
+peaks at omega,
 
 .. math:: s(t) = (1 - 2 x^2) e^{-x^2}, \qquad x = \tfrac12 \omega (t - t_0) ,
 
-and a sweep :math:`s(t) = \sin\phi(t)` has a frequency :math:`\dot\phi` that goes evenly from one value to another.
+and a sweep :math:`s(t) = \sin\phi(t)` has a frequency :math:`\dot\phi` that changes linearly from one value to another.
 
-**Motion of the floor.** A rigid floor with the acceleration a(t) is, seen from the floor itself, a floor at rest and a
-force :math:`-m a(t)` on every disk, exactly. Seismometers record velocities; `differentiated` makes accelerations of
-them, by central differences at the samples.
+**Motion of the floor.** In the frame of a rigid floor with the acceleration a(t), the floor is at rest and a force
+:math:`-m a(t)` acts on every disk, exactly. Seismometers record velocities; `differentiated` computes accelerations
+from velocities, by central differences at the samples.
 """
 
 from __future__ import annotations

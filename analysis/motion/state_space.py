@@ -14,7 +14,8 @@ eigenvectors Q and the eigenvalues :math:`\Lambda`, and put :math:`p = W z`, :ma
 
 the kinetic energy and the energy of the symmetric part :math:`K_s` of K, where :math:`K_s` is positive. If K is
 symmetric and there is no dissipation, Z is antisymmetric: every eigenvalue is perfectly conditioned, and no state grows
-in the norm of the energy. What Z is beyond that, K's antisymmetric part has done. An eigenvalue s of Z is one of
+in the norm of the energy. Any other part of Z comes from the antisymmetric part of K, or from dissipation. An
+eigenvalue s of Z is an eigenvalue of
 :math:`s^2 M + s C + K`, and the upper half of its eigenvector belongs to the displacement.
 """
 

@@ -1,37 +1,37 @@
-r"""Transient gain: how far a packing that is linearly stable moves away before it comes back.
+r"""Transient gain: how far a linearly stable packing moves away before it returns.
 
 Below the onset all eigenvalues are real and positive, and every motion of the linearised packing is a sum of
-oscillations. K is not symmetric, though, its modes are oblique, and a start that is a small difference of two nearly
-parallel modes becomes their sum once their phases differ by :math:`\pi`. The gain is the largest growth over all starts
-and over the time t,
+oscillations. But K is not symmetric, and its modes are not orthogonal. An initial displacement that is a small
+difference of two nearly parallel modes becomes their sum when their phases differ by :math:`\pi`. The gain is the
+largest growth over all starts and over the time t,
 
 .. math:: \mathcal G(t) = \max_{q_0} \frac{|q(t)|^2}{|q_0|^2} = \|P(t)\|_2^2 .
 
 **Displacement.** q is (x.., y.., R theta..), the start is a displacement at rest, and P(t) is the propagator of
 :math:`M \ddot q + C \dot q + K q = 0`; without dissipation :math:`P = M^{-1/2} \cos(A^{1/2} t) M^{1/2}`.
 
-**Energy.** The start is any displacement and any velocity, and the norm is the energy
-:math:`\tfrac12 \dot q^T M \dot q + \tfrac12 q^T K_s q` with the symmetric part :math:`K_s` of K; P(t) is
-:math:`e^{Zt}` of :mod:`~faultgouge.analysis.motion.state_space`. Were K symmetric, both gains would be 1: the
-antisymmetric part of K alone makes them larger. (See Trefethen and Embree, *Spectra and Pseudospectra*, 2005, for what
-eigenvalues do not tell of such matrices.)
+**Energy.** The start is any displacement and any velocity, and the norm is the energy :math:`\tfrac12 \dot q^T M \dot q
++ \tfrac12 q^T K_s q` with the symmetric part :math:`K_s` of K; P(t) is :math:`e^{Zt}` of
+:mod:`~faultgouge.analysis.motion.state_space`. If K were symmetric, both gains would be 1: only the antisymmetric part
+of K makes them larger. (For properties of such matrices that eigenvalues do not show, see Trefethen and Embree,
+*Spectra and Pseudospectra*, 2005.)
 
 **The maximum.** With the modes x, the rows l of the inverse of their matrix and the functions f of the eigenvalues,
-:math:`P(t) = \sum_k f_k(t)\, x_k l_k^H`. Close to an onset two terms have most of it, those of the pair that is about
-to coalesce, :math:`|x_k| |l_k| = \kappa`: the gain is close to :math:`4\kappa^2` where their phases have come apart by
-:math:`\pi`, at the beat time :math:`\pi/(\omega_1 - \omega_2)`. It grows as the inverse of the distance from the onset,
-the amplitude and the time as its inverse root. Farther away several pairs share in it. So P is sampled on the few modes
-with large :math:`|x_k| |l_k|`, `propagator.SAMPLES` times a period, over a window of time that is stated with the
-result. At the best of these times Lanczos iteration finds the largest singular value of the whole propagator.
-Times are refined on the space of these vectors, where P(t) is a small matrix: its norm is nowhere larger than that of
-P(t), and meets it at each time whose vectors are in the space, with its slope; so the vectors at its maximum join it,
-until the maximum stays (the subspace method of Kangal, Meerbergen, Mengi and Michiels, SIAM J. Matrix Anal. Appl. 39,
-48, 2018). What is returned has been attained by the start that is returned.
+:math:`P(t) = \sum_k f_k(t)\, x_k l_k^H`. Close to an onset two terms dominate, those of the pair that is about to
+coalesce, :math:`|x_k| |l_k| = \kappa`: the gain is close to :math:`4\kappa^2` when their phases differ by :math:`\pi`,
+at the beat time :math:`\pi/(\omega_1 - \omega_2)`. The gain grows as the inverse of the distance from the onset; the
+amplitude and the time grow as the inverse square root of this distance. Farther from the onset several pairs
+contribute. So P is sampled on the few modes with large :math:`|x_k| |l_k|`, `propagator.SAMPLES` times a period, over a
+window of time that is stated with the result. At the best of these times Lanczos iteration finds the largest singular
+value of the whole propagator. Times are refined on the space of these vectors, where P(t) is a small matrix: the norm
+of this matrix never exceeds that of P(t), and equals it, with its slope, at each time whose vectors are in the space.
+The vectors at the maximum are added to the space until the maximum no longer changes (the subspace method of Kangal,
+Meerbergen, Mengi and Michiels, SIAM J. Matrix Anal. Appl. 39, 48, 2018). The returned start attains the returned gain.
 
-Whether a later time has a larger gain no window tells, as the frequencies are incommensurate. But P is never larger
-than :math:`\|X S\|_2 \|S^{-1} X^{-1}\|_2` with any scaling S of the modes, since no :math:`|f_k|` exceeds 1; with the
-scaling that makes :math:`|x_k| = |l_k|` the square of this, `bound`, is close to the gain wherever one pair dominates
-(the displacement, without dissipation; the energy, always).
+The search in a window cannot exclude a larger gain at a later time, because the frequencies are incommensurate. But P
+is never larger than :math:`\|X S\|_2 \|S^{-1} X^{-1}\|_2` with any scaling S of the modes, since no :math:`|f_k|`
+exceeds 1; with the scaling that makes :math:`|x_k| = |l_k|` the square of this, `bound`, is close to the gain wherever
+one pair dominates (the displacement, without dissipation; the energy, always).
 """
 
 from dataclasses import dataclass
@@ -74,19 +74,20 @@ class TransientGain:
     gain : float
         |q(time)|^2 / |q(0)|^2, or the ratio of the energies.
     time : float
-        When it is reached.
+        Time of the largest gain.
     start : ndarray, shape (3N,)
-        The displacement (x.., y.., R theta..) that reaches it. Of norm 1, or with the velocity of energy 1/2.
+        The initial displacement (x.., y.., R theta..) with this gain. Its norm is 1, or its energy with the velocity is
+        1/2.
     velocity : ndarray, shape (3N,)
-        Its velocity at the start; zero for the displacement.
+        The initial velocity; zero for the norm "displacement".
     norm : {"displacement", "energy"}
-        What has grown.
+        Norm of which the gain is computed.
     window : float
-        The times from 0 to this were searched.
+        The search covers the times from 0 to this time.
     bound : float
-        No later time has a larger gain; inf where no bound is known.
+        No later time has a gain larger than this; inf if no bound is known.
     dimension : int
-        2 of disks, 3 of spheres.
+        2 for disks, 3 for spheres.
     """
 
     gain: float
@@ -104,12 +105,12 @@ class TransientGain:
 
     @property
     def disk(self) -> int:
-        """The worst disk to push: that which the start displaces farthest."""
+        """The worst disk to push: the disk with the largest initial displacement."""
         return int(np.argmax(np.linalg.norm(self._translations, axis=0)))
 
     @property
     def direction(self) -> Floats:
-        """In which direction, a unit vector (x, y) or (x, y, z)."""
+        """Direction of the displacement of this disk, a unit vector (x, y) or (x, y, z)."""
         push = self._translations[:, self.disk]
         return np.asarray(push / np.linalg.norm(push))
 
@@ -131,7 +132,7 @@ def transient_gain(packing: Packing | Snapshot, norm: Norm = "displacement") -> 
     Raises
     ------
     NoGainError
-        If some motion grows for ever, or the norm is the energy and K has none that is positive.
+        If some motion grows for ever, or the norm is the energy and the energy of K is not positive.
     numpy.linalg.LinAlgError
         If more than two eigenvalues coalesce.
     """

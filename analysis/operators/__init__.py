@@ -1,4 +1,4 @@
-"""What a small displacement and a small velocity do to the forces: the stability operator K and the damping matrix C.
+"""Derivatives of the forces by displacements and by velocities: the stability operator K and the damping matrix C.
 
 May import: `packing`.
 """

@@ -1,8 +1,8 @@
 r"""The damping matrix :math:`C = -\partial F / \partial \dot q` of a packing.
 
-Coordinates and the vectors N and T of a contact are those of :mod:`~faultgouge.analysis.operators.stiffness`. A
-contact has a dashpot along its normal and one along its slip (:mod:`~faultgouge.analysis.packing.law`), and a disk
-may feel a drag
+Coordinates and the vectors N and T of a contact are those of :mod:`~faultgouge.analysis.operators.stiffness`. A contact
+has a dashpot along its normal and one along its slip (:mod:`~faultgouge.analysis.packing.law`), and there may be a drag
+on each disk,
 :math:`-(m/\tau)\,\mathbf v` and :math:`-(I/\tau)\,\omega`:
 
 .. math::
@@ -13,9 +13,9 @@ may feel a drag
 C is symmetric and positive semidefinite: the energy falls by :math:`\dot q^T C\, \dot q` per unit of time. Small motion
 about an equilibrium obeys :math:`M \ddot q + C \dot q + K q = 0`.
 
-A contact at Coulomb's bound has no term in T. There the tangential force is no differentiable function of the
-velocity: it stays at the bound if the contact slides on, and the dashpot acts if the contact slides back. C takes the
-first of the two, as the stability operator does where the slip of such a contact is concerned.
+A contact at Coulomb's bound has no term in T. At the bound the tangential force is not a differentiable function of the
+velocity: the force stays at the bound if the contact continues to slide, and the dashpot acts if the contact slides
+back. C uses the first case, as the stability operator does for the slip of such a contact.
 """
 
 from dataclasses import replace
@@ -40,14 +40,13 @@ def damping_matrix(packing: Packing | Snapshot, sliding: ArrayLike = False) -> c
     packing : Packing or Snapshot
         The configuration, with dashpots ``law.cn`` and ``law.ct`` and with ``drag_time``; any of them may be absent.
     sliding : array_like of bool, shape () or (C,)
-        As of `stiffness_matrix`: contacts that slide on have no tangential dashpot.
+        As in `stiffness_matrix`: contacts that continue to slide have no tangential dashpot.
 
     Returns
     -------
     scipy.sparse.csr_array, shape (3N, 3N), or (6N, 6N) of spheres
-        Force time / length, in the order (x.., y.., R theta..), or as of
-        :mod:`~faultgouge.analysis.packing.snapshot`; of a Packing symmetric and positive semidefinite. Empty without
-        dashpots and drag.
+        Force time / length, in the order (x.., y.., R theta..), or as in :mod:`~faultgouge.analysis.packing.snapshot`.
+        For a Packing, C is symmetric and positive semidefinite. Without dashpots and drag, C is empty.
     """
     if isinstance(packing, Snapshot):
         return assembled_damping(packing)
@@ -65,7 +64,7 @@ def damping_matrix(packing: Packing | Snapshot, sliding: ArrayLike = False) -> c
 
 
 def largest_damping_rate(packing: Packing) -> float:
-    """Largest eigenvalue of M^-1 C of the dashpots, 1 / time: what limits the time step; drag does not.
+    """Largest eigenvalue of M^-1 C of the dashpots, 1 / time, which limits the time step; drag does not limit it.
 
     Parameters
     ----------

@@ -16,15 +16,15 @@ For one contact of i and j let :math:`\mathbf u = \mathrm d\mathbf r_i - \mathrm
     \mathrm d\mathbf T_i &= -l_i\, (\mathrm d\mathbf n \times \mathbf f_t + \mathbf n \times \mathrm d\mathbf f_t)
     - l_i'\, \mathbf n \times \mathbf f_t\, \mathrm d\delta .
 
-S is P where the contact sticks; where it slides, it is P without the direction of :math:`\mathbf f_t`: sideways the
-contact is as stiff as before. The last term of :math:`\mathrm d\mathbf f_t` turns the force with the contact, as a code
-does that projects its history onto the new plane. A twist about n changes nothing. The arms of slip s and of torque l
-are both the radius in LAMMPS's gran/* styles; its `granular` takes the radius for the slip and
-:math:`R - \delta/2` for the torque, so that K is not symmetric even without b. A wall is a partner that has no
-coordinates, and :math:`1/r = 0`. The three columns of a particle's spin about its only contact vanish together:
-such motions have the eigenvalue zero.
+For a sticking contact, S is P. For a sliding contact, S is P without the direction of :math:`\mathbf f_t`: sideways the
+contact keeps its stiffness. The last term of :math:`\mathrm d\mathbf f_t` rotates the force with the contact, as in a
+code that projects the history onto the new tangent plane. A twist about n changes nothing. The arms of slip s and of
+torque l are both the radius in LAMMPS's gran/* styles; its style `granular` uses the radius for the slip and :math:`R -
+\delta/2` for the torque, so that K is not symmetric even without b. A wall is a partner without coordinates, with
+:math:`1/r = 0`. The three columns of a particle's rotation about its only contact vanish together: such motions have
+the eigenvalue zero.
 
-Dashpots are the same formulas with velocities for displacements,
+Dashpots follow from the same formulas with velocities in place of displacements,
 :math:`f_n' \to c_n`, :math:`k_t' \to c_t`, and without forces. (Bonfanti et al., arXiv:1909.05070, have K of a smooth
 law in three dimensions.)
 """

@@ -18,15 +18,14 @@ and with a and b of :mod:`~faultgouge.analysis.packing.law`,
     -K_c = -f_n'\, N N^T + \frac{f_n}{r}\, P P^T + a\, T T^T
     - b\, T N^T - \frac{f_t}{r}\, N P^T
 
-For the floor only the first three coordinates exist and P = 0. The last two terms are not symmetric: the
-tangential force depends on the overlap while the normal force does not depend on the slip, and the tangential
-force follows the turning contact. ``form="paper"`` leaves out the last term, as the operator published by
-Charan, Pomyalov and Procaccia does: there the slip vector is differentiated with
-:math:`\partial t/\partial r = 1 - \mathbf n \mathbf n^T` and the turning of the tangent is lost.
-``form="consistent"`` is the exact derivative of the integrated forces.
+For the floor only the first three coordinates exist and P = 0. The last two terms are not symmetric: the tangential
+force depends on the overlap but the normal force does not depend on the slip, and the tangential force rotates with the
+contact. ``form="paper"`` leaves out the last term, as does the operator published by Charan, Pomyalov and Procaccia.
+They differentiate the slip vector with :math:`\partial t/\partial r = 1 - \mathbf n \mathbf n^T`, and so lose the
+rotation of the tangent. ``form="consistent"`` is the exact derivative of the integrated forces.
 
-The 36 numbers of a contact are nine and their negatives. Translations of the two disks have opposite signs in N, P and
-T, and rotations the same sign:
+The 36 numbers of a contact are nine numbers and their negatives. Translations of the two disks have opposite signs in
+N, P and T, and rotations the same sign:
 
 .. math::
 
@@ -37,7 +36,7 @@ T, and rotations the same sign:
 with :math:`S = f_n' \mathbf n \mathbf n^T - (f_n/r + a) \boldsymbol\tau \boldsymbol\tau^T +
 b\, \boldsymbol\tau \mathbf n^T + (f_t/r)\, \mathbf n \boldsymbol\tau^T`. K is assembled from these (`contact_terms`).
 
-Without friction only N and P are left, and K is an operator on the 2N coordinates (x, y): rows and columns of rotations
+Without friction only N and P remain, and K is an operator on the 2N coordinates (x, y): rows and columns of rotations
 are empty.
 """
 
@@ -73,29 +72,29 @@ def stiffness_matrix(
     packing : Packing or Snapshot
         The configuration; it need not be in balance.
     form : {"consistent", "paper"}
-        The exact derivative, or the one without the turning of the tangent.
+        The exact derivative, or the derivative without the rotation of the tangent.
     coupled : ndarray of bool, shape (C,), optional
-        Contacts whose tangential force depends on their overlap; all by default. Of the others b = d f_t / d overlap
-        counts as zero. That is no derivative of this law: it tells what comes of b.
+        Contacts whose tangential force depends on their overlap; all by default. For the other contacts b = d f_t / d
+        overlap is set to zero. The result is not a derivative of this law; it shows the effect of b.
     parting : array_like, shape () or (C,)
-        Share of the derivative while a contact parts, for a law that rescales slips: 0 that of contacts which
-        close, 1 that of contacts which part, and by default 1/2, the first harmonic of a small vibration
+        Weight of the derivative of an opening contact, for a law that rescales slips: 0 for closing contacts, 1 for
+        opening contacts, and by default 1/2, the first harmonic of a small vibration
         (:mod:`~faultgouge.analysis.packing.law`).
     sliding : array_like of bool, shape () or (C,)
-        Which contacts slide on if they are at Coulomb's bound, for Coulomb's slider, which has two derivatives there.
-        By default they stick, as contacts do that a small vibration has shaken.
+        Which of the contacts at Coulomb's bound continue to slide, for Coulomb's slider, which has two derivatives
+        there. By default they stick, like contacts after a small vibration.
 
     Returns
     -------
     scipy.sparse.csr_array, shape (3N, 3N), or (6N, 6N) of spheres
-        Force / length, in the order (x.., y.., R theta..), or as of
+        Force / length, in the order (x.., y.., R theta..), or as in
         :mod:`~faultgouge.analysis.packing.snapshot`. Rows of rattlers are empty, and so are all rows and columns
         of rotations without friction.
 
     Raises
     ------
     ValueError
-        If the form is neither of the two, or a Snapshot is asked for another operator than its own.
+        If the form is neither of the two, or an option does not apply to a Snapshot.
     """
     if form not in ("consistent", "paper"):
         raise ValueError(f'form = "{form}" must be "consistent" or "paper".')

@@ -1,7 +1,7 @@
-"""A packing of disks: where the disks are, which of them touch, and the contact law that their forces obey.
+"""A packing of disks: positions, contacts, and the contact law.
 
-`packing` has the one data type that everything passes on; `law`, `contacts` and `geometry` are its parts, `arrays`
-and `compensated` its numbers.
+`packing` has the data type that all parts exchange; `law`, `contacts` and `geometry` are its parts, `arrays` and
+`compensated` its numbers.
 
 May import: nothing of the analysis but its errors.
 """

@@ -1,9 +1,9 @@
-"""Values as packings and other frozen data keep them: checked, converted, copied and read-only.
+"""Values of packings and other frozen data: checked, converted, copied and read-only.
 
-A frozen dataclass whose fields are not what its constructor takes (arrays for lists, ones for None) has a constructor
-of its own, which converts with the functions here and hands the result to `set_frozen`. `derive_frozen` makes one of
-another, without checking again what has been checked. Nothing else sets a field, and neither does so of data that
-anybody has.
+If the fields of a frozen dataclass differ from its arguments (arrays for lists, ones for None), the class has its own
+constructor, which converts the arguments with the functions here and passes the result to `set_frozen`.
+`derive_frozen` makes a new object from another, without repeating checks. Only these two functions set fields, and
+only of new objects.
 """
 
 from collections.abc import Iterable

@@ -1,14 +1,14 @@
-r"""Differences of coordinates and overlaps to the last digit, however small they are.
+r"""Differences of coordinates and overlaps, accurate to the last digit, however small they are.
 
-A coordinate may come with a low part: x + x', an unevaluated sum of about 100 bits, as the compensated arithmetic of
-the pair style leaves it. Without low parts the coordinates are taken as the exact doubles that they are. Either way
+A coordinate may have a low part: x + x', an unevaluated sum of about 100 bits, from the compensated arithmetic of
+the pair style. Without low parts the coordinates are treated as exact doubles. Either way
 :math:`\delta = R_i + R_j - r` would lose the digits in which both sides agree, eleven of sixteen at an overlap of
 1e-11. Instead
 
 .. math:: \delta = \frac{c^2 - r^2}{c + r}, \qquad c = R_i + R_j,
 
-with :math:`c^2 - r^2` from sums and products whose errors are kept (Knuth's two-sum, Dekker's product). Numbers with
-an error kept are pairs of arrays, (high, low), and stand for their sum.
+with :math:`c^2 - r^2` from sums and products with their rounding errors (Knuth's two-sum, Dekker's product). A number
+with its error is a pair of arrays, (high, low), and represents their sum.
 """
 
 import numpy as np

@@ -15,8 +15,8 @@ FLOOR = -1
 class Contacts:
     """The contacts of a packing and their slips, kept in one canonical order.
 
-    Whatever the order given, a pair is stored with i < j (the slip is even under the exchange), pairs stand
-    in lexicographic order, and contacts with the floor follow all pairs, by disk.
+    For any given order, a pair is stored with i < j (the slip does not change under the exchange), pairs are in
+    lexicographic order, and contacts with the floor follow after all pairs, sorted by disk.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Contacts:
         return self.j == FLOOR
 
     def slipped(self, slip: ArrayLike, slip_low: ArrayLike | None = None) -> "Contacts":
-        """The same contacts with other slips, whose order is the one here; length, shape (C,)."""
+        """The same contacts with other slips in the same order; length, shape (C,)."""
         low = None if slip_low is None else floats("slip_low", slip_low, self.i.shape)
         return derive_frozen(self, slip=floats("slip", slip, self.i.shape), slip_low=low)
 

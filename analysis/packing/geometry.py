@@ -1,4 +1,4 @@
-"""Where contacts are and how they stand, in a box that may be periodic; definitions as of `packing`."""
+"""Positions and directions of contacts, in a box that may be periodic; definitions as in `packing`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class ContactGeometry(NamedTuple):
-    """Where each contact is and how it stands; arrays over contacts, read-only.
+    """Normal, tangent, distance and overlap of each contact, as read-only arrays over contacts.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ def nearest_image(difference: Floats, box_length: float | None) -> Floats:
 
 
 def touching(position: ArrayLike, radius: ArrayLike, box_length: float | None = None) -> Contacts:
-    """Every contact that positions alone imply, with zero slips.
+    """Find every contact from positions alone, with zero slips.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-r"""The contact law: a repulsion, a tangential force that meets Coulomb's bound smoothly, and dashpots.
+r"""The contact law: a repulsion, a tangential force that approaches Coulomb's bound smoothly, and dashpots.
 
-Two disks overlap by :math:`\delta > 0` and have slid by :math:`s` along the contact since they met.
+Two disks overlap by :math:`\delta > 0` and have slid by :math:`s` along the contact since they first touched.
 
 .. math::
 
@@ -8,9 +8,8 @@ Two disks overlap by :math:`\delta > 0` and have slid by :math:`s` along the con
     f_t &= -k_t \delta^{p-1} (1 + x - x^2)\, s, \qquad
     x = |s| / t^*, \quad t^* = \mu \frac{k_n}{k_t} \delta
 
-The exponent p is 3/2, that of Hertz and Mindlin, or 1: harmonic disks, which much of the literature takes. The slip
-is clamped to :math:`[-t^*, t^*]`, where :math:`|f_t| = \mu f_n` exactly. The derivatives that the stability operator
-needs are
+The exponent p is 3/2, that of Hertz and Mindlin, or 1: harmonic disks, common in the literature. The slip is clamped to
+:math:`[-t^*, t^*]`, where :math:`|f_t| = \mu f_n` exactly. The derivatives that the stability operator needs are
 
 .. math::
 
@@ -19,28 +18,28 @@ needs are
     b = \frac{\partial f_t}{\partial \delta} &= (p - 1) \frac{f_t}{\delta} - k_t \delta^{p-1} s\,
     \frac{2x^2 - x}{\delta}
 
-The tangential stiffness :math:`-a` first rises, to :math:`\tfrac43 k_t \delta^{p-1}` at :math:`x = 1/3`, and
-falls to zero at :math:`x = 1`. There :math:`b = p f_t / \delta`, which is also the derivative of the
-clamped branch :math:`f_t = \mp \mu k_n \delta^p`: the force is once continuously differentiable at the
-bound, so the clamp needs no case of its own in the derivatives.
+The tangential stiffness :math:`-a` first rises, to :math:`\tfrac43 k_t \delta^{p-1}` at :math:`x = 1/3`, and falls to
+zero at :math:`x = 1`. There :math:`b = p f_t / \delta`, which is also the derivative of the clamped branch :math:`f_t =
+\mp \mu k_n \delta^p`: the force is once continuously differentiable at the bound, so that the clamp needs no separate
+case in the derivatives.
 
 Dashpots resist the velocities of overlap and slip,
 
 .. math:: f_n' = C_N \delta^{p-1}\, \dot\delta, \qquad f_t' = -C_T \delta^{p-1}\, \dot s,
 
-as physics demands for p = 3/2 (no jump where a contact opens); for p = 1 they are constant while the contact lasts. The
-sum of :math:`f_t` and :math:`f_t'` is clamped to :math:`[-\mu f_n, \mu f_n]`, :math:`f_n` being the elastic force. So a
-contact at the bound has no tangential dashpot in the direction in which it slides; in the linear operator (`dashpots`)
-it has none at all.
+as physics requires for p = 3/2 (no jump when a contact opens); for p = 1 the dashpots are constant while the contact
+lasts. The sum of :math:`f_t` and :math:`f_t'` is clamped to :math:`[-\mu f_n, \mu f_n]`, where :math:`f_n` is the
+elastic force. A contact at the bound therefore has no tangential dashpot in the direction in which it slides; in the
+linear operator (`dashpots`) it has no tangential dashpot at all.
 
-**Does the force create energy?** What a contact gives back at constant overlap is
+**Does the force create energy?** The energy that a contact returns at constant overlap is
 
 .. math:: W(\delta, s) = \int_0^{|s|} |f_t|\, \mathrm ds = k_t \delta^{p-1} s^2
     \left(\tfrac12 + \tfrac x3 - \tfrac{x^2}4\right).
 
-The normal force is a function of the overlap alone, and does no work on a cycle. So no cycle that begins without slip
-creates energy if W does not grow while the overlap changes at rest, :math:`\mathrm dW \le 0` at :math:`\mathrm ds = 0`;
-what slips then brings in is at least :math:`\mathrm dW`. For p = 3/2:
+The normal force is a function of the overlap alone, and does no work on a cycle. A cycle that begins without slip
+therefore creates no energy if W does not grow while the overlap changes without slip, :math:`\mathrm dW \le 0` at
+:math:`\mathrm ds = 0`; the energy supplied by slip is then at least :math:`\mathrm dW`. For p = 3/2:
 
 .. math::
 
@@ -48,63 +47,64 @@ what slips then brings in is at least :math:`\mathrm dW`. For p = 3/2:
     g = \frac{x/3 - x^2/2}{1/2 + x/3 - x^2/4} \\
     \frac{\partial \ln W}{\partial \ln \delta}\Big|_{s \sqrt\delta} &= -\frac12 - \frac32 g(x) \le -0.07
 
-At constant slip W falls while the overlap falls and grows while the overlap grows: the law above creates energy where a
-contact slips out, is pressed, and slips back (Elata and Berryman, Mech. Mater. 24, 229 (1996)). At constant
+At constant slip W falls while the overlap falls and grows while the overlap grows: the law above creates energy if a
+contact slips out, is compressed, and slips back (Elata and Berryman, Mech. Mater. 24, 229 (1996)). At constant
 :math:`s\sqrt\delta` W falls while the overlap grows. The history is therefore either
 
 - *total*: s is the whole slip, the paper's law, which creates energy; or
-- *rescaled*: s counts as above, and while the overlap grows it falls so that :math:`s \sqrt\delta` stays,
+- *rescaled*: s is counted as above, and while the overlap grows, s also falls so that :math:`s \sqrt\delta` is
+  constant,
 
   .. math:: \mathrm ds = T \cdot \mathrm dq - \frac{s}{2 \delta} \max(\mathrm d\delta, 0),
 
-  which creates none.
+  which creates no energy.
 
 **Coulomb's slider.** Without the smoothing,
 
 .. math:: f_t = -k_t \delta^{p-1} s, \qquad |s| \le t^*,
 
-the contact is a spring behind a slider that gives way at :math:`\mu f_n` and sticks as soon as the motion turns back:
-the standard law of granular simulations (Cundall and Strack, Geotechnique 29, 47 (1979)). The history *coulomb* is
-this force with rescaled slips. The force is what the contact remembers, :math:`s = -f_t/(k_t \delta^{p-1})` is the
-stretch of the spring, :math:`W = k_t \delta^{p-1} s^2/2`, and no path creates energy. (Nor does one for p = 1, where
-there is nothing to rescale.) With p = 3/2 the law is LAMMPS's mindlin_rescale/force (Thornton, Cummins and Cleary,
-Powder Technol. 233, 30 (2013)), whose stiffnesses have the root of an effective radius besides. LAMMPS keeps the
-force and reduces it by the ratio of contact radii, :math:`\sim \sqrt\delta`, while they fall; that is the slip kept. It
-leaves the force alone while they grow; that is the slip rescaled. LAMMPS's mindlin/force, without the rescaling,
-creates energy where a contact is unloaded; its mindlin_rescale, which rescales a slip and not the force, creates
-energy where a contact is loaded. Harmonic disks have one stiffness, which nothing rescales, and the smoothing alone
-makes their forces depend on the overlap.
+the contact is a spring in series with a slider that slides at :math:`\mu f_n` and sticks as soon as the motion
+reverses: the standard law of granular simulations (Cundall and Strack, Geotechnique 29, 47 (1979)). The history
+*coulomb* is this force with rescaled slips. The contact remembers its force, :math:`s = -f_t/(k_t \delta^{p-1})` is the
+stretch of the spring, :math:`W = k_t \delta^{p-1} s^2/2`, and no path creates energy. (The same holds for p = 1,
+without any rescaling.) With p = 3/2 the law is LAMMPS's mindlin_rescale/force (Thornton, Cummins and Cleary, Powder
+Technol. 233, 30 (2013)), except that the stiffnesses of LAMMPS have an additional factor, the square root of an
+effective radius. While contact radii fall, LAMMPS reduces the force by their ratio, :math:`\sim \sqrt\delta`; this
+keeps the slip. While contact radii grow, LAMMPS does not change the force; this rescales the slip. LAMMPS's
+mindlin/force, without the rescaling, creates energy when a contact is unloaded; its mindlin_rescale, which rescales a
+slip and not the force, creates energy when a contact is loaded. Harmonic disks have a constant stiffness and no
+rescaling, and only the smoothing makes their forces depend on the overlap.
 
-**Two derivatives.** A rescaled force has another b where the overlap grows than where the overlap falls,
+**Two derivatives.** For a rescaled force, b differs between a growing and a falling overlap,
 
 .. math:: b_+ = \frac32 k_t \sqrt\delta\, s\, \frac{x - 2x^2}{\delta}, \qquad b_- = b \text{ of above},
 
-and both are :math:`p f_t / \delta` at the bound. Small x has :math:`b_+ \to 0`: to press a contact that sticks does not
-change its tangential force. So K is one for each choice of contacts that part. Every method takes the share of
-:math:`b_-`: 0 is the derivative while all overlaps grow, 1 while all fall, which is that of the total law, and 1/2 (the
-default) is the first harmonic of a small vibration: the rate of the force is
+and both are :math:`p f_t / \delta` at the bound. For small x, :math:`b_+ \to 0`: compression of a sticking contact does
+not change its tangential force. K therefore depends on which contacts open. Every method takes the weight of
+:math:`b_-`: 0 is the derivative while all overlaps grow; 1 is the derivative while all fall, which is that of the total
+law; and 1/2 (the default) is the first harmonic of a small vibration: the rate of the force is
 :math:`a \dot s + \tfrac12 (b_+ + b_-) \dot\delta + \tfrac12 (b_+ - b_-) |\dot\delta|`, and the last term has no
-component at the frequency of :math:`\dot\delta`. The last term makes the force fall a little with each period, so
-that no operator says all: D(t) grows in LAMMPS more slowly than the mean of both says, by 5 % in the median of ten
-packings, at most by 35 % (4.60 for 4.74 in one with 5.57 and 3.77 to either side, tests/plugin/test_history.py). As no
-contact creates energy, what grows is taken from what contacts and load have stored. A contact of elastic bodies
-(Mindlin and Deresiewicz) that is loaded a little and unloaded again follows :math:`b_+` both ways, since the annulus
-that parts carries no shear yet.
+component at the frequency of :math:`\dot\delta`. The last term makes the force fall a little with each period, so that
+no linear operator is exact: in LAMMPS D(t) grows more slowly than the mean of both predicts, by 5 % in the median of
+ten packings, at most by 35 % (4.60 for 4.74 in one with 5.57 and 3.77 to either side, tests/plugin/test_history.py). As
+no contact creates energy, the energy of the growing motion comes from the energy stored in contacts and load. A contact
+of elastic bodies (Mindlin and Deresiewicz) that is loaded a little and unloaded again follows :math:`b_+` in both
+directions, because the separating annulus carries no shear yet.
 
 Coulomb's slider has, while it sticks,
 
 .. math:: a = -k_t \delta^{p-1}, \qquad b_+ = 0, \qquad b_- = (p - 1) f_t/\delta,
 
-and a = 0, :math:`b = p f_t/\delta` while it slides on. At the bound it does either, as the motion has it. The operator
-of small vibrations takes all contacts as sticking, with the mean :math:`b = f_t/(4\delta)` for p = 3/2: a contact at
-the bound gives way in the first periods, until the vibration no longer reaches the bound (it is *shaken down*). The
-share of :math:`b_-`, and which contacts at the bound slide on, may be given. Newton's method takes each contact as its
-displacement has it: those that arrive at the bound slide.
+and a = 0, :math:`b = p f_t/\delta` while it continues to slide. At the bound either case occurs, depending on the
+motion. The operator of small vibrations treats all contacts as sticking, with the mean :math:`b = f_t/(4\delta)` for p
+= 3/2: a contact at the bound yields in the first periods, until the vibration no longer reaches the bound (it is
+*shaken down*). The weight of :math:`b_-`, and the contacts at the bound that continue to slide, may be given. Newton's
+method treats each contact according to its displacement: contacts that reach the bound slide.
 
 :math:`k_n, k_t, C_N` and :math:`C_T` are constants per length\ :sup:`p-1`; no effective radius enters. :math:`\mu = 0`
-or :math:`k_t = 0` means no tangential force at all, and no memory of the slip.
+or :math:`k_t = 0` means no tangential force at all, and no history of the slip.
 
-This module and mindlin_law.h are the two places that know the law. See docs/howto_law.md for how to add another.
+Only this module and mindlin_law.h contain the law. See docs/howto_law.md for how to add another.
 """
 
 from dataclasses import dataclass
@@ -146,7 +146,7 @@ class Derivatives(NamedTuple):
 class MindlinLaw:
     """The smooth Mindlin law; every method is vectorised over contacts.
 
-    A contact whose overlap is not positive is open and exerts nothing.
+    A contact whose overlap is not positive is open and exerts no force.
 
     Parameters
     ----------
@@ -163,13 +163,13 @@ class MindlinLaw:
     rescaled : bool
         Whether slips are rescaled while overlaps grow, which needs p = 3/2.
     coulomb : bool
-        Whether the tangential force is that of a spring behind Coulomb's slider, not smoothed, with rescaled slips.
+        Whether the tangential force is a spring in series with Coulomb's slider, not smoothed, with rescaled slips.
 
     Raises
     ------
     ValueError
-        If a parameter is not finite or has the wrong sign, the exponent is another one, nothing can be rescaled, or
-        there are two histories.
+        If a parameter is not finite or has the wrong sign, the exponent is neither 3/2 nor 1, slips cannot be rescaled,
+        or two histories are given.
     """
 
     kn: float
@@ -203,12 +203,12 @@ class MindlinLaw:
 
     @property
     def history(self) -> str:
-        """What contacts remember: "total", "rescaled" or "coulomb"."""
+        """Rule for the slip: "total", "rescaled" or "coulomb"."""
         return "coulomb" if self.coulomb else "rescaled" if self.rescaled else "total"
 
     @property
     def rescales(self) -> bool:
-        """Whether slips fall while overlaps grow, so that b depends on whether a contact closes or parts."""
+        """Whether slips fall while overlaps grow, so that b depends on whether a contact closes or opens."""
         return self.history != "total" and self.exponent == 1.5
 
     @property
@@ -233,22 +233,22 @@ class MindlinLaw:
         return overlap * self.mu * self.kn / self.kt if self.frictional else np.zeros_like(overlap)
 
     def at_bound(self, overlap: ArrayLike, slip: ArrayLike) -> NDArray[np.bool_]:
-        """Which contacts have reached Coulomb's bound, but for rounding; none without friction."""
+        """Which contacts have reached Coulomb's bound, within rounding; none without friction."""
         limit = self.slip_limit(overlap)
         return (np.abs(slip) >= AT_THE_BOUND * limit) & (limit > 0)
 
     def clamped(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
-        """Slip brought back into [-t*, t*], length: what a contact remembers after an increment."""
+        """Slip limited to [-t*, t*], length: the slip that a contact stores after an increment."""
         limit = self.slip_limit(overlap)
         return np.clip(np.asarray(slip, dtype=np.result_type(slip, np.float64)), -limit, limit)
 
     def remembered(self, slip: ArrayLike, before: ArrayLike, after: ArrayLike) -> Floats:
-        """Slip that a contact remembers when its overlap has changed steadily and nothing has slipped, length.
+        """Slip of a contact after a monotonic change of its overlap without slipping, length.
 
         Parameters
         ----------
         slip : array_like
-            The slip until then, length.
+            The slip before the change, length.
         before, after : array_like
             Overlaps, length, positive.
         """
@@ -281,7 +281,7 @@ class MindlinLaw:
         return float(self.kn ** (1 / p) * force ** ((p - 1) / p))
 
     def tangential_force(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
-        """Tangential force f_t along tau, force; at Coulomb's bound beyond the slip limit.
+        """Tangential force f_t along tau, force; beyond the slip limit it is Coulomb's bound.
 
         Parameters
         ----------
@@ -291,8 +291,8 @@ class MindlinLaw:
         Returns
         -------
         ndarray
-            f_t = -kt overlap^(p-1) (1 + x - x^2) slip, or without the bracket behind Coulomb's slider: it opposes the
-            slip.
+            f_t = -kt overlap^(p-1) (1 + x - x^2) slip, or without the bracket for Coulomb's slider. The force opposes
+            the slip.
         """
         overlap = _closed_overlap(overlap)
         slip = self.clamped(overlap, slip)
@@ -322,11 +322,11 @@ class MindlinLaw:
         overlap, slip : ndarray
             Overlap and slip of each contact, length.
         parting : array_like
-            Share of the derivative while the overlap falls in b; only rescaled slips have another one while the
-            overlap grows.
+            Weight in b of the derivative for a falling overlap. Only for rescaled slips does the derivative for a
+            growing overlap differ.
         sliding : array_like of bool
-            Which contacts slide on if they are at Coulomb's bound. Only Coulomb's slider has two derivatives there, and
-            by default sticks.
+            Which of the contacts at Coulomb's bound continue to slide. Only Coulomb's slider has two derivatives there;
+            by default it sticks.
         """
         overlap, p = np.maximum(overlap, 0.0), self.exponent
         root, rest_power = self._powers(overlap)
@@ -354,14 +354,14 @@ class MindlinLaw:
         )
 
     def dashpots(self, overlap: ArrayLike, slip: ArrayLike, sliding: ArrayLike = False) -> tuple[Floats, Floats]:
-        """Coefficients of the dashpots of small velocities, force time / length.
+        """Coefficients of the dashpots for small velocities, force time / length.
 
         Parameters
         ----------
         overlap, slip : array_like
             Overlap and slip of each contact, length.
         sliding : array_like of bool
-            As of `derivatives`.
+            As in `derivatives`.
 
         Returns
         -------
@@ -377,7 +377,7 @@ class MindlinLaw:
         return self.cn * power, self.ct * power * (self.frictional & ~slides)
 
     def growth(self, overlap: Floats) -> Floats:
-        """overlap^(p-1), with which stiffnesses and dashpots grow; of overlaps that are not negative, or complex."""
+        """overlap^(p-1), proportional to stiffnesses and dashpots; overlaps may be complex, but not negative."""
         return np.sqrt(overlap) if self.exponent != 1 else np.asarray(overlap != 0, dtype=overlap.dtype)
 
     def _powers(self, overlap: Floats) -> tuple[Floats, Floats]:

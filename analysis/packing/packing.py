@@ -1,20 +1,19 @@
-r"""A packing of frictional disks, the one data type that everything passes on.
+r"""A packing of frictional disks, the data type that all parts exchange.
 
-Two disks touch when :math:`\delta = R_i + R_j - r > 0`, with :math:`r` the length of the branch vector
-:math:`\mathbf r_i - \mathbf r_j` (nearest image along x in a periodic box).
-:math:`\mathbf n = (\mathbf r_i - \mathbf r_j)/r` points to i and
-:math:`\boldsymbol\tau = \hat z \times \mathbf n = (-n_y, n_x)`. The history of a contact is one number, the
-slip s along :math:`\boldsymbol\tau`, and it is even under exchange of i and j: the normal, the relative
+Two disks touch when :math:`\delta = R_i + R_j - r > 0`, with :math:`r` the length of the branch vector :math:`\mathbf
+r_i - \mathbf r_j` (nearest image along x in a periodic box). :math:`\mathbf n = (\mathbf r_i - \mathbf r_j)/r` points
+to i and :math:`\boldsymbol\tau = \hat z \times \mathbf n = (-n_y, n_x)`. The history of a contact is one number, the
+slip s along :math:`\boldsymbol\tau`. The slip does not change under exchange of i and j: the normal, the relative
 motion and the tangent all change sign. The flat floor at y = 0 is a partner with :math:`\mathbf n = (0, 1)`,
 :math:`\boldsymbol\tau = (-1, 0)`, :math:`\delta = R - y` and a normal that never turns.
 
 With the coordinates :math:`q = (x_1..x_N, y_1..y_N, u_1..u_N)`, :math:`u_i = R_i \theta_i`, the forces are
 :math:`(F_x, F_y, T/R)`; a contact puts :math:`f_n \mathbf n + f_t \boldsymbol\tau` on i, the opposite on j,
-and :math:`-f_t` as T/R on both, because the lever arm is the full radius. Each disk of the upper layer
-carries :math:`(f_x, -f_y)` besides.
+and :math:`-f_t` as T/R on both, because the lever arm is the full radius. Each disk of the upper layer also carries the
+force :math:`(f_x, -f_y)`.
 
-Coordinates and slips are doubles, or doubles with low parts (:mod:`~faultgouge.analysis.packing.compensated`), if
-compensated arithmetic has found them.
+Coordinates and slips are doubles, or doubles with low parts (:mod:`~faultgouge.analysis.packing.compensated`) in
+compensated arithmetic.
 """
 
 from dataclasses import dataclass, replace
@@ -68,15 +67,15 @@ class Packing:
     fx, fy : float
         Force on each disk of the upper layer: fx along +x, fy downwards.
     position_low : array_like, shape (N, 2), optional
-        Low parts of the coordinates, length: the packing is then a compensated one. None by default.
+        Low parts of the coordinates, length, of a packing in compensated arithmetic; none by default.
     drag_time : float, optional
         tau of the drag -(m/tau) v and -(I/tau) omega on every disk, time, positive; no drag by default.
 
     Raises
     ------
     ValueError
-        If a shape does not fit, a number is not finite or has the wrong sign, a contact names a disk that
-        does not exist, or the box is so narrow that a disk could touch two images of another.
+        If a shape does not fit, a number is not finite or has the wrong sign, a contact names a disk that does not
+        exist, or the box is so narrow that a disk could touch two images of another disk.
     """
 
     position: Floats
@@ -177,15 +176,15 @@ class Packing:
 
     @property
     def contact_states(self) -> bytes:
-        """Which contacts there are, and which of them slide to which side; equal for equal states."""
+        """State of the contacts: their disks, which of them slide, and in which direction; equal for equal states."""
         slides = np.sign(self.contacts.slip) * self.sliding
         return np.array([self.contacts.i, self.contacts.j, slides], dtype=np.int64).tobytes()
 
     @property
     def load_error(self) -> float:
-        """r / n^(1/2) of a residual r and n top disks, force per disk: what is out of balance is exact at another load.
+        """r / n^(1/2) of a residual r and n top disks, force per disk: the shift of the load that balances r.
 
-        Rounding leaves forces of r or less at random on the disks, and their mean over n disks is that of a load.
+        Rounding leaves random forces of r or less on the disks. Their mean over n disks acts as a load.
         """
         return self.residual / float(np.sqrt(max(1, self.top.sum())))
 
@@ -201,7 +200,7 @@ class Packing:
 
     @property
     def coordinate_rounding(self) -> float:
-        """What a coordinate is known to, length: its last place, or that of its low part (see compensated.h)."""
+        """Rounding error of a coordinate, length: its last place or that of its low part (see compensated.h)."""
         if not self.compensated:
             return float(np.finfo(float).eps * np.abs(self.position).max())
         exponent = int(np.frexp(2 * self.radius.max())[1])
@@ -229,7 +228,7 @@ class Packing:
 
     @property
     def mobilised(self) -> Floats:
-        """|f_t|/(mu f_n): the share of Coulomb's bound that each contact uses, shape (C,); zero without friction."""
+        """|f_t|/(mu f_n), the mobilised fraction of Coulomb's bound, shape (C,); zero without friction."""
         limit = self.law.mu * self.normal_force
         return np.divide(np.abs(self.tangential_force), limit, out=np.zeros_like(limit), where=limit > 0)
 
@@ -246,7 +245,7 @@ class Packing:
     def net_force(self) -> Floats:
         """Force on every coordinate, load included: (Fx_1.., Fy_1.., T_1/R_1..), shape (3N,).
 
-        Of a compensated packing it is summed in numpy's long doubles, which have 64 bits on x86.
+        For a compensated packing the sum is in numpy's long doubles, which have 64 bits on x86.
         """
         i, j, pair = self.contacts.i, self.contacts.j, ~self.contacts.floor
         fn, ft, normal = self._contact_forces
@@ -284,14 +283,14 @@ class Packing:
         position_low: ArrayLike | None = None,
         fx: float | None = None,
     ) -> "Packing":
-        """The same disks elsewhere; only what is new is checked.
+        """The same disks at other positions; only the new values are checked.
 
         Parameters
         ----------
         position, angle, contacts, position_low
-            As of the class.
+            As for the class.
         fx : float, optional
-            Force along x on each disk of the upper layer; as it was by default.
+            Force along x on each disk of the upper layer; unchanged by default.
         """
         n = len(self)
         _check_partners(contacts, n)
@@ -305,15 +304,15 @@ class Packing:
         )
 
     def loaded(self, least: float) -> "Packing":
-        """The packing without the contacts that carry no more than a given force.
+        """The packing without the contacts whose normal force does not exceed a given force.
 
-        A disk that nothing holds comes to rest just about touching another, with an overlap, and so a stiffness, that
-        is rounding noise: of order (force / k_n)^(1/3), which is not small.
+        A disk that nothing holds comes to rest barely touching another disk. The overlap, and so the stiffness, is then
+        rounding noise: of order (force / k_n)^(1/3), which is not small.
 
         Parameters
         ----------
         least : float
-            Normal force that a contact has to exceed.
+            Normal force that a contact must exceed.
         """
         kept = self.normal_force > least
         if np.all(kept):
@@ -333,7 +332,7 @@ class Packing:
     def residual(self) -> float:
         """Largest |(Fx, Fy, T/R)| on a disk that has a contact, force; zero if none has.
 
-        A rattler of the upper layer would fall under the load: it has no balance to miss and is not counted.
+        A rattler of the upper layer would fall under the load: it cannot be in balance and is not counted.
         """
         per_disk = np.linalg.norm(self.net_force.reshape(3, -1), axis=0)
         return float(np.delete(per_disk, self.rattlers).max(initial=0.0))

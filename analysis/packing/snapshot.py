@@ -1,17 +1,17 @@
-r"""A packing as some other code holds it, in two or three dimensions: what each contact does to first order.
+r"""A packing of another code, in two or three dimensions, with its contacts to first order.
 
-A contact law, whatever it is, enters the operators through a few numbers at each contact: the normal, the distance and
-the lever arms; the normal and the tangential force; and the derivatives of both. `LinearisedContacts` has them,
-`Snapshot` adds the particles, and :mod:`~faultgouge.analysis.operators.linearised_contacts` makes the operators.
+Any contact law enters the operators through a few numbers at each contact: the normal, the distance and the lever arms;
+the normal and the tangential force; and the derivatives of both. `LinearisedContacts` has them, `Snapshot` adds the
+particles, and :mod:`~faultgouge.analysis.operators.linearised_contacts` assembles the operators.
 
 **Coordinates** are translations and rotations as lengths, :math:`R\theta`, axis by axis:
 (x.., y.., R theta..) of disks and (x.., y.., z.., R theta_x.., R theta_y.., R theta_z..) of spheres. Vectors always
 have three components; those of disks lie in the plane, and disks turn about z.
 
-**Two derivatives.** Some laws have another derivative :math:`b = \partial \mathbf f_t / \partial \delta` while the
-overlap grows than while it falls (LAMMPS's mindlin_rescale). Both are kept; every operator takes the share of contacts
-that part (:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks on the way back and slides on
-the way on. `sliding` chooses.
+**Two derivatives.** For some laws (LAMMPS's mindlin_rescale) the derivative :math:`b = \partial \mathbf f_t / \partial
+\delta` differs between a growing and a falling overlap. Both are stored; every operator takes the weight of opening
+contacts (:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks if the motion reverses, and
+slides if the motion continues. `sliding` chooses.
 """
 
 from dataclasses import dataclass
@@ -54,18 +54,18 @@ PER_CONTACT = {
 
 @dataclass(frozen=True, init=False, eq=False)
 class LinearisedContacts:
-    """What each contact does to first order; C contacts, arrays are copied and made read-only.
+    """The contacts of a packing to first order: forces and derivatives. Arrays are copied and made read-only.
 
     Parameters
     ----------
     i : array_like of int, shape (C,)
         First partner.
     j : array_like of int, shape (C,)
-        Second partner; -1 is a wall, which neither moves nor turns.
+        Second partner; -1 is a wall, which neither moves nor rotates.
     normal : array_like, shape (C, 3)
         Unit vector n towards i.
     distance : array_like, shape (C,)
-        Length r of the branch vector between two centres; infinite for a wall, whose normal does not turn.
+        Length r of the branch vector between two centres; infinite for a wall, whose normal does not rotate.
     overlap : array_like, shape (C,)
         delta, length.
     slip_arm : array_like, shape (C, 2)
@@ -73,7 +73,7 @@ class LinearisedContacts:
     lever_arm : array_like, shape (C, 2)
         Arms l_i, l_j of the torques -l n x f_t; length.
     lever_slope : array_like, shape (C,)
-        -d l / d delta: 0 where the arm is a radius, 1/2 where it ends in the middle of the overlap.
+        -d l / d delta: 0 if the arm is a radius, 1/2 if it ends in the middle of the overlap.
     normal_force : array_like, shape (C,)
         f_n, force, positive for a repulsion.
     tangential_force : array_like, shape (C, 3)
@@ -83,9 +83,9 @@ class LinearisedContacts:
     closing, parting : array_like, shape (C, 3)
         b = d f_t / d delta at constant slip while the overlap grows, and while the overlap falls; force / length.
     friction : array_like, shape (C,)
-        mu f_n, Coulomb's bound, force; infinite where there is none.
+        mu f_n, Coulomb's bound, force; infinite without such a bound.
     sliding : array_like of bool, shape (C,)
-        Contacts that slide: they resist no slip along f_t, and b is that of f_t = mu f_n.
+        Contacts that slide: they have no stiffness along f_t, and b is that of f_t = mu f_n.
     normal_dashpot, tangential_dashpot : array_like, shape (C,)
         Force time / length.
 
@@ -151,7 +151,7 @@ class LinearisedContacts:
         return (tangential > 0) & (tangential >= AT_COULOMBS_BOUND * self.friction)
 
     def overlap_derivative(self, parting: ArrayLike = 0.5) -> Floats:
-        """b of each contact, shape (C, 3), with a share of contacts that part, shape () or (C,)."""
+        """b of each contact, shape (C, 3), with the weight of opening, shape () or (C,)."""
         share = np.broadcast_to(np.asarray(parting, dtype=np.float64), (len(self),))[:, None]
         stick = (1 - share) * self.closing + share * self.parting
         # a sliding contact keeps |f_t| = mu f_n, in the direction in which it slides
@@ -162,7 +162,7 @@ class LinearisedContacts:
         return np.where(self.sliding[:, None], slide, stick)
 
     def chosen(self, which: NDArray) -> "LinearisedContacts":
-        """Some of the contacts, by a mask or by numbers."""
+        """Some of the contacts, selected by a mask or by numbers."""
         return derive_frozen(self, **{name: np.array(getattr(self, name)[which]) for name in PER_CONTACT})
 
 
@@ -195,7 +195,7 @@ def linearise_contacts(
 
 @dataclass(frozen=True, init=False, eq=False)
 class Snapshot:
-    """Particles as they stand, in two or three dimensions, with their linearised contacts.
+    """Particles of a packing in two or three dimensions, with their linearised contacts.
 
     Parameters
     ----------
@@ -208,23 +208,23 @@ class Snapshot:
     contacts : LinearisedContacts
         The contacts.
     box : array_like, shape (3, 3)
-        Edges of the box in rows, length; a sheared box has edges that are not along the axes.
+        Edges of the box in rows, length; the edges of a sheared box are not along the axes.
     origin : array_like, shape (3,)
         Its lower corner.
     periodic : array_like of bool, shape (3,)
         Along which edges it is periodic.
     load : array_like, shape (N, 2, 3)
-        Force and torque on each particle besides those of its contacts, of a packing at rest.
+        Force and torque on each particle other than those of its contacts, for a packing at rest.
     free : array_like of bool, shape (N,), optional
-        Particles that move; those that are held take part in contacts alone. All by default.
+        Particles that move; fixed particles only take part in contacts. All by default.
     ids : array_like of int, shape (N,), optional
-        Numbers that the other code has given to the particles; 1 to N by default.
+        IDs of the particles in the other code; 1 to N by default.
     kind : array_like of int, shape (N,), optional
         Their types; 1 by default.
     fx : float
-        Value of the load parameter at which the snapshot was taken, if it is one of a path.
+        Value of the load parameter of the snapshot, if it belongs to a path.
     load_error : float
-        Error of `fx` that goes with what is out of balance, in units of `fx`.
+        Error of `fx` that corresponds to the residual, in units of `fx`.
 
     Raises
     ------
@@ -312,7 +312,7 @@ class Snapshot:
 
     @classmethod
     def of_packing(cls, packing: Packing) -> "Snapshot":
-        """The linearised contacts of a packing of this package's own, without its drag."""
+        """The linearised contacts of a Packing of this package, without its drag."""
         g, c, n = packing.geometry, packing.contacts, len(packing)
         flat = np.zeros(len(c))
         arms = np.column_stack([packing.radius[c.i], np.where(c.floor, 0.0, packing.radius[c.j])])
@@ -352,7 +352,7 @@ class Snapshot:
 
     @property
     def top(self) -> NDArray[np.bool_]:
-        """The disks of a driven layer, of which a snapshot knows none, shape (N,)."""
+        """The disks of a driven layer, shape (N,): none, as a snapshot has no such layer."""
         return np.zeros(len(self), dtype=np.bool_)
 
     @property
@@ -393,7 +393,7 @@ class Snapshot:
 
     @property
     def contact_states(self) -> bytes:
-        """Which particles touch, and which contacts slide; equal for equal states."""
+        """State of the contacts: which particles touch, and which contacts slide; equal for equal states."""
         c = self.contacts
         order = np.lexsort((c.j, c.i))
         return np.array([c.i, c.j, c.sliding], dtype=np.int64)[:, order].tobytes()

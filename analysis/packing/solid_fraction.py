@@ -1,13 +1,13 @@
-r"""How much of a layer is solid: its volume fraction phi, in the plane an area fraction.
+r"""Volume fraction phi of a layer, in the plane an area fraction.
 
 .. math:: \phi = \frac{A(H)}{L\, H}
 
-H is the mean height of the centres of the upper layer above the floor, L the period, or without one the width from
-the leftmost to the rightmost point of the disks, and A(H) the area of all disks below H: of a disk that H cuts, the
-part below. Rattlers count. An overlap counts for either of its disks, which adds less than a thousandth at usual loads.
+H is the mean height of the centres of the upper layer above the floor, L the period, or without one the width from the
+leftmost to the rightmost point of the disks, and A(H) the area of all disks below H; of a disk that H cuts, only the
+part below H counts. Rattlers count. An overlap counts for both disks, which adds less than a thousandth at usual loads.
 
-The cut at the centres leaves out the ragged surface, where there is no more a packing to speak of. The floor, beside
-which disks fill the plane less well, is left in. :func:`solid_fraction_below_top` counts the surface, too.
+The cut at the centres leaves out the ragged surface, where there is no packing. The region at the floor, where disks
+fill the plane less well, is included. :func:`solid_fraction_below_top` also includes the surface.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ from .packing import Packing
 
 
 def solid_fraction(packing: Packing) -> float:
-    """Volume fraction phi of a layer below the mean height of its upper layer's centres.
+    """Volume fraction phi of a layer, up to the mean height of the centres of its upper layer.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def solid_fraction(packing: Packing) -> float:
     Returns
     -------
     float
-        NaN of disks whose centres are not above the floor y = 0.
+        NaN if the centres are not above the floor y = 0.
     """
     heights = packing.position[:, 1]
     return _solid_below(packing, float(heights[packing.top].mean() if packing.top.any() else heights.max()))

@@ -1,13 +1,14 @@
 r"""Negative eigenvalues of the stability operator: the classical instability, for packings of any size.
 
-A real :math:`\lambda < 0` makes :math:`\omega` imaginary: disks leave the equilibrium without oscillation, D as
-:math:`e^{2 \sqrt{-\lambda}\, t}`. With dissipation such an eigenvalue still has a real :math:`s > 0`. Along a branch of
-equilibria :math:`\lambda` goes through zero at a turning point. Newton's method may step across one.
+A real :math:`\lambda < 0` makes :math:`\omega` imaginary: disks leave the equilibrium without oscillation, and D grows
+as :math:`e^{2 \sqrt{-\lambda}\, t}`. With dissipation such an eigenvalue still has a real :math:`s > 0`. Along a branch
+of equilibria :math:`\lambda` passes through zero at a turning point. Newton's method may step across a turning point.
 
-Most packings have none, and that is proved without an eigenvalue: every eigenvalue of A has
+Most packings have no negative eigenvalue, and this is proved without computing any eigenvalue: every eigenvalue of A
+has
 :math:`\mathrm{Re}\,\lambda \ge \min \lambda(S)` with :math:`S = (A + A^T)/2` (Bendixson, Acta Math. 25, 359
-(1902)), and factors :math:`L D L^T` of S with positive pivots say that S is positive definite (Sylvester's law of
-inertia). Else the factors of :math:`S + c` give a bound :math:`-c` below all real parts, and all real negative
+(1902)), and factors :math:`L D L^T` of S with positive pivots show that S is positive definite (Sylvester's law of
+inertia). Otherwise the factors of :math:`S + c` give a bound :math:`-c` below all real parts, and all real negative
 eigenvalues lie within c/2 of -c/2, where Arnoldi's iteration with that shift finds every eigenvalue.
 """
 
@@ -29,7 +30,7 @@ FIRST = 16
 def negative_eigenvalues(packing: Packing) -> Floats:
     """The real negative eigenvalues of a packing, beyond their rounding uncertainty.
 
-    Where the symmetric part of the operator is positive definite, a sparse factorisation shows that there are none.
+    If the symmetric part of the operator is positive definite, a sparse factorisation shows that there are none.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def negative_eigenvalues(packing: Packing) -> Floats:
     Returns
     -------
     ndarray, shape (B,)
-        The most negative first, 1 / time^2. Empty where nothing buckles; complex pairs are another matter.
+        The most negative first, 1 / time^2. Empty if the packing does not buckle. Complex pairs are not included.
     """
     matrix, _ = dynamical_matrix(packing)
     size, rounding = matrix.shape[0], unit_rounding(matrix.data)

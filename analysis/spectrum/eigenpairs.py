@@ -1,6 +1,6 @@
-"""Eigenvalues of the stability operator with their right and left vectors: all of them, or those that are asked for.
+"""Eigenvalues of the stability operator with their right and left vectors: all of them, or those nearest to a shift.
 
-Vectors live in the mass-weighted coordinates of :mod:`~faultgouge.analysis.spectrum.spectrum`.
+Vectors are in the mass-weighted coordinates of :mod:`~faultgouge.analysis.spectrum.spectrum`.
 """
 
 from dataclasses import dataclass
@@ -25,11 +25,11 @@ class Eigenpairs:
         Eigenvalues, 1 / time^2.
     right, left : ndarray of complex, shape (3N, k)
         Unit vectors A x = lambda x and y^H A = lambda y^H in columns, in the order (x.., y.., R theta..);
-        zero on coordinates that feel no force.
+        zero for coordinates on which no force acts.
     solves : int
-        Sparse solves that it took; 0 of a dense solver.
+        Number of sparse solves; 0 for the dense solver.
     axes : int
-        Coordinates of a particle: 3 of disks, 6 of spheres.
+        Coordinates per particle: 3 for disks, 6 for spheres.
     """
 
     values: Complexes
@@ -55,7 +55,7 @@ class Eigenpairs:
 
 
 def normal_modes(packing: Packing | Snapshot) -> Eigenpairs:
-    """Every mode with its left and right vectors, by LAPACK's dense solver.
+    """Compute every mode with its left and right vectors, by LAPACK's dense solver.
 
     Parameters
     ----------
@@ -65,28 +65,28 @@ def normal_modes(packing: Packing | Snapshot) -> Eigenpairs:
     Returns
     -------
     Eigenpairs
-        Sorted by real part, then imaginary part, as of :func:`spectrum`.
+        Sorted by real part, then imaginary part, as in :func:`spectrum`.
     """
     return Eigenpairs(*all_modes(mass_weighted(stiffness_matrix(packing), packing)), 0, packing.axes)
 
 
 def closest_to_meeting(modes: Eigenpairs) -> tuple[int, int, float]:
-    r"""The two real modes that are closest to a coalescence.
+    r"""Find the two real modes that are closest to a coalescence.
 
-    Where two real eigenvalues coalesce their vectors become one. In the normal form of two modes the cosine between
+    At a coalescence of two real eigenvalues the vectors become one. In the normal form of two modes the cosine between
     the right vectors is :math:`\eta/\delta = 1 - \epsilon`, and :math:`\epsilon` is the distance from the coalescence.
-    The two are therefore the real modes whose right vectors, mass-weighted, are nearest to parallel.
+    The two modes are therefore the real modes whose mass-weighted right vectors are most nearly parallel.
 
     Parameters
     ----------
     modes : Eigenpairs
-        All modes of a packing, of :func:`normal_modes`.
+        All modes of a packing, from :func:`normal_modes`.
 
     Returns
     -------
     tuple of (int, int, float)
-        Indices of the two, the lower eigenvalue first, and the cosine; 0 for the modes of a symmetric operator, but
-        for rounding.
+        Indices of the two modes, the lower eigenvalue first, and the cosine. The cosine is 0, up to rounding, for the
+        modes of a symmetric operator.
 
     Raises
     ------
@@ -103,28 +103,27 @@ def closest_to_meeting(modes: Eigenpairs) -> tuple[int, int, float]:
 
 
 def eigenpairs(packing: Packing | Snapshot, near: complex, count: int, tolerance: float = 0.0) -> Eigenpairs:
-    """The eigenvalues nearest to a shift, with left and right vectors: shift-invert Arnoldi (ARPACK).
+    """Compute the eigenvalues nearest to a shift, with left and right vectors, by shift-invert Arnoldi (ARPACK).
 
     One sparse LU factorisation of :math:`A - \\sigma` serves the right vectors and, transposed, the left
-    ones; the cost is that of a few solves, so that packings far beyond the dense solver are in reach.
+    ones; the cost is a few solves, so that packings far too large for the dense solver are possible.
 
     Parameters
     ----------
     packing : Packing
         The configuration.
     near : complex
-        The shift sigma, 1 / time^2. It should not be an eigenvalue to the last digit.
+        The shift sigma, 1 / time^2. It must not be exactly an eigenvalue.
     count : int
-        How many eigenvalues, at least 1 and at most E - 2 of the E coordinates that feel a force.
+        Number of eigenvalues, from 1 to E - 2, with E the number of coordinates on which a force acts.
     tolerance : float
-        Relative error of the eigenvalues of the inverted operator at which the iteration may end; 0 for that of
-        doubles.
+        Relative error of the eigenvalues of the inverted operator at which the iteration may end; 0 for the precision
+        of doubles.
 
     Returns
     -------
     Eigenpairs
-        Sorted by real part, then imaginary part. A complex pair at the rim of the wanted set may lack its
-        partner.
+        Sorted by real part, then imaginary part. A complex eigenvalue at the edge of this set may lack its partner.
 
     Raises
     ------

@@ -20,11 +20,12 @@ complex for :math:`\nu > 1` (where the paper has :math:`\eta > 1`). With half th
     \mathbf e_\perp = \frac{(1, -1)}{\sqrt2}, \quad g = \sqrt{\frac{1 + \nu}{1 - \nu}} = \sqrt{\frac{2 - \epsilon}
     \epsilon} ,
 
-because :math:`N \mathbf e_\perp = -\delta (1 + \nu)\, \mathbf v^*`. It goes over into the paper's Eq. 18 for
+because :math:`N \mathbf e_\perp = -\delta (1 + \nu)\, \mathbf v^*`. The solution becomes the paper's Eq. 18 for
 :math:`\epsilon \to 0`: the amplitude is :math:`\sqrt{2/\epsilon}`, reached after the time :math:`\pi/2d`.
 
-**Damping** takes :math:`\sqrt{1 - \gamma^2 \pm r}`, :math:`\gamma = 1/2\tau`, for the frequencies and multiplies by
-:math:`e^{-\gamma t} = e^{-t/2\tau}` (the paper has :math:`e^{-t/\tau}`), so that for small :math:`\epsilon` and
+**Damping** changes the frequencies to :math:`\sqrt{1 - \gamma^2 \pm r}`, :math:`\gamma = 1/2\tau`, and multiplies the
+solution by :math:`e^{-\gamma t} = e^{-t/2\tau}` (the paper has :math:`e^{-t/\tau}`), so that for small :math:`\epsilon`
+and
 :math:`\gamma`
 
 .. math::

@@ -1,13 +1,12 @@
-r"""Eigenvalues of the stability operator, and which complex pairs among them are real physics.
+r"""Eigenvalues of the stability operator, and the test whether a complex pair is physical or rounding noise.
 
 Small motion about an equilibrium obeys :math:`M \ddot q = -K q` with :math:`M = \mathrm{diag}(m, m, I_0 m)`
 in the coordinates (x, y, R theta), so :math:`q \propto v e^{i\omega t}` with
 
 .. math:: K v = \lambda M v, \qquad \omega = \sqrt\lambda .
 
-All vectors here live in the mass-weighted coordinates :math:`M^{1/2} q`, where the operator is
-:math:`A = M^{-1/2} K M^{-1/2}`: it is symmetric whenever K is, and then every eigenvalue has condition number
-one.
+All vectors here are in the mass-weighted coordinates :math:`M^{1/2} q`, in which the operator is :math:`A = M^{-1/2} K
+M^{-1/2}`. A is symmetric if K is symmetric, and then every eigenvalue has condition number one.
 
 K is not symmetric, and real eigenvalues may coalesce and leave the axis as a pair
 :math:`\lambda = \lambda_R \pm i\lambda_I`. Then :math:`\omega = \pm\omega_R \pm i\omega_I`, one motion of
@@ -16,16 +15,15 @@ each pair grows as :math:`e^{|\omega_I| t}`, and the mean square displacement as
 
 **Negative eigenvalues.** A real :math:`\lambda < 0` is the classical instability (buckling): :math:`\omega` is
 imaginary, and the motion leaves the equilibrium without oscillation. A branch of equilibria passes through
-:math:`\lambda = 0` at a turning point; Newton's method can land beyond it, on equilibria that no packing reaches by
-itself. A packing is linearly stable only if it has neither complex pairs nor negative eigenvalues.
+:math:`\lambda = 0` at a turning point; Newton's method can land beyond the turning point, on equilibria that no packing
+reaches by itself. A packing is linearly stable only if it has neither complex pairs nor negative eigenvalues.
 
 **Noise.** A backward stable solver returns the eigenvalues of :math:`A + E` with :math:`|E| \sim u |A|`, u
 the unit roundoff, and a simple eigenvalue with unit right and left vectors x, y moves by :math:`\kappa |E|`,
 :math:`\kappa = 1/|y^H x|`. Close to a coalescence :math:`\kappa \to \infty` as one over the distance of the
-pair, so that a double real eigenvalue turns into a spurious complex pair of size :math:`(u |A| c)^{1/2}`, c
-the difference of the couplings of the two modes, far above :math:`u |A|`. A pair is therefore believed only
-if :math:`|\lambda_I|` exceeds a safety factor times its own :math:`\kappa u |A|`; the others are counted as
-noise.
+pair, so that a double real eigenvalue turns into a spurious complex pair of size :math:`(u |A| c)^{1/2}`, far above
+:math:`u |A|`; c is the difference of the couplings of the two modes. A pair is therefore accepted only if
+:math:`|\lambda_I|` exceeds a safety factor times its own :math:`\kappa u |A|`; the other pairs are counted as noise.
 
 **Time steps.** Velocity Verlet with step dt turns the frequency of a frozen K into :math:`\Omega`,
 
@@ -89,7 +87,7 @@ class ComplexPair:
     eigenvalue : complex
         The member with positive imaginary part, 1 / time^2.
     overlap : float
-        |y^H x| of its unit left and right vectors: it vanishes where the pair coalesces.
+        |y^H x| of the unit left and right vectors; zero at the coalescence of the pair.
     participation : float
         Participation ratio of the mode, from 1/N for one disk that moves alone to 1 for disks that move alike.
     rotation : float
@@ -113,7 +111,7 @@ class ComplexPair:
 
     @property
     def quality(self) -> float:
-        """|Re omega| / (2 |Im omega|): what dissipates with a lower quality factor stops the growth."""
+        """|Re omega| / (2 |Im omega|): dissipation with a lower quality factor stops the growth."""
         return self.frequency / self.growth_rate if self.growth_rate > 0 else np.inf
 
     @property
@@ -129,8 +127,8 @@ class Spectrum(TableDisplay):
     Attributes
     ----------
     eigenvalues : ndarray of complex, shape (E,)
-        Sorted by real part, then imaginary part; 1 / time^2. Rattlers and other coordinates that feel no
-        force at all are left out.
+        Sorted by real part, then imaginary part; 1 / time^2. Rattlers and other coordinates on which no force acts are
+        left out.
     pairs : tuple of ComplexPair
         The complex pairs that exceed their own rounding uncertainty, fastest growing first.
     negative : ndarray, shape (B,)
@@ -171,12 +169,12 @@ class Spectrum(TableDisplay):
 
     @property
     def is_stable(self) -> bool:
-        """Whether no motion grows: no believable complex pair, and no negative eigenvalue beyond noise."""
+        """Whether no motion grows: no complex pair and no negative eigenvalue beyond rounding noise."""
         return not self.pairs and not len(self.negative)
 
     @property
     def free(self) -> int:
-        """Number of eigenvalues that are zero within rounding: such a motion meets no force, and drifts."""
+        """Number of eigenvalues that are zero within rounding: no force opposes such a motion, which drifts."""
         return int(np.count_nonzero(np.abs(self.eigenvalues) <= SAFETY * self.rounding))
 
     @property
@@ -191,7 +189,7 @@ class Spectrum(TableDisplay):
 
     @property
     def unstable(self) -> Complexes:
-        """Eigenvalues whose motion grows: one of each believable pair, and the negative ones."""
+        """Eigenvalues whose motion grows: one of each complex pair beyond noise, and the negative eigenvalues."""
         return np.concatenate([[pair.eigenvalue for pair in self.pairs], self.negative]).astype(np.complex128)
 
     def growth_rate(self, dt: float | None = None) -> float:
@@ -200,8 +198,7 @@ class Spectrum(TableDisplay):
         Parameters
         ----------
         dt : float, optional
-            Time step of velocity Verlet, whose dispersion is then taken into account; exact dynamics by
-            default.
+            Time step of velocity Verlet, to include its dispersion; exact dynamics by default.
 
         Returns
         -------
@@ -255,8 +252,8 @@ def dynamical_matrix(packing: Packing | Snapshot, form: Form = "consistent") -> 
     matrix : scipy.sparse.csr_array, shape (E, E)
         1 / time^2.
     active : ndarray of int, shape (E,)
-        Which of the coordinates (x.., y.., R theta..) its rows are. A coordinate whose row of K is zero
-        feels no force: its eigenvalue is zero and says nothing.
+        The coordinates (x.., y.., R theta..) of the rows. Coordinates with a zero row of K are left out: no force acts
+        on them, and their eigenvalue is zero.
     """
     matrix = mass_weighted(stiffness_matrix(packing, form), packing)
     active = active_coordinates(matrix)
@@ -294,9 +291,9 @@ def mass_weighted(stiffness: csr_array, packing: Packing | Snapshot) -> csr_arra
 
 
 def eigenvalues(packing: Packing | Snapshot, form: Form = "consistent") -> Complexes:
-    """Every eigenvalue without vectors, by LAPACK's dense solver, in a third of the time of :func:`spectrum`.
+    """Compute every eigenvalue without vectors, by LAPACK's dense solver, in a third of the time of :func:`spectrum`.
 
-    Which of the complex pairs exceed their rounding uncertainty is not known without vectors.
+    Without vectors it is not known which complex pairs exceed their rounding uncertainty.
 
     Parameters
     ----------
@@ -319,12 +316,12 @@ def _sort_eigenvalues(values: Complexes) -> Complexes:
 
 
 def spectrum(packing: Packing | Snapshot, form: Form = "consistent") -> Spectrum:
-    """Every eigenvalue, by LAPACK's dense solver; left and right vectors only where complex pairs appear.
+    """Compute every eigenvalue by LAPACK's dense solver, and left and right vectors only if there are complex pairs.
 
     Parameters
     ----------
     packing : Packing or Snapshot
-        The configuration, in equilibrium if the result is to mean stability.
+        The configuration. The result describes stability only if it is in equilibrium.
     form : {"consistent", "paper"}
         As in :func:`~faultgouge.analysis.stiffness_matrix`.
 
@@ -430,8 +427,8 @@ class StableTimestep(float):
 def stable_timestep(of: float | Packing | Snapshot) -> StableTimestep:
     r"""The largest stable time step of velocity Verlet.
 
-    Without dissipation it is :math:`2/\omega_{max}`. Dashpots take the velocity of the half step, as in all granular
-    styles of LAMMPS: a motion begins to alternate in sign and to grow where :math:`4 M - 2\,dt\, C - dt^2 K` becomes
+    Without dissipation it is :math:`2/\omega_{max}`. Dashpots use the velocity of the half step, as in all granular
+    styles of LAMMPS: a motion begins to alternate in sign and to grow when :math:`4 M - 2\,dt\, C - dt^2 K` becomes
     singular, so that dt = 2/mu with the largest mu of :math:`\mu^2 M - \mu C - K`.
 
     Parameters
@@ -442,7 +439,7 @@ def stable_timestep(of: float | Packing | Snapshot) -> StableTimestep:
     Returns
     -------
     StableTimestep
-        Time, infinite for a packing without contacts; `error` is what Arnoldi's iteration leaves, 0 of omega_max.
+        Time, infinite for a packing without contacts; `error` is that of Arnoldi's iteration, 0 for a given omega_max.
 
     Raises
     ------

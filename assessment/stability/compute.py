@@ -1,8 +1,9 @@
 """Stiff and extreme cases: each holds within a stated bound, or is refused in one sentence.
 
-Never a NaN, a hang, a crash or a quiet wrong number. The cases are in `cases`, a module for each kind of trouble; here
-they are run. stability.json and stability.md are written anew after every case, so that a case which takes the program
-down is the one that is missing. Runs with LAMMPS use all ranks, whose number changes no figure; rank 0 writes.
+No case may give a NaN, a hang, a crash or a wrong number without a message. The cases are in `cases`, one module for
+each kind of difficulty; this module runs them. stability.json and stability.md are written again after every case, so
+that a case that crashes the program is the missing case. Runs with LAMMPS use all ranks; their number changes no
+figure. Rank 0 writes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Every case in a picture: how far within its bound it is."""
+"""A picture of all cases: the figure of each over its bound."""
 
 from __future__ import annotations
 

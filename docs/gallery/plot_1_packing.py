@@ -2,7 +2,7 @@
 A packing and its unstable mode
 ===============================
 
-Forty disks are settled, and sheared to a load at which one pair of eigenvalues is complex.
+This example settles forty disks, and shears them to a load at which one pair of eigenvalues is complex.
 """
 
 from faultgouge.analysis import normal_modes, spectrum
@@ -16,12 +16,13 @@ packing = last.packing
 print(packing)
 
 # %%
-# Bars are contacts, as wide as their normal force. Their colour says what share of Coulomb's bound they use.
+# Bars are contacts, with a width proportional to the normal force. The colour shows the mobilised fraction of
+# Coulomb's bound.
 
 chains = draw_packing(packing)
 
 # %%
-# The spectrum has one complex pair. Its motion grows exponentially.
+# The spectrum has one complex pair. The motion of this pair grows exponentially.
 
 found = spectrum(packing)
 print(found)

@@ -2,7 +2,7 @@
 The pair through its onset
 ==========================
 
-Two real eigenvalues of the stability operator meet at the onset :math:`F_x^c` and go on as complex conjugates.
+Two real eigenvalues of the stability operator merge at the onset :math:`F_x^c` and become complex conjugates.
 """
 
 import numpy as np

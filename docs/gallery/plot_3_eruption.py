@@ -2,8 +2,8 @@
 An eruption
 ===========
 
-At a large load several pairs are complex. The packing is left alone, and what moves it is the rounding of its
-coordinates.
+At a large load several pairs are complex. No force pushes the packing: only the rounding of its coordinates starts the
+motion.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""From one equilibrium to the next at another load, by Newton's method; rattlers are moved out of its way.
+"""Newton's method from one equilibrium to the next at another load; rattlers in the way are moved.
 
 May import: `lammps`.
 """

@@ -1,26 +1,26 @@
 r"""Newton's method from one equilibrium, at one load.
 
 The unknown is the displacement q from the last equilibrium, :math:`q = (\Delta x.., \Delta y.., R \Delta\theta..)`.
-LAMMPS moves the disks by q along a straight path, advances the slips from their values at that equilibrium
-(never from an iterate), clamps them, and gives the forces F(q). With the consistent stiffness matrix K of
-the trial configuration,
+LAMMPS moves the disks by q along a straight path, advances the slips from their values at that equilibrium (never from
+an iterate), clamps them, and returns the forces F(q). With the consistent stiffness matrix K of the trial
+configuration,
 
 .. math:: K\, \Delta q = F(q), \qquad q \leftarrow q + \Delta q.
 
-K is the Jacobian of F up to the finite length of the path, a relative error of order :math:`|q|`, so the
-convergence is quadratic until it is linear with a factor of about 1e-4 or less. A contact that opens, closes,
-sticks or slides on the way changes K, and the iteration goes on with the new contacts.
+K is the Jacobian of F up to the finite length of the path, a relative error of order :math:`|q|`, so the convergence is
+quadratic until it is linear with a factor of about 1e-4 or less. A contact that opens, closes, sticks or slides changes
+K, and the iteration continues with the new contacts.
 
-Doubles bound what can be reached: a coordinate x is known to :math:`\epsilon |x|`, which changes the force of a
-contact of stiffness k by :math:`k \epsilon |x|`. The rounding floor sums this over the contacts of each disk. An
-equilibrium whose residual no longer falls and is of this order is at the floor. No further iteration is made where the
-last two residuals show that it would gain nothing. In compensated arithmetic a coordinate is known to 1e-23, and the
-next bound is the displacement itself, a double: :math:`k \epsilon |q|`. From there on displacements count from the
-iterate. What is left, :math:`q'`, is of order :math:`\epsilon |q|`, and that its slips start at an iterate changes them
-by :math:`|q| |q'|`, which is less than they can resolve.
+Doubles limit the residual: a coordinate x is accurate to :math:`\epsilon |x|`, which changes the force of a contact of
+stiffness k by :math:`k \epsilon |x|`. The rounding floor is the sum of these errors over the contacts of each disk. An
+equilibrium whose residual no longer falls and is of this order is at the floor. The iteration ends when the last two
+residuals show that another step would gain nothing. In compensated arithmetic a coordinate is accurate to 1e-23, and
+the next limit is the displacement itself, a double: :math:`k \epsilon |q|`. From there on displacements are measured
+from the iterate. The remaining displacement :math:`q'` is of order :math:`\epsilon |q|`. Its slips start at an iterate,
+which changes them by :math:`|q| |q'|`, less than they can resolve.
 
-A rattler that a neighbour runs into on the way is moved to the middle of its cage: it carries nothing, and where it
-lies is no matter (:mod:`~faultgouge.pywrap.equilibria.rattlers`).
+If a neighbour hits a rattler, the rattler is moved to the middle of its cage: it carries no force, and its position
+does not matter (:mod:`~faultgouge.pywrap.equilibria.rattlers`).
 """
 
 from collections.abc import Callable

@@ -1,9 +1,9 @@
 """Newton's matrix: K of a trial, factored.
 
-Contacts below the rounding floor are left out, since their stiffness is noise, and so are the coordinates that nothing
-holds then. A contact that has closed since the displacement began has no slip, however long the displacement: its
-tangential force is no function of it, and has no part in K. A small matrix is a band and goes to LAPACK, a large one is
-sparse (:mod:`~faultgouge.analysis.factors.linear_solver`).
+The matrix leaves out contacts below the rounding floor, because their stiffness is noise, and coordinates that no
+contact then holds. A contact that has closed since the displacement began has no slip, however long the displacement:
+its tangential force does not depend on the displacement, and has no part in K. A small matrix is a band for LAPACK; a
+large matrix is sparse (:mod:`~faultgouge.analysis.factors.linear_solver`).
 """
 
 from typing import NamedTuple

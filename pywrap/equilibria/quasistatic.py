@@ -1,13 +1,14 @@
 r"""From equilibrium to equilibrium, by Newton's method (:mod:`~faultgouge.pywrap.equilibria.newton`).
 
-The first step needs no forces: at an equilibrium they are those of the increment on the upper layer, and the iteration
-starts from the linear response to these. Its factors of K serve the next iterations, too, as long as these converge
-fast: a small increment takes no others. Between equilibria q is nearly proportional to the increment: where a third one
-is known, its displacement in proportion is a better start. The ramp of an onset takes the equilibrium before the last;
-a ramp that is stored does not, so that it goes on to the bit where it was cut off.
+The first step needs no force evaluation: from an equilibrium, the unbalanced forces are the increment on the upper
+layer, and the iteration starts from the linear response to these forces. The factors of K also serve the next
+iterations as long as these converge fast: a small increment needs no other factors. Between equilibria q is nearly
+proportional to the increment: if a third equilibrium is known, its displacement in proportion is a better initial
+guess. The ramp of an onset uses the equilibrium before the last. A stored ramp does not, so that an interrupted ramp
+continues bitwise unchanged.
 
-Where Newton fails the increment is halved, since the path matters: friction remembers. Where that leads nowhere, other
-ways are tried (`TRIED`) before the packing is said to flow.
+If Newton's method fails, the increment is halved, because friction depends on the path. If this fails, other methods
+are tried (`TRIED`) before the packing is reported to flow.
 """
 
 from collections.abc import Iterable
@@ -50,7 +51,7 @@ TRIED = (
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """An equilibrium and how well it is balanced.
+    """An equilibrium and the accuracy of its balance.
 
     Attributes
     ----------
@@ -61,9 +62,9 @@ class Equilibrium:
     floor : float
         Estimate of the residual that the rounding of coordinates leaves.
     evaluations : int
-        Force evaluations that it took from the equilibrium before.
+        Number of force evaluations since the previous equilibrium.
     way : str or None
-        In words, which of the ways of `TRIED` led here, and from where; None where halving the increment did.
+        In words, which of the methods in `TRIED` led here, and from where; None if halving the increment was enough.
     """
 
     packing: Packing
@@ -74,7 +75,7 @@ class Equilibrium:
 
     @classmethod
     def of(cls, packing: Packing) -> "Equilibrium":
-        """A packing as it stands, by its own forces: where to start from, balanced or not."""
+        """The record of a packing with its present forces: a starting point, balanced or not."""
         return cls(packing, packing.residual, rounding_floor(packing), 0)
 
     @property
@@ -105,24 +106,24 @@ def equilibrate(
     beside: Equilibrium | None = None,
     onward: bool = False,
 ) -> Equilibrium:
-    """The equilibrium at fx that follows from the last one.
+    """Compute the equilibrium at fx from the last equilibrium.
 
     Parameters
     ----------
     engine : Engine
         LAMMPS with this packing.
     last : Equilibrium
-        Where to start; its fx may be lower or higher.
+        Starting point; its fx may be lower or higher.
     fx : float
         Force along x on each disk of the upper layer.
     force_tolerance : float, optional
-        Residual to stop at. By default the iteration ends at the floor.
+        Residual at which the iteration stops. By default the iteration ends at the rounding floor.
     beside : Equilibrium, optional
-        Another one near the last, at another fx: its displacement is a better guess than none. It does not change what
-        is found, except for the rounding.
+        Another equilibrium near the last, at another fx, whose displacement gives the initial guess. It changes the
+        result only within rounding.
     onward : bool
-        Whether the ways of `TRIED` are taken where halving the increment leads nowhere. By default the branch of
-        equilibria ends there.
+        Whether to try the methods in `TRIED` if halving the increment fails. By default the branch of equilibria ends
+        there.
 
     Returns
     -------
@@ -131,7 +132,7 @@ def equilibrate(
     Raises
     ------
     NoEquilibriumError
-        If no way that may be taken leads there.
+        If no permitted method finds an equilibrium.
     """
     guess = _response(engine, last, fx) if beside is None else _in_proportion(last, beside, fx)
     here = _halving(engine, last, fx, force_tolerance, guess)

@@ -1,18 +1,18 @@
-r"""Rattlers out of the way: disks that carry nothing, moved to the middle of their cages.
+r"""Move rattlers, disks that carry no force, to the middle of their cages.
 
-A settled packing leaves a disk that nothing holds just about touching one of its neighbours. Where it lies is of no
-consequence to anything but Newton's method: as the packing is sheared the neighbour runs into it, and a contact opens
-as delta^(3/2) -> 0, to which Newton's method converges slowly, one such disk at a time. In a packing of 10,000 disks,
-with its hundreds of rattlers, ten of them are hit in an increment of 1e-4 of the load. Such a disk may as well lie
-where it touches nothing: its position is no property of the equilibrium.
+In a settled packing a disk that nothing holds barely touches one of its neighbours. Its position matters only to
+Newton's method: as the packing is sheared, the neighbour hits the disk, and a contact opens as delta^(3/2) -> 0, for
+which Newton's method converges slowly, one such disk at a time. In a packing of 10,000 disks, with hundreds of
+rattlers, ten rattlers are hit in an increment of 1e-4 of the load. Such a disk may be moved to where it touches
+nothing: its position is not a property of the equilibrium.
 
-The middle of a cage is where the narrowest gap is widest. A gap :math:`g_j = |x - x_j| - R - R_j` is a convex function
-of the disk's position, so that its linearisation is a lower bound. The linear program
+The middle of a cage is the point at which the narrowest gap is largest. A gap :math:`g_j = |x - x_j| - R - R_j` is a
+convex function of the disk's position, so that its linearisation is a lower bound. The linear program
 
 .. math:: \max_{d, t} t \quad\text{with}\quad t \le g_j + n_j \cdot d
 
-over a move d of the disk therefore leaves the narrowest gap t no smaller than it finds it, and a few of them in turn
-reach the maximum, however narrow the cage.
+over a move d of the disk therefore never makes the narrowest gap t smaller, and a few such programs in turn reach the
+maximum, however narrow the cage.
 """
 
 from dataclasses import replace

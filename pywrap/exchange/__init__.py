@@ -1,7 +1,8 @@
 """Packings from and to other codes: LAMMPS, MercuryDPM, YADE, GSD, extended XYZ, CSV, VTK.
 
-`formats` says which module reads and writes which file. A reader returns `Disks`, plain columns; `packing_of` makes a
-packing of them, `upper_layer` finds the layer that carries the load, `resting` brings to rest what is out of balance.
+`formats` lists the module that reads and writes each kind of file. A reader returns `Disks`, plain columns;
+`packing_of` makes a packing of disks, and `upper_layer` finds the layer that carries the load. `settling.relax` brings
+a packing out of balance to rest.
 """
 
 from .disks import Disks, Slips, packing_of

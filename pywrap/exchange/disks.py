@@ -1,8 +1,8 @@
-"""Disks as a file of another code has them, and the packing that they are under a law and a load.
+"""Disks from a file of another code, and the packing of these disks under a law and a load.
 
-Readers find columns; `of_columns` gives them their meaning, whatever the format calls them. What a file does not say
-is taken as follows: mass 1, angle 0, slips 0, open sides. Numbers that no packing has are refused here, once for all
-formats: disks out of the plane, below the floor, or with a centre inside of another disk.
+Readers find columns; `of_columns` interprets the columns, whatever their names in the format. If a file lacks masses,
+angles, slips or the period, the mass is 1, angles and slips are 0, and the sides are open. Impossible numbers are
+refused here, once for all formats: disks out of the plane, below the floor, or with a centre inside another disk.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Slips:
     low : ndarray, shape (C,), or None
         Their low parts.
     complete : bool
-        Whether these are all contacts. Otherwise all that touches is in contact, and what is not listed has no slip.
+        Whether these are all contacts. Otherwise all touching disks are in contact; contacts not listed have no slip.
     """
 
     first: Indices
@@ -59,31 +59,31 @@ class Slips:
 
 @dataclass(frozen=True, eq=False)
 class Disks:
-    """What a file says about disks, or a loose start, sorted by ID.
+    """Disks from a file, or from a loose random packing, sorted by ID.
 
     Attributes
     ----------
     source : str
-        The file, and where in it; or what else they come from.
+        The file and the place in it, or another origin of the disks.
     position : ndarray, shape (N, 2)
         Centres, length.
     radius : ndarray, shape (N,)
         Radii, length.
     id : ndarray of int, shape (N,)
-        IDs, as the file has them; else from 1.
+        IDs of the file, or from 1.
     mass, angle, kind, top, position_low : ndarray or None
-        Mass, orientation, type, whether a disk is of the upper layer, low parts of the centres; None if not there.
+        Mass, orientation, type, whether a disk belongs to the upper layer, low parts of the centres; None if absent.
     box_length : float or None
-        Period along x; None where the sides are open.
+        Period along x; None if the sides are open.
     slips : Slips or None
         None if the file has none.
     given : mapping
-        Law, load and inertia, as far as the file has them: kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau,
+        Law, load and inertia, as far as the file gives them: kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau,
         fx, fy, inertia_factor.
     groups : mapping
         Groups of disks by name, as booleans.
     remark : str
-        What the format has lost; empty for nothing.
+        Information that the format has lost; empty for none.
     """
 
     source: str
@@ -105,7 +105,7 @@ class Disks:
         return len(self.radius)
 
     def above(self, floor: float) -> Disks:
-        """The disks with a floor at another height moved to y = 0."""
+        """The disks, shifted so that a floor at another height is at y = 0."""
         return self if floor == 0 else replace(self, position=self.position - (0.0, floor))
 
 
@@ -177,7 +177,7 @@ def packing_of(
     inertia_factor: float = 1.0,
     drag_time: float | None = None,
 ) -> Packing:
-    """The packing that disks are under a law and a load.
+    """Make a packing of disks under a law and a load.
 
     Parameters
     ----------
@@ -188,12 +188,12 @@ def packing_of(
     top : ndarray of bool, shape (N,)
         The upper layer.
     fx, fy, inertia_factor, drag_time : float
-        As of :class:`~faultgouge.analysis.Packing`.
+        As for :class:`~faultgouge.analysis.Packing`.
 
     Raises
     ------
     PackingFileError
-        If the disks lie below the floor or in one another, or form no packing.
+        If disks lie below the floor or inside one another, or form no packing.
     """
     _check_places(disks)
     try:

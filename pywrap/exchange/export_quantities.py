@@ -1,8 +1,8 @@
-"""What files have of a packing: law and load by name, contacts as rows; and what exports show besides.
+"""Quantities of a packing in files: law and load by name, contacts as rows; and further quantities in exports.
 
-Law, load and inertia are names with numbers, and contacts rows (first ID, second ID, slip), where a second ID of 0 is
-the floor; low parts of compensated packings are a column more. `float.__repr__` is the shortest text that is the same
-double when it is read. Besides, exports show forces, mobilised friction and modes.
+Law, load and inertia are names with numbers. Contacts are rows (first ID, second ID, slip); a second ID of 0 is the
+floor. Low parts of compensated packings are an additional column. `float.__repr__` is the shortest text that gives the
+same double when it is read. Exports also show forces, mobilised friction and modes.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class ModeVectors:
     Attributes
     ----------
     name : str
-        Of its fields.
+        Name of its fields.
     eigenvalue : complex
         lambda, 1 / time^2.
     displacement : ndarray of complex, shape (3, N)
@@ -43,7 +43,7 @@ class ModeVectors:
 
     @property
     def fields(self) -> dict[str, Floats]:
-        """Vectors, shape (N, 3), and rotations, shape (N,), by the names that they have in a file."""
+        """Vectors, shape (N, 3), and rotations, shape (N,), by their names in a file."""
         found = {}
         for part, moved in (("", self.displacement.real), ("_imag", self.displacement.imag)):
             if not part or np.any(moved):
@@ -54,18 +54,18 @@ class ModeVectors:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A packing as it is written, alone or as a frame of a film.
+    """A packing for an export, alone or as a frame of a film.
 
     Attributes
     ----------
     packing : Packing
-        The packing. Its contacts are those that touch, without slips, if it is not `whole`.
+        The packing. If it is not `whole`, its contacts are all disks that touch, without slips.
     time : float
-        F_x of an equilibrium, or the whole way of F_x where it turns round; or the time of an undamped run.
+        F_x of an equilibrium, or the total path of F_x on a ramp with turning points; or the time of an undamped run.
     displacement : ndarray, shape (N, 2), or None
-        From the first frame of a film, length.
+        Displacement from the first frame of a film, length.
     whole : bool
-        Whether angles and slips, and so the forces, are known: an undamped run stores positions alone.
+        Whether angles and slips, and so the forces, are known: an undamped run stores only positions.
     """
 
     packing: Packing
@@ -75,7 +75,7 @@ class Frame:
 
     @property
     def number(self) -> dict[str, float]:
-        """The time by its name: a ramp has none beside fx."""
+        """The time with its name; a ramp has no time besides fx."""
         return {} if self.whole else {"time": self.time}
 
 

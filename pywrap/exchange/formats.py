@@ -1,6 +1,6 @@
-"""The formats of other codes: what reads and writes which file, and what a format has no room for.
+"""The formats of other codes: the module that reads and writes each format, and what a format cannot store.
 
-A module is imported when a file of its format is met.
+A module is imported only when a file of its format is used.
 """
 
 from __future__ import annotations
@@ -94,18 +94,18 @@ def list_formats() -> str:
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether a file begins as HDF5 does, or as a run.h5."""
+    """Whether a file begins like HDF5 or like a run.h5."""
     with open_plain(path) as stream:
         return stream.read(64).startswith(BEGINNINGS)
 
 
 def format_of(path: Path) -> Format:
-    """The format of a file, by its suffix, or by its beginning as LAMMPS's users name files.
+    """Find the format of a file by its suffix, or by its prefix for LAMMPS files.
 
     Raises
     ------
     PackingFileError
-        If no reader takes it.
+        If no reader knows the format.
     """
     from .lammps_restart import is_restart
 
@@ -145,19 +145,19 @@ def _by_beginning(path: Path) -> Format | None:
 
 
 def read_disks(path: Path, frame: int | None = None) -> Disks:
-    """Disks of a file of another code.
+    """Read the disks in a file of another code.
 
     Parameters
     ----------
     path : Path
         The file; see `list_formats`.
     frame : int, optional
-        Which of several frames; negative ones count from the last.
+        Number of the frame; negative numbers count from the last.
 
     Raises
     ------
     PackingFileError
-        If the file is missing, is of no known format, or does not hold disks in a plane.
+        If the file is missing, has no known format, or does not contain disks in a plane.
     """
     if not path.is_file():
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
@@ -191,7 +191,7 @@ def write_frames(path: Path, frames: Iterable[Frame]) -> None:
     Raises
     ------
     BadInputError
-        If the suffix is none of `FILMS`.
+        If the suffix is not in `FILMS`.
     OutputError
         If the file cannot be written.
     """
@@ -219,17 +219,17 @@ def write_packing(path: Path, packing: Packing, modes: Sequence[ModeVectors] = (
     packing : Packing
         The packing.
     modes : sequence of ModeVectors
-        To go with it.
+        Modes to write with the packing.
 
     Returns
     -------
     str
-        What the file has, and what its format cannot hold.
+        Description of the contents, and of what the format cannot store.
 
     Raises
     ------
     BadInputError
-        If the suffix is none of `WRITTEN`, or the format has no modes.
+        If the suffix is not in `WRITTEN`, or the format has no modes.
     OutputError
         If the file cannot be written.
     """

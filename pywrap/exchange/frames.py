@@ -13,7 +13,7 @@ from .export_quantities import Frame
 
 
 def choose_frames(run: RunFile, says: str) -> range:
-    """The numbers of the frames that are meant.
+    """Interpret a choice of frames as numbers of frames.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def choose_frames(run: RunFile, says: str) -> range:
     Raises
     ------
     BadInputError
-        If it is neither, or means no frame.
+        If the text is neither, or selects no frame.
     """
     total = len(run)
     if "trajectory" in run.names_of_series:
@@ -44,15 +44,15 @@ def choose_frames(run: RunFile, says: str) -> range:
 
 
 def frames_of(run: RunFile, numbers: range) -> Iterator[Frame]:
-    """The frames of a file, one after the other.
+    """Yield the frames of a file one after the other.
 
     Parameters
     ----------
     run : RunFile
-        The file, open until the last frame has been taken. Frame 0 of an undamped run is the equilibrium where it
-        began.
+        The file, which must stay open until the last frame has been read. Frame 0 of an undamped run is its initial
+        equilibrium.
     numbers : range
-        Of :func:`choose_frames`.
+        From :func:`choose_frames`.
     """
     if "trajectory" in run.names_of_series:
         yield from _of_run(run, numbers)

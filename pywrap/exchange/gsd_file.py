@@ -1,8 +1,8 @@
 """GSD, HOOMD's format, in and out, by the library gsd.
 
-GSD keeps positions, diameters, masses and orientations in float32, too coarse for overlaps. An export has them in
-float64 besides, among the logged quantities (``log/particles/faultgouge/...``), which `import` prefers; other readers
-see float32. The y axis of a GSD box has its middle at zero; an export says where the floor is.
+GSD keeps positions, diameters, masses and orientations in float32, too coarse for overlaps. An export also has these
+numbers in float64, among the logged quantities (``log/particles/faultgouge/...``), which `import` prefers; other
+readers see float32. The y axis of a GSD box has its middle at zero; an export gives the height of the floor.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """LAMMPS data files of atom style sphere, in and out.
 
-The mass of a disk is that of the sphere which LAMMPS takes it for: density times 4/3 pi R^3. What the format has no
-column for stands in comments, which LAMMPS skips: law and load in the first line, contacts in the header, and the mass
-and the angle of a disk behind its line, since no density may give a mass to the last bit.
+LAMMPS treats a disk as a sphere: its mass is density times 4/3 pi R^3. Quantities without a column are in comments,
+which LAMMPS skips: law and load in the first line, contacts in the header, and the mass and the angle of a disk at the
+end of its line, because there may be no density that gives the mass to the last bit.
 
     # faultgouge kn=200000.0 kt=57142.857142857145 mu=1.0 fx=0.01 fy=3.0 inertia_factor=1.0
     # contact 1 2 1.25e-05          first ID, second ID (0 is the floor), slip

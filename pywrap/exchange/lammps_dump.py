@@ -1,7 +1,7 @@
-"""LAMMPS text dumps of disks: the decks' own (NAME.disks) and those of any other run (dump custom).
+"""LAMMPS text dumps of disks: those of the decks (NAME.disks) and those of any other run (dump custom).
 
-Columns are found by name: x or xu or xs, radius or diameter, and, if there, id, type, mass, theta. A file with several
-snapshots must be of the same disks, or one has to be chosen.
+Columns are found by name: x or xu or xs, radius or diameter, and, if present, id, type, mass, theta. Several snapshots
+in a file must have the same disks; otherwise a snapshot must be chosen.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """LAMMPS restart files, read by LAMMPS itself: disks, their masses, types and groups.
 
-Slips are not taken: another pair style's are of another law, and those of a deck's own restart are in the dumps that
-write.in makes.
+Slips are not read: those of another pair style belong to another law, and those of a restart of the decks are in the
+dumps of write.in.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""MDAnalysis as a door to run.h5: import this module, and its Universe opens the file.
+"""Reader of run.h5 for MDAnalysis: import this module, and a Universe opens the file.
 
     import MDAnalysis
     import faultgouge.pywrap.exchange.mdanalysis
@@ -7,11 +7,11 @@
     layer = universe.select_atoms("type top")
 
 An atom is a disk, with its radius, its mass and its type, "top" (the upper layer) or "bed". A frame is an equilibrium,
-with its number as its time, or a sample of an undamped run, with the time of the run. MDAnalysis has positions in
-float32. ``ts.data["position"]`` has them in float64, and ``ts.data`` has all other observables of the frame, such as
-fx; those that an undamped run does not store are nan.
+with its number as its time, or a sample of an undamped run, with the time of the run. Positions in MDAnalysis are
+float32. ``ts.data["position"]`` is float64, and ``ts.data`` has all other observables of the frame, such as fx;
+observables that an undamped run does not store are nan.
 
-`MeanSquareDisplacement` is D(t) as an analysis of MDAnalysis, of the disks that are selected.
+`MeanSquareDisplacement` computes D(t) of the selected disks, as an analysis of MDAnalysis.
 """
 
 from __future__ import annotations

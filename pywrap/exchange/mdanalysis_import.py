@@ -1,4 +1,4 @@
-"""Whatever MDAnalysis reads with radii, such as PQR. Its positions are float32."""
+"""Formats that MDAnalysis reads with radii, such as PQR. Their positions are float32."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Libraries that one format needs, imported when a file of that format is met."""
+"""Libraries for single formats, imported only when a file of the format is used."""
 
 from importlib import import_module
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Text of numbers: lines, words, columns by name, and the frame that is meant."""
+"""Read text of numbers: lines, words, columns by name, and the selected frame."""
 
 from __future__ import annotations
 

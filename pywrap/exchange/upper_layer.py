@@ -1,4 +1,4 @@
-"""Which disks are the upper layer: a count, a type, IDs, a group, or a region, in one line of text."""
+"""Select the upper layer by a number of disks, a type, IDs, a group, or a region, in one line of text."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ CONDITION = re.compile(r"\s*(x|y|radius)\s*(<=|>=|<|>)\s*([-+.\deE]+)\s*")
 
 
 def upper_layer(disks: Disks, says: str | int | None) -> NDArray[np.bool_]:
-    """The disks of the upper layer.
+    """Select the disks of the upper layer.
 
     Parameters
     ----------
     disks : Disks
         From a reader.
     says : str or int, optional
-        A count of the highest, ``type:K``, ``ids:1,4,7-9``, ``ids:@FILE`` (numbers in a file), ``group:NAME``, or
-        conditions on x, y and radius joined by "and". By default what the file itself says.
+        A number of highest disks, ``type:K``, ``ids:1,4,7-9``, ``ids:@FILE`` (numbers in a file), ``group:NAME``, or
+        conditions on x, y and radius joined by "and". By default the upper layer of the file.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def upper_layer(disks: Disks, says: str | int | None) -> NDArray[np.bool_]:
     Raises
     ------
     BadInputError
-        If nothing says it, what is said is not understood, or no disk is meant.
+        If no upper layer is given, the text is not understood, or it selects no disk.
     """
     if says is None:
         if disks.top is None:

@@ -1,9 +1,10 @@
 """VTK PolyData (.vtp), for ParaView: disks as vertices, contacts as lines, modes as vectors; full precision.
 
-Points are the N centres, and behind them two ends for each contact: the centre of its first disk, and that of the
-second one's nearest image, or the foot on the floor. So a contact across the periodic boundary is a short line, and not
-one across the box. Cells are N vertices, then the lines. What a point or a cell has no value for is nan, and the radius
-of an end is 0. The file is XML with arrays in base64 (VTK file formats, "XML file formats", header type UInt64).
+The points are the N centres, followed by two ends for each contact: the centre of the first disk, and the centre of the
+nearest image of the second disk, or the foot on the floor. A contact across the periodic boundary is therefore a short
+line, not a line across the box. Cells are N vertices, then the lines. Quantities that are not defined for a point or a
+cell are nan, and the radius of an end is 0. The file is XML with arrays in base64 (VTK file formats, "XML file
+formats", header type UInt64).
 """
 
 from __future__ import annotations

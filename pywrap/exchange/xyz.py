@@ -1,7 +1,7 @@
-"""Extended XYZ, in and out: what OVITO and ASE read. Full precision: `import` takes an export back to the bit.
+"""Read and write extended XYZ, the format of OVITO and ASE, in full precision: `import` reads an export back bitwise.
 
 The second line has the box (Lattice, pbc), the columns (Properties), law and load by name, and the contacts as one list
-of numbers; a line a disk follows.
+of numbers. One line for each disk follows.
 """
 
 from __future__ import annotations

@@ -1,16 +1,16 @@
-"""Texts of other codes for grains: YADE's and MercuryDPM's.
+"""Text files of YADE and MercuryDPM.
 
-**YADE**, as yade.export.textExt writes it: a line with the names of the columns, and a line a sphere.
+**YADE**, from yade.export.textExt: a line with the names of the columns, and one line for each sphere.
 
     #format x_y_z_r_matId
     1.25    0.5    0    0.5    1
 
-The names are put together by underscores. YADE's own export has six digits, so that overlaps are rounded.
+Underscores join the names. YADE's own export has six digits, so that overlaps are rounded.
 
-**MercuryDPM**, its data files: for each time a line "N time bounds", and a line a particle. In two dimensions there are
-four bounds, and a line is x y vx vy radius angle spin info. In three there are six, and it is x y z vx vy vz radius,
-three angles, three spins, info. The file has no masses, and does not say whether x is periodic: it is taken to be, with
-the width of the bounds, as for LAMMPS data.
+**MercuryDPM**, data files: for each time a line "N time bounds", and one line for each particle. In two dimensions
+there are four bounds, and a line is x y vx vy radius angle spin info. In three dimensions there are six bounds, and a
+line is x y z vx vy vz radius, three angles, three spins, info. The file has no masses, and does not say whether x is
+periodic: x is assumed periodic with the width of the bounds, as for LAMMPS data.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""LAMMPS with one packing in it: instances, deck parts, and the way of every number into LAMMPS and out of it.
+"""A LAMMPS instance with one packing: instances, deck parts, and the transfer of all numbers into LAMMPS and out of it.
 
 `engine` is the door; `trial` is what comes out after a displacement, `dynamics` what comes out of a run.
 

@@ -1,7 +1,7 @@
-"""Which disks touch, and the index arrays that serve as long as it stays so.
+"""The graph of touching disks, and index arrays that remain valid as long as the graph does not change.
 
-Contacts change seldom from one Newton iteration to the next, and what has been counted, sorted or looked up for them
-need not be again: sums over the contacts of each disk, and the places of their stiffnesses in a matrix.
+Contacts seldom change from one Newton iteration to the next. The index arrays for sums over the contacts of each disk,
+and for the places of their stiffnesses in a matrix, are therefore kept.
 """
 
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""The dynamics of the disks in LAMMPS from rest, undamped but for what damping the packing has.
+"""The dynamics of the disks in LAMMPS from rest, with only the damping of the packing.
 
 `Engine.undamped` starts it: deck part undamped.in with a force on some disks (push.in), a signal (signal.in), and
 friction that falls with velocity (weaken.in).

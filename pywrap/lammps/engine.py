@@ -1,7 +1,7 @@
-"""A LAMMPS instance that holds one packing.
+"""A LAMMPS instance that contains one packing.
 
-The instance is set up by the deck part ``system.in``, the same file that ``lmp -in`` runs, and driven by its
-companions (:mod:`~faultgouge.pywrap.lammps.decks`). A `Packing` goes in and a `Packing` comes out, bit for bit
+The instance is set up by the deck part ``system.in``, the same file that ``lmp -in`` runs, and driven by its companions
+(:mod:`~faultgouge.pywrap.lammps.decks`). A `Packing` is transferred into LAMMPS and back, bitwise
 (:mod:`~faultgouge.pywrap.lammps.lammps_state`). All methods are collective over the ranks of the communicator, and
 every rank sees the whole packing.
 """
@@ -53,12 +53,12 @@ class Relaxation:
 
 
 class Engine:
-    """LAMMPS with one packing in it.
+    """A LAMMPS instance that contains one packing.
 
     Parameters
     ----------
     packing : Packing
-        Positions, angles, slips, law and load to begin with. The arithmetic is compensated if it is.
+        Initial positions, angles, slips, law and load. The arithmetic is compensated if the packing is compensated.
     communicator : mpi4py.MPI.Comm, optional
         The ranks that share the packing; all of them by default.
     log : Path, optional
@@ -67,7 +67,7 @@ class Engine:
     Raises
     ------
     EngineError
-        If the plugin is not there, or LAMMPS refuses the packing.
+        If the plugin is missing, or LAMMPS refuses the packing.
     """
 
     def __init__(self, packing: Packing, communicator: MPI.Comm | None = None, log: Path | None = None) -> None:
@@ -87,18 +87,18 @@ class Engine:
 
     @property
     def lammps(self) -> Any:
-        """The LAMMPS instance, for what it holds and for commands that the driver does not cover."""
+        """The LAMMPS instance, for its data and for commands that the driver does not cover."""
         self._state.end_displacements()
         return self._decks.lammps
 
     @property
     def packing(self) -> Packing:
-        """The configuration as it stands, with its slips and its load."""
+        """The present configuration, with its slips and its load."""
         return self._state.read().packing
 
     @property
     def net_force(self) -> Floats:
-        """Forces as LAMMPS has them, (Fx.., Fy.., T/R..), shape (3N,), load included."""
+        """Forces in LAMMPS, (Fx.., Fy.., T/R..), shape (3N,), load included."""
         return self._state.net_force()
 
     def set_fx(self, fx: float) -> None:
@@ -106,7 +106,7 @@ class Engine:
         self._state.set_fx(fx)
 
     def restore(self, packing: Packing) -> None:
-        """Put the disks, slips and load of a packing back, to the bit."""
+        """Restore the disks, slips and load of a packing bitwise."""
         self._state.end_displacements()
         self._state.write(packing)
         self.set_fx(packing.fx)
@@ -114,18 +114,18 @@ class Engine:
     def settle(
         self, force_tolerance: float, gather: float = 1.0, viscosity: float | None = None, steps: int = 10_000_000
     ) -> None:
-        """Let a loose start settle under the load (deck parts gather.in, bed.in).
+        """Settle a loose packing under the load (deck parts gather.in, bed.in).
 
         Parameters
         ----------
         force_tolerance : float
             Largest force on a disk.
         gather : float
-            Share of its height to which the start is brought down evenly at first; 1 for not at all.
+            Fraction of its height to which the loose packing is first brought down evenly; 1 for not at all.
         viscosity : float, optional
-            Of the damping, mass / time; by default that of the decks.
+            Viscosity of the damping, mass / time; by default that of the decks.
         steps : int
-            Time steps of each stage, at the most.
+            Largest number of time steps in each stage.
         """
         self._state.end_displacements()
         self._decks.variables(force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
@@ -136,9 +136,9 @@ class Engine:
         self._decks.include("bed.in")
 
     def damp(self, packing: Packing, force_tolerance: float, steps: int, viscosity: float | None = None) -> None:
-        """Viscously damped dynamics from a packing at rest (deck part damp.in), for so many steps at the most.
+        """Run viscously damped dynamics from a packing at rest (deck part damp.in), for at most `steps` steps.
 
-        The viscosity is that of the call before, or of `settle`, unless it is given.
+        By default the viscosity is that of the previous call, or of `settle`.
         """
         self.restore(packing)
         if viscosity is not None:
@@ -164,9 +164,9 @@ class Engine:
         time_step : float, optional
             By default from the stiffness of a heavily loaded contact.
         chunk : int
-            Steps between two looks at the forces.
+            Steps between two checks of the forces.
         steps : int
-            Time steps at the most.
+            Largest number of time steps.
         """
         self._state.end_displacements()
         self._decks.command("variable relax_step delete")  # that of an earlier call
@@ -185,9 +185,9 @@ class Engine:
     def displace(self, base: Packing, displacement: Floats) -> Packing:
         """Move the disks from a configuration along a straight path and advance the slips along it.
 
-        LAMMPS sees the displacement as the motion of one time step of length one. The configuration before
-        the call is forgotten, so that any number of trials may start from one base, each to the bit as if
-        there had been no other.
+        For LAMMPS the displacement is the motion in one time step of length one. The result does not depend on the
+        configuration before the call: any number of trials may start from one base, and each is bitwise independent of
+        the others.
 
         Parameters
         ----------
@@ -204,7 +204,7 @@ class Engine:
         return self.try_displacement(base, displacement).packing
 
     def try_displacement(self, base: Packing, displacement: Floats) -> Trial:
-        """The same as a `Trial`, for many displacements in turn."""
+        """The same as `displace`, but returned as a `Trial`, for many displacements in turn."""
         return self._state.displace(base, displacement)
 
     def keep(self, trial: Trial) -> Packing:
@@ -222,7 +222,7 @@ class Engine:
     def dump(self, stem: Path) -> None:
         """Write the configuration as LAMMPS dumps in full precision (deck part write.in): STEM.disks and others.
 
-        What is written depends on the configuration alone, and not on what was before.
+        The output depends only on the configuration, not on its history.
         """
         bottom, top = box_heights(self.packing)
         self._state.end_displacements()
@@ -247,31 +247,31 @@ class Engine:
         on: Literal["layer", "floor"] = "layer",
         drag_time: float | None = None,
     ) -> Iterator[Dynamics]:
-        """Dynamics from rest, undamped but for what damping the packing has.
+        """Run dynamics from rest, with only the damping of the packing.
 
         Parameters
         ----------
         time_step : float
-            Of velocity Verlet, time.
+            Time step of velocity Verlet, time.
         amplitude : float
-            Of the force a cos(omega t) along x on each disk of the target; 0 for none.
+            Amplitude a of the force a cos(omega t) along x on each disk of the target; 0 for none.
         omega : float
-            Its angular frequency, 1 / time.
+            Angular frequency of the force, 1 / time.
         target : array_like of int, optional
-            The disks that feel it; the upper layer by default.
+            The disks on which the force acts; the upper layer by default.
         weakening : Weakening, optional
             Friction that falls with the velocity of the upper layer; constant by default.
         signal : Signal, optional
             A further force along x (deck part signal.in); none by default.
         on : {"layer", "floor"}
-            What the signal is: the force on each disk of the target, or the acceleration of the floor.
+            Meaning of the signal: the force on each disk of the target, or the acceleration of the floor.
         drag_time : float, optional
             tau of the drag -(m/tau) v and -(I/tau) omega on every disk, time; that of the packing by default.
 
         Yields
         ------
         Dynamics
-            To go on with. Rattlers are held still: nothing would stop them.
+            The dynamics, to be continued. Rattlers are held fixed, because nothing would stop them.
         """
         packing = self.packing
         self._state.end_displacements()

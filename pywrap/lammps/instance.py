@@ -1,4 +1,4 @@
-"""A LAMMPS instance with the plugin in it, of whichever LAMMPS is installed."""
+"""A LAMMPS instance with the plugin, of the installed LAMMPS version."""
 
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from .plain_file_names import plain_name
 
 
 class EngineError(FaultgougeError):
-    """LAMMPS could not do what was asked: one sentence with its reason."""
+    """LAMMPS failed to execute a command; the text is one sentence with the reason."""
 
 
 def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:

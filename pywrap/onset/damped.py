@@ -1,4 +1,4 @@
-"""The onset with dissipation of a scene, beside the undamped one (:mod:`~faultgouge.analysis.damped_onset.windows`)."""
+"""The onset of a scene with dissipation, and the undamped onset (:mod:`~faultgouge.analysis.damped_onset.windows`)."""
 
 from __future__ import annotations
 

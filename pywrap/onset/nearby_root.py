@@ -1,4 +1,4 @@
-"""The root of a function of the load that is known to be near: by a slope, by secants, or by halving at a jump."""
+"""Find a nearby root of a function of the load: by a slope, by secants, or by bisection at a jump."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The path of equilibria of a scene: a ramp of F_x in steps, or the equilibrium at any F_x that is asked for.
+"""The path of equilibria of a scene: a ramp of F_x in steps, or the equilibrium at any given F_x.
 
 All functions are collective over the ranks of the communicator.
 """
@@ -29,22 +29,22 @@ def ramp(
     dumps: Path | None = None,
     behind: int | None = None,
 ) -> Iterator[Equilibrium]:
-    """Equilibria at F_x = step, 2 step, ... up to the scene's ramp.until, or through its turning points.
+    """Compute equilibria at F_x = step, 2 step, ... up to the scene's ramp.until, or through its turning points.
 
     Parameters
     ----------
     scene : Scene
         With a section [ramp].
     start : Equilibrium, optional
-        Where to begin, one of a ramp of this scene; by default the scene is settled and the settled packing
-        is the first to be yielded.
+        An equilibrium of a ramp of this scene from which to start. By default the scene is settled, and the settled
+        packing is yielded first.
     communicator : mpi4py.MPI.Comm, optional
         The ranks that share the packing; all by default.
     dumps : Path, optional
         Stem of LAMMPS dumps of each equilibrium k, the first of the ramp being 1: STEM.k.disks and the others of
         write.in. None by default.
     behind : int, optional
-        How many loads of the ramp, the first of them 0, lie behind `start`, see `count_behind`; by default those up to
+        Number of loads of the ramp, the first of them 0, before `start`, see `count_behind`; by default the loads up to
         its F_x on the way to the first turning point.
 
     Yields
@@ -75,7 +75,7 @@ def ramp(
 
 
 def reach(scene: Scene, fx: float) -> Iterator[Equilibrium]:
-    """The equilibria of a ramp up to and with fx, by the steps of the scene's ramp or, without one, of F_y/3000."""
+    """Compute the equilibria up to and including fx, in steps of the scene's ramp or, without a ramp, of F_y/3000."""
     step = step_of(scene)
     step = min(step, fx) or step  # one increment, where the first one of the ramp were too large
     settings = scene.ramp or Ramp(step=step, until=step)

@@ -1,4 +1,4 @@
-"""run.h5 of a scene: begun, or opened where a run was cut off."""
+"""Write the run.h5 of a scene: a new file, or the file of an interrupted run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Task = Literal["ramp", "perturb"]
 
 
 class Record:
-    """run.h5 of a scene: opened where it was cut off, or begun.
+    """The run.h5 of a scene, created or continued after an interruption.
 
     Parameters
     ----------
@@ -38,19 +38,19 @@ class Record:
     communicator : mpi4py.MPI.Comm, optional
         Rank 0 writes; all by default.
     task : {"ramp", "perturb"}
-        What the file is for: a settled packing and its ramp, or an undamped run. A file for the other is refused.
+        Purpose of the file: a settled packing and its ramp, or an undamped run. A file of the other kind is refused.
     saved : callable, optional
-        Told in words what the file holds, and its path, whenever it has been saved.
+        Called with a description of the contents and the path, each time the file has been saved.
 
     Attributes
     ----------
     last : Equilibrium or None
-        The last one in the file.
+        The last equilibrium in the file.
 
     Raises
     ------
     SceneError
-        If the file holds another scene, or is for another task.
+        If the file contains another scene, or is for another task.
     OutputError
         If the file cannot be written, or another run is writing it.
     """
@@ -104,11 +104,11 @@ class Record:
 
     @property
     def complete(self) -> bool:
-        """Whether the run has come to its end; the same on all ranks."""
+        """Whether the run is complete; the same on all ranks."""
         return bool(raise_on_all_ranks(self.communicator, lambda: self._file is not None and self._file.complete))
 
     def finish(self) -> None:
-        """The run has come to its end."""
+        """Mark the run as complete."""
         if self._file is not None:
             with self._file.change():
                 self._file.put_checkpoint()
@@ -137,7 +137,7 @@ class Record:
     def undamped(
         self, scene: Scene, start: Equilibrium, name: str = "undamped", weakening: Weakening | None = None
     ) -> Iterator[Sample]:
-        """An undamped run whose lines go into a time series; it goes on where it was cut off.
+        """Run the undamped dynamics and write its samples to a time series; an interrupted run continues.
 
         Parameters
         ----------
@@ -146,14 +146,14 @@ class Record:
         start : Equilibrium
             Where the run begins.
         name : str
-            Of the series.
+            Name of the series.
         weakening : Weakening, optional
-            As of `perturb`.
+            As in `perturb`.
 
         Yields
         ------
         Sample
-            Those that were in the file first.
+            First the samples that are already in the file.
         """
         assert scene.perturb is not None
         _, steps = sample_steps(scene.perturb, start.packing)
@@ -222,7 +222,7 @@ class Record:
         file = self._file
         if file is None or not file.saved or len(file) == 0:
             return
-        goes_on = "is complete" if file.complete else "the same command goes on from there"
+        goes_on = "is complete" if file.complete else "the same command continues from there"
         count = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}{more}"
         self._said(f"{self.path} holds {count}; {goes_on}", self.path)
 

@@ -1,7 +1,7 @@
 """Undamped runs from an equilibrium: their time step, their perturbation and their time series.
 
-A run yields each sample as soon as it has it. It resumes its own state after every part, so that one that is continued
-from a checkpoint is the same to the bit. All functions are collective over the ranks of the communicator.
+A run yields each sample as soon as it is computed. The run resumes its own state after every part, so that a run
+continued from a checkpoint is bitwise the same. All functions are collective over the ranks of the communicator.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def perturb(
     keep: Callable[[Checkpoint], None] | None = None,
     resume: Checkpoint | None = None,
 ) -> Iterator[Sample]:
-    """An undamped run from rest at an equilibrium, with the scene's perturbation if it has one.
+    """Run the undamped dynamics from rest at an equilibrium, with the perturbation of the scene, if any.
 
     Parameters
     ----------
@@ -131,10 +131,10 @@ def perturb(
     watch : callable, optional
         Called with the time, and the positions and velocities, of each sample.
     keep : callable, optional
-        Called with a checkpoint after every part of the run, see `SHORTEST_PART`, once the samples before it have been
+        Called with a checkpoint after every part of the run, see `SHORTEST_PART`, after the samples before it have been
         consumed.
     resume : Checkpoint, optional
-        Go on from there, and yield the samples that follow: the same to the bit.
+        Continue from this checkpoint, and yield the samples that follow: bitwise the same.
 
     Returns
     -------
@@ -144,8 +144,8 @@ def perturb(
     Raises
     ------
     SceneError
-        At once, if the scene has no section [perturb], its time step is over the limit, or its time shorter than one
-        step.
+        Immediately, if the scene has no section [perturb], its time step is above the limit, or its time is shorter
+        than one step.
     """
     settings, packing = require_section(scene.perturb, "perturb"), start.packing
     dt, steps = sample_steps(settings, packing, samples, early)

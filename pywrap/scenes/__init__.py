@@ -1,4 +1,4 @@
-"""A scene: what is wanted, in TOML, checked in full before any work is done; its real units, and what it will cost.
+"""A scene: description of a computation in TOML, checked in full before any work starts; its real units and its cost.
 
 May import: `exchange`, which reads packings from files.
 """

@@ -1,8 +1,8 @@
-"""Which sections of a scene a command reads.
+"""The sections of a scene that each command reads.
 
-A command meets a scene with the sections that it reads, and no other: what it does not read cannot refuse it, and is
-no part of what it stores. Of the other sections the keys alone are checked, since a misspelled key is a mistake
-wherever it stands. A section that a command needs is asked for before any work is done.
+A command receives a scene with only the sections that it reads: other sections cannot make it fail, and are not part of
+its output. In the other sections only the keys are checked, because a misspelled key is always a mistake. A missing
+section that a command requires is reported before any work starts.
 """
 
 from collections.abc import Mapping

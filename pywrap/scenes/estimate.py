@@ -1,14 +1,14 @@
-r"""What a scene asks for, before any of it is done: steps, increments, memory, size of files, time.
+r"""Estimates for a scene before any work starts: steps, increments, memory, size of files, time.
 
-Two questions. *Can it be at all?* `refuse_impossible` finds in the numbers of a scene what no packing bears: overlaps
-beyond the contact law, forces that drown in the rounding of the coordinates, a settling that never ends. *How long does
-it take?* `estimate_work` counts the work of a command, and `describe_work` refuses what nobody can want. Times are
-those of one core of 2020, within a factor of three or so, and say whether to wait or to come back tomorrow.
+There are two questions. *Is the scene possible?* `refuse_impossible` finds impossible numbers in a scene: overlaps
+beyond the contact law, forces below the rounding of the coordinates, a settling that never ends. *How long does it
+take?* `estimate_work` counts the work of a command, and `describe_work` refuses absurd amounts. Times are for one core
+of 2020, within a factor of about three.
 
-A contact that carries the force f has :math:`\delta = (f/k_n)^{1/p}` and the stiffness
-:math:`k = p\, k_n \delta^{p-1}`, with p = 3/2 for Hertz. A time step is a share of :math:`(m/k)^{1/2}`, a disk falls
-under :math:`F_y` through the medium at the speed :math:`(F_y d/m)^{1/2}`, d its diameter: their ratio,
-:math:`(k_n d^{3/2}/F_y)^{1/3}` for Hertz, is what the steps of a settling grow with.
+A contact that carries the force f has :math:`\delta = (f/k_n)^{1/p}` and the stiffness :math:`k = p\, k_n
+\delta^{p-1}`, with p = 3/2 for Hertz. A time step is a share of :math:`(m/k)^{1/2}`, a disk falls under :math:`F_y`
+through the medium at the speed :math:`(F_y d/m)^{1/2}`, d its diameter. The number of steps of a settling is
+proportional to their ratio, :math:`(k_n d^{3/2}/F_y)^{1/3}` for Hertz.
 """
 
 from __future__ import annotations

@@ -1,19 +1,19 @@
-r"""Where a settling starts: disks that touch nothing yet, the upper layer above them.
+r"""The initial loose random packing: disks that do not touch, with the upper layer above the others.
 
-The disks have equal shares of the given radii, the upper layer too, where they take turns. It is evenly spaced along
-x, in as many tiers as it takes to keep its disks apart: a layer that is wider than the box when stretched out closes
-it, and cannot sink into the bed. The others are shuffled over the cells of a lattice that is wide enough for the
-largest disk, each at a random place inside its own cell. So no two disks overlap, whatever the seed, at a cost that
-grows as their number. The paper says only "loosely packed disks". A layer as open as this one, of which a third is
-filled, does not carry: without weight of their own the disks give way, and an upper layer that is loaded alone sinks
-to the floor. A settling from here has to lay a bed first.
+The disks have equal shares of the given radii. In the upper layer, the radii alternate. The upper layer is evenly
+spaced along x, in as many tiers as needed to keep its disks apart: if the layer, stretched out, is wider than the box,
+it closes the box and cannot sink into the bed. The other disks are shuffled over the cells of a lattice that is wide
+enough for the largest disk, each at a random place inside its cell. No two disks overlap, for any seed, at a cost
+proportional to their number. The paper says only "loosely packed disks". A packing as open as this, with a third of the
+area filled, does not carry load: the weightless disks give way, and the upper layer, if it alone were loaded, would
+sink to the floor. Settling therefore lays a bed first.
 
-Even on a bed a heavy layer may sink, as a heavy liquid does through a light one. Without friction a bed bears shear
-stresses of a tenth of its pressure at the most, and that pressure is the weight of the layer above. Where the layer is
-thinner than elsewhere the bed is pressed up, the layer slides off the bulge, and gets thinner there; a layer of one or
-two disks differs by more than a tenth from place to place, since it is made of disks, and a wide one will find its weak
-spot. A layer of several disks comes to rest. A tenth of all disks, the paper's 10 of 100 if those are its layer, keeps
-the geometry the same for packings of all sizes.
+Even on a bed a heavy layer may sink, like a heavy liquid through a light one. Without friction a bed bears shear
+stresses of at most a tenth of its pressure, and this pressure is the weight of the layer above. Where the layer is
+thin, the bed is pushed up, the layer slides off the bulge, and becomes thinner still. A layer of one or two disks
+varies in thickness by more than a tenth, because it is made of disks, and a wide layer will have a weak spot. A layer
+of several disks comes to rest. A tenth of all disks (the paper's 10 of 100, if those are its layer) keeps the geometry
+the same for packings of all sizes.
 """
 
 import numpy as np

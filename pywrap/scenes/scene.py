@@ -1,4 +1,4 @@
-"""A scene: what is wanted, in TOML, checked in full before any work is done.
+"""A scene: description of a computation in TOML, checked in full before any work starts.
 
     precision = "double"          # of the coordinates
     [packing]   the disks and the box: generated from a seed, or read from a file
@@ -15,11 +15,11 @@
     [units]     what the numbers are in SI
     [output]    what is written beside the result
 
-packing, law and load are needed; of the others, one that is absent is a feature that is not in the run. A command
-takes the sections that it reads, and needs some of them (:mod:`faultgouge.pywrap.scenes.command_sections`). The
-units are the user's own: k_n and k_t are force / length^law.exponent, 3/2 by default, and the paper's numbers take
-the mass of a disk and the diameter of a small disk as units. Defaults are the paper's values where it gives one; the
-docstrings say where it does not.
+packing, law and load are required. Each other section switches on a feature; without the section, the run does not have
+the feature. A command reads only some sections, and requires some of those
+(:mod:`faultgouge.pywrap.scenes.command_sections`). The user chooses the units: k_n and k_t are force /
+length^law.exponent, 3/2 by default. The units of the paper are the mass of a disk and the diameter of a small disk.
+Defaults are the values of the paper if it gives them; the docstrings say where it does not.
 """
 
 from collections.abc import Mapping
@@ -38,7 +38,7 @@ from .validation import SceneError, Section, read_toml, refusal_sentence, requir
 
 
 class Scene(SceneKeys):
-    """What is wanted, complete and consistent: `SceneKeys` whose sections agree with each other."""
+    """A complete and consistent description of a computation: `SceneKeys` whose sections agree with each other."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
@@ -78,9 +78,9 @@ class Scene(SceneKeys):
         path : str or Path
             A TOML file. A relative packing.file in it counts from its folder.
         packing : mapping, optional
-            A section [packing] in place of the file's, whose own may name a file that is not there yet.
+            A section [packing] in place of that of the file, which may name a file that does not exist yet.
         command : str, optional
-            The command, or the task of a sweep, that the scene is for: it gets the sections that it reads
+            The command, or the task of a sweep, that reads the scene: the scene then has the sections that it reads
             (:mod:`faultgouge.pywrap.scenes.command_sections`). By default all.
 
         Returns
@@ -90,7 +90,7 @@ class Scene(SceneKeys):
         Raises
         ------
         SceneError
-            If the file cannot be read, is no TOML, or does not describe a scene that can be run.
+            If the file cannot be read, is not TOML, or does not describe a scene that can be run.
         """
         path = Path(path)
         mapping = read_toml(path, "scene")
@@ -99,14 +99,14 @@ class Scene(SceneKeys):
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any], folder: str | Path = ".", command: str | None = None) -> "Scene":
-        """Make a scene from what a TOML file would hold.
+        """Make a scene from a mapping with the contents of a TOML file.
 
         Parameters
         ----------
         mapping : mapping
             Sections by name, keys and values in them as in TOML; `resolved` gives such a mapping.
         folder : str or Path
-            The folder from which a relative packing.file counts.
+            The folder to which a relative packing.file refers.
         command : str, optional
             As in `from_toml`.
 

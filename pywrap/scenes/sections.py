@@ -1,6 +1,6 @@
 """The sections of a scene beside [packing]: their keys, units and defaults.
 
-Defaults are the paper's values where it gives one; the docstrings say where it does not.
+Defaults are the values of the paper if it gives them; the docstrings say where it does not.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""The keys of [perturb] that say what forces the packing, and the signal that they mean."""
+"""The keys of [perturb] that describe the forcing, and the signal that they define."""
 
 from __future__ import annotations
 

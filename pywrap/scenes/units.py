@@ -1,30 +1,32 @@
-r"""Real units: what the numbers of a scene are for grains of a certain size and material.
+r"""Real units: the physical values of the numbers in a scene for grains of a given size and material.
 
-A scene has three units that nothing in it fixes. The grains do: the length is the diameter :math:`2 R_1` of the
-smallest disks, the mass that of a smallest grain, a sphere or (with a thickness h) a cylinder,
+A scene has three units that its numbers do not fix. The grains fix them: the unit of length is the diameter
+:math:`2 R_1` of the smallest disks, and the unit of mass is the mass of a smallest grain, a sphere or (with a thickness
+h) a cylinder,
 
 .. math:: M = \tfrac43 \pi R_1^3 \rho \quad\text{or}\quad M = \pi R_1^2 h \rho ,
 
-and the time follows from Hertz's contact of two such spheres (K. L. Johnson, *Contact Mechanics*, 1985, section 4.2),
+and the unit of time follows from Hertz's contact of two such spheres (K. L. Johnson, *Contact Mechanics*, 1985, section
+4.2),
 
 .. math:: F = \tfrac43 E^* \sqrt{R_1/2}\, \delta^{3/2}, \qquad E^* = \frac{E}{2 (1 - \nu^2)},
     \qquad\text{so}\qquad k = \frac{E \sqrt{2 R_1}}{3 (1 - \nu^2)} ,
 
 which is the scene's k_n: :math:`T^2 = k_n M / (k \sqrt{2 R_1})`. A cylinder has no contact law with the exponent 3/2;
-its thickness changes the mass and the area alone.
+its thickness changes only the mass and the area.
 
-**Stress.** The upper layer has n disks above the area W h, W the width of the box and h the thickness, or
-:math:`2 R_1`. The force F_y on each of them is the overburden :math:`n F_y / (W h)`, F_x the shear stress, and
-F_x/F_y their ratio. The ratio k_n/F_y of a scene therefore *is* a depth, and the overburden that is given must be that
-of the scene.
+**Stress.** The upper layer has n disks above the area W h, W the width of the box and h the thickness, or :math:`2
+R_1`. The force F_y on each of them is the overburden :math:`n F_y / (W h)`, F_x the shear stress, and F_x/F_y their
+ratio. The ratio k_n/F_y of a scene therefore corresponds to a depth, and a given overburden must agree with that of the
+scene.
 
 **Waves.** A force a on each disk of the upper layer is a stress :math:`\sigma = n a/(W h)`. A plane shear wave in the
-rock, with the modulus :math:`G = E/2(1 + \nu)`, has it at the strain :math:`\sigma/G` and the ground velocity
+rock, with the modulus :math:`G = E/2(1 + \nu)`, has this stress at the strain :math:`\sigma/G` and the ground velocity
 :math:`\sigma/\sqrt{G\rho}`. An acceleration A of the floor at the angular frequency omega is a ground velocity A/omega.
 
-**Dissipation.** The restitution e of two smallest grains that meet head on at a velocity follows from
-:math:`\tfrac12 M \ddot\delta = -k \delta^{3/2} - C_N \delta^{1/2} \dot\delta`; it falls as the velocity grows
-(N. V. Brilliantov et al., Phys. Rev. E 53, 5382, 1996), so that a restitution needs a velocity. The ratio
+**Dissipation.** The restitution e of two smallest grains that collide head on at a given velocity follows from
+:math:`\tfrac12 M \ddot\delta = -k \delta^{3/2} - C_N \delta^{1/2} \dot\delta`; the restitution falls as the velocity
+grows (N. V. Brilliantov et al., Phys. Rev. E 53, 5382, 1996), so that a restitution needs a velocity. The ratio
 :math:`Q = \omega/2|\mathrm{Re}\,s|` is the quality factor of a motion :math:`e^{st}`.
 """
 

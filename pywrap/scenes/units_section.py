@@ -1,4 +1,4 @@
-"""The section [units] of a scene: what grains it means, as quantities with units."""
+"""The section [units] of a scene: size and material of the grains, as quantities with units."""
 
 from __future__ import annotations
 

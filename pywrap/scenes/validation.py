@@ -1,6 +1,6 @@
-"""What a scene is refused for, in one sentence: what is wrong, where, and what to do.
+"""Errors of a scene in one sentence: what is wrong, where, and what to do.
 
-pydantic finds what is wrong with a section; `sentence` says so in words of the scene.
+pydantic finds the errors in a section; `sentence` describes them in the terms of the scene.
 """
 
 import reprlib
@@ -54,7 +54,7 @@ MISSING = {"friction.v_ss": ', and the paper gives no value: give a velocity, or
 
 
 class SceneError(BadInputError):
-    """A scene that cannot be run: one sentence that says what is wrong, where, and what to do."""
+    """The scene cannot be run; the text is one sentence: what is wrong, where, and what to do."""
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:

@@ -1,27 +1,28 @@
-r"""A loose packing brought to rest under its load, without friction, whatever its size.
+r"""Bring a loose packing of any size to rest under its load, without friction.
 
 Without friction the disks have an energy, that of the contacts and of the load,
 
 .. math:: E(q) = \frac{k_n}{p + 1} \sum_c \delta_c^{p+1} + F_y \sum_{top} y_i, \qquad F = -\partial E/\partial q,
 
-and settling is to find a minimum of it. Most of the way are rearrangements, in which contacts open and close one after
-the other: damped dynamics takes them in their stride, at a thousandth of the price of a linear solve a step (deck parts
-gather.in, bed.in, damp.in). The end is slow for dynamics and quick for Newton's method, if that is taught to live with
-what floats: a packing without friction has modes without stiffness (all of it may slide along the floor, a chain is
-about to buckle, a disk is held by nothing), on which K is singular or has a negative eigenvalue. So the flow
-:math:`\dot q = F` is integrated with implicit steps of length :math:`1/\sigma` (pseudo-transient continuation; Kelley
-and Keyes, SIAM J. Numer. Anal. 35, 508 (1998)),
+and settling means to find a minimum of this energy. Most of the path consists of rearrangements, in which contacts open
+and close one after the other. Damped dynamics handles rearrangements well, at a thousandth of the cost of a linear
+solve per step (deck parts gather.in, bed.in, damp.in). The end is slow for dynamics and fast for Newton's method, if
+that can deal with floating modes: a packing without friction has modes without stiffness (the whole packing slides
+along the floor, a chain is about to buckle, nothing holds a disk), for which K is singular or has a negative
+eigenvalue. Therefore the flow :math:`\dot q = F` is integrated with implicit steps of length :math:`1/\sigma`
+(pseudo-transient continuation; Kelley and Keyes, SIAM J. Numer. Anal. 35, 508 (1998)),
 
 .. math:: (K + \sigma)\, \Delta q = F(q), \qquad q \leftarrow q + \alpha\, \Delta q .
 
-On stiff modes that is Newton's step, while floating parts creep by :math:`F/\sigma`. :math:`\sigma` is large enough for
-K + sigma to be positive definite, which the signs of its pivots tell, so that every step goes down and no saddle
-attracts; it falls where a whole step is good, and Newton's method with its quadratic convergence is what remains.
-:math:`\alpha < 1` where the step runs into something: it is shortened until the slope :math:`F \cdot \Delta q` along it
-is no longer uphill. Energies are never compared, as their differences drown in rounding long before forces do.
+For stiff modes this is Newton's step, while floating parts creep by :math:`F/\sigma`. :math:`\sigma` is large enough
+for K + sigma to be positive definite, as the signs of its pivots show, so that every step reduces the energy and no
+saddle attracts. :math:`\sigma` falls when a whole step is good, and the method becomes Newton's method with its
+quadratic convergence. :math:`\alpha < 1` if the step meets a new contact: the step is shortened until the slope
+:math:`F \cdot \Delta q` along it is no longer uphill. Energies are never compared, because rounding hides their
+differences long before those of forces.
 
-All of this is NumPy on the whole packing, the same on every rank. Where Newton's method gets lost in a rearrangement,
-dynamics goes on from there, down to a tenth of the force before.
+All of this is NumPy on the whole packing, the same on every rank. If Newton's method fails in a rearrangement, dynamics
+continues from there, down to a tenth of the previous force.
 """
 
 from collections.abc import Callable

@@ -1,8 +1,8 @@
-"""Disks of another code brought to rest under this law and load.
+"""Bring the disks of another code to rest under this law and load.
 
-Without slips they rest without friction first, and friction begins with zero slips: so K is symmetric at F_x = 0, as
-in a packing of our own. Disks that come with slips keep friction and rest by overdamped dynamics. Dynamics begins where
-the disks are. It makes what rearrangements there are; Newton's method does the last digits.
+Disks without slips first come to rest without friction, and friction then starts with zero slips. K is therefore
+symmetric at F_x = 0, as in a generated packing. Disks with slips keep friction and come to rest by overdamped dynamics.
+Dynamics starts from the given positions and makes the rearrangements; Newton's method gives the last digits.
 """
 
 from __future__ import annotations

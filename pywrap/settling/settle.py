@@ -49,28 +49,28 @@ def settle(
     watch: Watch = lambda says: None,
     bed: Packing | None = None,
 ) -> Equilibrium:
-    """The packing of a scene in equilibrium at F_x = 0.
+    """Settle the packing of a scene to equilibrium at F_x = 0.
 
-    A generated packing settles without friction, and friction begins with zero slips (or settles with
-    friction, if the scene says so); a stored one is taken as it is. Both are brought to the rounding floor. Where the
-    upper layer sinks through the bed, the next loose start of the seed is settled, up to `STARTS` of them.
+    A generated packing settles without friction, and friction then starts with zero slips (or it settles with friction,
+    if the scene asks for this). A stored packing is used unchanged. Both are brought to the rounding floor. If the
+    upper layer sinks through the bed, the next random packing of the seed is settled, up to `STARTS` of them.
 
-    Settling is chaotic: two arithmetics would end in two packings. It takes doubles in either arithmetic, so that a
-    seed is one packing, and compensated arithmetic begins where the settled packing is brought to its own floor.
+    Settling is chaotic: two arithmetics would end in two packings. Settling therefore always uses doubles, so that a
+    seed gives one packing. Compensated arithmetic begins when the settled packing is brought to its own floor.
 
     Parameters
     ----------
     scene : Scene
-        What is wanted.
+        The scene.
     mu : float, optional
         Friction coefficient; by default the scene's first.
     communicator : mpi4py.MPI.Comm, optional
         The ranks that share the packing; all by default.
     watch : callable, optional
-        Told in words what begins, for a packing of more than 300 disks, which takes a while.
+        Called with a description of each stage, for a packing of more than 300 disks, which takes some time.
     bed : Packing, optional
-        What `settle_bed` gives for a scene that settles as this one does: it is then not settled again, and the
-        equilibrium is the same to the bit.
+        Result of `settle_bed` for a scene that settles to the same packing. The packing is then not settled again, and
+        the equilibrium is bitwise the same.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """Remote triggering in a stressed layer of frictional disks.
 
-``faultgouge.analysis`` takes a configuration and gives its Jacobian, spectrum, onset and growth;
-``faultgouge.pywrap`` drives LAMMPS from a scene to stored configurations; ``faultgouge.studies`` puts
-results on paper; ``faultgouge.assessment`` measures errors, run time and limits.
+``faultgouge.analysis`` computes the stability operator, spectrum, onset and growth of a configuration;
+``faultgouge.pywrap`` drives LAMMPS from a scene to stored configurations; ``faultgouge.studies`` computes and reports
+results; ``faultgouge.assessment`` measures errors, run time and limits.
 """
 
 import sys

@@ -1,10 +1,11 @@
-"""How the command ends when something goes wrong: one sentence and one exit code, on all ranks.
+"""The end of a command after an error: one sentence and one exit code, on all ranks.
 
 Exit codes: 1 for a computation that failed, 2 for bad input; 130 and 143 for signals, see
 :mod:`faultgouge.signal_guard`.
 
-An error that all ranks meet ends them one by one; one that a rank meets alone would leave the others waiting for ever.
-Which of the two it is, the ranks find out by meeting: who is alone for `MEETING` ends all.
+An error on all ranks ends them one by one. After an error on one rank alone, the other ranks would wait for ever. To
+distinguish the two cases, ranks with an error wait for each other: a rank that is alone for the time `MEETING` ends all
+ranks.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Pictures in a notebook: a cell that ends with a packing or with a figure shows it."""
+"""Pictures in a notebook: if a cell ends with a packing or a figure, the notebook shows its picture."""
 
 import sys
 from io import BytesIO

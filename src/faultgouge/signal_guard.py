@@ -1,17 +1,17 @@
-"""A command works in a process of its own, and a guard beside it ends with it: in one sentence, within two seconds.
+"""A command works in its own process, and a second process, the guard, ends it: in one sentence, within two seconds.
 
-Python runs a signal's handler between two of its own instructions, and LAMMPS or LAPACK may be minutes away from the
-next one; SciPy's `eig` does not even let another thread run. So the process that the shell or mpiexec has started
-forks before anything heavy is imported. Its child does the work. The guard waits for the child and for signals, hands
-SIGINT (Ctrl-C), SIGTERM and SIGHUP on, and gives the child `GRACE` to close files and to end other processes. Nothing
-is lost by that, as files of results are whole at any moment (:mod:`faultgouge.analysis.files.atomic_write`). Then the
-guard says what is kept, in the words that the child has left in memory that both share (`keeps`), and exits with 128
-and the number of the signal: 130, 143 or 129.
-When the guard ends, in whatever way, the kernel kills the child. A child that a library has ended (SIGSEGV, SIGABRT,
-or SIGKILL for want of memory), or a limit of CPU time (SIGXCPU), ends in a sentence as well.
+Python runs the handler of a signal between two Python instructions, and LAMMPS or LAPACK may run for minutes before the
+next; SciPy's `eig` does not even let another thread run. The process that the shell or mpiexec has started therefore
+forks before it imports any heavy package. The child does the work. The guard waits for the child and for signals,
+passes SIGINT (Ctrl-C), SIGTERM and SIGHUP on, and gives the child the time `GRACE` to close files and to end other
+processes. Nothing is lost, because files of results are complete at any moment
+(:mod:`faultgouge.analysis.files.atomic_write`). The guard then prints what is kept, in words that the child has left in
+memory shared by both (`keeps`), and exits with 128 plus the number of the signal: 130, 143 or 129. When the guard ends,
+for any reason, the kernel kills the child. If a library (SIGSEGV, SIGABRT, or SIGKILL for lack of memory) or a limit of
+CPU time (SIGXCPU) ends the child, the guard prints a sentence as well.
 
-Under mpiexec every rank has its guard. mpiexec hands a signal to all ranks and kills the others once the work of one is
-gone, so the guards end `TOGETHER`, and the work after them. Rank 0 alone speaks.
+Under mpiexec every rank has its guard. mpiexec passes a signal to all ranks, and kills the other ranks when the work of
+one rank has ended. The guards therefore end `TOGETHER`, and the work after them. Only rank 0 prints.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ SIGNALS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # `nohup` has a command go on without its terminal
     SIGNALS[signal.SIGHUP] = "the terminal or the connection was closed"
 
-NOTHING = "nothing was written, and the same command begins anew"
+NOTHING = "nothing was written, and the same command starts from the beginning"
 _shared = mmap.mmap(-1, 4096)
 """Shared by guard and work: what an interrupt leaves, as UTF-8, a place and words that each end with a zero, and
 `CLOSED`."""
@@ -165,7 +165,7 @@ def _end(status: int, now: float) -> NoReturn:
     if code - 128 in set(SIGNALS):
         _interrupted(code - 128, now)
     if code == -signal.SIGKILL:
-        _say(f"killed from outside, for want of memory perhaps: {_kept()}")
+        _say(f"killed from outside, possibly for lack of memory: {_kept()}")
         os._exit(128 + signal.SIGKILL)
     if code == -signal.SIGXCPU:
         _say(f"the limit of CPU time (ulimit -t) is reached: {_kept()}")
@@ -179,7 +179,7 @@ def _end(status: int, now: float) -> NoReturn:
 def _kept() -> str:
     place, words, *_ = _shared[:CLOSED].decode(errors="replace").split("\0")
     if place and not os.path.exists(place):
-        return f"{place} is not there, and the same command begins anew"
+        return f"{place} is not there, and the same command starts from the beginning"
     return words
 
 

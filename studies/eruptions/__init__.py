@@ -1,4 +1,4 @@
-"""How large an eruption is and what ends it: see `compute` for the physics, `study` for what is left in a folder."""
+"""The size of eruptions and how they end: see `compute` for the physics, `study` for the files written."""
 
 from .study import eruptions
 

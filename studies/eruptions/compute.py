@@ -1,24 +1,24 @@
-r"""How large: undamped runs from rest at many loads, until they are over.
+r"""The size of eruptions: undamped runs from rest at many loads, until they are over.
 
-Above its onset a packing at rest is unstable. The rounding of the coordinates is perturbation enough: D grows from it
-at the rate :math:`2 |\mathrm{Im}\,\omega|` of the spectrum (:math:`2\,\mathrm{Re}\,s` with dissipation), by ten and
-more decades, and then levels off. The largest D
-is the size of the eruption at that load.
+Above its onset a packing at rest is unstable. The rounding of the coordinates is a sufficient perturbation: D grows
+from it at the rate :math:`2 |\mathrm{Im}\,\omega|` of the spectrum (:math:`2\,\mathrm{Re}\,s` with dissipation), by ten
+and more decades, and then levels off. The largest D is the size of the eruption at that load.
 
-**Over** is a run at time t when the largest D of its second half, (t/2, t], is at most 1.5 times that of the quarter
-before, (t/4, t/2], and when D has had the time to grow by `DECADES` decades at the spectrum's rate. A stable packing
-is watched for `QUIET` times and then said to be stable, unless D *rises* all the same. A run that is not over in the
-time of the scene is cut off, and its size is a lower bound. A layer that has slid by the diameter of a disk *flows*.
+**Over.** A run is over at time t when two conditions hold: the largest D of its second half, (t/2, t], is at most 1.5
+times that of the quarter before, (t/4, t/2]; and t is long enough for D to grow by `DECADES` decades at the rate of the
+spectrum. A stable packing is observed for `QUIET` times and then reported as stable, unless D *rises* nevertheless. A
+run that is not over in the time of the scene is cut off, and its size is a lower bound. A layer that has slid by the
+diameter of a disk *flows*.
 
-**What ends the growth** is what has happened by the time at which D first reaches a tenth of its largest value. The
-contacts are looked at in each sample: *opens* if a contact of the start has opened by then, *slides* if none has, but
-one slides at its Coulomb bound that did not at the start, and *law* if neither has: then the growth ends by the
-curvature of the contact law alone. A contact that opens and closes between two samples is missed.
+**What ends the growth** is determined when D first reaches a tenth of its largest value. Each sample examines the
+contacts: *opens* if an initial contact has opened by then; *slides* if none has opened, but a contact slides at its
+Coulomb bound that did not slide initially; and *law* if neither has happened: the growth then ends by the curvature of
+the contact law alone. A contact that opens and closes between two samples is missed.
 
-**Energy.** No potential belongs to the tangential force, so nothing is conserved but the balance of work: the kinetic
-energy changes by the work of all forces, load included. Each run ends with `WORK_STEPS` steps in which this work is
-added up; without drag, which is no force to LAMMPS, the balance is off by the order of the time step squared. The noise
-floor is the largest D of the first time unit, before anything could grow.
+**Energy.** The tangential force has no potential, and energy is not conserved. But the balance of work holds: the
+kinetic energy changes by the work of all forces, load included. Each run ends with `WORK_STEPS` steps in which this
+work is summed. Without drag, which is not a force in LAMMPS, the error of the balance is of the order of the time step
+squared. The noise floor is the largest D of the first time unit, before any growth.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The sizes of eruptions over the load, in the frame of a study, and as a task of a sweep."""
+"""The sizes of eruptions over the load, as a study and as a task of a sweep."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Complex modes over the load: how many there are, how fast they grow, and how lossy a contact must be to stop them."""
+"""Complex modes over the load: their number, their growth rates, and the loss of a contact that stops them."""

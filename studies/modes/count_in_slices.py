@@ -1,18 +1,19 @@
-r"""The complex pairs of packings that are too large for all eigenvalues: counted slice by slice of the spectrum.
+r"""Count the complex pairs of packings that are too large for all eigenvalues, slice by slice of the spectrum.
 
 All eigenvalues of E coordinates take some :math:`10 E^3` operations or more: hours for 10,000 disks. Here the
-eigenvectors X of the symmetric part of the operator A come in slices (:mod:`~faultgouge.analysis.onset.block_lanczos`),
-and three neighbouring slices at a time span a space from which A's own is found by inverse iteration with a shift
-:math:`\sigma` in the middle one, on both sides:
+eigenvectors X of the symmetric part of the operator A are computed in slices
+(:mod:`~faultgouge.analysis.onset.block_lanczos`), and three neighbouring slices span a space, from which inverse
+iteration finds the corresponding space of A with a shift :math:`\sigma` in the middle slice, on both sides:
 
 .. math:: R \leftarrow (A - \sigma)^{-1} R, \qquad L \leftarrow (A - \sigma)^{-T} L, \qquad R_0 = L_0 = X .
 
-Of the eigenvalues of the projection :math:`(L^T R)^{-1} L^T A R` those count whose real part lies within the slice in
-the middle. The projection :math:`X^T A X` itself is not good enough: of 1,000 disks it lacks 7 % of the pairs at
-F_x/F_y = 0.03, since modes far away have a part in the couplings. The cost grows as :math:`E^2`.
+Those eigenvalues of the projection :math:`(L^T R)^{-1} L^T A R` are counted whose real part lies within the middle
+slice. The projection :math:`X^T A X` itself is not accurate enough: for 1,000 disks it misses 7 % of the pairs at
+F_x/F_y = 0.03, because distant modes contribute to the couplings. The cost grows as :math:`E^2`.
 
-**The error.** The count is made after `STEPS` - 1 iterations, too. The differences in the slices, all taken as
-positive, sum up to the stated error. An iteration divides what is wrong by ten or so: the last count is off by less.
+**The error.** The pairs are also counted after `STEPS` - 1 iterations. The stated error is the sum of the absolute
+differences in the slices. An iteration divides the error by about ten: the error of the last count is smaller than
+stated.
 """
 
 from __future__ import annotations

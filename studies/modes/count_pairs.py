@@ -1,4 +1,4 @@
-r"""Complex pairs along a ramp: how many, how fast, and what stops them.
+r"""Complex pairs along a ramp: their number, their growth rates, and the loss that stops them.
 
 Beyond the first window the operator :math:`K = S + A` of a packing, S symmetric and A antisymmetric, has ever more
 complex pairs. With :math:`\omega = \sqrt\lambda`, the mean square displacement of a pair grows at the rate
@@ -7,30 +7,31 @@ complex pairs. With :math:`\omega = \sqrt\lambda`, the mean square displacement 
 .. math:: Q = \frac{|\mathrm{Re}\,\omega|}{2\,|\mathrm{Im}\,\omega|}
 
 is the quality factor below which a dissipation that gives each mode the loss :math:`\omega/Q` stops the growth. The
-least Q over the pairs of a load is the Q that stops them all. The *share* of complex modes is twice the number of pairs
-over the number of eigenvalues; rattlers have none.
+least Q over the pairs of a load is the Q that stops all of them. The *share* of complex modes is twice the number of
+pairs over the number of eigenvalues; rattlers have none.
 
-**Which pairs count.** Rounding makes pairs of eigenvalues that nearly meet, with imaginary parts of up to
+**Which pairs count.** For eigenvalues that nearly merge, rounding makes spurious pairs with imaginary parts of up to
 :math:`(u |A|_F\, c)^{1/2}` for couplings c (:mod:`~faultgouge.analysis.spectrum.spectrum`). No coupling is larger than
-the largest eigenvalue, so that a pair beyond that bound is real without a look at its vectors. Of the others the
-vectors are computed, and decide.
+the largest eigenvalue, so that a pair beyond that bound is physical, and its vectors are not needed. For the other
+pairs the vectors are computed, and decide.
 
 **Where the branch ends.** A real negative eigenvalue is the classical instability: Newton's method has passed a turning
-point, and no packing reaches such an equilibrium by itself. The loads of a packing end before it ("turning point").
+point, and no packing reaches such an equilibrium by itself. The loads of a packing end before this point ("turning
+point").
 
-**Large packings.** Of more than `ALL` disks the pairs are counted in slices of the spectrum, with a stated error
+**Large packings.** For more than `ALL` disks the pairs are counted in slices of the spectrum, with a stated error
 (:mod:`~faultgouge.studies.modes.count_in_slices`): the key pairs_error of a load.
 
 **A bound.** The imaginary part of an eigenvalue is at most the norm of the antisymmetric part, :math:`|\mathrm{Im}\,
 \lambda| \le |(A - A^T)/2|_2` with A the mass-weighted operator (Bendixson, Acta Math. 25, 359 (1902)): the key bound. A
-contact couples two disks alone, so that the norm does not grow with the number of disks unless contacts become
-stiffer or more loaded: growth rates cannot grow with it for ever.
+contact couples only two disks, so that the norm does not grow with the number of disks unless contacts become stiffer
+or more loaded: growth rates cannot grow without limit with the number of disks.
 
 **Where b matters.** A tangential force that depends on the overlap, :math:`b = \partial f_t/\partial\delta`, makes K
-non-symmetric. Of packings of up to `SMALL` disks pairs are also counted with b of sticking contacts alone, of sliding
-contacts alone, and of none, at the same equilibria. (The turning of the tangent, which is non-symmetric too, stays.)
-With rescaled slips b is the mean of that of contacts which close and of contacts which part, and the key while has the
-pairs with either (:mod:`~faultgouge.analysis.packing.law`).
+non-symmetric. For packings of up to `SMALL` disks pairs are also counted with b of sticking contacts alone, of sliding
+contacts alone, and of none, at the same equilibria. (The rotation of the tangent, which is non-symmetric too, is kept.)
+With rescaled slips b is the mean of its values for closing and for opening contacts, and the key while has the pairs
+with either (:mod:`~faultgouge.analysis.packing.law`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Complex modes of a scene or of a sweep, computed, drawn and written into a folder."""
+"""Complex modes of a scene or of a sweep: computed, drawn and written to a folder."""
 
 from __future__ import annotations
 

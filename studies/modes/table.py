@@ -1,4 +1,4 @@
-"""Loads of many packings: what there is of each load, and medians over the packings that bear it."""
+"""Table of loads for many packings: results at each load, and medians over the packings that bear it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 r"""The paper's protocol on one packing: ramps, onsets, growth, and the numbers of its summary.
 
-Settle, raise F_x from equilibrium to equilibrium for each friction coefficient, find the onset F_x^c where two real
+Settle, raise F_x from equilibrium to equilibrium for each friction coefficient, find the onset F_x^c at which two real
 eigenvalues coalesce; then start undamped dynamics from an equilibrium above the onset and compare the growth of the
-mean square displacement D(t), which starts from rounding noise, with the rate 2 |Im omega| of the spectrum. Where the
+mean square displacement D(t), which starts from rounding noise, with the rate 2 |Im omega| of the spectrum. If the
 scene asks for it, a minute perturbation just below the onset follows (`triggering`).
 """
 

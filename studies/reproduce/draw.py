@@ -1,4 +1,4 @@
-"""The figures of the protocol, from what `compute` has found."""
+"""The figures of the protocol, from the results of `compute`."""
 
 from __future__ import annotations
 

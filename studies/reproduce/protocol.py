@@ -20,24 +20,24 @@ from .page import report
 
 
 def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | None = None) -> dict[str, Any]:
-    """Run the protocol and leave figures, run.h5, summary.json and report.md in a folder.
+    """Run the protocol and write figures, run.h5, summary.json and report.md to a folder.
 
     Parameters
     ----------
     scene : Scene
         With a section [ramp] and one or more friction coefficients.
     output : Path
-        The folder, made if need be. Ramps are written to run.h5 (first friction coefficient) and run-mu*.h5.
+        The folder, created if needed. Ramps are written to run.h5 (first friction coefficient) and run-mu*.h5.
     say : callable
-        Takes a line of progress.
+        Called with a line of progress.
     triggered : Scene, optional
-        Another packing, with [perturb] and [friction], which is the one that is triggered; its ramps are written to
-        triggered.h5 and triggered-mu*.h5. By default it is the packing of `scene`, if that has these sections.
+        Another scene, with [perturb] and [friction], of which the packing is triggered; its ramps are written to
+        triggered.h5 and triggered-mu*.h5. By default the packing of `scene` is triggered, if that has these sections.
 
     Returns
     -------
     dict
-        What summary.json holds.
+        The contents of summary.json.
     """
     make_folder(output)
     runs = _ramps(scene, output / "run.h5", say)

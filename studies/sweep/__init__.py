@@ -1,1 +1,1 @@
-"""Sweeps: one task for every scene of a product of keys, handed out to workers, resumable, in shards."""
+"""Sweeps: one task for every scene of a product of keys, distributed to workers, resumable, in shards."""

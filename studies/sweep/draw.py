@@ -1,4 +1,4 @@
-"""The picture of a sweep: onsets, or the sizes of eruptions, over the keys that were swept."""
+"""The picture of a sweep: onsets, or the sizes of eruptions, over the swept keys."""
 
 from __future__ import annotations
 

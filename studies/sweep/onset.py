@@ -1,20 +1,20 @@
-r"""The task "onset": the first window of complex eigenvalues of one scene, and which modes meet there.
+r"""The task "onset": the first window of complex eigenvalues of one scene, and the modes that merge there.
 
-Up to the first window a ramp ends in one of three ways: with an *onset*; *until* the scene's last F_x without one; or
-with a packing that *flows*, because no equilibrium follows the last. The two latter say that the onset, if there is
+A ramp to the first window ends in one of three ways: with an *onset*; without one at the scene's last F_x (*until*); or
+with a packing that *flows*, because no equilibrium follows the last. In the latter two cases the onset, if there is
 one, lies beyond the last equilibrium: they are right-censored observations.
 
 **The pair.** At the onset the two modes have one eigenvector v in common (mass-weighted, unit length). Disk k carries
 the weight :math:`w_k = v_{x,k}^2 + v_{y,k}^2 + v_{u,k}^2`, and :math:`1/\sum_k w_k^2` is the *participation*, the
 number of disks that move. The *rotation* is the share :math:`\sum_k v_{u,k}^2`, the *layer* that of the disks of the
-upper layer. In packings whose modes are all computed, *rank* is the number of eigenvalues below the pair, of *modes*
-in all, and *ancestors* are the two modes of the packing at F_x = 0, by number, which span most of the pair's plane,
-with their share of it in *ancestry*. At F_x = 0 K does not depend on mu where slips are zero: two onsets of one packing
-at different mu are of one pair if their ancestors are the same.
+upper layer. If all modes of a packing are computed, *rank* is the number of eigenvalues below the pair and *modes* the
+total number. *ancestors* are the numbers of the two modes at F_x = 0 that span most of the plane of the pair, and
+*ancestry* is their share of it. If slips are zero, K at F_x = 0 does not depend on mu: two onsets of one packing at
+different mu belong to one pair if their ancestors are the same.
 
-**The error** is the whole one, as that of `faultgouge onset`, and F_x^c is the same: the path is solved again with
-other increments (:mod:`~faultgouge.pywrap.onset.path_error`). *error_of_path* is what these do. It is None where no
-equilibrium is found at the onset a second time, and the error then is that of rounding alone.
+**The error** is the total error, as in `faultgouge onset`, and F_x^c is the same: the path is solved again with other
+increments (:mod:`~faultgouge.pywrap.onset.path_error`). *error_of_path* is the part due to the increments. It is None
+if no equilibrium is found at the onset a second time; the error then is that of rounding alone.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""Run a sweep: every point is a line of results.jsonl as soon as it has ended, and results.csv the table of all.
+"""Run a sweep: each point is a line of results.jsonl as soon as it ends, and results.csv is the table of all.
 
-Shards of a sweep, each with a folder of its own, are put together by `merge`.
+`merge` joins the shards of a sweep, each with its own folder.
 
-Points are handed out to workers (:mod:`.workers`), each with one thread. The table does not depend on the number of
-workers, on shards, or on where a run was cut off.
+Points are distributed to workers (:mod:`.workers`), each with one thread. The table does not depend on the number of
+workers, on shards, or on interruptions.
 
-A folder holds sweep.json (what was asked for), results.jsonl and results.csv. Lines of results.jsonl that are of a
-point of this sweep are not computed again. A last line that a kill has cut is computed again.
+A folder contains sweep.json (the request), results.jsonl and results.csv. Points of this sweep with a line in
+results.jsonl are not computed again. A last line that a kill has truncated is computed again.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def run_sweep(
     workers: int | None = 1,
     executor: Executor | None = None,
 ) -> list[Row]:
-    """Compute what is missing of a sweep, and write its table.
+    """Compute the missing points of a sweep, and write its table.
 
     Parameters
     ----------
@@ -56,12 +56,13 @@ def run_sweep(
     say : callable
         Takes a line of words.
     progress : callable
-        Takes the rows that end and their number, and hands the rows on.
+        Called with the rows as they end and their number; it passes the rows on.
     workers : int or None
-        Processes that compute; None: as many as this process may use cores. Ranks of mpiexec take their place.
+        Number of processes; None: the number of cores that this process may use. Ranks of mpiexec replace these
+        processes.
     executor : concurrent.futures.Executor, optional
-        Computes in place of these, on other machines perhaps. Its workers have faultgouge and one thread each: LAMMPS
-        does not stand several threads in a process.
+        Replaces these processes, possibly on other machines. Its workers need faultgouge and one thread each: LAMMPS
+        cannot run in several threads of a process.
 
     Returns
     -------
@@ -73,7 +74,7 @@ def run_sweep(
     SceneError
         If another process writes to the folder.
     WorkerError
-        If workers are killed again and again.
+        If workers are killed repeatedly.
     """
     points = shard(sweep.points, part)
     with open_executor(workers, executor) as pool:
@@ -100,12 +101,12 @@ def read_results(path: Path) -> dict[str, Row]:
 
 
 def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep, list[Row]]:
-    """Merge folders of sweeps into one.
+    """Merge the folders of shards into one.
 
     Parameters
     ----------
     parts : sequence of Path
-        Folders that `sweep` has left.
+        Folders written by `sweep`.
     output : Path
         The folder, made if need be.
     say : callable
@@ -114,13 +115,13 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
     Returns
     -------
     sweep : Sweep
-        Which they are of.
+        The sweep of the parts.
     rows : list of dict
 
     Raises
     ------
     SceneError
-        If the parts do not belong together, or are no parts.
+        If the parts do not belong together, or are not parts of a sweep.
     """
     for part in parts:
         if not (part / ASKED).is_file():

@@ -9,8 +9,8 @@
     kn = 2e5
     ...
 
-The points are the product of the lists, the last key varying fastest. Every point is a scene of its own, and carries as
-its key a hash of the task and of the resolved scene, so that a result is known again whatever sweep it came from.
+The points are the product of the lists, the last key varying fastest. Each point is a separate scene. Its key is a hash
+of the task and of the resolved scene, so that a result can be recognised in any sweep.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class SweepPoint:
 
 @dataclass(frozen=True)
 class Sweep:
-    """What is wanted of which scenes.
+    """A task and the scenes for which to run it.
 
     Attributes
     ----------
@@ -83,11 +83,11 @@ class Sweep:
     axes : dict
         Values by swept key; several keys that vary together are one, separated by commas.
     scene : dict
-        What all scenes share, sections by name.
+        Keys that all scenes share, in sections by name.
     code : str
-        Of a function of the user's, sixteen hexadecimal digits that stand for its code; else empty.
+        For a function of the user, sixteen hexadecimal digits that identify its code; else empty.
     folder : Path
-        From which the file of such a function counts.
+        Folder to which the file name of such a function refers.
     """
 
     task: str

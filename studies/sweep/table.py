@@ -1,7 +1,7 @@
-"""The table of a sweep: a row a scene in the order of the sweep, results.csv, and results.parquet if pandas is there.
+"""The table of a sweep, one row for each scene in the order of the sweep: results.csv, and results.parquet with pandas.
 
-Columns are the swept keys, then the result's, those of dicts joined by dots, and what went wrong. Numbers have all
-their digits, so that two runs of one sweep leave the same file; wall times are in results.jsonl alone.
+Columns are the swept keys, the keys of the result (nested keys joined by dots), and the error sentence. Numbers have
+all their digits, so that two runs of one sweep write the same file; wall times are only in results.jsonl.
 """
 
 from __future__ import annotations

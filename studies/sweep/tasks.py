@@ -1,9 +1,9 @@
-"""The tasks of a sweep by name: what is done with each scene.
+"""The tasks of a sweep by name; a task is applied to each scene.
 
-A task takes the scene and a function that gives its settled packing for a friction coefficient, and returns one row:
-numbers, words, lists and dicts of these. A task that settles by itself leaves the function alone. What one task costs
-is a power of the number of disks, measured, for `sweep --dry-run`. A task may be a function of the user's, too
-(:mod:`.user_function`); what that costs is told by the rows that are there.
+A task takes the scene and a function that returns the settled packing for a friction coefficient. The task returns one
+row: numbers, strings, lists and dicts of these. A task that settles by itself does not call the function. For `sweep
+--dry-run`, the cost of a task is a measured power of the number of disks. A task may also be a function of the user
+(:mod:`.user_function`); its cost is estimated from existing rows.
 """
 
 from __future__ import annotations

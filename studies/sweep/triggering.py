@@ -1,19 +1,18 @@
 r"""The task "triggering": onsets of one packing for several friction coefficients, and whether it erupts between them.
 
-The packing is ramped for every friction coefficient of the scene, and for :math:`\mu \mu_{ss}`, what friction weakens
-to (without [friction] in the scene the last coefficient takes its place), each as in
-:mod:`~faultgouge.studies.sweep.onset`.
+The packing is ramped for every friction coefficient of the scene, and for the weakened friction :math:`\mu \mu_{ss}`
+(without [friction] in the scene, for the last coefficient), each as in :mod:`~faultgouge.studies.sweep.onset`.
 
-Weakening lowers the onset where :math:`F_x^c(\mu \mu_{ss}) < F_x^c(\mu)`, and that can be known although one of the
-two is censored. Where both are known and leave a window between them, three undamped runs from its middle tell whether
-the packing erupts (:mod:`~faultgouge.studies.triggering`): unperturbed, perturbed, perturbed with mu(v). The *rise* is
-the distance in decades between the largest D of the last two.
+Weakening lowers the onset if :math:`F_x^c(\mu \mu_{ss}) < F_x^c(\mu)`, which may be known even if one of the two is
+censored. If both are known and there is a window between them, three undamped runs from its middle show whether the
+packing erupts (:mod:`~faultgouge.studies.triggering`): unperturbed, perturbed, perturbed with mu(v). The *rise* is the
+distance in decades between the largest D of the last two.
 
-A rise alone is no instability: D *jumps* in a packing that is stable with the weakened friction, too
-(:mod:`~faultgouge.studies.triggering.compute`), and how far, a *control* shows: mu(v) at a force as far below the lower
-onset as the middle of the window is above it. An instability goes on to *grow* after the jump, at the rate of the
-spectrum with the weakened friction. The pair may also be real again at the middle of the window, or grow too slowly for
-the length of the run; so the rate is kept beside all this.
+A rise alone does not prove an instability: D also *jumps* in a packing that is stable with the weakened friction
+(:mod:`~faultgouge.studies.triggering.compute`). A *control* shows how far: mu(v) at a force as far below the lower
+onset as the middle of the window is above it. In an instability, D continues to *grow* after the jump, at the rate of
+the spectrum with the weakened friction. The pair may also be real again at the middle of the window, or grow too slowly
+for the length of the run; the rate is therefore stored as well.
 """
 
 from __future__ import annotations

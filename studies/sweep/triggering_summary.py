@@ -1,7 +1,7 @@
-"""What a sweep of the task "triggering" shows: shares of its scenes with intervals, in numbers and in words.
+"""Summary of a sweep of the task "triggering": shares of its scenes with intervals, in numbers and in words.
 
-See :mod:`.triggering` for what is examined, and :mod:`~faultgouge.studies.statistics` for shares, intervals and
-distributions. Nothing is dropped: a scene counts in all that was found before it failed.
+See :mod:`.triggering` for the quantities, and :mod:`~faultgouge.studies.statistics` for shares, intervals and
+distributions. No result is dropped: a scene that fails counts with all results found before.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ QUARTILES = (0.25, 0.5, 0.75)
 
 
 def summary(rows: Sequence[Row]) -> dict[str, Any]:
-    """Numbers of the rows of a sweep of the task "triggering".
+    """Summarise the rows of a sweep of the task "triggering" in numbers.
 
     Parameters
     ----------

@@ -1,15 +1,15 @@
-"""A function of the user's as the task of a sweep: "file.py:function" or "package.module:function".
+"""A function of the user as the task of a sweep: "file.py:function" or "package.module:function".
 
 The function takes a scene and returns one row, a dict of numbers, words, lists and dicts of these:
 
     def task(scene): ...
     def task(scene, settled): ...
 
-With a second parameter it is also given the packing as it settled with the scene's first friction coefficient, an
-:class:`~faultgouge.pywrap.Equilibrium`. Scenes that settle alike share this packing.
+With a second parameter the function also receives the packing settled with the scene's first friction coefficient, an
+:class:`~faultgouge.pywrap.Equilibrium`. Scenes that settle to the same packing share it.
 
-A row is known by the scene and by the code of the function's file. A change of the code lets the sweep compute its rows
-anew; comments, docstrings and the layout of the file are no code.
+A row is identified by the scene and by the code of the function's file. After a change of the code, the sweep computes
+its rows again; comments, docstrings and the layout of the file do not count as code.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""The points of a sweep in the hands of workers.
+"""Distribution of the points of a sweep to workers.
 
-Points that settle alike share the settled packing: the first of them is handed out alone, and the others with the
-packing that it brought back. As the packing is the same to the bit wherever it was settled, no row depends on the
-workers. A worker that is killed takes nothing with it: what it had in hand is handed out again.
+Points that settle to the same packing share it: the first point is distributed alone, and the others with the packing
+that the first has returned. The packing is bitwise the same wherever it was settled, so that no row depends on the
+workers. If a worker is killed, nothing is lost: its points are distributed again.
 
-A point has a row, whatever goes wrong with it.
+Each point gives a row, even if it fails.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ class _Shared:
         """Hand out again what killed workers had in hand."""
         if deaths > TRIES or not isinstance(self._pool, Processes):
             raise WorkerError(
-                "a worker was killed, for want of memory perhaps: give fewer --workers; the same command goes on"
+                "a worker was killed, possibly for lack of memory: give fewer --workers; the same command continues"
             )
         self._pool.renew()
         lost, self._lost = self._lost, []

@@ -1,4 +1,4 @@
-"""Which waves trigger how critical a layer: see `compute` for the physics, `study` for what is left in a folder."""
+"""The critical amplitude of waves that trigger a layer: `compute` has the physics, `study` writes the files."""
 
 from .study import trigger_map
 

@@ -1,18 +1,19 @@
-r"""The critical amplitude: how strong a wave must be to trigger a layer of frictional disks.
+r"""The critical amplitude of a wave that triggers a layer of frictional disks.
 
-Friction weakens once the mean velocity v of the upper layer exceeds v_0. In the linear regime v is proportional to the
-amplitude a of the wave :math:`a \cos\omega t`, which begins at t = 0 on a packing at rest. So the wave triggers from
+Friction weakens as soon as the mean velocity v of the upper layer exceeds v_0. In the linear regime v is proportional
+to the amplitude a of the wave :math:`a \cos\omega t`, which begins at t = 0 on a packing at rest. The wave therefore
+triggers for amplitudes above
 
 .. math:: a_c(\omega, F_x) = \frac{v_0}{\max_{0 \le t \le T} |v(t)|}, \qquad v(t)\ \text{for}\ a = 1,
 
-on, T being the time for which the wave lasts. v(t) follows from K, and from C and M, alone
-(:mod:`~faultgouge.analysis.motion.forcing`), transient and all: without dissipation what the beginning of the wave
-has set off never dies, and where the wave is slow nearly all of v is such free motion.
+where T is the duration of the wave. v(t) follows from K, C and M alone (:mod:`~faultgouge.analysis.motion.forcing`),
+transient included: without dissipation the motion excited by the beginning of the wave never decays, and for a slow
+wave nearly all of v is such free motion.
 
-In LAMMPS, the same wave triggers or does not; a bisection in the amplitude finds where. Nothing of the linear theory is
-in these runs. The wave is a force on each disk of the upper layer, or an acceleration of the floor.
+In LAMMPS, the same wave triggers or does not; a bisection finds the critical amplitude. These runs use nothing of the
+linear theory. The wave is a force on each disk of the upper layer, or an acceleration of the floor.
 
-v_0 is the user's. The paper takes the largest velocity of the run that nobody perturbs, which is rounding noise.
+The user gives v_0. The paper uses the largest velocity of the unperturbed run, which is rounding noise.
 """
 
 from __future__ import annotations

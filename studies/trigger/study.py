@@ -1,4 +1,4 @@
-"""The map of waves that trigger, in the frame of a study."""
+"""The map of waves that trigger, as a study."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Remote triggering: what is computed, drawn and said of it. See `compute` for the physics."""
+"""Remote triggering: computation, figures and text. See `compute` for the physics."""

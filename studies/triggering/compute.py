@@ -1,22 +1,23 @@
 r"""Remote triggering: a linearly stable packing just below its onset that erupts once friction weakens with velocity.
 
-Between the onsets of two friction coefficients, mu mu_ss and mu, a packing is stable with the larger and unstable with
-the smaller one. Three undamped runs from the same equilibrium show what a minute perturbation a cos(omega t) does
-there: nothing without it; a small bounded response with it; and an eruption where it sets the upper layer into motion
-that is fast enough to weaken the friction, mu(v), of all contacts.
+Between the onsets of two friction coefficients, mu mu_ss and mu, a packing is stable with the larger coefficient and
+unstable with the smaller. Three undamped runs from the same equilibrium show the effect of a minute perturbation a
+cos(omega t). Without the perturbation nothing happens. With the perturbation there is a small bounded response. If the
+perturbation makes the upper layer move fast enough to weaken the friction, mu(v), of all contacts, there is an
+eruption.
 
-A rise of D alone is no instability. As soon as mu(v) has fallen, every contact that carries tangential load carries
-less of it, and the equilibrium is elsewhere: D *jumps* to the square of that distance, in a packing that is stable with
-the weakened friction as well. A control run says how far: mu(v) at a force as far below the onset of the weakened
-friction as the run is above it. The jump counts from the moment at which the layer exceeds v_0: before, nothing has
-weakened. What tells an instability from the jump is that D *grows* on after it, beyond the jump that linear theory
-foresees, at a fitted rate that agrees with that of the spectrum with the weakened friction (:func:`judge`).
+A rise of D alone does not prove an instability. As soon as mu(v) falls, the tangential force of every loaded contact
+falls, and the equilibrium shifts: D *jumps* to the square of this shift, even in a packing that is stable with the
+weakened friction. A control run shows how far: mu(v) at a force as far below the onset of the weakened friction as the
+run is above it. The jump counts from the moment at which the layer exceeds v_0: before, nothing has weakened. In an
+instability, unlike a mere jump, D continues to *grow*, beyond the jump that linear theory predicts, at a fitted rate
+that agrees with that of the spectrum with the weakened friction (:func:`judge`).
 
-A perturbation that drowns in the rounding noise triggers nothing: the layer then exceeds v_0 by chance, or because v_0
-is that noise.
+A perturbation below the rounding noise triggers nothing: the layer then exceeds v_0 by chance, or because v_0 is that
+noise.
 
-Closer and closer to the onset, the response of the pair that is about to coalesce grows as
-:math:`\epsilon^{-1/2}`, and damping cuts it off where its time tau falls below :math:`\tau_d`.
+Towards the onset, the response of the pair that is about to coalesce grows as :math:`\epsilon^{-1/2}`, and damping
+limits the response if its time tau is below :math:`\tau_d`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-r"""The figures of remote triggering, from what `compute` has found.
+r"""The figures of remote triggering, from the results of `compute`.
 
 Friction weakens with the velocity v of the upper layer as
 

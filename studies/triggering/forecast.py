@@ -1,11 +1,11 @@
-"""What linear theory says, before any run, of a packing whose friction has weakened.
+"""Prediction of linear theory, before any run, for a packing with weakened friction.
 
-Friction that falls from mu to a smaller one leaves the disks where they are and changes the tangential forces: the
+If friction falls from mu to a smaller value, the disks do not move at once, but the tangential forces change: the
 packing is out of balance by f, and moves as :math:`M \\ddot q + K q = f` from rest, with f and K those of the smaller
-mu. This has both the jump and, where K has complex eigenvalues, the growth after it. It holds while displacements are
-small against overlaps.
+mu. This motion contains both the jump and, if K has complex eigenvalues, the growth after the jump. It holds while
+displacements are small against overlaps.
 
-`choose_seed` says for which packings, of a list of seeds, the growth is large enough to see. It makes no run.
+`choose_seed` selects, from a list of seeds, packings with visible growth. It makes no run.
 """
 
 from __future__ import annotations

@@ -112,7 +112,7 @@ def test_growth_of_a_stable_start_is_not_invented(path):
     stable, time = path(0.02), np.linspace(0.1, 100, 2000)
     for packing, words in (
         (stable, "linearly stable"),
-        (replace(path(0.022), drag_time=1.0), "the dissipation takes away"),
+        (replace(path(0.022), drag_time=1.0), "dissipation damps all motion"),
     ):
         found = growth_of_run(packing, time, 1e-26 * np.exp(0.3 * time))
         assert (found.measured, found.predicted, found.needed, found.enough) == (None, 0, None, None)

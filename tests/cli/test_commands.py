@@ -146,7 +146,7 @@ def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves
     gain, (displacement, energy) = printed["transient_gain"], transient_gains(packing)
     assert (gain["displacement"], gain["time"], gain["energy"]) == (displacement.gain, displacement.time, energy.gain)
     said = faultgouge_here("spectrum", run).stdout
-    assert f"a start at rest grows by up to {displacement.gain:.6g} times in |q|^2" in said
+    assert f"a displacement from rest grows by up to {displacement.gain:.6g} times in |q|^2" in said
 
 
 @pytest.mark.slow

@@ -166,4 +166,7 @@ def test_a_folder_that_is_gone_keeps_nothing(tmp_path):
         "guarded(work)"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30, cwd=tmp_path)
-    assert done.stderr == f"Error: terminated: {tmp_path / 'gone'} is not there, and the same command begins anew.\n"
+    assert (
+        done.stderr
+        == f"Error: terminated: {tmp_path / 'gone'} is not there, and the same command starts from the beginning.\n"
+    )

@@ -80,7 +80,7 @@ def test_a_run_says_what_is_kept(tmp_path, command, ranks, at, group, number):
         assert not run.complete
     assert errors.startswith(f"{command}: about ")
     assert says.startswith(f"Error: {ENDS[number][1]}: run.h5 holds {held}")
-    assert says.endswith("the same command goes on from there.")
+    assert says.endswith("the same command continues from there.")
 
 
 @pytest.mark.slow
@@ -104,13 +104,25 @@ def simulates(folder):
 @pytest.mark.parametrize(
     ("command", "says"),
     [
-        ("onset scene.toml -o onset.json", "nothing was written, and the same command begins anew"),
-        ("explain scene.toml", "nothing was written, and the same command begins anew"),
-        ("reproduce scene.toml -o out", "what is in out so far is kept; the same command begins anew and replaces it"),
-        ("report --quick -o out", "out has the studies that were finished; the same command begins anew and replaces"),
-        ("stability --quick -o out", "out has the cases that were finished; the same command begins anew and replaces"),
-        ("eruptions scene.toml -o out", "out/eruptions.jsonl has the runs that were over; the same command goes on"),
-        ("sweep sweep.toml -o out", "out/results.jsonl has the scenes that have ended; the same command goes on from"),
+        ("onset scene.toml -o onset.json", "nothing was written, and the same command starts from the beginning"),
+        ("explain scene.toml", "nothing was written, and the same command starts from the beginning"),
+        (
+            "reproduce scene.toml -o out",
+            "what is in out so far is kept; the same command starts from the beginning and replaces it",
+        ),
+        (
+            "report --quick -o out",
+            "out has the studies that were finished; the same command starts from the beginning and replaces",
+        ),
+        (
+            "stability --quick -o out",
+            "out has the cases that were finished; the same command starts from the beginning and replaces",
+        ),
+        ("eruptions scene.toml -o out", "out/eruptions.jsonl has the runs that were over; the same command continues"),
+        (
+            "sweep sweep.toml -o out",
+            "out/results.jsonl has the scenes that have ended; the same command continues from",
+        ),
     ],
 )
 @pytest.mark.long
@@ -141,7 +153,7 @@ def test_a_long_search_goes_on_to_the_bit(faultgouge, tmp_path):
     interrupted(start_command(onset, tmp_path), signal.SIGKILL, lambda: known() >= 10, group=True)
     first = known()
     errors = interrupted(start_command(onset, tmp_path), signal.SIGINT, lambda: known() >= first + 10)
-    says = "Error: interrupted: onset.json.slices has what was found so far; the same command goes on from there."
+    says = "Error: interrupted: onset.json.slices has what was found so far; the same command continues from there."
     assert errors.splitlines()[-1] == says
     faultgouge(*onset.command.split())
     assert not slices.exists()
@@ -194,10 +206,10 @@ GUARDED = "import os, sys; from faultgouge.signal_guard import guarded; guarded(
 @pytest.mark.parametrize(
     ("script", "code", "says"),
     [
-        (IN_A_CLASS, 130, "Error: interrupted: nothing was written, and the same command begins anew.\n"),
+        (IN_A_CLASS, 130, "Error: interrupted: nothing was written, and the same command starts from the beginning.\n"),
         (GUARDED.format("os.abort()"), 1, "a library has ended the command (SIGABRT)"),
         (GUARDED.format("os.kill(os.getpid(), 11)"), 1, "a library has ended the command (SIGSEGV)"),
-        (GUARDED.format("os.kill(os.getpid(), 9)"), 137, "killed from outside, for want of memory perhaps"),
+        (GUARDED.format("os.kill(os.getpid(), 9)"), 137, "killed from outside, possibly for lack of memory"),
         (GUARDED.format("sys.exit(3)"), 3, ""),
     ],
     ids=["interrupt while a class is made", "abort", "segmentation fault", "kill", "exit"],

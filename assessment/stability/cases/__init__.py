@@ -1,4 +1,4 @@
-"""The cases of the stability study, a module for each kind of trouble.
+"""The cases of the stability study, one module for each kind of difficulty.
 
-`case` says what a case is, `packings` makes what they run on, `checks` has the criteria that several of them share.
+`case` defines a case, `packings` makes the packings, and `checks` has criteria that several cases share.
 """

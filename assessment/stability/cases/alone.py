@@ -1,7 +1,7 @@
-"""Input that LAMMPS must refuse, run by the programs ``lmp`` or ``faultgouge`` in a process of its own.
+"""Input that LAMMPS must refuse, run by the programs ``lmp`` or ``faultgouge`` in a separate process.
 
-An error that one rank alone meets ends MPI, and one inside of the set-up can end in a crash when the instance closes:
-nothing of that may take the study along. Rank 0 runs the program, all know what it said.
+An error on one rank alone ends MPI, and an error inside the set-up can cause a crash when the instance closes. Neither
+may end the study. Rank 0 runs the program, and all ranks receive its output.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A case of the stability study: something extreme that is tried, and what came of it."""
+"""A case of the stability study: an extreme input and the outcome."""
 
 from __future__ import annotations
 

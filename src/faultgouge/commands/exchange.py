@@ -35,7 +35,7 @@ Source = Annotated[
     typer.Argument(
         metavar="FILE",
         help="A LAMMPS deck (.in); or LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended "
-        "XYZ, GSD, packing.json, or what MDAnalysis reads with radii.",
+        "XYZ, GSD, packing.json, or a file that MDAnalysis reads with radii.",
         show_default=False,
     ),
 ]
@@ -43,13 +43,13 @@ Layer = Annotated[
     str | None,
     typer.Option(
         metavar="LAYER",
-        help="The upper layer: a count of the highest, type:2, ids:1,4,7-9, ids:@FILE, group:NAME of a restart, or "
-        "a region such as 'y>10 and x<5'. By default what the file says.",
+        help="The upper layer: a number of highest disks, type:2, ids:1,4,7-9, ids:@FILE, group:NAME of a restart, "
+        "or a region such as 'y>10 and x<5'. By default the upper layer of the file.",
     ),
 ]
 Like = Annotated[Path | None, typer.Option(help="Law, load, damping and inertia of this scene.", show_default=False)]
 Width = Annotated[
-    str | None, typer.Option(metavar="L|open", help="Period along x, or open sides; else what the file says.")
+    str | None, typer.Option(metavar="L|open", help="Period along x, or open sides; by default as in the file.")
 ]
 Slips = Annotated[
     Path | None, typer.Option(help="Slips: CSV with id1, id2 (0: the floor), slip; or a LAMMPS dump local.")
@@ -70,25 +70,30 @@ def import_(
     mu: Annotated[float | None, typer.Option(help="Friction coefficient; 1 by default.", show_default=False)] = None,
     exponent: Annotated[float | None, typer.Option(help="1.5 (Hertz, the default) or 1.", show_default=False)] = None,
     fy: Annotated[float | None, typer.Option(help="Load on each disk of the layer.", show_default=False)] = None,
-    fx: Annotated[float | None, typer.Option(help="Shear force on each of them; 0 by default.")] = None,
+    fx: Annotated[float | None, typer.Option(help="Shear force on each disk of the layer; 0 by default.")] = None,
     inertia: Annotated[float | None, typer.Option(help="I_0 in I = I_0 m R^2; 1 by default.")] = None,
-    floor: Annotated[float, typer.Option(help="y of the floor in the file; it is moved to 0.")] = 0.0,
+    floor: Annotated[
+        float, typer.Option(help="y of the floor in the file; the packing is shifted so that the floor is at 0.")
+    ] = 0.0,
     width: Width = None,
     contacts: Slips = None,
-    frame: Annotated[int | None, typer.Option(help="Which of several frames; negative ones from the last.")] = None,
-    relax: Annotated[bool, typer.Option("--relax", help="Bring to rest what is out of balance.")] = False,
+    frame: Annotated[
+        int | None, typer.Option(help="Number of the frame; negative numbers count from the last.")
+    ] = None,
+    relax: Annotated[bool, typer.Option("--relax", help="Bring a packing out of balance to rest.")] = False,
     slides: Annotated[
-        bool, typer.Option("--slides", help="Of a deck: contacts at Coulomb's bound slide; they stick by default.")
+        bool, typer.Option("--slides", help="For a deck: contacts at Coulomb's bound slide; by default they stick.")
     ] = False,
 ) -> None:
-    """Take a packing of another code, as run.h5 for draw, spectrum, and the key packing.file of a scene.
+    """Convert a packing of another code to a run.h5 for draw, spectrum, and the key packing.file of a scene.
 
-    A packing in balance is taken as it is, to the bit. With --relax one out of balance
-    comes to rest under law and load: without friction, which then begins with zero
-    slips; with friction if the file has slips. What moved is said.
+    A packing in balance is imported unchanged, to the bit. With --relax, a packing out
+    of balance comes to rest under law and load. It relaxes without friction, and
+    friction then starts with zero slips. If the file has slips, it relaxes with
+    friction. The command prints how far the disks moved.
 
     A LAMMPS deck (NAME.in, in.NAME) is run in its own folder, and its last state is
-    kept as it stands, with LAMMPS's own granular styles, disks or spheres.
+    stored unchanged, with LAMMPS's own granular styles, disks or spheres.
     """
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
@@ -138,14 +143,14 @@ def export(
     frame: Frame = -1,
     mode: Annotated[
         str | None,
-        typer.Option("--mode", metavar="pair|N", help="Also a mode as vectors, as of `faultgouge draw`."),
+        typer.Option("--mode", metavar="pair|N", help="Also a mode as vectors, as in `faultgouge draw`."),
     ] = None,
     frames: Annotated[
         str | None,
         typer.Option(
             "--frames",
             metavar="all|START:STOP[:STEP]",
-            help="Frames of the undamped run if the file has its trajectory, else of the ramp; to .xyz, .gsd or .pvd.",
+            help="Frames of the undamped run if the file has its trajectory, else of the ramp; .xyz, .gsd or .pvd.",
         ),
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="The file: .vtp, .pvd, .xyz, .data or .gsd.")] = Path(
@@ -154,11 +159,11 @@ def export(
 ) -> None:
     """Write a stored packing for ParaView (.vtp), OVITO (.xyz), LAMMPS (.data) or HOOMD (.gsd).
 
-    Disks with radii, net forces and mobilised friction; contacts with forces and
-    slips (in .vtp as lines); modes as vectors (not in .data). `faultgouge import`
-    takes .xyz, .data and .gsd back to the bit. A .gsd needs pip install
-    'faultgouge[export]'. With --frames a film of displacements: a .pvd for ParaView
-    comes with a folder of .vtp.
+    The file contains disks with radii, net forces and mobilised friction; contacts
+    with forces and slips (in .vtp as lines); modes as vectors (not in .data).
+    `faultgouge import` reads .xyz, .data and .gsd back unchanged, to the bit. A .gsd
+    needs pip install 'faultgouge[export]'. With --frames the file is a film of
+    displacements; a .pvd for ParaView comes with a folder of .vtp.
     """
     from faultgouge.pywrap.exchange import ModeVectors
     from faultgouge.pywrap.exchange.formats import check_writer, write_packing

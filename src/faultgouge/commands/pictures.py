@@ -43,12 +43,12 @@ WhichMode = Annotated[
     typer.Option(
         "--mode",
         metavar="pair|N",
-        help="The unstable pair, or before the onset the two modes closest to meeting; or mode N, counted by its "
+        help="The unstable pair, or before the onset the two modes closest to merging; or mode N, counted by "
         "eigenvalue from 0.",
     ),
 ]
 WhichColour = Annotated[
-    Colour, typer.Option(help="Of the contacts: |f_t|/(mu f_n), slip over its limit, f_n, or none of these.")
+    Colour, typer.Option(help="Colour of the contacts: |f_t|/(mu f_n), slip over its limit, f_n, or none.")
 ]
 
 
@@ -57,7 +57,10 @@ def draw(
     file: PackingFile,
     frame: Annotated[
         int | None,
-        typer.Option(help="Which equilibrium, by default the last; negative ones count from it.", show_default=False),
+        typer.Option(
+            help="Number of the equilibrium, by default the last; negative numbers count from the end.",
+            show_default=False,
+        ),
     ] = None,
     mode: WhichMode = None,
     color: WhichColour = Colour.MOBILISED,
@@ -65,14 +68,14 @@ def draw(
         Path, typer.Option("-o", "--output", help="The picture: .png, .svg or .pdf.", show_default=True)
     ] = Path("picture.png"),
 ) -> None:
-    """Draw a stored packing, with its force chains or with one of its modes; a cycle of loads; of perturb.h5 D(t).
+    """Draw a stored packing with its force chains or a mode, a cycle of loads, or the D(t) of perturb.h5.
 
     Disks are to scale: the upper layer is yellow, rattlers are hollow. Bars are
-    contacts: their width is the normal force. Of a mode, arrows are displacements
-    and colours rotations; participation ratio and share of rotation stand above.
-    A ramp with turning points is drawn as F_x over the displacement of the upper
-    layer, and perturb.h5 as D(t) with the slope that the spectrum predicts; with
-    --frame or --mode their packing.
+    contacts, with a width proportional to the normal force. For a mode, arrows are
+    displacements and colours rotations; the participation ratio and the share of
+    rotation stand above. A ramp with turning points is drawn as F_x over the
+    displacement of the upper layer, and perturb.h5 as D(t) with the predicted slope.
+    With --frame or --mode, the packing of these files is drawn instead.
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
@@ -114,19 +117,19 @@ def movie(
     frame: Frame = -1,
     color: WhichColour = Colour.MOBILISED,
     seconds: Annotated[float, typer.Option(min=0.1, max=600, help="Length of the film.")] = 10.0,
-    rate: Annotated[float, typer.Option(min=1, max=60, help="Frames a second.")] = 10.0,
+    rate: Annotated[float, typer.Option(min=1, max=60, help="Frames per second.")] = 10.0,
     span: Annotated[
         tuple[float, float] | None,
-        typer.Option(metavar="T0 T1", help="Times of the run between which it is shown; all by default."),
+        typer.Option(metavar="T0 T1", help="First and last time of the run to show; all by default."),
     ] = None,
-    dots: Annotated[int, typer.Option(min=30, max=400, help="Dots an inch; a film is some five inches wide.")] = 110,
+    dots: Annotated[int, typer.Option(min=30, max=400, help="Dots per inch; a film is some five inches wide.")] = 110,
     output: Annotated[Path, typer.Option("-o", "--output", help="The film: .gif or .mp4.")] = Path("film.gif"),
 ) -> None:
     """Make a film of an undamped run, of a mode, or of a ramp.
 
-    Of perturb.h5 with its trajectory ([output] trajectory = true): the run, with
-    displacements times a power of ten that is written on the film and falls in
-    steps, and D(t) beside it. With --mode: the motion of a mode, growth left out. Of
+    From perturb.h5 with its trajectory ([output] trajectory = true): the run and
+    D(t). Displacements are magnified by a power of ten, which is printed on the film
+    and falls in steps. With --mode: the motion of a mode without its growth. From
     run.h5: the ramp, and F_x over the displacement of the upper layer. An .mp4 needs
     pip install 'faultgouge[movie]'.
     """
@@ -159,8 +162,7 @@ def view(
         int | None,
         typer.Option(
             min=1,
-            help="Equilibria on the page, equally spaced if there are more; 60 by default, and fewer of more than 300 "
-            "disks.",
+            help="Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 300 disks.",
             show_default=False,
         ),
     ] = None,
@@ -168,9 +170,9 @@ def view(
 ) -> None:
     """Make one page that any browser opens offline: a ramp with its pair, under a slider.
 
-    The page has the packing with its force chains, the plane of eigenvalues, in which
-    two meet, both over F_x, and D(t) if the file has it. The modes of the pair move.
-    It needs pip install 'faultgouge[view]'.
+    The page shows the packing with its force chains, the eigenvalues in the complex
+    plane, the pair that merges over F_x, and D(t) if the file contains it. The modes
+    of the pair move. The command needs pip install 'faultgouge[view]'.
     """
     if output.suffix.lower() != ".html":
         raise typer.BadParameter(f"-o {output}: a page is an .html")

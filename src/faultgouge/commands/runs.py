@@ -40,7 +40,7 @@ app = typer.Typer()
 def init(
     output: Annotated[Path, typer.Option("-o", "--output", help="The scene to write.")] = Path("scene.toml"),
 ) -> None:
-    """Write a scene with every section and key commented, to be changed."""
+    """Write a scene with every section and key, commented."""
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
     if is_root():
@@ -68,11 +68,11 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
 
 @app.command(epilog="Example: mpiexec -n 2 faultgouge ramp paper.toml -o run.h5")
 def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False) -> None:
-    """Raise F_x from equilibrium to equilibrium, each stored as it is reached.
+    """Raise F_x from equilibrium to equilibrium, and store each equilibrium.
 
-    With turning points in ramp.until F_x goes up, down and below zero, and what is
-    left when F_x comes back is said: the displacement of the layer, and the work of
-    the loads.
+    With turning points in ramp.until, F_x goes up, down and below zero. When F_x
+    returns to an earlier value, the command prints the remaining displacement of
+    the layer and the work of the loads.
     """
     from faultgouge.pywrap import Record
     from faultgouge.pywrap import ramp as ramp_up
@@ -97,21 +97,21 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     if as_json:
         print_json({"equilibria": _equilibria(output), "hysteresis": None if left is None else asdict(left)})
         return
-    print_line(f"F_x = {record.last.fx:g} reached, {record.last.residual:.2g} on a disk; written to {output}")
+    print_line(f"F_x = {record.last.fx:g} reached; residual force {record.last.residual:.2g}; written to {output}")
     if left is not None:
         print_line(
-            f"F_x is back at {left.fx:g}: the upper layer has moved by {left.remaining:.4g} since it was there first, "
-            f"and the loads have done the work {left.work:.4g} on it"
+            f"F_x is back at {left.fx:g}: since F_x first had this value, the upper layer has moved by "
+            f"{left.remaining:.4g}, and the work of the loads is {left.work:.4g}"
         )
 
 
 @app.command(epilog="Example: faultgouge perturb paper.toml -o run.h5")
 def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
-    """Run undamped from the equilibrium at perturb.fx, with or without a perturbation, and record D(t).
+    """Run the undamped dynamics from the equilibrium at perturb.fx, and record D(t).
 
-    It says whether D grew, at what rate, what the spectrum of the equilibrium
-    predicts, and whether the run was long enough. Of several friction coefficients
-    the first one is run.
+    The run may have a perturbation. The command prints whether D grew, the growth
+    rate, the rate that the spectrum of the equilibrium predicts, and whether the run
+    was long enough. With several friction coefficients, the run uses the first.
     """
     from faultgouge.analysis import RunFile
     from faultgouge.analysis.motion.growth import growth_of_run
@@ -125,7 +125,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     settings = require_section(wanted.perturb, "perturb")
     mus = wanted.law.mus
     if len(mus) > 1:
-        say(f"mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene, is run")
+        say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
     with Record(output, wanted, task="perturb", saved=keeps) as record:
         if record.last is None:
             total = ceil(settings.fx / step_of(wanted) * (1 - 1e-9)) + 1

@@ -1,4 +1,4 @@
-"""What is run for a result on paper: explain, reproduce, report, stability, trigger, eruptions."""
+"""Commands that write studies and reports: explain, reproduce, report, stability, trigger, eruptions."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ app = typer.Typer()
 
 @app.command(epilog="Example: faultgouge explain paper.toml")
 def explain(scene: ScenePath, as_json: AsJson = False) -> None:
-    """What a scene includes, what it leaves out, why, and what each part costs.
+    """Explain what a scene includes, what it leaves out, why, and what each part costs.
 
-    Every part is switched off, or on, in LAMMPS, and measured: ratios of times
-    with their quartiles, and whether what both compute agrees to the bit. It
-    takes some ten seconds.
+    The command switches every part off, or on, in LAMMPS, and measures ratios of
+    times with their quartiles, and whether both runs agree to the bit. This takes
+    some ten seconds.
     """
     from faultgouge.assessment.explain.explain import explain as explain_scene
 
@@ -57,14 +57,14 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
 @app.command(epilog="Example: faultgouge reproduce -o results")
 def reproduce(
     scene: Annotated[
-        Path | None, typer.Argument(metavar="[SCENE]", help="Another scene than the one that ships.")
+        Path | None, typer.Argument(metavar="[SCENE]", help="A scene of your own, in place of that of the package.")
     ] = None,
     output: NewFolder = Path("results"),
 ) -> None:
-    """The paper's protocol on one packing: its figures, numbers and a report.
+    """Run the paper's protocol on one packing: figures, numbers and a report.
 
-    Without a scene, figures 1, 3 and 4 are of paper.toml, and figure 5 is of
-    triggered.toml, a packing in which the instability does the work.
+    Without a scene, figures 1, 3 and 4 show paper.toml. Figure 5 shows
+    triggered.toml, a packing in which the growth comes from the instability.
     """
     from importlib.resources import files
 
@@ -72,7 +72,7 @@ def reproduce(
     wanted = read_scene(scene or shipped / "paper.toml", "reproduce", "reproduce")
     from faultgouge.studies.reproduce import reproduce as run_protocol
 
-    keeps(f"what is in {output} so far is kept; the same command begins anew and replaces it", output)
+    keeps(f"what is in {output} so far is kept; the same command starts from the beginning and replaces it", output)
     triggered = read_scene(shipped / "triggered.toml", "reproduce") if scene is None else None
     with lock_folder(output):
         run_protocol(wanted, output, say, triggered)
@@ -84,10 +84,13 @@ def report(
     output: NewFolder = Path("report"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points: a minute instead of ten.")] = False,
 ) -> None:
-    """Error against run time: which method to take when, for six tasks, with figures and numbers."""
+    """Measure error against run time: which method to use when, for six tasks, with figures and numbers."""
     from faultgouge.assessment.work_precision import report as run_studies
 
-    keeps(f"{output} has the studies that were finished; the same command begins anew and replaces them", output)
+    keeps(
+        f"{output} has the studies that were finished; the same command starts from the beginning and replaces them",
+        output,
+    )
     with lock_folder(output):
         run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
     print_line(f"written: {output}/report.md")
@@ -96,14 +99,17 @@ def report(
 @app.command(epilog="Example: mpiexec -n 2 faultgouge stability -o stability")
 def stability(
     output: NewFolder = Path("stability"),
-    quick: Annotated[bool, typer.Option("--quick", help="The small part of the cases.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="About half of the cases, in a few seconds.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
+    """Test stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
     from faultgouge.assessment.stability import check
     from faultgouge.assessment.stability import stability as try_cases
 
-    keeps(f"{output} has the cases that were finished; the same command begins anew and replaces them", output)
+    keeps(
+        f"{output} has the cases that were finished; the same command starts from the beginning and replaces them",
+        output,
+    )
     with lock_folder(output):
         result = try_cases(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
     counts = Counter(case["status"] for case in result.get("cases", ()))
@@ -118,11 +124,12 @@ def stability(
 
 @app.command(epilog="Example: mpiexec -n 3 faultgouge trigger trigger.toml -o trigger")
 def trigger(scene: ScenePath, output: Folder = Path("trigger"), as_json: AsJson = False) -> None:
-    """Which waves trigger how critical a layer: the critical amplitude over frequency and distance from the onset.
+    """Compute the critical amplitude of a wave over its frequency and the distance of the layer from the onset.
 
-    Predicted from the stiffness, the damping and the masses, and measured by
-    bisection in LAMMPS for some pairs. The scene says friction.v0, the velocity
-    above which friction weakens. Of several ranks one hands out the runs.
+    The amplitude is predicted from the stiffness, the damping and the masses, and
+    for some pairs measured by bisection in LAMMPS. The scene must give friction.v0,
+    the velocity above which friction weakens. With several ranks, one rank
+    distributes the runs.
     """
     from faultgouge.studies.trigger import trigger_map
 
@@ -131,9 +138,9 @@ def trigger(scene: ScenePath, output: Folder = Path("trigger"), as_json: AsJson 
 
 @app.command(epilog="Example: mpiexec -n 3 faultgouge eruptions eruptions.toml -o eruptions")
 def eruptions(scene: ScenePath, output: Folder = Path("eruptions"), as_json: AsJson = False) -> None:
-    """How large: undamped runs from rest at each load of [eruptions], until they are over, and what ended the growth.
+    """Measure the size of eruptions: undamped runs from rest at each load of [eruptions], and how the growth ends.
 
-    Of several ranks one hands out the loads.
+    With several ranks, one rank distributes the loads.
     """
     from faultgouge.studies.eruptions import eruptions as run_all
 
@@ -145,7 +152,7 @@ def _into_folder(
 ) -> None:
     """Run a study of a scene that goes on in its folder; `what` is counted, and `kept` is what an interrupt leaves."""
     wanted = read_scene(scene, name)
-    keeps(f"{output}/{name}.jsonl has {kept}; the same command goes on from there", output)
+    keeps(f"{output}/{name}.jsonl has {kept}; the same command continues from there", output)
     with lock_folder(output):
         result = study(wanted, output, say, lambda results, count: progress(results, what, count))
     (say if as_json else print_line)(f"written: {output}/{name}.md")

@@ -14,9 +14,9 @@ from .terminal import Folder, Workers, print_line, progress, say, table_of
 app = typer.Typer()
 
 Shard = Annotated[
-    str, typer.Option(metavar="K/N", help="Part K of N alone, for job arrays; each with a folder of its own.")
+    str, typer.Option(metavar="K/N", help="Only part K of N, for job arrays; each part needs its own folder.")
 ]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what there is to do and what it will cost.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the remaining work and an estimate of its time.")]
 
 
 @app.command(epilog="Example: faultgouge sweep genericity.toml -o sweep")
@@ -27,15 +27,15 @@ def sweep(
     workers: Workers = None,
     dry_run: DryRun = False,
 ) -> None:
-    """One task for every scene of a product of keys: results.jsonl, the table results.csv, and a picture.
+    """Run one task for every scene of a product of keys: results.jsonl, the table results.csv, and a picture.
 
     A sweep names a task (onset, triggering, ..., or a function of your own as
-    "file.py:function"); below [sweep] lists of values
-    or ranges for any keys of a scene, as in "packing.seed" = "1:200"; and below
-    [scene.SECTION] what all scenes share. Every result is written as it ends,
-    and the same command goes on where it was cut off. A scene that fails
-    is a result, too, with its sentence. Of several ranks, on several machines
-    perhaps, one hands out the work: mpiexec -n 5 keeps 4 cores busy.
+    "file.py:function"). Section [sweep] has lists of values or ranges for any keys
+    of a scene, as in "packing.seed" = "1:200". Sections [scene.SECTION] have the
+    keys that all scenes share. Each result is written as soon as it is known, and
+    the same command continues an interrupted sweep. A scene that fails is a row with
+    its error sentence. With several ranks, possibly on several machines, one rank
+    distributes the work: mpiexec -n 5 keeps 4 cores busy.
     """
     from faultgouge.studies.sweep.draw import draw_sweep
     from faultgouge.studies.sweep.run_sweep import LINES, read_results, run_sweep
@@ -51,7 +51,7 @@ def sweep(
             for line in estimate(wanted.task, missing, known.values()):
                 print_line(line)
         return
-    keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there", output)
+    keeps(f"{output}/{LINES} has the scenes that have ended; the same command continues from there", output)
     rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count), workers)
     if is_root():
         failed = sum(row["says"] is not None for row in rows)
@@ -66,7 +66,7 @@ def merge(
     parts: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Folders of `sweep --shard`.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The folder to write.")] = Path("merged"),
 ) -> None:
-    """Shards of a sweep put together: the table of a sweep that was never divided."""
+    """Join the shards of a sweep; the table is that of an undivided sweep."""
     from faultgouge.studies.sweep.draw import draw_sweep
     from faultgouge.studies.sweep.run_sweep import merge as merge_parts
 
@@ -107,13 +107,13 @@ def modes(
     workers: Workers = None,
     dry_run: DryRun = False,
 ) -> None:
-    """Complex modes along the ramp: how many, how fast they grow, and which loss would stop them.
+    """Compute the complex modes along the ramp: their number, growth rates, and the loss that would stop them.
 
-    At each load of the section [modes], all eigenvalues: the share of complex
-    ones, the largest growth rate, and the least Q, the quality factor below which
-    dissipation stops all growth. Leaves modes.json, modes.csv, pictures over the
-    load and of the plane of frequencies, and a film of that plane. Of a sweep,
-    medians over its packings.
+    At each load of the section [modes] the command computes all eigenvalues: the
+    share of complex modes, the largest growth rate, and the least Q, the quality
+    factor below which dissipation stops all growth. It writes modes.json, modes.csv,
+    pictures over the load and of the plane of frequencies, and a film of this plane.
+    For a sweep, the pictures show medians over packings.
     """
     from faultgouge.studies.modes.study import modes as count_modes
     from faultgouge.studies.modes.study import read_modes_sweep
@@ -127,7 +127,7 @@ def modes(
             (print_line if dry_run else say)(line)
     if dry_run:
         return
-    keeps(f"{output}/{LINES} has the scenes that have ended; the same command goes on from there", output)
+    keeps(f"{output}/{LINES} has the scenes that have ended; the same command continues from there", output)
     result = count_modes(wanted, output, part, say, lambda rows, count: progress(rows, "scenes", count), workers)
     if is_root():
         _show_modes(result["rows"])

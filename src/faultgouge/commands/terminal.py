@@ -1,4 +1,4 @@
-"""What the commands share: their common options, and how they speak.
+"""The parts that commands share: common options, and output.
 
 Results go to files and to standard output, as JSON or in words; progress and messages go to standard error. Rank 0
 alone speaks.
@@ -31,17 +31,17 @@ EVERY = 60.0
 """Seconds between two lines of progress off a terminal."""
 
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)]
-Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted one is continued.")]
-Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted one is continued.")]
+Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted run continues.")]
+Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted study continues.")]
 NewFolder = Annotated[Path, typer.Option("-o", "--output", help="The folder for numbers, pictures and page.")]
 Workers = Annotated[
     int | None,
-    typer.Option(min=1, metavar="N", show_default=False, help="Processes that compute; all cores unless given."),
+    typer.Option(min=1, metavar="N", show_default=False, help="Number of processes; all cores by default."),
 ]
 PackingFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks of a deck's dumps.", show_default=False)
+    Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks from the dumps of a deck.", show_default=False)
 ]
-Frame = Annotated[int, typer.Option(help="Which equilibrium; negative ones count from the last.")]
+Frame = Annotated[int, typer.Option(help="Number of the equilibrium; negative numbers count from the last.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
@@ -149,8 +149,8 @@ def report_fallback(equilibrium: Equilibrium) -> None:
     """Of an equilibrium that was not reached by halved increments, how it was."""
     if equilibrium.way is not None:
         say(
-            f"F_x = {equilibrium.fx:.10g} was reached by {equilibrium.way}, after smaller and smaller increments had "
-            "led nowhere: it may lie on another branch of equilibria"
+            f"F_x = {equilibrium.fx:.10g} was reached by {equilibrium.way}, after smaller increments had failed: the "
+            "equilibrium may lie on another branch"
         )
 
 
