@@ -35,8 +35,8 @@ from .spectrum.spectrum import (
     growth_rate,
     largest_frequency,
     spectrum,
-    stable_timestep,
 )
+from .spectrum.stable_timestep import stable_timestep
 
 __all__ = [
     "FLOOR",

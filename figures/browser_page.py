@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.colors import to_hex
 
-from faultgouge.analysis import BadInputError, Packing
+from faultgouge.analysis import BadInputError, Packing, Snapshot
+from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.analysis.motion.hysteresis import layer_displacement
 from faultgouge.analysis.packing.arrays import Floats
 
@@ -61,13 +62,17 @@ def loads_shown(disks: int) -> int:
 
 
 def write_view(
-    packings: Sequence[Packing], path: Path, title: str, series: dict[str, Any] | None = None, progress: Progress = iter
+    packings: Sequence[Packing | Snapshot],
+    path: Path,
+    title: str,
+    series: dict[str, Any] | None = None,
+    progress: Progress = iter,
 ) -> None:
     """Write the page.
 
     Parameters
     ----------
-    packings : sequence of Packing
+    packings : sequence of Packing or Snapshot
         Equilibria in order of their load, all with the same disks.
     path : Path
         The page to write.
@@ -91,7 +96,8 @@ def write_view(
     from bokeh.resources import INLINE
 
     course = follow_eigenvalues(packings, progress)
-    moved = layer_displacement(packings)[:, 0]
+    ramp = [each for each in packings if isinstance(each, Packing)]
+    moved = layer_displacement(ramp)[:, 0] if ramp else np.zeros(len(packings))
     frames = [_frame(packing, course, k) | {"moved": moved[k]} for k, packing in enumerate(packings)]
     sources = {
         name: ColumnDataSource({column: [] for column in columns.split()}, name=name) for name, columns in MOVED.items()
@@ -114,12 +120,17 @@ def write_view(
         INLINE,
         title=title,
         template=(folder / "view.html.j2").read_text(),
-        template_variables={"count": len(packings), "colours": (FIRST, SECOND), "others": others},
+        template_variables={
+            "count": len(packings),
+            "colours": (FIRST, SECOND),
+            "others": others,
+            "yellow": "Yellow: upper layer." if ramp else "Red: walls, and disks that are held.",
+        },
     )
-    path.write_text(page, encoding="utf-8")
+    write_text(path, page)
 
 
-def _frame(packing: Packing, course: RampEigenvalues, k: int) -> dict[str, Any]:
+def _frame(packing: Packing | Snapshot, course: RampEigenvalues, k: int) -> dict[str, Any]:
     """The arrays of one load, in float32."""
     view, contacts = View.of(packing, margin=0.5 * packing.radius.max()), packing.contacts
     force = packing.normal_force
@@ -129,7 +140,7 @@ def _frame(packing: Packing, course: RampEigenvalues, k: int) -> dict[str, Any]:
         "y": view.place[:, 1],
         "disk": view.disk,
         "radius": packing.radius[view.disk],
-        "angle": packing.angle[view.disk],
+        "angle": np.zeros(len(view.disk)) if isinstance(packing, Snapshot) else packing.angle[view.disk],
         "x0": view.start[:, 0],
         "y0": view.start[:, 1],
         "x1": view.end[:, 0],
@@ -164,7 +175,7 @@ def _plot(name: str, x: str, y: str, **more: Any) -> "figure":
     return plot
 
 
-def _packing_plot(packings: Sequence[Packing], sources: dict[str, Any]) -> "figure":
+def _packing_plot(packings: Sequence[Packing | Snapshot], sources: dict[str, Any]) -> "figure":
     """Disks and force chains; the floor."""
     from bokeh.models import BoxAnnotation, ColorBar, LogColorMapper
 
@@ -185,7 +196,10 @@ def _packing_plot(packings: Sequence[Packing], sources: dict[str, Any]) -> "figu
     plot.segment("x0", "y0", "x1", "y1", source=sources["marks"], line_color=INK, line_width=1.2)
     chains = {"line_width": "px", "line_cap": "round", "line_color": {"field": "share", "transform": colours}}
     plot.segment("x0", "y0", "x1", "y1", source=sources["chains"], **chains)
-    plot.add_layout(BoxAnnotation(top=0, fill_color=FLOOR, fill_alpha=1, line_color=None, level="overlay"))
+    for wall in views[0].walls:
+        side = [["right", "left"], ["top", "bottom"]][wall.axis][wall.sign < 0]
+        beyond: dict[str, Any] = {side: wall.place}
+        plot.add_layout(BoxAnnotation(**beyond, fill_color=FLOOR, fill_alpha=1, line_color=None, level="overlay"))
     bar = ColorBar(color_mapper=colours, height=8, title="mobilised friction |fₜ| / (μ fₙ)", title_standoff=4)
     bar.background_fill_color = None
     plot.add_layout(bar, "below")
@@ -207,7 +221,7 @@ def _plane(course: RampEigenvalues, sources: dict[str, Any]) -> "figure":
     return plot
 
 
-def _curves(packings: Sequence[Packing], course: RampEigenvalues, sources: dict[str, Any]) -> list["figure"]:
+def _curves(packings: Sequence[Packing | Snapshot], course: RampEigenvalues, sources: dict[str, Any]) -> list["figure"]:
     """Real and imaginary parts of the pair over the load."""
     fx = np.array([packing.fx for packing in packings])
     plots: list[figure] = []
@@ -221,7 +235,7 @@ def _curves(packings: Sequence[Packing], course: RampEigenvalues, sources: dict[
     return plots
 
 
-def _cycle(packings: Sequence[Packing], moved: Floats, sources: dict[str, Any]) -> "figure":
+def _cycle(packings: Sequence[Packing | Snapshot], moved: Floats, sources: dict[str, Any]) -> "figure":
     """F_x over the displacement of the upper layer."""
     plot = _plot("cycle", "displacement of the upper layer", "Fₓ")
     plot.line(moved, [packing.fx for packing in packings], line_color=OTHERS, line_width=2)

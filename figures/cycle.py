@@ -52,7 +52,8 @@ def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
         words = [
             f"{name} {_format_signed(value)}" for name, value in (("remains:", left.remaining), ("work:", left.work))
         ]
-        axes.set_title(f"back at $F_x = {left.fx:.4g}$: " + ", ".join(words), fontsize=7)
+        says = "the path closes, to rounding" if left.closes else ", ".join(words)
+        axes.set_title(f"back at $F_x = {left.fx:.4g}$: {says}", fontsize=7)
     return figure_of(axes)
 
 

@@ -21,7 +21,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from faultgouge.analysis import Packing, PackingFileError, RunFile, nearest_image
+from faultgouge.analysis import Packing, PackingFileError, RunFile, Snapshot, nearest_image
 from faultgouge.analysis.motion.hysteresis import layer_displacement
 from faultgouge.analysis.packing.arrays import Floats
 
@@ -218,7 +218,7 @@ class ModeFilm(Film):
 
     Parameters
     ----------
-    packing : Packing
+    packing : Packing or Snapshot
         The packing.
     modes : sequence of Mode
         Which.
@@ -230,7 +230,13 @@ class ModeFilm(Film):
 
     @styled
     def __init__(
-        self, packing: Packing, modes: Sequence[Mode], words: str, frames: int, periods: int, dots: int = DOTS
+        self,
+        packing: Packing | Snapshot,
+        modes: Sequence[Mode],
+        words: str,
+        frames: int,
+        periods: int,
+        dots: int = DOTS,
     ) -> None:
         figure, axes, points = side_by_side(packing, len(modes))
         self._artists = [

@@ -15,7 +15,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from faultgouge.analysis import BadInputError, Eigenpairs, Packing, closest_to_meeting
+from faultgouge.analysis import BadInputError, Eigenpairs, Packing, Snapshot, closest_to_meeting
 from faultgouge.analysis.packing.arrays import Floats
 
 from .packing import WIDTH, PackingArtist, View
@@ -59,7 +59,7 @@ class Mode:
     rotation: float
 
     @classmethod
-    def of(cls, packing: Packing, modes: Eigenpairs, number: int) -> "Mode":
+    def of(cls, packing: Packing | Snapshot, modes: Eigenpairs, number: int) -> "Mode":
         """One of the modes of a packing."""
         moved = displacement(packing, modes.right[:, number])
         return cls(
@@ -99,22 +99,23 @@ class Mode:
         )
 
 
-def displacement(packing: Packing, vector: Complexes) -> Complexes:
+def displacement(packing: Packing | Snapshot, vector: Complexes) -> Complexes:
     """A mass-weighted vector, shape (3N,), as of :class:`Mode`: x, y and R theta of every disk, shape (3, N)."""
-    mass = np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
-    vector = vector / np.sqrt(mass)
+    vector = vector / np.sqrt(packing.coordinate_mass)
     vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
     moved = vector.reshape(3, -1)
     largest = np.sqrt(np.sum(np.abs(moved[:2]) ** 2, axis=0)).max()
     return np.asarray(moved / largest)
 
 
-def unstable_pair(packing: Packing, modes: Eigenpairs, believed: Sequence[complex]) -> tuple[list[Mode], str]:
+def unstable_pair(
+    packing: Packing | Snapshot, modes: Eigenpairs, believed: Sequence[complex]
+) -> tuple[list[Mode], str]:
     """The modes that make a packing unstable, or are about to.
 
     Parameters
     ----------
-    packing : Packing
+    packing : Packing or Snapshot
         The packing.
     modes : Eigenpairs
         All its modes.
@@ -144,6 +145,9 @@ def unstable_pair(packing: Packing, modes: Eigenpairs, believed: Sequence[comple
         raise ModeError(
             f"at F_x = {packing.fx:g} all modes are orthogonal to {SYMMETRIC:g}, so that no two of them are about to "
             "meet: take a later --frame, or a mode by its number"
+            if isinstance(packing, Packing)
+            else f"all modes are orthogonal to {SYMMETRIC:g}, so that no two of them are about to meet: take a mode by "
+            "its number"
         )
     words = f"the two real modes closest to meeting: the cosine between them is {cosine:.4f}"
     return [Mode.of(packing, modes, number) for number in (first, second)], words
@@ -156,7 +160,7 @@ class ModeArtist:
     ----------
     axes : Axes
         Where.
-    packing : Packing
+    packing : Packing or Snapshot
         The packing at rest.
     mode : Mode
         The mode.
@@ -167,7 +171,7 @@ class ModeArtist:
     """
 
     def __init__(
-        self, axes: Axes, packing: Packing, mode: Mode, points: float | None = None, moves: bool = False
+        self, axes: Axes, packing: Packing | Snapshot, mode: Mode, points: float | None = None, moves: bool = False
     ) -> None:
         self.mode, self.moves = mode, moves
         self.reach = LONGEST * packing.radius.max() * (0.3 if moves else 1.0)
@@ -208,12 +212,12 @@ class ModeArtist:
 
 
 @styled
-def draw_modes(packing: Packing, modes: Sequence[Mode], words: str) -> Figure:
+def draw_modes(packing: Packing | Snapshot, modes: Sequence[Mode], words: str) -> Figure:
     """Modes side by side, with their numbers below.
 
     Parameters
     ----------
-    packing : Packing
+    packing : Packing or Snapshot
         The packing.
     modes : sequence of Mode
         One or two.
@@ -238,7 +242,7 @@ def draw_modes(packing: Packing, modes: Sequence[Mode], words: str) -> Figure:
     return figure
 
 
-def side_by_side(packing: Packing, count: int) -> tuple[Figure, list[Axes], float]:
+def side_by_side(packing: Packing | Snapshot, count: int) -> tuple[Figure, list[Axes], float]:
     """A figure with axes for the same packing, and points per unit of length in them."""
     view = View.of(packing)
     across = WIDTH - 0.1
@@ -248,9 +252,10 @@ def side_by_side(packing: Packing, count: int) -> tuple[Figure, list[Axes], floa
     return figure, list(axes), 72 * across / (view.right - view.left)
 
 
-def finish(figure: Figure, axes: Sequence[Axes], packing: Packing, words: str) -> None:
+def finish(figure: Figure, axes: Sequence[Axes], packing: Packing | Snapshot, words: str) -> None:
     """The line above and the scale of rotation below."""
-    figure.suptitle(f"$F_x = {packing.fx:.6g}$: {words}", fontsize=8)
+    load = f"$F_x = {packing.fx:.6g}$: " if isinstance(packing, Packing) else ""
+    figure.suptitle(f"{load}{words}", fontsize=8)
     scale = ScalarMappable(Normalize(-1, 1), "RdBu_r")
     bar = figure.colorbar(scale, ax=list(axes), location="bottom", aspect=50, shrink=0.6, pad=0.02)
     bar.set_ticks([-1, 0, 1], labels=["clockwise", "rotation", "anticlockwise"])

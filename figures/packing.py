@@ -1,10 +1,10 @@
 r"""A packing: disks to scale, force chains, load, floor and periodic images.
 
-The disks of the upper layer are yellow, rattlers hollow, the floor is red. A bar joins the centres of each contact; the
-width of the bar is proportional to the normal force :math:`f_n`, and its colour is one of
+The disks of the upper layer are yellow, rattlers hollow; floor, walls and disks that are held are red. A bar joins the
+centres of each contact; the width of the bar is proportional to the normal force :math:`f_n`, and its colour is one of
 
 - ``mobilised``, :math:`|f_t|/(\mu f_n)`: the mobilised fraction of Coulomb's bound, one for a sliding contact,
-- ``slip``, :math:`|s|/t^*`: the slip over the slip limit,
+- ``slip``, :math:`|s|/t^*`: the slip over the slip limit; a Snapshot has no slips,
 - ``force``, :math:`f_n` itself,
 - ``none``: ink.
 
@@ -18,14 +18,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
 from matplotlib.colors import Colormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from faultgouge.analysis import Packing
+from faultgouge.analysis import BadInputError, Packing, Snapshot
 from faultgouge.analysis.packing.arrays import Floats, Indices
 
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER, figure_of, styled
@@ -37,7 +37,9 @@ WIDTH = 3.4
 """Width of a figure that holds one packing, inch."""
 
 
-def _slip_share(packing: Packing) -> Floats:
+def _slip_share(packing: Packing | Snapshot) -> Floats:
+    if isinstance(packing, Snapshot):
+        raise BadInputError("A packing of LAMMPS has forces and no slips: let colours show mobilised, force or none.")
     limit = packing.law.slip_limit(packing.geometry.overlap)
     return np.divide(np.abs(packing.contacts.slip), limit, out=np.zeros(len(limit)), where=limit > 0)
 
@@ -50,7 +52,9 @@ def _force_scale(values: Floats) -> Normalize:
     return Normalize(0, values.max(initial=0.0) or 1.0)
 
 
-COLOURS: dict[str, tuple[str, Callable[[Packing], Floats], Callable[[Floats], Normalize], str | Colormap]] = {
+COLOURS: dict[
+    str, tuple[str, Callable[[Packing | Snapshot], Floats], Callable[[Floats], Normalize], str | Colormap]
+] = {
     "mobilised": (r"mobilised friction $|f_t|/(\mu f_n)$", attrgetter("mobilised"), _share_scale, MOBILIZATION),
     "slip": ("slip / slip limit", _slip_share, _share_scale, MOBILIZATION),
     "force": ("normal force $f_n$", attrgetter("normal_force"), _force_scale, "viridis_r"),
@@ -74,6 +78,10 @@ class View:
         The contact of each bar.
     start, end : ndarray, shape (c, 2)
         Where the bar begins and ends, length.
+    walls : tuple of Wall
+        Floor and walls.
+    edges : ndarray, shape (e, 2, 2)
+        Ends of the lines at which the picture repeats, length.
     """
 
     left: float
@@ -85,42 +93,114 @@ class View:
     contact: Indices
     start: Floats
     end: Floats
+    walls: tuple["Wall", ...]
+    edges: Floats
 
     @classmethod
-    def of(cls, packing: Packing, margin: float = 0.0) -> "View":
+    def of(cls, packing: Packing | Snapshot, margin: float = 0.0) -> "View":
         """Every image of every disk and contact that reaches to within a margin of the box; length."""
-        x, y = packing.position.T
-        largest, length = packing.radius.max(), packing.box_length
-        if length is None:
-            images = packing.position[None]
-            left, right = float((x - packing.radius).min()), float((x + packing.radius).max())
-        else:
-            images = np.column_stack([x % length, y]) + np.array([[[shift * length, 0.0]] for shift in (-1, 0, 1)])
-            left, right = 0.0, length
-        near = images[..., 0]
-        image, disk = np.nonzero((near + packing.radius > left - margin) & (near - packing.radius < right + margin))
-        start = images[:, packing.contacts.i]
-        end = start - packing.geometry.distance[:, None] * packing.geometry.normal
-        ends = np.stack([start[..., 0], end[..., 0]])
-        bar, contact = np.nonzero((ends.max(axis=0) > left - margin) & (ends.min(axis=0) < right + margin))
-        ceiling = float((y + packing.radius).max() + (1.5 if packing.fx or packing.fy else 0.3) * largest)
-        return cls(
-            left,
-            right,
-            float(-0.3 * largest),
-            ceiling,
-            disk,
-            images[image, disk],
-            contact,
-            start[bar, contact],
-            end[bar, contact],
-        )
+        cell, origin, periodic = _cell(packing)
+        position, radius, contacts = packing.position[:, :2], packing.radius, packing.contacts
+        walls, branch = _walls(packing), branch_vectors(packing)
+        share = (position - origin) @ np.linalg.inv(cell)
+        position = origin + (share - np.where(periodic, np.floor(share), 0.0)) @ cell
+        low, high = _frame(packing, position, cell, origin, periodic, walls)
+        around = [np.arange(-2, 3) if each else [0] for each in periodic]
+        images = position + (np.stack(np.meshgrid(*around), axis=-1).reshape(-1, 1, 2) @ cell)
+        near_low, near_high = (np.where(periodic, side, far) for side, far in ((low, -np.inf), (high, np.inf)))
+        reach = radius[:, None]
+        within = (images + reach > near_low - margin) & (images - reach < near_high + margin)
+        image, disk = np.nonzero(within.all(axis=2))
+        start = images[:, contacts.i]
+        ends = np.stack([start, start - branch])
+        within = (ends.max(axis=0) > near_low - margin) & (ends.min(axis=0) < near_high + margin)
+        bar, contact = np.nonzero(within.all(axis=2))
+        (left, bottom), (right, ceiling) = low.tolist(), high.tolist()
+        place, begin = images[image, disk], start[bar, contact]
+        edges = _edges(cell, origin, periodic, low, high, walls)
+        return cls(left, right, bottom, ceiling, disk, place, contact, begin, begin - branch[contact], walls, edges)
 
     def points(self, axes: Axes) -> float:
         """Points per unit of length, so that widths of lines are to scale; as the axes stand now."""
         box = axes.get_window_extent()
         scale = min(box.width / (self.right - self.left), box.height / (self.ceiling - self.bottom))
         return float(72 / figure_of(axes).dpi * scale)
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A wall: all that lies beyond a place along an axis, seen along sign times the axis."""
+
+    axis: int
+    sign: float
+    place: float
+
+    def corners(self, view: View) -> Floats:
+        """What a picture shows of the wall, shape (4, 2), length."""
+        low, high = np.array([view.left, view.bottom]), np.array([view.right, view.ceiling])
+        (high if self.sign > 0 else low)[self.axis] = self.place
+        return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
+
+
+def branch_vectors(packing: Packing | Snapshot) -> Floats:
+    """From the second partner of each contact, or from the wall, to the first; length, shape (C, 2)."""
+    if isinstance(packing, Packing):
+        return np.asarray(packing.geometry.distance[:, None] * packing.geometry.normal)
+    c = packing.contacts
+    reach = np.where(c.wall, packing.radius[c.i] - c.overlap, c.distance)
+    return np.asarray(reach[:, None] * c.normal[:, :2])
+
+
+def _cell(packing: Packing | Snapshot) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Edges of the box in rows, its lower corner, and along which edges it is periodic."""
+    if isinstance(packing, Snapshot):
+        cell = packing.box[:2, :2].copy()
+        cell[~cell.any(axis=1)] = np.eye(2)[~cell.any(axis=1)]  # an open side may have no length
+        return cell, packing.origin[:2], packing.periodic[:2]
+    return np.diag([packing.box_length or 1.0, 1.0]), np.zeros(2), np.array([packing.box_length is not None, False])
+
+
+def _walls(packing: Packing | Snapshot) -> tuple[Wall, ...]:
+    """The floor of a packing; the walls that disks of a snapshot touch."""
+    if isinstance(packing, Packing):
+        return (Wall(1, 1.0, 0.0),)
+    c = packing.contacts
+    at = np.flatnonzero(c.wall)
+    normal, axis = c.normal[at, :2], np.argmax(np.abs(c.normal[at, :2]), axis=1)
+    sign = np.sign(normal[np.arange(len(at)), axis])
+    place = packing.position[c.i[at], axis] - sign * (packing.radius[c.i[at]] - c.overlap[at])
+    sides = sorted({*zip(axis.tolist(), sign.tolist(), strict=True)})
+    return tuple(Wall(a, s, float(np.mean(place[(axis == a) & (sign == s)]))) for a, s in sides)
+
+
+def _frame(
+    packing: Packing | Snapshot, position: Floats, cell: Floats, origin: Floats, periodic: Any, walls: tuple[Wall, ...]
+) -> tuple[Floats, Floats]:
+    """Lower left and upper right corner of a picture: the box where it is periodic, else what lies in it."""
+    reach, largest = packing.radius[:, None], packing.radius.max()
+    low, high = (position - reach).min(axis=0), (position + reach).max(axis=0)
+    if isinstance(packing, Packing):
+        low[1] = -0.3 * largest
+        high[1] += (1.5 if packing.fx or packing.fy else 0.3) * largest
+    else:
+        for wall in walls:
+            (low if wall.sign > 0 else high)[wall.axis] = wall.place
+        low, high = low - 0.3 * largest, high + 0.3 * largest
+    corners = origin + np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) @ cell
+    return np.where(periodic, corners.min(axis=0), low), np.where(periodic, corners.max(axis=0), high)
+
+
+def _edges(cell: Floats, origin: Floats, periodic: Any, low: Floats, high: Floats, walls: tuple[Wall, ...]) -> Floats:
+    """Lines at which a picture repeats, shape (e, 2, 2)."""
+    if all(periodic):
+        a, b, c, d = (origin + np.array(corner) @ cell for corner in ((0, 0), (1, 0), (1, 1), (0, 1)))
+        return np.array([[a, b], [b, c], [c, d], [d, a]])
+    begin, end = low.copy(), high.copy()
+    for wall in walls:
+        (begin if wall.sign > 0 else end)[wall.axis] = wall.place
+    lines = [[[low[0], begin[1]], [low[0], end[1]]], [[high[0], begin[1]], [high[0], end[1]]]] if periodic[0] else []
+    lines += [[[begin[0], low[1]], [end[0], low[1]]], [[begin[0], high[1]], [end[0], high[1]]]] if periodic[1] else []
+    return np.array(lines).reshape(-1, 2, 2)
 
 
 class PackingArtist:
@@ -150,7 +230,12 @@ class PackingArtist:
     """
 
     def __init__(
-        self, axes: Axes, packing: Packing, color: str = "none", view: View | None = None, points: float | None = None
+        self,
+        axes: Axes,
+        packing: Packing | Snapshot,
+        color: str = "none",
+        view: View | None = None,
+        points: float | None = None,
     ) -> None:
         self.packing, self.view = packing, view or View.of(packing)
         axes.set(aspect="equal", xlim=(self.view.left, self.view.right), ylim=(self.view.bottom, self.view.ceiling))
@@ -159,11 +244,12 @@ class PackingArtist:
         self.disks = self._disks(axes)
         self.widest = 0.5 * packing.radius.min() * self.points
         self.chains = self._chains(axes, color)
-        sides = [self.view.left, self.view.right]
-        floor = axes.fill_between(sides, self.view.bottom, 0, color=FLOOR, linewidth=0, zorder=4, label="floor")
-        if packing.box_length is not None:
+        corners = [wall.corners(self.view) for wall in self.view.walls]
+        floor = PolyCollection(corners, facecolors=FLOOR, linewidths=0, zorder=4, label="floor")
+        axes.add_collection(floor)
+        if len(self.view.edges):
             dashes: dict[str, Any] = {"linewidths": 0.8, "linestyles": (0, (3, 3)), "clip_on": False}
-            axes.vlines(sides, 0, self.view.ceiling, colors=INK, **dashes)
+            axes.add_collection(LineCollection(list(self.view.edges), colors=INK, **dashes))
         self.moving = (self.disks, self.chains, floor)
 
     def move(self, displacement: Floats) -> None:
@@ -171,15 +257,17 @@ class PackingArtist:
         view, contacts = self.view, self.packing.contacts
         self.disks.set_offsets(view.place + displacement[view.disk])
         i, j = contacts.i[view.contact], contacts.j[view.contact]
-        along_floor = displacement[i] * np.array([1.0, 0.0])
-        far = np.where((j < 0)[:, None], along_floor, displacement[j])
+        normal = (view.start - view.end) / np.linalg.norm(view.start - view.end, axis=1, keepdims=True)
+        along_wall = displacement[i] - np.sum(normal * displacement[i], axis=1, keepdims=True) * normal
+        far = np.where((j < 0)[:, None], along_wall, displacement[j])
         self.chains.set_segments(list(np.stack([view.start + displacement[i], view.end + far], axis=1)))
 
     @staticmethod
-    def faces(packing: Packing) -> NDArray[np.str_]:
+    def faces(packing: Packing | Snapshot) -> NDArray[np.str_]:
         """Colours of the disks, shape (N,)."""
         hollow = np.isin(np.arange(len(packing)), packing.rattlers)
-        return np.where(hollow, "white", np.where(packing.top, UPPER, BULK))
+        faces = np.where(hollow, "white", np.where(packing.top, UPPER, BULK))
+        return np.where(packing.free, faces, FLOOR) if isinstance(packing, Snapshot) else faces
 
     def _disks(self, axes: Axes) -> EllipseCollection:
         packing, disk = self.packing, self.view.disk
@@ -224,13 +312,15 @@ class PackingArtist:
 
 
 @styled
-def draw_packing(packing: Packing, axes: Axes | None = None, color: str = "mobilised", caption: bool = False) -> Figure:
+def draw_packing(
+    packing: Packing | Snapshot, axes: Axes | None = None, color: str = "mobilised", caption: bool = False
+) -> Figure:
     """Draw a packing with its force chains (the paper's figure 1).
 
     Parameters
     ----------
-    packing : Packing
-        Any configuration.
+    packing : Packing or Snapshot
+        Any configuration of disks.
     axes : Axes, optional
         Where to draw; a figure of its own, with a legend, by default.
     color : {"mobilised", "slip", "force", "none"}
@@ -255,6 +345,7 @@ def draw_packing(packing: Packing, axes: Axes | None = None, color: str = "mobil
     figure = Figure(figsize=(WIDTH, height + (0.85 if caption else 0.52)), layout="constrained")
     if caption:
         load, _, numbers = in_words(packing).partition(": ")
+        numbers = numbers.replace("; ", "\n")
         figure.suptitle(f"{load.replace('F_x', '$F_x$').replace('F_y', '$F_y$')}\n{numbers}", fontsize=7.5)
     axes = figure.add_subplot()
     artist = PackingArtist(axes, packing, color, view, points=72 * across / (view.right - view.left))
@@ -267,8 +358,15 @@ def draw_packing(packing: Packing, axes: Axes | None = None, color: str = "mobil
     return figure
 
 
-def in_words(packing: Packing) -> str:
+def in_words(packing: Packing | Snapshot) -> str:
     """Load, contacts, rattlers, and how many contacts slide."""
+    if isinstance(packing, Snapshot):
+        c = packing.contacts
+        slide = ", which slide" if c.sliding.any() else ", which stick" if c.at_bound.any() else ""
+        return (
+            f"{len(packing)} disks as LAMMPS left them: {len(c)} contacts ({int(c.wall.sum())} with walls), "
+            f"{len(packing.rattlers)} rattlers; {int(c.at_bound.sum())} contacts at Coulomb's bound{slide}"
+        )
     sliding = int(np.count_nonzero(_slip_share(packing) >= 1))
     return (
         f"F_x = {packing.fx:g}, F_y = {packing.fy:g}: {len(packing)} disks, {len(packing.contacts)} contacts "
@@ -283,6 +381,8 @@ def _add_key(figure: Figure, artist: PackingArtist) -> None:
         handles.append(Patch(facecolor=UPPER, edgecolor=EDGE, linewidth=0.6, label="upper layer"))
     if len(packing.rattlers):
         handles.append(Patch(facecolor="white", edgecolor=EDGE, linewidth=0.6, label="rattler (no contact)"))
+    if isinstance(packing, Snapshot) and not packing.free.all():
+        handles.append(Patch(facecolor=FLOOR, edgecolor=EDGE, linewidth=0.6, label="held"))
     if handles:
         below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "ncols": 2}
         figure.axes[0].legend(handles=handles, handlelength=1.0, handleheight=1.0, **below)
@@ -298,7 +398,7 @@ def _add_key(figure: Figure, artist: PackingArtist) -> None:
 def _draw_load(axes: Axes, artist: PackingArtist) -> None:
     """Arrows down onto the upper layer, and one along x above it."""
     packing, view = artist.packing, artist.view
-    if not packing.top.any():
+    if isinstance(packing, Snapshot) or not packing.top.any():
         return
     x, y = packing.position[packing.top].T
     x = x if packing.box_length is None else x % packing.box_length

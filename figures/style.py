@@ -13,6 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
+from faultgouge.analysis.files.atomic_write import replace_whole
+
 STYLE = str(files(__package__) / "faultgouge.mplstyle")
 
 BULK, UPPER, EDGE, FLOOR, INK = "#dfe5ea", "#f2c14e", "#8a949c", "#c0392b", "#333333"
@@ -79,4 +81,5 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
 def save_as(figure: Figure, path: Path) -> None:
     """Write a figure in the format that its name ends in: png, svg or pdf; the same bytes for the same figure."""
     dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    figure.savefig(path, metadata=dates.get(path.suffix.lower()))
+    with replace_whole(path) as new:
+        figure.savefig(new, metadata=dates.get(path.suffix.lower()))

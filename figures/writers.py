@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from faultgouge.analysis import BadInputError
+from faultgouge.analysis.files.atomic_write import replace_whole
 
 from .film import Film
 
@@ -54,7 +55,8 @@ def write_film(film: Film, path: Path, rate: float = 10.0, progress: Progress = 
     """
     check_name(path)
     write = _gif if path.suffix.lower() == ".gif" else _mp4
-    write(film, path, rate, progress)
+    with replace_whole(path) as new:
+        write(film, new, rate, progress)
 
 
 def check_name(path: Path) -> None:
@@ -81,25 +83,23 @@ def _gif(film: Film, path: Path, rate: float, progress: Progress) -> None:
 
     timing: dict[str, Any] = {"duration": round(1000 / rate), "disposal": 1}
     with path.open("wb") as file:
-        try:
-            shown = None
-            for number in progress(range(film.count), film.count):
-                frame = film.frame(number)
-                picture = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-                now = np.asarray(picture)
-                if shown is None:
-                    file.writelines(getheader(picture, info={"loop": 0, "background": 0})[0])
-                    file.writelines(getdata(picture, **timing))
-                    shown = now.copy()
-                else:
-                    # what stays as it was is transparent, which compresses well; one dot at least keeps the time
-                    changed = np.abs(frame - colours[shown]).max(axis=2) > UNSEEN
-                    box = Image.fromarray(changed).getbbox() or (0, 0, 1, 1)
-                    picture.paste(COLOURS - 1, mask=Image.fromarray(~changed))
-                    file.writelines(getdata(picture.crop(box), box[:2], transparency=COLOURS - 1, **timing))
-                    shown[changed] = now[changed]
-        finally:
-            file.write(b";")  # a film that ends early has the frames so far
+        shown = None
+        for number in progress(range(film.count), film.count):
+            frame = film.frame(number)
+            picture = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+            now = np.asarray(picture)
+            if shown is None:
+                file.writelines(getheader(picture, info={"loop": 0, "background": 0})[0])
+                file.writelines(getdata(picture, **timing))
+                shown = now.copy()
+            else:
+                # what stays as it was is transparent, which compresses well; one dot at least keeps the time
+                changed = np.abs(frame - colours[shown]).max(axis=2) > UNSEEN
+                box = Image.fromarray(changed).getbbox() or (0, 0, 1, 1)
+                picture.paste(COLOURS - 1, mask=Image.fromarray(~changed))
+                file.writelines(getdata(picture.crop(box), box[:2], transparency=COLOURS - 1, **timing))
+                shown[changed] = now[changed]
+        file.write(b";")
 
 
 def _mp4(film: Film, path: Path, rate: float, progress: Progress) -> None:

@@ -47,12 +47,30 @@ protected:
   const int numbers;         // arguments before the keywords
 
   double positive_argument(const char *name, const char *text);
-  template <bool ROTATION, bool COMPENSATED> void move(int i);    // by v dt and omega dt
-  template <bool COMPENSATED> void complete_force(int i);
+  struct Velocity {
+    double x, y, spin;
+  };
+
+  // LAMMPS's arrays of this rank's disks, whose rows lie one behind the other; found once for a loop over disks
+  struct Disks {
+    using Row = double[3];
+    double dt = 0.0;
+    int count = 0;
+    Row *x = nullptr, *v = nullptr, *f = nullptr, *omega = nullptr, *torque = nullptr;
+    const double *mass = nullptr, *radius = nullptr;
+    const int *mask = nullptr;
+    double *theta = nullptr;    // null: there are no angles
+
+    template <bool ROTATION> void set_velocity(int i, const Velocity &velocity) const;
+  };
+
+  Disks disks() const;
+  // by v dt and omega dt
+  template <bool ROTATION, bool COMPENSATED> void move(const Disks &disks, int i, const Velocity &velocity);
   void complete_forces();
-  void wrap();                                       // all disks into the periodic box
-  void refuse(int i, double dx, double dy) const;    // disk i cannot move so far
-  double *angles() const;                            // null: there are none
+  void wrap();                                                    // all disks into the periodic box
+  [[noreturn]] void refuse(int i, double dx, double dy) const;    // disk i cannot move so far
+  double *angles() const;                                         // null: there are none
 
   // work(rotates, compensates) with both known at compile time
   template <class Work> void choose(Work work) const
@@ -88,8 +106,9 @@ public:
 private:
   double kept = 1.0;    // share of a velocity that drag leaves over half a step
 
-  template <bool ROTATION> void kick(int i);     // by half a step
-  template <bool ROTATION> void decay(int i);    // likewise
+  static void decay(Velocity &velocity, double kept);
+  // work(i, velocity of disk i, function that adds half a step's forces to a velocity)
+  template <bool ROTATION, class Work> void for_each_disk(const Disks &disks, Work work) const;
   // work(rotates, compensates, drags) with all known at compile time
   template <class Work> void choose_all(Work work) const;
 };

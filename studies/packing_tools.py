@@ -29,6 +29,11 @@ def path_from(rest: Equilibrium, scene: Scene) -> Iterator[EquilibriumPath]:
         yield EquilibriumPath(engine, rest, scene)
 
 
+def unit_of_time(packing: Packing) -> float:
+    """sqrt(3 m d/F_y) of the smallest and the lightest disk: 1 for m = d = 1 and the paper's F_y = 3."""
+    return float(np.sqrt(3 * packing.mass.min() * 2 * packing.radius.min() / packing.fy))
+
+
 def shake_disks(engine: Engine, packing: Packing, size: float, seed: int) -> None:
     """Put a packing into LAMMPS, x and y of each disk at random about where they are, by this standard deviation."""
     noise = np.zeros(3 * len(packing))

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.files.plain_file import read_plain
 from ..analysis.packing.packing import Floats
 from ..pywrap import Scene, SceneError
 
@@ -26,7 +27,10 @@ def read_keyed_rows(path: Path, key: str, what: str) -> list[dict[str, Any]]:
     """
     if not path.exists():
         return []
-    data = path.read_bytes()
+    try:
+        data = read_plain(path)
+    except OSError as error:
+        raise SceneError(f"{path} cannot be read ({error.strerror}): take it out, or give another folder") from None
     complete = data[: data.rfind(b"\n") + 1]
     if complete != data:
         os.truncate(path, len(complete))
@@ -35,7 +39,7 @@ def read_keyed_rows(path: Path, key: str, what: str) -> list[dict[str, Any]]:
         try:
             rows.append(json.loads(line))
             rows[-1][key]
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             raise SceneError(
                 f"{path}: line {number} is no result of {what}: take it out, or give another folder"
             ) from None

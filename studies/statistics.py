@@ -74,7 +74,12 @@ def median(values: Sequence[float] | Floats, draws: int = 2000) -> list[float]:
 
 
 def sign_test(strong: Mapping[str, Any], weak: Mapping[str, Any]) -> bool | None:
-    """Whether the second of two ramps, "ends" and "reach", has the lower onset; None if either may have it."""
+    """Whether the second of two ramps, "ends" and "reach", has the lower onset; None if either may have it.
+
+    A packing that is unstable at F_x = 0 with both has no onset on the ramp, and tells nothing.
+    """
+    if strong["reach"] == weak["reach"] == 0:
+        return None
     if weak["ends"] == "onset" and weak["reach"] < strong["reach"]:
         return True
     # the weak one has none up to there, or a later one

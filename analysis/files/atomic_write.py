@@ -39,15 +39,14 @@ BLOCK = 1 << 20
 """Bytes that are read at a time."""
 
 
-def write_whole(path: Path, *parts: bytes) -> None:
-    """Replace a file by new content, in one step.
+@contextmanager
+def replace_whole(path: Path) -> Iterator[Path]:
+    """Replace a file in one step by what is written to a new one, whose name is handed on.
 
     Parameters
     ----------
     path : Path
         The file. A device is written to directly.
-    *parts : bytes
-        Its content, part after part.
 
     Raises
     ------
@@ -55,16 +54,16 @@ def write_whole(path: Path, *parts: bytes) -> None:
         If the file cannot be written, or is read-only. What it held before is still there.
     """
     target = Path(os.path.realpath(path))
-    part = target.with_name(f".{target.name[:LONGEST_NAME]}.{secrets.token_hex(8)}.part")
+    part = target.with_name(f".{target.stem[:LONGEST_NAME]}.{secrets.token_hex(8)}.part{target.suffix}")
     try:
         if target.exists() and not target.is_file():
-            target.write_bytes(b"".join(parts))
+            yield target
             return
         _check_changeable(target)
         with part.open("xb") as stream:  # a file of its own, or an error
             if target.exists():
                 os.fchmod(stream.fileno(), stat.S_IMODE(target.stat().st_mode))
-            stream.writelines(parts)
+        yield part
         os.replace(part, target)
     except BaseException as error:
         with suppress(OSError):  # a folder that does not exist, or may not be written to, has no part
@@ -72,16 +71,22 @@ def write_whole(path: Path, *parts: bytes) -> None:
         if not isinstance(error, OSError):
             raise
         kept = "what it held before is kept" if target.exists() else "there is no such file now"
-        raise OutputError(f"{path} cannot be written: {error.strerror}; {kept}.") from error
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}; {kept}.") from error
+
+
+def write_whole(path: Path, *parts: bytes) -> None:
+    """Replace a file by new content, part after part; errors as those of `replace_whole`."""
+    with replace_whole(path) as new, new.open("wb") as stream:
+        stream.writelines(parts)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Replace a text file, in one step; errors as those of `write_whole`."""
+    """Replace a text file, in one step; errors as those of `replace_whole`."""
     write_whole(path, text.encode())
 
 
 def write_json(path: Path, value: object) -> None:
-    """Replace a JSON file, in one step; errors as those of `write_whole`."""
+    """Replace a JSON file, in one step; errors as those of `replace_whole`."""
     write_text(path, json.dumps(value, indent=1) + "\n")
 
 
@@ -129,7 +134,7 @@ def _check_changeable(path: Path) -> None:
 def lock_output(path: Path) -> Iterator[None]:
     """Keep other processes from writing a file, or into a folder: they find a lock, which goes with this process.
 
-    The lock is a file beside the file, or in the folder, and is removed in the end.
+    The lock is a file beside the file, or in the folder, and is removed in the end. A device has none.
 
     Raises
     ------
@@ -137,6 +142,9 @@ def lock_output(path: Path) -> Iterator[None]:
         If another process has it.
     """
     target = Path(os.path.realpath(path))
+    if target.exists() and not (target.is_file() or target.is_dir()):
+        yield
+        return
     lock = target / ".lock" if target.is_dir() else target.with_name(f".{target.name[:LONGEST_NAME]}.lock")
     stream = _take_lock(lock, path)
     try:

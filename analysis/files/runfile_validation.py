@@ -55,12 +55,12 @@ def check(file: h5py.File, path: Path, size: int) -> None:
         creator = file.get("h5md/creator")
         if creator is None or creator.attrs.get("name") != "faultgouge":
             raise PackingFileError(f"{path} is an HDF5 file, but not a run of faultgouge.")
-        _check_places(file)
+        check_places(file)
         disks, frames = _check_position(file, size)
         _check_parameters(file, disks)
         _check_observables(file, disks, frames, size)
         for name, group in file.get("faultgouge", {}).items():
-            for column in [_dataset(group, each, size) for each in group]:
+            for column in [dataset(group, each, size) for each in group]:
                 _require(column.ndim, f"the series {name} has columns without rows")
                 _check_finite(column)
     except _UnsoundError as error:
@@ -79,7 +79,7 @@ def equilibria(file: h5py.File) -> int:
     return frames if "position" in trajectory or "time" not in trajectory else frames - len(trajectory["time"])
 
 
-def _dataset(file: h5py.Group, name: str, size: int, rows: int | None = None) -> h5py.Dataset:
+def dataset(file: h5py.Group, name: str, size: int, rows: int | None = None) -> h5py.Dataset:
     """A dataset of numbers whose bytes can stand for its shape, or for its first rows if no others are read.
 
     Behind the equilibria a trajectory has rows that nobody wrote, and that have no bytes.
@@ -99,7 +99,7 @@ def _dataset(file: h5py.Group, name: str, size: int, rows: int | None = None) ->
 
 def _check_shape(file: h5py.Group, name: str, shape: tuple[int, ...], size: int, kind: str = "f") -> h5py.Dataset:
     """A dataset of this shape and kind, its numbers finite."""
-    item = _dataset(file, name, size)
+    item = dataset(file, name, size)
     _require(item.shape == shape, f"{item.name} has the shape {item.shape}, and should have {shape}")
     _require(item.dtype.kind in kind, f"{item.name} is of type {item.dtype}")
     _check_finite(item)
@@ -122,7 +122,7 @@ def _check_finite(item: h5py.Dataset, rows: int | None = None) -> None:
     _require(finite, f"{item.name} has numbers that are not finite")
 
 
-def _check_places(file: h5py.File) -> None:
+def check_places(file: h5py.File) -> None:
     """Every number lies in the file itself, whose checksum covers it, and unpacks into the memory that there is."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     unpacked, seen, groups = 0, set[int](), [file]
@@ -148,8 +148,8 @@ def _check_places(file: h5py.File) -> None:
 
 def _check_position(file: h5py.File, size: int) -> tuple[int, int]:
     """Numbers of disks and of frames."""
-    value = _dataset(file, "particles/disks/position/value", size)
-    step = _dataset(file, "particles/disks/position/step", size)
+    value = dataset(file, "particles/disks/position/value", size)
+    step = dataset(file, "particles/disks/position/step", size)
     shaped = value.ndim == 3 and value.shape[1] >= 1 and value.shape[2] == 3 and step.ndim == 1
     _require(shaped, f"{value.name} has the shape {value.shape}, and should have (T, N, 3)")
     disks, frames = value.shape[1], len(step)
@@ -187,7 +187,7 @@ def _check_observables(file: h5py.File, disks: int, frames: int, size: int) -> N
     shapes = {"angle": (disks,), "fx": (), "fy": (), "residual": (), "position_low": (disks, 2)}
     needed = {"contacts", *shapes} - {"position_low"} if frames else set()
     for name in needed | set(group):
-        item = _dataset(group, f"{name}/value", size, frames)
+        item = dataset(group, f"{name}/value", size, frames)
         enough = item.ndim and item.shape[0] >= frames
         _require(enough, f"{item.name} has the shape {item.shape} for {frames} equilibria")
         fits = not frames or item.shape[1:] == shapes.get(name, item.shape[1:])
@@ -197,7 +197,7 @@ def _check_observables(file: h5py.File, disks: int, frames: int, size: int) -> N
     if not frames:
         return
     if "box_length" in file["parameters"]:
-        _dataset(file, "particles/disks/box/edges/value", size, frames)
+        dataset(file, "particles/disks/box/edges/value", size, frames)
     contacts = group["contacts/value"]
     width = 4 if "position_low" in group else 3
     _require(contacts.shape[2:] == (width,), f"{contacts.name} has the shape {contacts.shape}")

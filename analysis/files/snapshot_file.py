@@ -19,7 +19,9 @@ from ..errors import PackingFileError
 from ..packing.snapshot import PER_CONTACT, LinearisedContacts, Snapshot
 from .atomic_write import has_checksum
 from .checksummed_file import new_file, open_checksummed, write
+from .plain_file import check_plain
 from .runfile_header import CHECKED, CREATOR, program_version
+from .runfile_validation import check_places, dataset
 
 SCALARS = ("dimension", "fx", "load_error")
 ARRAYS = ("position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind")
@@ -74,6 +76,7 @@ def write_snapshot(path: Path, snapshot: Snapshot, attributes: Mapping[str, str 
 def holds_snapshot(path: Path) -> bool:
     """Whether a file is an HDF5 file with a snapshot in it; false for whatever cannot be read."""
     try:
+        check_plain(path)
         with h5py.File(path, "r", locking=False) as file:
             return "snapshot" in file
     except OSError:
@@ -93,9 +96,10 @@ def read_snapshot(path: Path) -> Snapshot:
     has_checksum(path)  # refuses what has changed
     with open_checksummed(path) as file:
         try:
-            group = file["snapshot"]
-            contacts = LinearisedContacts(**{name: group["contacts"][name][()] for name in PER_CONTACT})
-            arrays = {name: group[name][()] for name in ARRAYS}
+            check_places(file)
+            group, size = file["snapshot"], path.stat().st_size
+            contacts = LinearisedContacts(**{name: dataset(group["contacts"], name, size)[()] for name in PER_CONTACT})
+            arrays = {name: dataset(group, name, size)[()] for name in ARRAYS}
             numbers = {name: group.attrs[name].item() for name in SCALARS}
             return Snapshot(contacts=contacts, **arrays, **numbers)
         except Exception as error:  # h5py raises nearly every exception there is, depending on what is damaged

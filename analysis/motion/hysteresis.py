@@ -22,6 +22,10 @@ from ..packing.arrays import Floats
 from ..packing.geometry import nearest_image
 from ..packing.packing import Packing
 
+ROUNDING = 1e-9
+"""Share of the displacement of a layer: coordinates have 1e-16, which is 1e-12 of a displacement of 1e-4 diameters, and
+soft modes magnify it some hundred times."""
+
 
 @dataclass(frozen=True)
 class Hysteresis:
@@ -37,12 +41,15 @@ class Hysteresis:
         Displacement of the upper layer along x since then, length.
     work : float
         Of the loads on all disks of the layer since then, force length.
+    closes : bool
+        Whether what remains is no more than rounding: `ROUNDING` of how far the layer has moved in between.
     """
 
     fx: float
     begin: int
     remaining: float
     work: float
+    closes: bool
 
 
 def layer_displacement(packings: Sequence[Packing]) -> Floats:
@@ -87,4 +94,6 @@ def hysteresis(packings: Sequence[Packing]) -> Hysteresis | None:
     last, disks = packings[-1], int(packings[0].top.sum())
     mean = 0.5 * (fx[begin + 1 :] + fx[begin:-1])
     work = mean @ np.diff(moved[:, 0]) - last.fy * (moved[-1, 1] - moved[0, 1])
-    return Hysteresis(last.fx, begin, float(moved[-1, 0] - moved[0, 0]), disks * float(work))
+    remaining = float(moved[-1, 0] - moved[0, 0])
+    closes = abs(remaining) <= ROUNDING * float(np.ptp(moved[:, 0]))
+    return Hysteresis(last.fx, begin, remaining, disks * float(work), closes)

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
-from ..errors import FaultgougeError, TurningPointError
+from ..errors import FaultgougeError, NoEquilibriumError, TurningPointError
 from ..packing.packing import Floats, Packing
+from ..packing.snapshot import Snapshot
 from ..spectrum.buckling import negative_eigenvalues
 from ..spectrum.spectrum import Spectrum, spectrum
 from ..table_display import TableDisplay
@@ -69,7 +70,7 @@ class Unstable:
     growth_rate: float
 
     @classmethod
-    def of(cls, packing: Packing) -> "Unstable":
+    def of(cls, packing: Packing | Snapshot) -> "Unstable":
         """Count what all eigenvalues of a packing show, without contacts whose force is unknown."""
         return cls.counted(spectrum(force_bearing(packing)))
 
@@ -114,7 +115,17 @@ class Onset(TableDisplay):
     ends: float | None = None
 
     def __repr__(self) -> str:
-        return f"<Onset: F_x^c = {with_uncertainty(self.fx_c, self.error)}, {len(self.windows)} windows>"
+        return f"<Onset: {self.describe()}, {len(self.windows)} windows>"
+
+    def describe(self) -> str:
+        """F_x^c with its error, in words; or that, and why, the packing is unstable at the smallest load."""
+        first = self.windows[0]
+        if first.kind != "start":
+            return f"F_x^c = {with_uncertainty(self.fx_c, self.error)}"
+        negative = f"an eigenvalue is {first.eigenvalue:.6g}"
+        known = negative if first.eigenvalue < 0 else f"a pair of eigenvalues is complex about {first.eigenvalue:.6g}"
+        shear = "before any shear is added" if self.fx_c == 0 else "the smallest load"
+        return f"unstable at F_x = {self.fx_c:g}, {shear}: {known if self.at_start is None else self.at_start}"
 
     def _rows(self) -> dict[str, str]:
         return windows_rows(self.windows)
@@ -143,7 +154,7 @@ class Onset(TableDisplay):
         }
 
 
-def takes_all_modes(packing: Packing, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
+def takes_all_modes(packing: Packing | Snapshot, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
     """Whether a packing is small enough for all of its modes to be searched, and for all windows to be found."""
     return modes is None and packing.coordinates <= 3 * limits.all_windows
 
@@ -161,7 +172,25 @@ def complex_windows(
     left out. All else is as in :func:`find_onset`.
     """
     loads = check_increasing(forces)
-    return all_windows(Family(operator, _narrowest(loads, limits) if narrowest is None else narrowest, limits), loads)
+    unit = unit_of(operator(float(loads[0])))
+    narrowest = _narrowest(loads, limits) if narrowest is None else narrowest
+    found = all_windows(Family(lambda fx: operator(fx) / unit, narrowest, limits), loads)
+    return tuple(_in_units(window, unit) for window in found)
+
+
+def unit_of(operator: Operator) -> float:
+    """A power of two of the size of a matrix's largest element: division by it changes no digit.
+
+    A search divides its operators by it, since what is rough in a search squares them in single precision, which goes
+    from 1e-38 to 1e38.
+    """
+    largest = float(abs(operator).max())
+    return 2.0 ** int(np.floor(np.log2(largest))) if largest > 0 else 1.0
+
+
+def _in_units(window: Window, unit: float) -> Window:
+    """A window of operators that were divided by a unit, 1 / time^2."""
+    return replace(window, eigenvalue=unit * window.eigenvalue)
 
 
 def _narrowest(loads: Floats, limits: Limits) -> float:
@@ -169,7 +198,7 @@ def _narrowest(loads: Floats, limits: Limits) -> float:
 
 
 def find_onset(
-    equilibrium: Callable[[float], Packing],
+    equilibrium: Callable[[float], Packing | Snapshot],
     forces: ArrayLike,
     *,
     narrowest: float | None = None,
@@ -189,9 +218,9 @@ def find_onset(
     Parameters
     ----------
     equilibrium : callable
-        fx -> Packing in equilibrium. It is called with the given loads in increasing order, and between calls for the
-        loads a and b with loads between these, in any order. There it may raise a NoEquilibriumError, and the search
-        goes around it. All other errors reach the caller.
+        fx -> Packing or Snapshot in equilibrium. It is called with the given loads in increasing order, and between
+        calls for the loads a and b with loads between these, in any order. There it may raise a NoEquilibriumError, and
+        the search goes around it. All other errors reach the caller.
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
     narrowest : float, optional
@@ -231,11 +260,11 @@ def find_onset(
     negative = negative_eigenvalues(force_bearing(start, limits))
     if len(negative):
         at_start = Unstable.of(start) if takes_all else None
-        window = _at_start(start, float(negative[0]), start.load_error, 1.0)
+        window = _at_start(start, float(negative[0]), 1.0)
         return Onset((window,), False, (), modes, at_start, start.fx)
     unbalanced: dict[float, float] = {}
     states: dict[float, bytes] = {}
-    given, ends = set(loads[1:].tolist()), np.inf
+    given, ends, unit = set(loads[1:].tolist()), np.inf, unit_of(full_operator(start, limits))
 
     def operator(fx: float) -> csr_array:
         nonlocal ends
@@ -247,26 +276,26 @@ def find_onset(
                 "stable equilibria ends before, at a turning point, and the packing leaves it without oscillation"
             )
         unbalanced[fx], states[fx] = packing.load_error, contact_states(packing, limits)
-        return full_operator(packing, limits)
+        return full_operator(packing, limits) / unit
 
     doubtful: Increments = ()
     all_modes: Spectrum | None = None
     if takes_all:
         narrowest = _narrowest(loads, limits) if narrowest is None else narrowest
         try:
-            windows = all_windows(Family(operator, narrowest, limits, states.__getitem__), loads, first=first)
-        except TurningPointError:
-            all_modes = _complex_at_start(start, limits)  # then the branch ends within the first increment
+            found = all_windows(Family(operator, narrowest, limits, states.__getitem__), loads, first=first)
+            windows = tuple(_in_units(window, unit) for window in found)
+        except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
+            all_modes = _complex_at_start(start, limits)
             if all_modes is None:
                 raise
             windows = (_fastest(start, all_modes),)
         windows = windows[:1] if first else windows
     elif modes is None and (all_modes := _complex_at_start(start, limits)):
         windows = (_fastest(start, all_modes),)
-        unbalanced[start.fx] = start.load_error
     else:
         one, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks, folder)
-        windows = (one,) if one else ()
+        windows = (_in_units(one, unit),) if one else ()
     if not windows:
         raise OnsetError.among(modes, float(loads[-1]), doubtful)
     windows = tuple(_with_imbalance(window, unbalanced) for window in windows)
@@ -277,31 +306,39 @@ def find_onset(
     return Onset(windows, complete, doubtful, modes, unstable, float(ends) if ends < np.inf else None)
 
 
-def _complex_at_start(start: Packing, limits: Limits) -> Spectrum | None:
+def _complex_at_start(start: Packing | Snapshot, limits: Limits) -> Spectrum | None:
     """The spectrum of a packing at the smallest load, if it has a complex pair.
 
-    None if it has none, or if the packing is too large for all eigenvalues to be asked for. Without tangential forces
-    the operator is symmetric, and nothing is computed.
+    None if it has none, or if the packing is too large for all eigenvalues to be asked for. Of a symmetric operator,
+    as without tangential forces, nothing is computed.
     """
-    if start.coordinates > limits.lapack or not start.contacts.slip.any():
+    if start.coordinates > limits.lapack or _symmetric(full_operator(start, limits)):
         return None
     found = spectrum(force_bearing(start, limits))
     return found if found.pairs else None
 
 
-def _fastest(start: Packing, found: Spectrum) -> Window:
+def _symmetric(matrix: csr_array) -> bool:
+    """Whether an operator is its transpose, but for the rounding of its entries, which are sums over contacts."""
+    return bool(abs(matrix - matrix.T).max() <= 1e-14 * abs(matrix).max())
+
+
+def _fastest(start: Packing | Snapshot, found: Spectrum) -> Window:
     """The window of the complex pair that grows fastest at the smallest load."""
     pair = max(found.pairs, key=lambda each: each.growth_rate)
-    return _at_start(start, pair.eigenvalue.real, 0.0, pair.overlap)
+    return _at_start(start, pair.eigenvalue.real, pair.overlap)
 
 
-def _at_start(start: Packing, eigenvalue: float, error: float, overlap: float) -> Window:
+def _at_start(start: Packing | Snapshot, eigenvalue: float, overlap: float) -> Window:
     """A window that is open at the smallest load."""
-    return Window.between(Edge(start.fx, error, eigenvalue, overlap, "start"), None)
+    return Window.between(Edge(start.fx, 0.0, eigenvalue, overlap, "start"), None)
 
 
 def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:
-    """A window whose errors have the imbalance of the equilibria next to its edges added, as a shift of the load."""
+    """A window whose errors have the imbalance of the equilibria next to its edges added, as a shift of the load.
+
+    The smallest load, at which a packing is unstable already, is given and has no error.
+    """
 
     def at(edge: float) -> float:
         return unbalanced[min(unbalanced, key=lambda known: abs(known - edge))]
@@ -309,6 +346,6 @@ def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:
     end = window.fx_end
     return replace(
         window,
-        error=window.error + at(window.fx_onset),
+        error=0.0 if window.kind == "start" else window.error + at(window.fx_onset),
         end_error=None if end is None else (window.end_error or 0.0) + at(end),
     )

@@ -79,7 +79,7 @@ class GrowthWindow:
         Load at which it ends to; None if it grows at the largest load that was looked at.
     error : float
         Uncertainty of fx_onset: that of the root, twice the scatter over the slope, or the bracket of a jump; and the
-        `load_error` of the equilibria; and `path_error`, if that is known.
+        `load_error` of the equilibria; and `path_error`, if that is known. 0 at a "start".
     kind : str
         What begins the window.
     path_error : float or None

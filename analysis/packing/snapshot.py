@@ -360,6 +360,12 @@ class Snapshot:
         """f_n of each contact, force, shape (C,)."""
         return self.contacts.normal_force
 
+    @property
+    def mobilised(self) -> Floats:
+        """|f_t|/(mu f_n): the share of Coulomb's bound that each contact uses, shape (C,); zero without friction."""
+        size, limit = np.linalg.norm(self.contacts.tangential_force, axis=1), self.contacts.friction
+        return np.divide(size, limit, out=np.zeros_like(limit), where=limit > 0)
+
     @cached_property
     def rattlers(self) -> Indices:
         """Indices of the particles that touch nothing."""

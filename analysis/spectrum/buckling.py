@@ -17,6 +17,7 @@ from scipy.sparse import csc_array, eye_array
 
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
 from ..packing.packing import Floats, Packing
+from ..packing.snapshot import Snapshot
 from .eigenpairs import eigenpairs
 from .spectrum import DENSE, SAFETY, dynamical_matrix, is_negative, spectrum, unit_rounding
 
@@ -27,14 +28,14 @@ FIRST = 16
 """Eigenvalues that are asked for at first; twice as many until the interval is covered."""
 
 
-def negative_eigenvalues(packing: Packing) -> Floats:
+def negative_eigenvalues(packing: Packing | Snapshot) -> Floats:
     """The real negative eigenvalues of a packing, beyond their rounding uncertainty.
 
     If the symmetric part of the operator is positive definite, a sparse factorisation shows that there are none.
 
     Parameters
     ----------
-    packing : Packing
+    packing : Packing or Snapshot
         In equilibrium.
 
     Returns

@@ -43,7 +43,7 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
-from ..operators.damping import coordinate_mass, damping_matrix
+from ..operators.damping import coordinate_mass
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
 from ..packing.snapshot import Snapshot
@@ -65,17 +65,6 @@ DENSE = 900
 LIMIT = 1e-4
 """Relative error of the largest eigenvalue of more coordinates. It bounds time steps, that are far below the bound; to
 resolve the fastest modes of a crystal, which lie close together, takes ten times as long."""
-
-
-FEW, MANY = 40, 10_000
-"""Coordinates up to which a time step is that of all eigenvalues, and from which on it has fewer digits."""
-
-LIMIT_OF_FEW, LIMIT_OF_MANY = 1e-8, 1e-3
-"""Relative errors of mu^2 for a time step. Packings have many modes near the fastest one: among 200,000 coordinates a
-digit more takes twice the time, and nobody runs within a thousandth of the limit."""
-
-LOOKS = 6
-"""Steps of the iteration for mu: each squares its error."""
 
 
 @dataclass(frozen=True)
@@ -410,85 +399,6 @@ def largest_frequency(packing: Packing | Snapshot) -> float:
     start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
     largest = eigs(matrix, 1, which="LM", v0=start, tol=LIMIT, return_eigenvectors=False)
     return float(np.sqrt(np.abs(largest).max()))
-
-
-class StableTimestep(float):
-    """A time step that is the limit of stability, a float with its `error`, both times."""
-
-    error: float
-
-    def __new__(cls, value: float, error: float = 0.0) -> "StableTimestep":
-        """The limit and its error."""
-        made = super().__new__(cls, value)
-        made.error = error
-        return made
-
-
-def stable_timestep(of: float | Packing | Snapshot) -> StableTimestep:
-    r"""The largest stable time step of velocity Verlet.
-
-    Without dissipation it is :math:`2/\omega_{max}`. Dashpots use the velocity of the half step, as in all granular
-    styles of LAMMPS: a motion begins to alternate in sign and to grow when :math:`4 M - 2\,dt\, C - dt^2 K` becomes
-    singular, so that dt = 2/mu with the largest mu of :math:`\mu^2 M - \mu C - K`.
-
-    Parameters
-    ----------
-    of : float, Packing or Snapshot
-        omega_max, radian / time, or a configuration with its dashpots.
-
-    Returns
-    -------
-    StableTimestep
-        Time, infinite for a packing without contacts; `error` is that of Arnoldi's iteration, 0 for a given omega_max.
-
-    Raises
-    ------
-    scipy.sparse.linalg.ArpackError
-        If the iteration does not converge.
-    """
-    if not isinstance(of, Packing | Snapshot):
-        return StableTimestep(2.0 / of)
-    stiffness = mass_weighted(stiffness_matrix(of), of)
-    active = active_coordinates(stiffness)
-    a = stiffness[active][:, active]
-    if not len(active):
-        return StableTimestep(np.inf)
-    damping = mass_weighted(damping_matrix(of), of)[active][:, active] if of.damped else None
-    return _largest_step(a, damping)
-
-
-def _largest_step(a: csr_array, damping: csr_array | None) -> StableTimestep:
-    """2/mu, by LAPACK for few coordinates, by Arnoldi's iteration for others, with the residual as its error."""
-    size = a.shape[0]
-    if size <= FEW:
-        if damping is None:
-            largest = np.sqrt(np.abs(eigvals(a.toarray())).max())
-        else:
-            pencil = np.block([[damping.toarray(), a.toarray()], [np.eye(size), np.zeros((size, size))]])
-            largest = eigvals(pencil).real.max()
-        return StableTimestep(2.0 / float(largest))
-    tolerance = LIMIT_OF_MANY if size > MANY else LIMIT_OF_FEW
-    vector = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
-    # mu^2 is an eigenvalue of A + mu G
-    mu, operator = 0.0, a
-    for loose in (True, *[False] * LOOKS):
-        if damping is None and loose:
-            continue
-        (value,), vectors = eigs(operator, 1, which="LM", v0=vector, tol=0.1 if loose else tolerance, ncv=12)
-        vector = np.ascontiguousarray(
-            vectors[:, 0].real if abs(value.imag) < abs(value) * 1e-3 else vectors.sum(axis=1).real
-        )
-        off = float(np.linalg.norm(operator @ vectors[:, 0] - value * vectors[:, 0]) / abs(value))
-        if damping is None:
-            mu = float(np.sqrt(abs(value)))
-            break
-        # mu^2 = lambda + c (mu - before), c being the slope of lambda in mu, but for what is not symmetric
-        c = float(vector @ (damping @ vector)) / float(vector @ vector)
-        before, mu = mu, 0.5 * (c + float(np.sqrt(c * c + 4 * abs(abs(value) - c * mu))))
-        if abs(mu - before) < tolerance * mu:
-            break
-        operator = a + mu * damping
-    return StableTimestep(2.0 / mu, 2.0 / mu * (0.5 * off + (0.0 if damping is None else abs(mu - before) / mu)))
 
 
 def unit_rounding(matrix: Floats) -> float:

@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...analysis import BadInputError, OutputError, Packing, PackingFileError
+from ...analysis import BadInputError, Packing, PackingFileError
 from ...analysis.files.atomic_write import BEGINNINGS
 from ...analysis.files.plain_file import open_plain, open_text
 from .disks import Disks
@@ -62,7 +62,7 @@ DUMP = Format("LAMMPS dump", "lammps_dump", (".dump", ".lammpstrj"), "read_custo
 RESTART = Format("LAMMPS restart", "lammps_restart", (".restart",), "read_restart", text=False)
 YADE = Format("YADE's text", "yade_mercury", ("line 1 is #format x_y_z_r",), "read_yade")
 MERCURY = Format("MercuryDPM's data", "yade_mercury", (".data, line 1 is N time bounds",), "read_mercury", frames=True)
-OTHER = Format("what MDAnalysis reads with radii", "mdanalysis_reader", (), "read_universe", frames=True)
+OTHER = Format("what MDAnalysis reads with radii", "mdanalysis_import", (), "read_universe", frames=True)
 
 FORMATS = (
     Format("VTK", "vtp", (".vtp",), writer="write_vtp"),
@@ -238,7 +238,4 @@ def write_packing(path: Path, packing: Packing, modes: Sequence[ModeVectors] = (
 
 
 def _write(format_: Format, path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
-    try:
-        return str(_import_module(format_, format_.writer)(path, frames, modes))
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror}.") from error
+    return str(_import_module(format_, format_.writer)(path, frames, modes))

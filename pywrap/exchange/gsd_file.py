@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis import Packing, PackingFileError
+from ...analysis.files.atomic_write import replace_whole
 from ...analysis.files.plain_file import check_plain
 from . import export_quantities
 from .disks import Disks, of_columns
@@ -69,7 +70,7 @@ def _disks(path: Path, frame: Any) -> Disks:
 def write_gsd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
     """A GSD file of one frame or several; what is in it, in words."""
     hoomd = needed_library("gsd.hoomd", path)
-    with hoomd.open(str(path), "w") as file:
+    with replace_whole(path) as new, hoomd.open(str(new), "w") as file:
         for number, each in enumerate(frames):
             frame = _frame(hoomd, each.packing)
             frame.configuration.step = number

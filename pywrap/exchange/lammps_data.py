@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis import PackingFileError
+from ...analysis.files.atomic_write import write_text
 from ..lammps.data_file import box_lines
 from . import export_quantities
 from .disks import Disks, of_columns, sphere_volume
@@ -100,7 +101,7 @@ def write_data(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) ->
     columns = [packing.top, 2 * packing.radius, density, *packing.position.T, *extra]
     for n, (top, d, rho, x, y, *more) in enumerate(zip(*(each.tolist() for each in columns), strict=True), 1):
         lines.append(f"{n} {1 + top} {d!r} {rho!r} {x!r} {y!r} 0.0 # " + " ".join(map(repr, more)))
-    path.write_text("\n".join(lines) + "\n")
+    write_text(path, "\n".join(lines) + "\n")
     exact = density * volume == packing.mass
     odd = "" if exact.all() else f" ({np.sum(~exact)} masses with a last bit of their own)"
     return f"LAMMPS reads places, radii, masses{odd} and types, and skips angles, slips, law and load in comments"

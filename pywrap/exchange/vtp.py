@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing
+from ...analysis.files.atomic_write import make_folder, write_whole
 from . import export_quantities
 from .export_quantities import Frame, ModeVectors
 
@@ -33,25 +34,35 @@ def write_vtp(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
     """A .vtp file; what is in it, in words."""
     (frame,) = frames
     packing = frame.packing
-    _tree(frame, modes).write(path, xml_declaration=True, encoding="utf-8")
+    write_xml(path, _tree(frame, modes))
     return f"{len(packing)} disks and {len(packing.contacts)} contacts, in float64"
 
 
 def write_pvd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
     """A .pvd file, ParaView's list of frames, and a folder of its name with a .vtp for each."""
-    folder = path.with_suffix("")
-    folder.mkdir(exist_ok=True)
-    root = Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
-    collection = ElementTree.SubElement(root, "Collection")
-    for number, frame in enumerate(frames):
-        name = f"{folder.name}/{number:05d}.vtp"
-        _tree(frame, modes).write(path.parent / name, xml_declaration=True, encoding="utf-8")
-        ElementTree.SubElement(collection, "DataSet", timestep=repr(float(frame.time)), part="0", file=name)
-    ElementTree.ElementTree(root).write(path, xml_declaration=True, encoding="utf-8")
+    write_frame_list(path, ((float(frame.time), _tree(frame, modes)) for frame in frames))
     return "displacements and what is known of forces"
 
 
-def _tree(frame: Frame, modes: list[ModeVectors]) -> ElementTree.ElementTree:
+def write_frame_list(path: Path, frames: Iterable[tuple[float, Element]]) -> None:
+    """A .pvd file and its folder, of times and pages of VTK."""
+    folder = path.with_suffix("")
+    make_folder(folder)
+    root = Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    collection = ElementTree.SubElement(root, "Collection")
+    for number, (time, page) in enumerate(frames):
+        name = f"{folder.name}/{number:05d}.vtp"
+        write_xml(path.parent / name, page)
+        ElementTree.SubElement(collection, "DataSet", timestep=repr(time), part="0", file=name)
+    write_xml(path, root)
+
+
+def write_xml(path: Path, page: Element) -> None:
+    """Replace a file by a page of XML."""
+    write_whole(path, ElementTree.tostring(page, encoding="utf-8", xml_declaration=True))
+
+
+def _tree(frame: Frame, modes: list[ModeVectors]) -> Element:
     packing = frame.packing
     numbers = export_quantities.scalars(packing) | (
         {} if packing.box_length is None else {"box_length": packing.box_length}
@@ -67,7 +78,7 @@ def _tree(frame: Frame, modes: list[ModeVectors]) -> ElementTree.ElementTree:
         for each in (on_disks, _of_contacts(packing))
     )
     centres = export_quantities.in_space(packing.position)
-    return ElementTree.ElementTree(write_poly_data(centres, _ends(packing), numbers, on_disks, on_contacts))
+    return write_poly_data(centres, _ends(packing), numbers, on_disks, on_contacts)
 
 
 def write_poly_data(

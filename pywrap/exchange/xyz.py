@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis import PackingFileError
+from ...analysis.files.atomic_write import replace_whole
 from . import export_quantities
 from .disks import Disks, of_columns
 from .export_quantities import Frame, ModeVectors
@@ -89,7 +90,7 @@ def _write_columns(frame: Frame, modes: list[ModeVectors]) -> list[tuple[str, st
 
 def write_xyz(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
     """An extended XYZ file of one frame or several; what is in it, in words."""
-    with path.open("w") as stream:
+    with replace_whole(path) as new, new.open("w") as stream:
         stream.writelines(_text(frame, modes) for frame in frames)
     return "all of the packing is in it, to the bit"
 

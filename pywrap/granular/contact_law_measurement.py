@@ -31,6 +31,10 @@ from .granular_commands import Commands, SnapshotError, wall_plane
 EXACT = 1e-6
 """Distance of a measured exponent from a multiple of 1/4: rounding of forces and overlaps leaves 1e-9 or less."""
 
+MEASURED = 1e-3, 0.1
+"""Overlaps at which laws are measured, in units of a radius: an overlap of 1e-10, as of spheres that barely touch, has
+lost ten digits, and one beyond a tenth is that of no contact."""
+
 
 class State(NamedTuple):
     """One contact: radii, masses (of a wall 0 and infinite) and overlap."""
@@ -181,7 +185,7 @@ def measure_law(bench: TwoParticleLammps, state: State, types: tuple[int, int], 
     bench : TwoParticleLammps
         LAMMPS with the law.
     state : State
-        A contact of the packing.
+        A contact of the packing; its law is measured at an overlap that is neither minute nor large.
     types : tuple of (int, int)
         Types of the two particles.
     who : str
@@ -192,7 +196,8 @@ def measure_law(bench: TwoParticleLammps, state: State, types: tuple[int, int], 
     SnapshotError
         If it is no power law of the kind above.
     """
-    state = state._replace(overlap=min(state.overlap, 0.1 * state.radii[0]))
+    least, most = (share * state.radii[0] for share in MEASURED)
+    state = state._replace(overlap=min(max(state.overlap, least), most))
     heavy = (3 * state.masses[0], state.masses[1] if bench.wall else 2 * state.masses[1])
     small = State((0.5 * state.radii[0], 0.8 * state.radii[1]), state.masses, state.overlap)
     states = [state, state._replace(overlap=0.5 * state.overlap), state._replace(masses=heavy), small]

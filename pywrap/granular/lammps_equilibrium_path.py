@@ -5,9 +5,17 @@ that is known, and what was reached beyond the largest one is kept: as a copy of
 LAMMPS in it. Contact histories stay what they are, to the bit; a restart file of LAMMPS may lose some. The instance of
 the user stays as it was.
 
-The load jumps, and the drag takes what the jump sets free. Motion ends soonest at the critical damping of the slowest
-mode, where the force that is out of balance is half of the drag. Where it is more than twice the drag, the rate of the
-drag is doubled. Where it is less than a quarter, since the packing creeps or a loose sphere rolls away, it is halved.
+**Newton's method.** A step of the load in which no contact slides moves particles by :math:`K^{-1}` times what is out
+of balance. LAMMPS moves them in one long step, in which slips advance, and gives the forces; some iterations with the K
+of the last equilibrium do. All is tried in a copy, and done in earnest if nothing slides, nothing has a negative
+eigenvalue, and the balance is that of a relaxation. Loads of 50 and 200 spheres then take 0.6 and 0.7
+of the time, and stand where a relaxation leaves them to 1e-6 of their way.
+
+**Relaxation.** Otherwise the load jumps, and the drag takes what the jump sets free. Motion ends soonest at the
+critical damping of the slowest mode, where the force that is out of balance is half of the drag. Where it is more than
+twice the drag, the rate of the drag is doubled. Where it is less than a quarter, since the packing creeps or a loose
+sphere rolls away, it is halved.
+
 The error of the path itself is not known: of increments half as large some contacts slide otherwise
 (:class:`~faultgouge.analysis.Onset` has None for it), and a second path with smaller increments tells it.
 """
@@ -26,13 +34,15 @@ from types import TracebackType
 from typing import Any, NoReturn
 
 import numpy as np
+from scipy.sparse import csc_array, eye_array
+from scipy.sparse.linalg import splu
 
-from ...analysis import NoEquilibriumError, Snapshot
+from ...analysis import NoEquilibriumError, Snapshot, negative_eigenvalues, stiffness_matrix
 from ...analysis.errors import FaultgougeError
-from ...analysis.packing.arrays import derive_frozen
+from ...analysis.packing.arrays import Floats, derive_frozen
 from . import forked_look
-from .from_lammps import from_lammps
-from .granular_commands import SnapshotError
+from .from_lammps import INTEGRATORS, from_lammps
+from .granular_commands import SnapshotError, read_commands, without_suffix
 
 REST = 1e-8
 """Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
@@ -40,6 +50,12 @@ rounding, 1e-12 of a force whose overlap is 1e-4 of a radius."""
 
 CHUNK = 2000
 """Steps between two looks: many beside the set-up of a run, few beside a relaxation."""
+
+ITERATIONS = 10
+"""Iterations of Newton's method, each of which must halve the residual until rounding stops it: six are the rule."""
+
+LONG = 1e6
+"""Length of a step in which particles are displaced, in time steps: so slow that dashpots have no share in forces."""
 
 SLOWEST, FASTEST = 1e-4, 0.2
 """Rates of the drag, per time step; explicit drag alternates from 1 on."""
@@ -211,13 +227,15 @@ class _Relaxation:
     ) -> None:
         self.lmp, self.apply, self.commands = lmp, apply, commands
         self.slides, self.balance, self.steps = slides, balance, steps
+        self.found: Snapshot | None = None  # the equilibrium where LAMMPS stands
         self.rate = 0.01  # of the drag, per time step: critical for a mode of 1000 steps
 
     def result(self, value: float) -> Snapshot | FaultgougeError:
         """The equilibrium at a value, or why there is none."""
         try:
             self.set(value)
-            found = self.relax(value)
+            found = self.displace_to_balance() or self.relax(value)
+            self.found = found
             change = forked_look.in_a_copy(lambda: self.force_change(value))
             if change == 0.0:
                 return SnapshotError(
@@ -253,6 +271,96 @@ class _Relaxation:
         change = float(np.linalg.norm(forces[1] - forces[0], axis=1).max())
         # forces have a rounding of 1e-16 of themselves, and of 1e-12 where overlaps are small beside coordinates
         return change / step if change > 1e-11 * np.abs(forces[0]).max() else 0.0
+
+    def displace_to_balance(self) -> Snapshot | None:
+        """Newton's method from the equilibrium where LAMMPS stands; None, with nothing changed, if it cannot serve."""
+        start = self.found
+        if start is None or not np.array_equal(start.contacts.closing, start.contacts.parting):
+            return None
+        if start.contacts.at_bound.any():
+            return None
+        try:
+            moves, found = forked_look.in_a_copy(lambda: self._try_newton(start))
+            if found is None:
+                return None
+        except SnapshotError:  # particles that nothing holds fly off: the relaxation has its own words for it
+            return None
+        again = iter(moves)
+        self._displace(start, lambda _: next(again, None))
+        return found
+
+    def _try_newton(self, start: Snapshot) -> tuple[list[Floats], Snapshot | None]:
+        """Newton's method with a log of its own, which has commands that this process has not given."""
+        with TemporaryDirectory(prefix="faultgouge") as folder:
+            _own_log(self.lmp, Path(folder))
+            return self._newton(start)
+
+    def _newton(self, start: Snapshot) -> tuple[list[Floats], Snapshot | None]:
+        """Displacements to the balance, and the packing there, if it is an equilibrium like that of a relaxation."""
+        stiffness = stiffness_matrix(start)
+        # what no contact feels has zero rows, and stays where it is
+        solver = splu(csc_array(stiffness + 1e-9 * abs(stiffness).max() * eye_array(start.coordinates)))
+        allowed = self.balance * float(start.contacts.normal_force.mean())
+        moves: list[Floats] = []
+        sizes: list[float] = []
+
+        def next_move(forces: Floats) -> Floats | None:
+            sizes.append(float(np.linalg.norm(forces.reshape(start.axes, -1), axis=0).max()))
+            slow = len(sizes) > 1 and sizes[-1] > 0.5 * sizes[-2]
+            if sizes[-1] <= 1e-4 * allowed or slow or len(sizes) > ITERATIONS:
+                return None
+            moves.append(np.asarray(solver.solve(forces)))
+            return moves[-1]
+
+        self._displace(start, next_move)
+        if sizes[-1] > allowed:
+            return moves, None
+        found = self.look()
+        good = found.residual <= self.balance * found.contacts.normal_force.mean()
+        good = good and not found.contacts.at_bound.any() and len(negative_eigenvalues(found)) == 0
+        return moves, found if good else None
+
+    def _displace(self, start: Snapshot, next_move: Callable[[Floats], Floats | None]) -> None:
+        """Displace particles as the forces on those that are free say, with slips that advance, until none is said."""
+        lmp, d = self.lmp, start.dimension
+        step = float(lmp.extract_global("dt"))
+        lines = [line for name, line in self._integrators() if lmp.has_id("fix", name)]
+        for line in lines:
+            lmp.command(f"unfix {line.split()[1]}")
+        lmp.command("fix faultgouge_moves all nve/noforce")
+        lmp.command(f"timestep {LONG * step:.17g}")
+
+        def arrays(*names: str) -> list[Floats]:
+            count = lmp.extract_setting("nlocal")
+            return [lmp.numpy.extract_atom(name)[:count] for name in names]
+
+        while True:
+            v, omega = arrays("v", "omega")
+            v[:] = omega[:] = 0.0
+            lmp.command("run 0 post no")
+            ids, f, torque, v, omega = arrays("id", "f", "torque", "v", "omega")
+            place = np.searchsorted(start.ids, ids)
+            turns = start.axes - d
+            forces = np.zeros((start.axes, len(start)))
+            forces[:d, place] = f[:, :d].T
+            forces[d:, place] = torque[:, 3 - turns :].T / start.radius[place]
+            moved = next_move(np.where(start.free, forces, 0.0).ravel())
+            if moved is None:
+                break
+            parts = moved.reshape(start.axes, -1) / (LONG * step)
+            v[:, :d] = parts[:d, place].T
+            omega[:, 3 - turns :] = (parts[d:, place] / start.radius[place]).T
+            lmp.command("run 1 post no")
+        lmp.command("unfix faultgouge_moves")
+        for line in lines:
+            lmp.command(line)
+        lmp.command(f"timestep {step:.17g}")
+
+    def _integrators(self) -> list[tuple[str, str]]:
+        """IDs and lines of the fixes that move particles."""
+        given = self.commands or forked_look.in_a_copy(lambda: forked_look.log_of(self.lmp)) or []
+        fixes = read_commands(given, log=self.commands is None).fixes
+        return [(name, line) for name, line in fixes.items() if without_suffix(line.split()[3]) in INTEGRATORS]
 
     def relax(self, value: float) -> Snapshot:
         """Run with drag until the packing rests."""

@@ -10,7 +10,7 @@ from ...analysis import BadInputError, Snapshot
 from ..lammps.instance import lammps_instance
 from . import forked_look
 from .from_lammps import BALANCE, from_lammps
-from .granular_commands import SnapshotError
+from .granular_commands import SnapshotError, check_fixes, check_pair, read_commands
 
 
 def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE) -> Snapshot:
@@ -26,13 +26,13 @@ def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE) -> S
     Raises
     ------
     BadInputError
-        If the deck is missing, or has a wall that does not hand out its contacts.
+        If the deck is missing, or what cannot be taken stands in its lines.
     SnapshotError
         If LAMMPS stops, or the packing cannot be taken.
     """
     if not path.is_file():
         raise BadInputError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
-    _refuse_silent_walls(path)
+    _check_deck(path)
     here = Path.cwd()
     with TemporaryDirectory(prefix="faultgouge") as folder:
         world = MPI.COMM_WORLD
@@ -51,13 +51,31 @@ def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE) -> S
     return found
 
 
-def _refuse_silent_walls(path: Path) -> None:
-    """Say before a long run that a wall of the deck lacks the word contacts, if the wall stays."""
-    text = path.read_text(errors="replace").replace("&\n", " ")
-    lines = [line.split("#")[0].split() for line in text.splitlines()]
-    gone = {words[1] for words in lines if words[:1] == ["unfix"] and len(words) > 1}
-    for words in lines:
-        if words[:1] == ["fix"] and words[3:4] == ["wall/gran"] and "contacts" not in words and words[1] not in gone:
+BRANCHES = ("if", "include", "jump", "next", "python", "shell")
+"""Commands after which the lines of a deck are not those that LAMMPS runs."""
+
+
+def _check_deck(path: Path) -> None:
+    """Refuse before a long run what the lines of a deck say that stands at its end, as far as they have no variables.
+
+    What is seen here is looked at again after the run, when all lines have numbers.
+    """
+    lines = path.read_text(errors="replace").replace("&\n", " ").splitlines()
+    words = [line.split("#")[0].split() for line in lines]
+    gone = {line[1] for line in words if line[:1] == ["unfix"] and len(line) > 1}
+    for line in words:
+        if line[:1] == ["fix"] and line[3:4] == ["wall/gran"] and "contacts" not in line and line[1] not in gone:
             raise BadInputError(
-                f"{path}: fix {words[1]} wall/gran does not hand out its contacts: write contacts at its end."
+                f"{path}: fix {line[1]} wall/gran does not hand out its contacts: write contacts at its end."
             )
+    if any(line[0] in BRANCHES or (line[0] == "pair_style" and "$" in "".join(line)) for line in words if line):
+        return
+    if not any(line[:1] == ["pair_style"] for line in words):
+        return
+    commands = read_commands(lines, log=True)
+    styles = {name: line.split()[3] for name, line in commands.fixes.items()}
+    try:
+        check_pair(commands, [])
+        check_fixes({name: style for name, style in styles.items() if "$" not in style}, commands)
+    except SnapshotError as error:
+        raise BadInputError(f"{path}: {error}") from error

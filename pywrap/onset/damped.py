@@ -26,6 +26,7 @@ from ...analysis.damped_onset.windows import (
 from ...analysis.onset import LIMITS, Family, Increments, full_operator, takes_all_modes
 from ...analysis.onset.all_windows import windows_along
 from ...analysis.onset.modes import contact_states
+from ...analysis.onset.search import unit_of
 from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
@@ -283,11 +284,12 @@ class Undamped:
         begin = int(np.searchsorted(loads, first, side="right")) - 1
         narrowest = LIMITS.narrowest * float(np.abs(loads).max())
         states: dict[float, bytes] = {}
+        unit = unit_of(full_operator(ramp.path(float(loads[max(begin, 0)]))))
 
         def operator(fx: float) -> csr_array:
             packing = ramp.path(fx)
             states[fx] = contact_states(packing)
-            return full_operator(packing)
+            return full_operator(packing) / unit
 
         family = Family(operator, narrowest, states=states.__getitem__)
         self._along = iter(windows_along(family, loads[begin:])) if first < loads[-1] else iter(())

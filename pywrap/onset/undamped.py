@@ -15,7 +15,6 @@ from ...analysis.onset.search import windows_rows
 from ...analysis.packing.arrays import Floats
 from ...analysis.spectrum.spectrum import active_coordinates
 from ...analysis.table_display import TableDisplay
-from ...analysis.uncertain_digits import with_uncertainty
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
 from ..runs.equilibrium_path import EquilibriumPath, loads
@@ -52,9 +51,8 @@ class OnsetRun(TableDisplay):
     between: dict[float, Packing]
 
     def __repr__(self) -> str:
-        found = with_uncertainty(self.onset.fx_c, self.onset.error)
         return (
-            f"<OnsetRun: mu = {self.mu:g}, F_x^c = {found}, {len(self.onset.windows)} windows, "
+            f"<OnsetRun: mu = {self.mu:g}, {self.onset.describe()}, {len(self.onset.windows)} windows, "
             f"{len(self.equilibria)} equilibria up to F_x = {self.equilibria[-1].fx:g}>"
         )
 

@@ -6,9 +6,9 @@ and more decades, and then levels off. The largest D is the size of the eruption
 
 **Over.** A run is over at time t when two conditions hold: the largest D of its second half, (t/2, t], is at most 1.5
 times that of the quarter before, (t/4, t/2]; and t is long enough for D to grow by `DECADES` decades at the rate of the
-spectrum. A stable packing is observed for `QUIET` times and then reported as stable, unless D *rises* nevertheless. A
-run that is not over in the time of the scene is cut off, and its size is a lower bound. A layer that has slid by the
-diameter of a disk *flows*.
+spectrum. A stable packing is observed for `QUIET` units of time and then reported as stable, unless D *rises*
+nevertheless. A run that is not over in the time of the scene is cut off, and its size is a lower bound. A layer that
+has slid by the diameter of a disk *flows*.
 
 **What ends the growth** is determined when D first reaches a tenth of its largest value. Each sample examines the
 contacts: *opens* if an initial contact has opened by then; *slides* if none has opened, but a contact slides at its
@@ -37,13 +37,13 @@ from ...analysis.packing.packing import Floats
 from ...pywrap import Engine
 from ...pywrap.lammps.dynamics import Dynamics, Motion
 from ...pywrap.runs.undamped import time_step
-from ..packing_tools import contact_pairs
+from ..packing_tools import contact_pairs, unit_of_time
 
 DECADES = 24.0
 """Decades of D between its noise, 1e-27 in the first steps, and the square of a tenth of an overlap."""
 
 QUIET = 50.0
-"""Time for which a stable packing is watched."""
+"""Times for which a stable packing is watched, in `unit_of_time`."""
 
 SAMPLES = 400
 """Looks at disks and contacts in a run of the full time, and at least so many in a shorter one."""
@@ -106,13 +106,13 @@ def erupt(start: Start) -> dict[str, Any]:
     """
     with threadpool_limits(1):
         rate = growth_rate(start.packing)
-        dt = time_step(start.packing)
+        dt, unit = time_step(start.packing), unit_of_time(start.packing)
         looks: list[Look] = []
         with Engine(start.packing, MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
             watch = _Watch(start)
             for at, motion in _course(dynamics, dt, start.time):
                 looks.append(watch.look(at, motion, engine.packing))
-                if _over(looks, rate) or _flows(looks, start.packing):
+                if _over(looks, rate, unit) or _flows(looks, start.packing):
                     break
             balance = _balance(dynamics, start.packing)
     columns: dict[str, Floats] = {name: np.array([each[name] for each in looks]) for name in looks[0]}
@@ -125,8 +125,8 @@ def erupt(start: Start) -> dict[str, Any]:
         **{name: float(columns[name].max()) for name in ("msd", "kinetic_energy")},
         "slip": float(np.abs(columns["slip"]).max()),
         **{name: int(columns[name].max()) for name in ("lost", "gained", "sliding")},
-        **_ending(start, looks, columns, rate),
-        "noise": _noise(columns),
+        **_ending(start, looks, columns, rate, unit),
+        "noise": _noise(columns, unit),
         "balance": balance,
         "series": {name: column.tolist() for name, column in columns.items()},
     }
@@ -150,11 +150,11 @@ def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[flo
         done = step
 
 
-def _over(looks: list[Look], rate: float) -> bool:
+def _over(looks: list[Look], rate: float, unit: float) -> bool:
     """Whether a run is over, see the module."""
     t = looks[-1]["time"]
     if rate == 0:
-        return t >= QUIET
+        return t >= QUIET * unit
     if t < DECADES * np.log(10) / rate:
         return False
     quarter = max((each["msd"] for each in looks if t / 4 < each["time"] <= t / 2), default=0.0)
@@ -215,20 +215,20 @@ def _balance(dynamics: Dynamics, packing: Packing) -> float:
     return float(abs(after - before - work) / max(abs(work), after, before))
 
 
-def _noise(columns: dict[str, Floats]) -> float:
+def _noise(columns: dict[str, Floats], unit: float) -> float:
     """Largest D of the first time unit."""
-    return float(columns["msd"][columns["time"] <= 1].max(initial=float(columns["msd"][0])))
+    return float(columns["msd"][columns["time"] <= unit].max(initial=float(columns["msd"][0])))
 
 
-def _ending(start: Start, looks: list[Look], columns: dict[str, Floats], rate: float) -> dict[str, Any]:
+def _ending(start: Start, looks: list[Look], columns: dict[str, Floats], rate: float, unit: float) -> dict[str, Any]:
     """When and by what the growth ended, see the module."""
     ended: float | None = None
-    ends: Ends = "stable" if columns["msd"].max() <= RISES * _noise(columns) else "rises"
+    ends: Ends = "stable" if columns["msd"].max() <= RISES * _noise(columns, unit) else "rises"
     if rate > 0:
         place = int(np.argmax(columns["msd"] >= TENTH * columns["msd"].max()))
         ended = float(columns["time"][place])
         upto = slice(0, place + 1)
         ends = "opens" if columns["lost"][upto].any() else "slides" if columns["sliding"][upto].any() else "law"
-        if not _over(looks, rate):
+        if not _over(looks, rate, unit):
             ends = "cut off"
     return {"ended": ended, "ends": "flows" if _flows(looks, start.packing) else ends}

@@ -50,7 +50,11 @@ def over_load(courses: Mapping[str, Course], names: Sequence[str] = ("share", "g
         seen = {load for course in courses.values() for load in course["loads"]}
         axes.set_xticks([load for load in TICKS if load in seen], [f"{load:g}" for load in TICKS if load in seen])
         axes.xaxis.set_minor_formatter(NullFormatter())
-        if name in ("growth_rate", "least_q"):
+        found = np.concatenate([np.ravel(np.array(course[name], dtype=float)) for course in courses.values()])
+        if not np.any(np.isfinite(found) & (found > 0)):
+            axes.text(0.5, 0.5, "no motion grows", transform=axes.transAxes, ha="center", color=INK)
+            axes.set_xlim(0.5 * min(seen), 2 * max(seen))
+        elif name in ("growth_rate", "least_q"):
             axes.set_yscale("log")
         if name == "least_q":
             axes.axhspan(*ROCK, color="0.9", zorder=0)

@@ -86,7 +86,7 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
     )
     # exact but for the product's rounding
     weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
-    if weakened and fx <= weakened[0].onset.fx_c:
+    if weakened and weakened[0].onset.windows[0].kind != "start" and fx <= weakened[0].onset.fx_c:
         return (
             f"F_x = {fx:g} is below the onset {weakened[0].onset.fx_c:g} of the weakened friction, too: no "
             "window between the two, and nothing to erupt."

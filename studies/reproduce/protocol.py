@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from ...analysis.files.atomic_write import make_folder, write_json, write_text
-from ...analysis.uncertain_digits import with_uncertainty
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
 from ...pywrap.settling.settle import settle_bed
@@ -80,5 +79,5 @@ def _ramps(scene: Scene, path: Path, say: Say) -> list[OnsetRun]:
         say(f"mu = {mu:g}: {'' if shared else 'settling, '}ramp and onset")
         here = path if number == 0 else path.with_stem(f"{path.stem}-mu{mu:g}")
         runs.append(recorded_ramp(scene, mu, here, bed))
-        say(f"mu = {mu:g}: F_x^c = {with_uncertainty(runs[-1].onset.fx_c, runs[-1].onset.error)}")
+        say(f"mu = {mu:g}: {runs[-1].onset.describe()}")
     return runs

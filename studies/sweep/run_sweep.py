@@ -11,17 +11,16 @@ results.jsonl are not computed again. A last line that a kill has truncated is c
 
 from __future__ import annotations
 
-import fcntl
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
 
-from ...analysis.files.atomic_write import make_folder, write_json, write_text
+from ...analysis.files.atomic_write import lock_output, make_folder, write_json, write_text
 from ...analysis.files.plain_file import read_plain_text
 from ...pywrap import SceneError
 from .. import result_rows
@@ -31,7 +30,7 @@ from .table import Row, write_tables
 from .tasks import TASKS
 from .workers import compute_points
 
-LINES, ASKED, LOCK = "results.jsonl", "sweep.json", "sweep.lock"
+LINES, ASKED = "results.jsonl", "sweep.json"
 
 
 def run_sweep(
@@ -71,7 +70,7 @@ def run_sweep(
 
     Raises
     ------
-    SceneError
+    OutputError
         If another process writes to the folder.
     WorkerError
         If workers are killed repeatedly.
@@ -81,7 +80,7 @@ def run_sweep(
         if MPI.COMM_WORLD.rank != 0:
             return []
         make_folder(output)
-        with _lock_folder(output):
+        with lock_output(output):
             write_json(output / ASKED, sweep.as_dict() | {"shard": list(part)})
             known = read_results(output / LINES)
             missing = [point for point in points if point.key not in known]
@@ -140,9 +139,10 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
         known |= read_results(part / LINES)
     table = [known[point.key] for point in sweep.points if point.key in known]
     make_folder(output)
-    write_json(output / ASKED, sweep.as_dict() | {"shard": [1, 1]})
-    write_text(output / LINES, "".join(json.dumps(row) + "\n" for row in table))
-    write_tables(table, sweep.names, output)
+    with lock_output(output):
+        write_json(output / ASKED, sweep.as_dict() | {"shard": [1, 1]})
+        write_text(output / LINES, "".join(json.dumps(row) + "\n" for row in table))
+        write_tables(table, sweep.names, output)
     say(f"{len(table)} of {len(sweep.points)} scenes from {len(parts)} folders; written: {output}/results.csv")
     if len(table) < len(sweep.points):
         say(f"the other {len(sweep.points) - len(table)} are in none of them: `faultgouge sweep` goes on from here")
@@ -154,21 +154,8 @@ def _read(path: Path) -> dict[str, Any]:
         value = json.loads(read_plain_text(path))
     except OSError as error:
         raise SceneError(f"{path} cannot be read ({error.strerror}): correct its path") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise SceneError(f"{path} is not valid JSON ({error}): give a file that faultgouge has written") from None
     if not isinstance(value, dict):
         raise SceneError(f"{path} is no result of faultgouge: give a file that it has written")
     return value
-
-
-@contextmanager
-def _lock_folder(folder: Path) -> Iterator[None]:
-    """Keep other processes out of a folder; the lock goes with the process."""
-    with (folder / LOCK).open("w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise SceneError(
-                f"{folder}: another process writes to this folder: wait for its end, or give every shard its own folder"
-            ) from None
-        yield

@@ -132,9 +132,10 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
         layer is fastest, time.
     """
     if growth_rate(packing) > 0:
+        where = f"at F_x = {packing.fx:.10g}, below the onset," if packing.fx > 0 else "before any shear is added"
         raise SceneError(
-            f"at F_x = {packing.fx:.10g}, below the onset, the packing is unstable already (by another window, or a "
-            "negative eigenvalue): nothing is at rest there to be triggered; take other distances or another seed"
+            f"{where} the packing is unstable already: nothing is at rest there to be triggered; take other distances "
+            "or another seed"
         )
     wanted, v0 = settings(scene), threshold(scene)
     force = layer_force(packing, 1.0) if wanted.on == "layer" else floor_force(packing)
@@ -193,7 +194,12 @@ def _bracket(wave: Wave) -> tuple[float, float, int, float]:
         raise SceneError(f"no wave up to {above:.3g} triggers at omega = {wave.expected['omega']:g}: lower friction.v0")
     if below < predicted:
         runs += 1
-        while (time := _triggers(wave, below)) is not None and runs < MOST:
+        while (time := _triggers(wave, below)) is not None:
+            if runs >= MOST or _triggers(wave, 0.0) is not None:
+                raise SceneError(
+                    f"at F_x = {wave.packing.fx:.6g} the layer exceeds v_0 = {threshold(wave.scene):g} without a wave, "
+                    "by rounding noise, so that no amplitude is critical: raise friction.v0"
+                )
             below, above, reached, runs = below / WIDEN, below, time, runs + 1
     return below, above, runs, reached
 

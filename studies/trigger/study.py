@@ -86,11 +86,12 @@ def _onset(scene: Scene, work: Work) -> Row:
     mu, undamped = scene.law.mus[0], None
     if scene.damping is None:
         found = onset_run(scene, mu).onset
-        fx_c, error = found.fx_c, found.error
+        fx_c, error, says = found.fx_c, found.error, found.describe()
     else:
         run = damped_onset_run(scene, mu)
         fx_c, error, undamped = run.fx_c, run.error, None if run.undamped is None else run.undamped.fx_c
-    work.say(f"F_x^c = {with_uncertainty(fx_c, error)}")
+        says = f"F_x^c = {with_uncertainty(fx_c, error)}"
+    work.say(says)
     return work.rows.append(kind="onset", fx_c=fx_c, error=error, undamped_fx_c=undamped)
 
 

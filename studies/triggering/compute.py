@@ -43,6 +43,7 @@ from ...pywrap.runs.equilibrium_path import next_equilibrium
 from ...pywrap.runs.undamped import perturb, time_step, weakening_of
 from ...pywrap.scenes.sections import Friction
 from ...pywrap.scenes.validation import require_section
+from ..packing_tools import unit_of_time
 from .forecast import JUMP_SHARE, Forecast, forecast
 
 EARLY = 2000
@@ -70,7 +71,7 @@ ABOVE_NOISE = 1e3
 """How much stronger the perturbation is that is compared with the linear response: a million times in D."""
 
 COMPARED_TIME = 50.0
-"""Length of that run, time: a few hundred periods of the pair."""
+"""Length of that run, in `unit_of_time`: a few hundred periods of the pair."""
 
 
 Series = dict[str, Floats]
@@ -297,7 +298,7 @@ def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: O
     if below is not None:
         run("control", settings.amplitude, weakening, start=below)
     packing, amplitude = start.packing, ABOVE_NOISE * settings.amplitude
-    run("strong", amplitude, time=min(settings.time, COMPARED_TIME))
+    run("strong", amplitude, time=min(settings.time, COMPARED_TIME * unit_of_time(packing)))
     response = linear_response(
         packing,
         runs["strong"]["time"],

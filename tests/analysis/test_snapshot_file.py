@@ -1,10 +1,12 @@
 """A run.h5 that holds a Snapshot gives it back to the bit, or is refused."""
 
+import h5py
 import numpy as np
 import pytest
 from test_linearised_contacts import make
 
 from faultgouge.analysis import PackingFileError
+from faultgouge.analysis.files.checksummed_file import new_file, write
 from faultgouge.analysis.files.snapshot_file import holds_snapshot, read_snapshot, write_snapshot
 
 
@@ -36,3 +38,38 @@ def test_damage_is_refused(tmp_path):
     with pytest.raises(PackingFileError, match="does not exist"):
         read_snapshot(tmp_path / "none.h5")
     assert not holds_snapshot(tmp_path / "none.h5")
+
+
+def elsewhere(file):
+    del file["snapshot/radius"]
+    file.create_dataset("snapshot/radius", (7,), "f8", external=[("raw", 0, 56)])
+
+
+def linked(file):
+    del file["snapshot/radius"]
+    file["snapshot/radius"] = h5py.ExternalLink("other.h5", "/radius")
+
+
+def huge(file):
+    del file["snapshot/radius"]
+    file.create_dataset("snapshot/radius", (10**13,), "f8", chunks=(1000,))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (elsewhere, "numbers in another file"),
+        (linked, "link to another file"),
+        (huge, "more than its 0 bytes hold"),
+    ],
+)
+def test_what_the_checksum_does_not_cover_is_refused(tmp_path, change, says):
+    path = tmp_path / "run.h5"
+    write_snapshot(path, make(2))
+    with h5py.File(path) as stored, new_file() as file:
+        for name in stored:
+            stored.copy(name, file)
+        change(file)
+        write(path, file)
+    with pytest.raises(PackingFileError, match=says):
+        read_snapshot(path)

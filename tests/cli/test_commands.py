@@ -3,14 +3,17 @@
 import json
 import time
 from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from reference_layer import LAYER, toml
+from reference_layer import LAYER, SMALL, toml
 
 from faultgouge.analysis import (
     Contacts,
     MindlinLaw,
+    NoEquilibriumError,
     Packing,
     RunFile,
     eigenvalues,
@@ -21,6 +24,8 @@ from faultgouge.analysis import (
 from faultgouge.analysis.motion.transient import transient_gains
 from faultgouge.commands import terminal
 from faultgouge.pywrap import Record, Scene, settle
+from faultgouge.pywrap.lammps.instance import lammps_instance
+from faultgouge.pywrap.settling.settle import settle_bed
 from fuzz.kills import difference, results
 
 SECTIONS = {
@@ -192,6 +197,79 @@ def test_onset_as_json_and_among_some_modes(faultgouge_here, tmp_path):
         assert result.get("modes") == modes
         assert result["fx_c"] == pytest.approx(0.0218330564080, rel=1e-9)
         assert result["windows"][0].keys() >= {"fx_onset", "fx_end", "lambda", "error"}
+
+
+@pytest.mark.slow
+def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge, tmp_path, monkeypatch):
+    """As two pipes of a shell see them; the onset of the reference packing is the first of its windows."""
+    scene = LAYER + toml({"ramp": {"step": 5.5e-3, "until": 0.022}, "perturb": {"fx": 0.022, "time": 0.1}})
+    (tmp_path / "scene.toml").write_text(scene)
+    first = faultgouge("onset", "scene.toml")
+    found, every = (json.loads(faultgouge("onset", "scene.toml", *more, "--json").stdout) for more in ((), ("--all",)))
+    assert first.stdout.startswith("mu = 1: F_x^c = 0.02183305")
+    assert "two eigenvalues merge there" in first.stdout
+    assert first.stderr == ""
+    table = faultgouge("onset", "scene.toml", "--all").stdout.splitlines()
+    assert [line.split()[:2] for line in table[:2]] == [["mu", "="], ["from", "F_x"]]
+    assert len(table) == 2 + len(every["windows"])
+    assert (len(found["windows"]), found["fx_c"]) == (1, every["fx_c"])
+    assert every["windows"] == sorted(every["windows"], key=lambda window: window["fx_onset"])
+    for command, result in (("settle", "100 disks"), ("ramp", "F_x = 0.022 reached"), ("perturb", "F_x = 0.022, mu")):
+        done = faultgouge(command, "scene.toml", "-o", f"{command}.h5")
+        assert done.stdout.startswith(result)
+        assert result not in done.stderr
+
+
+def test_an_estimate_is_progress(faultgouge_here, tmp_path, monkeypatch):
+    monkeypatch.setattr("faultgouge.pywrap.scenes.estimate.describe_work", lambda *_: "about a day")
+    for more in ((), ("--json",)):
+        done = faultgouge_here("onset", "scene.toml", *more, code=1)  # no onset up to the end of this ramp
+        assert (done.stdout, done.stderr.splitlines()[0]) == ("", "about a day")
+
+
+@pytest.mark.slow
+def test_a_bed_is_settled_once_for_all_friction_coefficients(faultgouge_here, tmp_path, monkeypatch):
+    """And the dumps of a ramp are written by the LAMMPS that has the packing, and by no other."""
+    settled, opened = [], []
+    for name, calls, what in (
+        ("faultgouge.pywrap.settling.settle.settle_bed", settled, settle_bed),
+        ("faultgouge.studies.reproduce.protocol.settle_bed", settled, settle_bed),
+        ("faultgouge.pywrap.lammps.engine.lammps_instance", opened, lammps_instance),
+    ):
+        monkeypatch.setattr(
+            name, partial(lambda calls, what, *given, **more: calls.append(1) or what(*given, **more), calls, what)
+        )
+    small = SMALL | {"packing": SMALL["packing"] | {"seed": 2}}
+    (tmp_path / "scene.toml").write_text(toml(small | {"law": {"kn": 2e5, "mu": [1.0, 0.8, 0.5]}}))
+    assert len(faultgouge_here("onset", "scene.toml").stdout.splitlines()) == 6
+    assert len(settled) == 1
+    settled.clear()
+    monkeypatch.setattr("faultgouge.studies.reproduce.protocol.recorded_ramp", ramps_that_end(beds := []))
+    faultgouge_here("reproduce", "scene.toml", "-o", "out", code=1)
+    assert len(settled) == 1
+    assert len(beds) == 3
+    assert all(bed is beds[0] is not None for bed in beds)
+    counts = []
+    for dumps in (False, True):
+        opened.clear()
+        (tmp_path / "scene.toml").write_text(toml(small | {"output": {"dumps": dumps}}))
+        faultgouge_here("ramp", "scene.toml", "-o", f"{dumps}.h5")
+        counts.append(len(opened))
+    assert counts[0] == counts[1]
+    assert len(list(tmp_path.glob("True.*.disks"))) == 5
+
+
+def ramps_that_end(beds):
+    """A ramp of which no more is asked than the bed that it is given; the third one ends the command."""
+
+    def ramp(scene, mu, path, bed):
+        beds.append(bed)
+        if len(beds) == 3:
+            raise NoEquilibriumError("enough")
+        onset = SimpleNamespace(describe=lambda: "none")
+        return SimpleNamespace(onset=onset)
+
+    return ramp
 
 
 @pytest.mark.slow

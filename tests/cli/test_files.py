@@ -1,5 +1,6 @@
 """Files as users have them: pipes, names with blanks and quotes, links, files that others write, and read-only ones."""
 
+import errno
 import json
 import os
 import signal
@@ -7,10 +8,12 @@ import subprocess
 import sys
 
 import pytest
-from reference_layer import LAYER, REFERENCE, toml
+from reference_layer import LAYER, REFERENCE, SMALL, toml
 
+from faultgouge.analysis import RunFile
 from faultgouge.analysis.files.atomic_write import lock_output, write_text
 from faultgouge.pywrap import Engine, Scene, settle
+from faultgouge.pywrap.exchange import write_packing
 from faultgouge.pywrap.lammps.plain_file_names import plain_name, temporary_folder
 
 SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 2e-3}, "output": {"dumps": True}})
@@ -33,9 +36,46 @@ def test_a_pipe_is_no_scene_and_no_signal(refusal, tmp_path):
     assert "no plain file" in refusal("perturb", "scene.toml")
 
 
+@pytest.mark.parametrize("name", ["pipe", "pipe.h5"])
+@pytest.mark.parametrize(
+    "command", ["spectrum", "draw -o x.png", "movie -o x.gif", "view -o x.html", "export -o x.vtp", "import -o x.h5"]
+)
+def test_a_pipe_is_no_stored_packing(refusal, tmp_path, command, name):
+    os.mkfifo(tmp_path / name)
+    verb, *more = command.split()
+    assert "is no file" in (said := refusal(verb, name, *more)) or "no plain file" in said
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("command", ["spectrum", "draw", "export"])
+def test_a_pipe_is_no_dump(refusal, tmp_path, command):
+    os.mkfifo(tmp_path / "pipe.disks")
+    assert "no plain file" in refusal(command, "pipe.disks")
+
+
+def test_no_pipe_is_read_beside_a_file(refusal, tmp_path, reference_packing):
+    write_packing(tmp_path / "packing.xyz", reference_packing(1.0))
+    (tmp_path / "scene.toml").write_text(SCENE + toml({"friction": {"v0": 1e-7, "v_ss": "10 v0"}}))
+    (tmp_path / "out").mkdir()
+    for name in ("pipe", "out/trigger.jsonl"):
+        os.mkfifo(tmp_path / name)
+    for more in ("--contacts pipe", "--top ids:@pipe", "--scene pipe"):
+        assert "no plain file" in refusal("import", "packing.xyz", *more.split())
+    assert "no plain file" in refusal("trigger", "scene.toml", "-o", "out")
+
+
+DEEP = "[" * 20_000 + "]" * 20_000
+
+
 def test_what_is_nested_too_deeply_is_refused(refusal, tmp_path):
-    (tmp_path / "scene.toml").write_text("a = " + "[" * 20_000 + "]" * 20_000)
-    assert "the scene is nested too deeply" in refusal("onset", "scene.toml")
+    for name, what in (("scene.toml", "onset"), ("sweep.toml", "sweep")):
+        (tmp_path / name).write_text(f"a = {DEEP}")
+        assert "is nested too deeply" in refusal(what, name)
+    (tmp_path / "packing.json").write_text(f'{{"x": {DEEP}}}')
+    assert "nested too deeply" in refusal("import", "packing.json")
+    (tmp_path / "scene.toml").write_text(SCENE + toml({"friction": {"v0": 1e-7, "v_ss": "10 v0"}}))
+    (tmp_path / "trigger.jsonl").write_text(f"{DEEP}\n")
+    assert "line 1 is no result of a study" in refusal("trigger", "scene.toml", "-o", ".")
 
 
 @pytest.mark.slow
@@ -85,30 +125,81 @@ def test_a_result_does_not_replace_what_it_is_made_of(refusal, tmp_path, command
     assert (tmp_path / name).read_bytes() == before
 
 
-@pytest.mark.parametrize("command", ["onset", "settle"])
-def test_a_read_only_file_is_kept(refusal, tmp_path, command):
+@pytest.fixture
+def stored(tmp_path, reference_packing):
+    """A folder with a scene, and a run.h5 of one equilibrium."""
     (tmp_path / "scene.toml").write_text(SCENE)
-    (tmp_path / "kept").write_text("kept")
-    (tmp_path / "kept").chmod(0o444)
-    assert "kept cannot be written: it is read-only" in refusal(command, "scene.toml", "-o", "kept", code=1)
-    assert (tmp_path / "kept").read_text() == "kept"
+    packing = reference_packing(1.0)
+    with RunFile.create(tmp_path / "run.h5", packing, {}) as file:
+        file.append(packing, floor=1e-11, evaluations=0)
+        file.complete = True
+    return tmp_path
+
+
+WRITTEN = {
+    "ramp scene.toml": "new.h5",
+    "onset scene.toml": "onset.json",
+    "draw run.h5": "run.png",
+    "movie run.h5": "run.gif",
+    "view run.h5": "run.html",
+    "export run.h5": "run.vtp",
+}
+"""What commands write to -o."""
+NEW = WRITTEN | {"init": "new.toml", "import run.vtp": "new.h5"}
+"""And what those write that replace no file."""
+
+
+@pytest.mark.parametrize("command", NEW)
+def test_a_file_that_another_run_writes_is_refused_before_work(refusal, stored, command):
+    name = NEW[command]
+    with lock_output(stored / name):
+        assert "another run is writing it" in refusal(*command.split(), "-o", name, code=1)
+    assert {path.name for path in stored.iterdir()} == {"scene.toml", "run.h5"}
+    with lock_output(stored / name):  # the lock went with the other
+        pass
+
+
+@pytest.mark.parametrize("command", WRITTEN)
+def test_a_read_only_file_is_kept(refusal, stored, command):
+    name = WRITTEN[command]
+    (stored / name).write_text("kept")
+    (stored / name).chmod(0o444)
+    assert f"{name} cannot be written: it is read-only" in refusal(*command.split(), "-o", name, code=1)
+    assert (stored / name).read_text() == "kept"
 
 
 @pytest.mark.slow
-def test_a_file_that_another_run_writes_is_refused_before_work(refusal, tmp_path):
-    (tmp_path / "scene.toml").write_text(SCENE)
-    code = (
-        "import sys; from pathlib import Path; from faultgouge.analysis.files.atomic_write import lock_output\n"
-        "with lock_output(Path('run.h5')): print('ready', flush=True); sys.stdin.read()"
-    )
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, **pipes) as other:
-        assert other.stdout.readline() == b"ready\n"
-        assert "another run is writing it" in refusal("ramp", "scene.toml", "-o", "run.h5", code=1)
-        other.stdin.close()
-    assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
-    with lock_output(tmp_path / "run.h5"):  # the lock went with the other
-        pass
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".vtp", ".xyz", ".data"])
+def test_a_picture_replaces_a_file_as_a_whole(faultgouge_here, stored, monkeypatch, suffix):
+    """What a full disk cuts off is not there; of two hard links one is replaced: nothing is changed in place."""
+    command = ("draw" if suffix in (".png", ".svg") else "export", "run.h5", "-o", f"new{suffix}")
+    (stored / f"new{suffix}").write_text("before")
+    (stored / "link").hardlink_to(stored / f"new{suffix}")
+    (stored / f"new{suffix}.part").symlink_to("run.h5")
+    with monkeypatch.context() as full:
+        full.setattr("os.replace", no_room)
+        assert "No space left on device; what it held before is kept" in faultgouge_here(*command, code=1).stderr
+    assert (stored / f"new{suffix}").read_text() == "before"
+    before = {path.name for path in stored.iterdir()}
+    faultgouge_here(*command)
+    assert (stored / f"new{suffix}").stat().st_size > 1000
+    assert (stored / "link").read_text() == "before"
+    assert {path.name for path in stored.iterdir()} == before
+
+
+def no_room(*_):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize("study", ["sweep", "trigger"])
+def test_a_folder_that_another_run_writes_is_refused(refusal, tmp_path, study):
+    sections = {"friction": {"v0": 1e-7, "v_ss": "10 v0"}}
+    (tmp_path / "scene.toml").write_text(SCENE + toml(sections))
+    (tmp_path / "sweep.toml").write_text('task = "onset"\n[sweep]\n"packing.seed" = [1]\n' + toml(SMALL, "scene."))
+    (tmp_path / "out").mkdir()
+    with lock_output(tmp_path / "out"):
+        name = "sweep.toml" if study == "sweep" else "scene.toml"
+        assert "out cannot be written, since another run is writing it" in refusal(study, name, "-o", "out", code=1)
 
 
 def test_no_link_is_followed_and_the_mode_is_kept(tmp_path):

@@ -1,6 +1,7 @@
 """faultgouge import DECK.in, and what takes the file that it leaves."""
 
 import json
+import re
 from xml.etree import ElementTree
 
 import numpy as np
@@ -58,13 +59,52 @@ def test_deck(faultgouge_here, tmp_path, shape):
     faultgouge_here("export", "pile.h5", "-o", "pile.xyz")
     rows = np.loadtxt((tmp_path / "pile.xyz").read_text().splitlines()[2:])
     assert np.array_equal(rows[:, : snapshot.dimension], snapshot.position)
-    for words in (["draw", "pile.h5"], ["view", "pile.h5"], ["movie", "pile.h5", "--mode", "0"]):
-        assert "faultgouge export pile.h5" in faultgouge_here(*words, code=2).stderr
+    assert "nothing moves in it" in faultgouge_here("movie", "pile.h5", code=None).stderr
+    if shape is ROUND:
+        for command in ("draw", "view"):
+            assert "`faultgouge export pile.h5 --mode 0" in faultgouge_here(command, "pile.h5", code=2).stderr
+        assert "(.xyz) or ParaView (.pvd)" in faultgouge_here("movie", "pile.h5", "--mode", "0", code=2).stderr
+        _check_film_of_spheres(faultgouge_here, tmp_path, snapshot)
+        return
+    assert "3 contacts (3 with walls)" in faultgouge_here("draw", "pile.h5", "-o", "pile.png").stdout
+    assert "mode 1 of 9" in faultgouge_here("draw", "pile.h5", "--mode", "1", "-o", "mode.png").stdout
+    assert "no slips" in faultgouge_here("draw", "pile.h5", "--color", "slip", code=2).stderr
+    faultgouge_here("movie", "pile.h5", "--mode", "1", "--seconds", "0.2", "-o", "mode.gif")
+    faultgouge_here("view", "pile.h5", "-o", "page.html")
+    assert "3 disks as LAMMPS left them" in (tmp_path / "page.html").read_text()
+
+
+def _check_film_of_spheres(faultgouge_here, tmp_path, snapshot):
+    """Each frame has the spheres where the mode moves them, about where they rest, half a radius away at most."""
+    faultgouge_here("movie", "pile.h5", "--mode", "1", "--seconds", "0.8", "-o", "mode.xyz")
+    lines = (tmp_path / "mode.xyz").read_text().splitlines()
+    names = [each.split(":") for each in re.findall(r"(\w+:R:\d)", lines[1])]
+    ends = np.cumsum([int(size) for *_, size in names])
+    column = {name: slice(end - int(size), end) for (name, _, size), end in zip(names, ends, strict=True)}
+    frames = np.array([np.loadtxt(lines[k + 2 : k + 5]) for k in range(0, len(lines), 5)])
+    assert len(frames) == 8
+    moved = frames[..., column["pos"]] - snapshot.position
+    assert moved == pytest.approx(frames[..., column["displacement"]], abs=1e-15)
+    assert moved.sum(axis=0) == pytest.approx(0, abs=1e-15)
+    assert 0 < np.linalg.norm(moved, axis=2).max() <= 0.5 * snapshot.radius.min() * (1 + 1e-15)
+    faultgouge_here("movie", "pile.h5", "--mode", "1", "--seconds", "0.8", "-o", "mode.pvd")
+    files = [each.get("file") for each in ElementTree.parse(tmp_path / "mode.pvd").iter("DataSet")]
+    assert len(files) == 8
+    assert ElementTree.parse(tmp_path / files[-1]).find(".//Piece").get("NumberOfVerts") == "3"
 
 
 def test_refused_before_the_run(faultgouge_here, tmp_path):
     (tmp_path / "pile.in").write_text(DECK.format(**ROUND, word="") + "run 1000000000\n")
     assert "write contacts at its end" in faultgouge_here("import", "pile.in", code=2).stderr
+    drum = DECK.format(**ROUND, word="contacts").replace(
+        "run 6000", "fix d all wall/gran/region hooke/history 1 1 1 1 1 1 region r\nrun 1000000000"
+    )
+    (tmp_path / "drum.in").write_text(drum)
+    assert "drum.in: fix d wall/gran/region has curved walls" in faultgouge_here("import", "drum.in", code=2).stderr
+    glue = DECK.format(**ROUND, word="contacts").replace("gran/hertz/history ${kn} NULL 10 NULL 0.9 1", "granular", 1)
+    glue = glue.replace("pair_coeff * *", "pair_coeff * * jkr 1e3 50 0.3 10 tangential mindlin 800 1 0.5")
+    (tmp_path / "glue.in").write_text(glue.replace("run 6000", "run 1000000000"))
+    assert "jkr is cohesive" in faultgouge_here("import", "glue.in", code=2).stderr
     assert "leave all options" in faultgouge_here("import", "pile.in", "--kn", "3", code=2).stderr
     (tmp_path / "in.wrong").write_text("units nothing\n")
     assert "LAMMPS stopped: " in faultgouge_here("import", "in.wrong", code=1).stderr

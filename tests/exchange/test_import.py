@@ -1,5 +1,6 @@
 """Packings of other codes: what is read, brought to rest, and refused in one sentence; docs/howto_own_packing.md."""
 
+import gzip
 import json
 import re
 import subprocess
@@ -93,6 +94,34 @@ def test_mercury_data(tmp_path, sheared, dimensions, name):
     assert disks.box_length == sheared.box_length
     np.testing.assert_array_equal(upper_layer(disks, "type:1"), sheared.top)
     np.testing.assert_array_equal(read_disks(tmp_path / name, 0).position, sheared.position + np.array([0, 0.5]))
+
+
+def test_what_is_compressed_is_what_it_was(tmp_path, sheared):
+    """LAMMPS itself writes a dump whose name ends in .gz, and text of any other code may be compressed, too."""
+    for name, text in (
+        ("a.dump.gz", dump(sheared)),
+        ("a.csv.gz", csv(sheared, "x,y,radius")),
+        ("dump.500.gz", dump(sheared)),
+    ):
+        (tmp_path / name).write_bytes(gzip.compress(text.encode()))
+        np.testing.assert_array_equal(read_disks(tmp_path / name).position, sheared.position)
+    (tmp_path / "cut.dump.gz").write_bytes(gzip.compress(dump(sheared).encode())[:-100])
+    with pytest.raises(BadInputError, match=r"cut\.dump\.gz"):
+        read_disks(tmp_path / "cut.dump.gz")
+
+
+@pytest.mark.parametrize("mass", [2.5, [2.0, 3.0, 4.0]])
+@pytest.mark.parametrize("top", [[2], [False, False, True]])
+def test_packing_json_has_masses_and_the_layer_by_number_or_by_truth(tmp_path, mass, top):
+    disks = {"x": [0.5, 1.6, 2.7], "y": [0.5, 0.5, 0.5], "radius": [0.5] * 3, "top": top, "mass": mass}
+    (tmp_path / "packing.json").write_text(json.dumps(disks))
+    found = read_disks(tmp_path / "packing.json")
+    assert found.top.tolist() == [False, False, True]
+    assert found.mass.tolist() == np.broadcast_to(mass, 3).tolist()
+    for change in ({"top": [True]}, {"top": [3]}, {"top": [0.5]}, {"mass": [1.0, 2.0]}, {"mass": -1.0}):
+        (tmp_path / "packing.json").write_text(json.dumps(disks | change))
+        with pytest.raises(BadInputError, match=r"packing\.json is not a packing file"):
+            read_disks(tmp_path / "packing.json")
 
 
 def test_the_layer_may_be_said_in_six_ways(tmp_path, sheared):

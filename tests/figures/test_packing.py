@@ -10,10 +10,21 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, closest_to_meeting, normal_modes, spectrum, touching
+from faultgouge.analysis import (
+    Contacts,
+    MindlinLaw,
+    Packing,
+    Snapshot,
+    closest_to_meeting,
+    normal_modes,
+    spectrum,
+    touching,
+)
+from faultgouge.analysis.packing.arrays import derive_frozen
 from faultgouge.analysis.spectrum.spectrum import participation_ratio, rotation_share
 from faultgouge.figures import PairCurve, draw_packing, draw_pair, save
 from faultgouge.figures.mode import Mode, draw_modes
+from faultgouge.figures.packing import View
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +64,39 @@ def test_bars_are_as_wide_as_their_force(packing):
     assert length == pytest.approx(packing.geometry.distance[strongest], rel=1e-12)  # rounding of the ends
     forces = packing.normal_force / packing.normal_force.max()
     assert widths.min() / widths.max() == pytest.approx(forces.min(), rel=1e-12)
+
+
+def test_a_snapshot_is_drawn_as_its_packing(packing):
+    """Disks, bars and their colours are the same, whether slips or forces are known."""
+    snapshot = Snapshot.of_packing(packing)
+    one, other = draw_packing(packing), draw_packing(snapshot)
+    disks, drawn = (labelled(each, EllipseCollection, "disks") for each in (one, other))
+    assert drawn.get_offsets() == pytest.approx(disks.get_offsets(), abs=1e-14)
+    assert np.isin(packing.rattlers, snapshot.rattlers).all()
+    bars, seen = (labelled(each, LineCollection, "contacts") for each in (one, other))
+    assert np.array(seen.get_segments()) == pytest.approx(np.array(bars.get_segments()), abs=1e-13)
+    assert np.array(seen.get_array()) == pytest.approx(np.array(bars.get_array()), rel=1e-12)
+
+
+def test_a_sheared_box_is_full_of_images(packing):
+    """Of disks in a box that is periodic along both edges, every place of the picture repeats along the edges."""
+    snapshot = Snapshot.of_packing(packing)
+    low, high = packing.position.min(axis=0), packing.position.max(axis=0)
+    box = np.array([[packing.box_length, 0, 0], [3.0, high[1] - low[1] + 1, 0], [0, 0, 1]])
+    sheared = derive_frozen(
+        snapshot, box=box, periodic=np.array([True, True, False]), contacts=snapshot.contacts.chosen(np.zeros(0, int))
+    )
+    view = View.of(sheared)
+    corners = np.array([[0, 0], box[0, :2], box[1, :2], box[0, :2] + box[1, :2]])
+    assert (view.left, view.bottom) == (corners[:, 0].min(), corners[:, 1].min())
+    assert (view.right, view.ceiling) == (corners[:, 0].max(), corners[:, 1].max())
+    within = (view.place > [view.left, view.bottom]).all(axis=1) & (view.place < [view.right, view.ceiling]).all(axis=1)
+    for edge in box[:2, :2]:
+        shifted = view.place[within] + edge
+        inside = (shifted > [view.left, view.bottom]).all(axis=1) & (shifted < [view.right, view.ceiling]).all(axis=1)
+        distance = np.linalg.norm(shifted[inside][:, None] - view.place[None], axis=2).min(axis=1, initial=np.inf)
+        assert distance == pytest.approx(0, abs=1e-12)
+    assert len(view.edges) == 4
 
 
 SHOWN = {

@@ -1,5 +1,6 @@
 """Ways of running LAMMPS that the styles do not serve: one sentence before the run."""
 
+import numpy as np
 import pytest
 
 from faultgouge.pywrap.lammps.decks import DECKS
@@ -43,6 +44,19 @@ REFUSED = {
         "minimize 0 1e-3 10 10\n",
         "cannot be minimized, since its forces depend on the path",
     ),
+    "a minimization with friction": (
+        f"{MODEL}minimize 0 1e-3 10 10\n",
+        "pair mindlin/smooth with friction cannot be minimized, since its forces depend on the path",
+    ),
+    "renumbered by delete_atoms": (
+        f"{MODEL}fix still all displace/disc\nrun 0\ngroup gone id 50\ndelete_atoms group gone\nrun 0\n",
+        "Atom IDs were renumbered, so that the slip history no longer belongs to its contacts",
+    ),
+    "renumbered by reset_atoms": (
+        f"{MODEL}fix still all displace/disc\nrun 0\nreset_atoms id sort yes\nrun 0\n",
+        "Atom IDs were renumbered",
+    ),
+    "replicate": (f"{MODEL}replicate 2 1 1\n", "Cannot replicate with fixes that store per-atom quantities"),
     "rerun": (RERUN, "pair mindlin/smooth with friction cannot serve rerun"),
     "radii that change": (
         f"{GROWING}variable d equal 1.0+step*dt\nfix grow all adapt 1 atom diameter v_d\n"
@@ -60,6 +74,42 @@ def test_it_is_refused_in_a_sentence(lmp, tmp_path, case):
     (tmp_path / "growing.in").write_text(text)
     done = lmp(script.replace(f"{DECKS}/growing.in", "growing.in"), fails=True)
     assert says in " ".join((done.stdout + done.stderr).split())
+
+
+SERVED = {
+    "change_box": "change_box all x scale 1.001 remap units box",
+    "displace_atoms": "displace_atoms top move 0.001 0 0",
+    "delete_atoms": "group gone id 50\ndelete_atoms group gone compress no",
+    "set diameter": "set atom 5 diameter 1.01",
+    "minimize": "unfix move\nminimize 0 1e-8 20 200\nfix move all nve/disc 1.0",
+}
+MOVES = f"{FRICTIONLESS}{MODEL}fix move all nve/disc 1.0\n"
+
+
+def dumped(path):
+    return np.loadtxt(path, skiprows=9)
+
+
+@pytest.mark.parametrize("case", SERVED)
+@pytest.mark.slow
+def test_after_a_command_forces_are_those_of_a_new_instance(lmp, tmp_path, case):
+    """To the bit, in what LAMMPS itself writes of the disks that the command has left."""
+    write = "run 0\nwrite_dump all custom {}.dump id x y fx fy modify sort id format float %.17g\n"
+    lmp(f"{MOVES}run 20\n{SERVED[case]}\n{write.format('one')}write_data left.data\n")
+    lmp(MOVES + write.format("new"), data="left.data")
+    one, new = (dumped(tmp_path / f"{name}.dump") for name in ("one", "new"))
+    assert np.array_equal(one, new)
+    assert len(one) == (99 if case == "delete_atoms" else 100)
+    assert np.abs(one[:, 3:]).max() > (0 if case == "minimize" else 1e-3)  # the command has changed something
+
+
+@pytest.mark.slow
+def test_velocities_of_the_command_velocity_move_disks(lmp, tmp_path):
+    write = "write_dump all custom {}.dump id x y modify sort id format float %.17g\n"
+    lmp(f"{MOVES}{write.format('before')}velocity all set 0.1 0 NULL\nrun 1\n{write.format('after')}")
+    before, after = (dumped(tmp_path / f"{name}.dump") for name in ("before", "after"))
+    # forces at rest are 1e-10, and the step is 1e-3
+    np.testing.assert_allclose(after[:, 1] - before[:, 1], 0.1 * 1e-3, rtol=0, atol=1e-13)
 
 
 @pytest.mark.slow

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference_layer import SMALL
 
-from faultgouge.analysis import MindlinLaw
-from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, perturb, ramp
+from faultgouge.analysis import MindlinLaw, RunFile
+from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, perturb, ramp, settle
 from faultgouge.pywrap.equilibria.rattlers import middle_of_cage
+from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.pywrap.settling.settle import own_units
 
 UNITS = st.floats(-9, 9).map(lambda power: 10.0**power)
@@ -103,3 +105,48 @@ def test_the_middle_of_a_cage_is_the_same_in_any_length(reference_packing):
     disks = one.rattlers
     assert len(disks)
     assert np.array_equal(middle_of_cage(small, disks), 2.0**-30 * middle_of_cage(one, disks))
+
+
+def onset_in(length=1.0, force=1.0, mass=1.0, damped=False):
+    sections = SMALL | {
+        "packing": SMALL["packing"]
+        | {"width": 6.0 * length, "radii": [0.5 * length, 0.7 * length], "mass": mass, "seed": 2},
+        "law": {"kn": 2e5 * force / length**1.5, "mu": 0.5},
+        "load": {"fy": 3.0 * force},
+        "ramp": {"step": 5e-3 * force, "until": 0.025 * force},
+    }
+    run = onset_run(Scene.from_mapping(sections), 0.5, first=True).onset
+    return run.fx_c / force, run.error / force, run.windows[0].eigenvalue * mass * length / force
+
+
+EXTREME = [(1e-9, 1.0, 1.0), (1e6, 1.0, 1.0), (1.0, 1e-9, 1.0), (1.0, 1e6, 1.0), (1.0, 1.0, 1e-9), (1.0, 1.0, 1e6)]
+TOGETHER = [(1e-6, 1e-3, 1e-15), (1e6, 1e-6, 1e9)]
+"""Grains of a micrometre in SI: eigenvalues of 1e22, whose squares single precision does not hold; and of 1e-18."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("units", [pytest.param(each, marks=pytest.mark.long) for each in EXTREME] + TOGETHER)
+def test_an_onset_is_the_same_in_any_units(units):
+    (fx, error, eigenvalue), (own, own_error, own_eigenvalue) = onset_in(*units), onset_in()
+    assert abs(fx - own) <= error + own_error < 1e-9
+    assert eigenvalue == pytest.approx(own_eigenvalue, rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("units", TOGETHER)
+def test_what_is_written_is_read_in_any_units(units, tmp_path, faultgouge_here):
+    """Exports come back to the bit, and an import is in balance; draw and view take it."""
+    for name, (length, force, mass) in (("own", (1.0, 1.0, 1.0)), ("other", units)):
+        packing = settle(scene(length, force, mass)).packing
+        with RunFile.create(tmp_path / f"{name}.h5", packing) as file:
+            file.append(packing)
+            file.complete = True
+        for suffix in (".xyz", ".data"):
+            faultgouge_here("export", f"{name}.h5", "-o", f"{name}{suffix}")
+            done = faultgouge_here("import", f"{name}{suffix}", "-o", f"{name}{suffix}.h5").stdout
+            assert f"12 disks, 3 of them the upper layer, {len(packing.contacts)} contacts" in done
+            with RunFile(tmp_path / f"{name}{suffix}.h5") as file:
+                assert np.array_equal(file.packing().position, packing.position)
+        for command, suffix in (("draw", ".png"), ("view", ".html")):
+            faultgouge_here(command, f"{name}.h5", "-o", f"{name}{suffix}")
+        assert (tmp_path / f"{name}.png").stat().st_size > 10_000

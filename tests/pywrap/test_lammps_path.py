@@ -63,6 +63,26 @@ def test_tilt_of_a_slope(tmp_path):
 
 
 @pytest.mark.slow
+def test_where_drag_leaves_it(tmp_path):
+    """A step in which nothing slides ends where LAMMPS's own run with drag ends, contact by contact."""
+    from faultgouge.pywrap import from_lammps, lammps_path
+
+    lmp = layer(tmp_path)
+    with lammps_path(lmp, "slope") as path:
+        first, last = path(0.0), path(0.01)
+    assert not last.contacts.at_bound.any()
+    for line in ("variable slope equal 0.01", "fix drag all viscous 1.0", "run 60000 post no"):
+        lmp.command(line)
+    found = from_lammps(lmp)
+    way = np.abs(last.position - first.position).max()
+    # both ways of the slips differ to second order, and the way is 1e-4 of a radius
+    assert np.abs(found.position - last.position).max() < 1e-4 * way
+    one, other = (np.sort(np.linalg.norm(each.contacts.tangential_force, axis=1)) for each in (found, last))
+    assert one == pytest.approx(other, abs=1e-6 * found.contacts.normal_force.mean())
+    lmp.close()
+
+
+@pytest.mark.slow
 def test_force_on_a_layer(tmp_path):
     """By a function; it says where it changes nothing, and what it raises reaches the caller in a sentence."""
     from faultgouge.pywrap import SnapshotError, lammps_path

@@ -1,6 +1,7 @@
 """Loads up, down and below zero: the way of F_x, a run that goes on along it, and what it leaves."""
 
 import json
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -86,7 +87,7 @@ def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_in)
         assert packings == [other.packing(k) for k in range(len(other))]
     assert turning_points(np.array([each.fx for each in packings])) == [5, 15]
     found = hysteresis(packings)
-    assert left == {"fx": 0.5, "begin": 5, "remaining": found.remaining, "work": found.work}
+    assert left == {"fx": 0.5, "begin": 5, "remaining": found.remaining, "work": found.work, "closes": False}
     # the work again, disk by disk
     top = packings[0].top
     work = sum(
@@ -100,3 +101,25 @@ def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_in)
     assert found.remaining == moved[-1] - moved[5]
     drawn = faultgouge_in(tmp_path, "draw", "cycle.h5", "-o", "cycle.svg").stdout
     assert "rattlers" not in drawn  # said of a packing
+    # a view of three loads has both turning points, too; all turning points and frames of either direction are there
+    for command, says in (
+        ("view cycle.h5 --loads 3 -o cycle.html", "5 loads, "),
+        ("movie cycle.h5 --seconds 0.5 --dots 40 -o cycle.gif", "5 frames"),
+        ("export cycle.h5 --frames all -o cycle.xyz", "26 frames of equilibria"),
+    ):
+        assert faultgouge_in(tmp_path, *command.split()).stdout.startswith(says)
+    assert "displacement of the upper layer" in (tmp_path / "cycle.html").read_text()
+    heads = (tmp_path / "cycle.xyz").read_text().splitlines()[1 :: len(packings[0]) + 2]
+    assert [float(re.search(r" fx=(\S+)", head)[1]) for head in heads] == [each.fx for each in packings]
+
+
+@pytest.mark.slow
+def test_a_small_cycle_closes(tmp_path, faultgouge_here):
+    """No contact slides for good: what remains is 1e-12 of how far the layer has moved, and no work."""
+    (tmp_path / "scene.toml").write_text(SCENE.format(mu=0.3, until=[0.1, 0.0]))
+    said = faultgouge_here("ramp", "scene.toml").stdout
+    assert "F_x is back at 0, and so is the upper layer: the path closes, to rounding" in said
+    with RunFile(tmp_path / "run.h5") as file:
+        found = hysteresis([file.packing(k) for k in range(len(file))])
+    assert found.closes
+    assert abs(found.work) < 1e-9 * 0.1 * 3e-4  # of F_x times the displacement

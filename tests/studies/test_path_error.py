@@ -2,6 +2,7 @@
 change before it, as a committed table says."""
 
 from contextlib import contextmanager
+from functools import partial
 from importlib.resources import files
 
 import numpy as np
@@ -13,7 +14,9 @@ from faultgouge.assessment.work_precision.coverage.stated_errors import FINER, d
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.onset.damped import damped_onset_run
 from faultgouge.pywrap.onset.path_error import OtherPaths, PathError, meeting, with_path_error
+from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
+from faultgouge.studies.sweep.onset import onset
 
 PAPER = Scene.from_toml(files("faultgouge") / "scenes/paper.toml").resolved()
 CASES = [case for case in read() if case.counts]
@@ -96,6 +99,20 @@ def test_onsets_with_dissipation_state_the_whole_error():
         found[precision, increment] = (run.fx_c, run.error), (run.undamped.fx_c, run.undamped.error)
     truth = found.pop(("compensated", 5e-4))
     assert all(covers(*pair) for onsets in found.values() for pair in zip(onsets, truth, strict=True))
+
+
+@pytest.mark.long
+def test_rows_of_a_sweep_state_the_error_that_onset_states_and_it_covers():
+    """Of this packing the root alone is known to 1.3e-11."""
+    ramp = {"step": 2e-3, "until": 0.006}
+    sections = {"packing": {"disks": 100, "seed": 28}, "law": {"kn": 2e5, "mu": 0.15}, "load": {"fy": 3.0}}
+    scene, fine = (Scene.from_mapping(sections | {"ramp": ramp | more}) for more in ({}, {"step": 1e-4}))
+    row = onset(scene, partial(settle, scene))
+    known, limit = (onset_run(each, 0.15, first=True) for each in (scene, fine))
+    window = known.onset.windows[0]
+    assert (row["fx_c"], row["error"], row["error_of_path"]) == (window.fx_onset, window.error, window.path_error)
+    assert row["error_of_path"] > 0.5 * row["error"]
+    assert abs(row["fx_c"] - limit.onset.fx_c) <= row["error"] + limit.onset.error < 2e-10
 
 
 @pytest.mark.slow

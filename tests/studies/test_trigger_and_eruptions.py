@@ -5,12 +5,17 @@ from dataclasses import replace
 from importlib.resources import files
 from itertools import takewhile
 
+import numpy as np
 import pytest
 from reference_layer import REFERENCE, SMALL, toml
 
-from faultgouge.pywrap import Scene, SceneError, perturb, reach
+from faultgouge.figures.pages import render
+from faultgouge.pywrap import Scene, SceneError, perturb, reach, settle
 from faultgouge.studies.eruptions import eruptions
+from faultgouge.studies.eruptions.compute import Start as RunStart
+from faultgouge.studies.eruptions.compute import erupt
 from faultgouge.studies.trigger import trigger_map
+from faultgouge.studies.trigger.compute import Wave, bisect_amplitude, predictions
 from faultgouge.studies.triggering.forecast import JUMP_SHARE, choose_seed, forecast
 
 BASE = SMALL | {"packing": {"file": str(REFERENCE)}, "ramp": {"step": 1e-3, "until": 0.025}}
@@ -70,6 +75,50 @@ def test_trigger_needs_a_threshold(tmp_path, more, says):
     with pytest.raises(SceneError, match=says):
         trigger_map(scene, tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_a_threshold_below_rounding_noise_gives_no_amplitude():
+    """Bisected down to the noise, it was given as the wave that triggers: 3.6e-19 where linear theory had 2.3e-15."""
+    scene = Scene.from_mapping(SMALL | {"friction": {"v0": 1e-16, "v_ss": "10 v0"}, "trigger": {"time": 1.0}})
+    packing = settle(scene).packing
+    (expected,) = predictions(scene, packing, 0.1, np.array([14.0]))
+    with pytest.raises(SceneError, match="exceeds v_0 = 1e-16 without a wave"):
+        bisect_amplitude(Wave(scene, packing, expected))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("units", [(1.0, 1.0, 1.0), (2.0**-20, 2.0**-10, 2.0**-14)])
+def test_a_stable_packing_is_watched_for_a_time_of_its_own_units(units, monkeypatch):
+    """And if D rises all the same, that is said, and it is not called stable."""
+    length, force, mass = units
+    sections = {
+        "packing": {"disks": 20, "top": 4, "width": 4.9 * length, "radii": [0.5 * length, 0.7 * length], "mass": mass},
+        "law": {"kn": 2e5 * force / length**1.5, "mu": 0.5},
+        "load": {"fy": 3.0 * force},
+    }
+    unit, found = (mass * length / force) ** 0.5, {}
+    for friction in (False, True):
+        sections["packing"]["settle_friction"] = friction  # with it the packing is unstable
+        start = settle(Scene.from_mapping(sections))
+        if friction:
+            monkeypatch.setattr("faultgouge.studies.eruptions.compute.growth_rate", lambda packing: 0.0)
+        run = erupt(RunStart(start.packing, start.residual, 200.0 * unit))
+        found[friction] = run["ends"], run["time"] / unit
+    assert [ends for ends, _ in found.values()] == ["stable", "rises"]
+    assert all(50 <= time < 52 for _, time in found.values())  # looked at 400 times in 200
+
+
+def test_the_page_of_eruptions_says_which_sizes_are_noise():
+    run = {"fx": 0.02, "damped": False, "rate": 0.01, "noise": 1e-25, "balance": 0.0, "slip": 0.0, "time": 9.0}
+    run |= {"kinetic_energy": 0.0, "lost": 0, "gained": 0, "sliding": 0, "ended": None}
+    words = {}
+    for name, more in {"noise": {"msd": 1e-24, "ends": "cut off"}, "grown": {"msd": 1e-10, "ends": "law"}}.items():
+        result = {"runs": [run | more], "scene": {"load": {"fy": 3.0}}}
+        page = render("faultgouge.studies.eruptions", "eruptions.md.j2", units=None, **eruptions.page(result))
+        words[name] = " ".join(page.split())
+    assert "1 did not leave it in their time: their sizes are those of the noise" in words["noise"]
+    assert "All sizes stand above it" in words["grown"]
 
 
 @pytest.mark.long

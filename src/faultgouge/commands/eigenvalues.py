@@ -17,7 +17,7 @@ from .terminal import (
     Frame,
     PackingFile,
     ScenePath,
-    check_output,
+    lock_output,
     print_json,
     print_line,
     read_scene,
@@ -190,6 +190,7 @@ def _gain_of(packing: Packing | Snapshot) -> dict[str, Any] | None:
 
 @app.command(epilog="Example: faultgouge onset paper.toml --json")
 def onset(
+    context: typer.Context,
     scene: ScenePath,
     output: Annotated[
         Path | None,
@@ -224,7 +225,7 @@ def onset(
     if part is not None and wanted.damping is not None:
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if output:
-        check_output(output, scene, *stored_files(wanted))
+        lock_output(context, output, scene, *stored_files(wanted))
     folder = _search_folder(slices, output)
     tell = say if as_json else print_line
     with status("settling") as show:
@@ -276,7 +277,6 @@ def _undamped_onset(
     tell: Tell,
 ) -> dict[str, Any]:
     """The onset of a scene, as its JSON; and what a user reads of it."""
-    from faultgouge.analysis.uncertain_digits import with_uncertainty
     from faultgouge.pywrap.onset.undamped import onset_run
 
     with status(f"mu = {mu:g}") as show:
@@ -286,15 +286,7 @@ def _undamped_onset(
     real = _in_si(scene, [(each.fx_onset, abs(each.eigenvalue) ** 0.5) for each in onset.windows])
     si, opening = real.get("si", []), onset.windows[0]
     among = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
-    if opening.kind == "start":
-        about = f"{opening.eigenvalue:.6g}"
-        known = (
-            f"an eigenvalue is {about}" if opening.eigenvalue < 0 else f"a pair of eigenvalues is complex about {about}"
-        )
-        why = known if onset.at_start is None else str(onset.at_start)
-        tell(f"mu = {mu:g}: unstable at F_x = {opening.fx_onset:g}{among}, before any shear is added: {why}")
-    else:
-        tell(f"mu = {mu:g}: F_x^c = {with_uncertainty(onset.fx_c, onset.error)}{among}")
+    tell(f"mu = {mu:g}: {onset.describe()}{among}")
     if onset.complete:
         _show_windows(onset.windows, si, tell)
     elif opening.kind != "start":

@@ -13,7 +13,7 @@ from .pictures import modes_of
 from .terminal import (
     Frame,
     PackingFile,
-    check_output,
+    lock_output,
     print_line,
     progress,
     say,
@@ -61,6 +61,7 @@ Slips = Annotated[
     epilog="Example: faultgouge import pour.data --top 12 --kn 2e5 --fy 3 --relax -o packing.h5",
 )
 def import_(
+    context: typer.Context,
     file: Source,
     output: Annotated[Path, typer.Option("-o", "--output", help="The run.h5 to write.")] = Path("packing.h5"),
     top: Layer = None,
@@ -97,7 +98,7 @@ def import_(
     """
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
-    check_output(output)
+    lock_output(context, output)
     if file.suffix == ".in" or file.name.startswith("in."):
         given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame, relax or None]
         if floor or any(each is not None for each in given):
@@ -139,6 +140,7 @@ def _import_deck(file: Path, output: Path, slides: bool) -> None:
 
 @app.command(epilog="Example: faultgouge export run.h5 --mode pair -o packing.vtp")
 def export(
+    context: typer.Context,
     file: PackingFile,
     frame: Frame = -1,
     mode: Annotated[
@@ -168,7 +170,7 @@ def export(
     from faultgouge.pywrap.exchange import ModeVectors
     from faultgouge.pywrap.exchange.formats import check_writer, write_packing
 
-    check_output(output, file)
+    lock_output(context, output, file)
     if frames is not None:
         if mode is not None or frame != -1:
             raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")

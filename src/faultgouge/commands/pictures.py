@@ -12,17 +12,19 @@ from ..mpi_rank import is_root
 from .terminal import (
     Frame,
     PackingFile,
-    check_output,
+    growth_in,
+    lock_output,
     print_line,
     progress,
-    refuse_snapshot,
     say,
+    snapshot_of_disks,
     stored_packing,
     stored_series,
+    stored_snapshot,
 )
 
 if TYPE_CHECKING:
-    from faultgouge.analysis import Packing
+    from faultgouge.analysis import Packing, Snapshot
     from faultgouge.figures.film import Film
     from faultgouge.figures.mode import Mode
 
@@ -54,6 +56,7 @@ WhichColour = Annotated[
 
 @app.command(epilog="Example: faultgouge draw run.h5 --mode pair -o mode.svg")
 def draw(
+    context: typer.Context,
     file: PackingFile,
     frame: Annotated[
         int | None,
@@ -79,14 +82,14 @@ def draw(
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
-    check_output(output, file)
-    refuse_snapshot(file)
-    packing, series, cycle = stored_packing(file, -1 if frame is None else frame), None, []
-    if frame is None and mode is None:
+    lock_output(context, output, file)
+    snapshot, series, cycle = snapshot_of_disks(file), None, []
+    packing = snapshot or stored_packing(file, -1 if frame is None else frame)
+    if snapshot is None and frame is None and mode is None:
         series, cycle = stored_series(file), _cycle(file)
     if not is_root():
         return
-    from faultgouge.analysis.motion.growth import growth_of_run
+    from faultgouge.analysis import Packing
     from faultgouge.figures import draw_cycle, draw_packing
     from faultgouge.figures.mode import draw_modes
     from faultgouge.figures.packing import in_words
@@ -96,7 +99,7 @@ def draw(
     if cycle:
         figure = draw_cycle(cycle)
     elif series is not None:
-        growth = growth_of_run(packing, series["time"], series["msd"], series["friction"])
+        growth = growth_in(file, series)
         print_line(growth.says)
         figure = draw_growth(series["time"], series["msd"], growth.predicted, growth.measured)
     elif mode is None:
@@ -104,7 +107,8 @@ def draw(
         figure = draw_packing(packing, color=color.value, caption=True)
     else:
         modes, what = modes_of(packing, mode)
-        print_line("\n".join([f"F_x = {packing.fx:g}: {what}", *(each.plain for each in modes)]))
+        load = f"F_x = {packing.fx:g}: " if isinstance(packing, Packing) else ""
+        print_line("\n".join([f"{load}{what}", *(each.plain for each in modes)]))
         figure = draw_modes(packing, modes, what)
     save_as(figure, output)
     print_line(f"written to {output}")
@@ -112,6 +116,7 @@ def draw(
 
 @app.command(epilog="Example: faultgouge movie perturb.h5 -o eruption.gif")
 def movie(
+    context: typer.Context,
     file: PackingFile,
     mode: WhichMode = None,
     frame: Frame = -1,
@@ -123,7 +128,9 @@ def movie(
         typer.Option(metavar="T0 T1", help="First and last time of the run to show; all by default."),
     ] = None,
     dots: Annotated[int, typer.Option(min=30, max=400, help="Dots per inch; a film is some five inches wide.")] = 110,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The film: .gif or .mp4.")] = Path("film.gif"),
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="The film: .gif or .mp4; of spheres .xyz or .pvd.")
+    ] = Path("film.gif"),
 ) -> None:
     """Make a film of an undamped run, of a mode, or of a ramp.
 
@@ -131,23 +138,31 @@ def movie(
     D(t). Displacements are magnified by a power of ten, which is printed on the film
     and falls in steps. With --mode: the motion of a mode without its growth. From
     run.h5: the ramp, and F_x over the displacement of the upper layer. An .mp4 needs
-    pip install 'faultgouge[movie]'.
+    pip install 'faultgouge[movie]'. A mode of spheres is written as frames for OVITO
+    (.xyz) or ParaView (.pvd).
     """
+    from faultgouge.analysis import PackingFileError
     from faultgouge.figures.writers import check_name, write_film
 
-    check_name(output)
-    refuse_snapshot(file)
-    check_output(output, file)
+    snapshot = stored_snapshot(file)
+    if snapshot is not None and mode is None:
+        raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
     count = max(2, round(seconds * rate))
+    periods = max(1, round(seconds / 2))
+    if snapshot is not None and snapshot.dimension == 3:
+        _frames_of_spheres(context, snapshot, str(mode), output, count, periods)
+        return
+    check_name(output)
+    lock_output(context, output, file)
     if not is_root():
         return
     from faultgouge.figures.film import ModeFilm
 
     film: Film
     if mode:
-        packing = stored_packing(file, frame)
+        packing = snapshot or stored_packing(file, frame)
         modes, what = modes_of(packing, mode)
-        film = ModeFilm(packing, modes, what, count, periods=max(1, round(seconds / 2)), dots=dots)
+        film = ModeFilm(packing, modes, what, count, periods=periods, dots=dots)
     else:
         film = _film_of_file(file, count, color.value, span, dots)
     write_film(film, output, rate, lambda frames, total: progress(frames, "frames", total))
@@ -157,6 +172,7 @@ def movie(
 
 @app.command(epilog="Example: faultgouge view run.h5 -o page.html")
 def view(
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5 of a ramp, or perturb.h5.", show_default=False)],
     loads: Annotated[
         int | None,
@@ -177,25 +193,46 @@ def view(
     if output.suffix.lower() != ".html":
         raise typer.BadParameter(f"-o {output}: a page is an .html")
     from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.hysteresis import turning_points
     from faultgouge.figures.browser_page import check_library, equally_spaced, loads_shown, write_view
     from faultgouge.figures.browser_pair import seconds
 
     check_library()
-    refuse_snapshot(file)
-    check_output(output, file)
+    snapshot = snapshot_of_disks(file)
+    lock_output(context, output, file)
     if not is_root():
         return
-    with RunFile(file) as run:
-        most = loads_shown(len(run.packing(0))) if loads is None else loads
-        packings = [run.packing(k) for k in equally_spaced(len(run), most)]
-        series = run.series("undamped") if "undamped" in run.names_of_series else None
-    span = " to ".join(f"{fx:g}" for fx in dict.fromkeys((packings[0].fx, packings[-1].fx)))
-    what = "undamped run" if series is not None else "equilibria"
-    title = f"{file.name}: {what} of {len(packings[0])} disks, Fₓ = {span}"
+    packings: list[Packing] | list[Snapshot]
+    if snapshot is not None:
+        packings, series = [snapshot], None
+        title = f"{file.name}: {len(snapshot)} disks as LAMMPS left them"
+    else:
+        with RunFile(file) as run:
+            most = loads_shown(len(run.packing(0))) if loads is None else loads
+            chosen = {*equally_spaced(len(run), most), *turning_points(run.fx)}
+            packings = [run.packing(k) for k in sorted(chosen)]
+            series = run.series("undamped") if "undamped" in run.names_of_series else None
+        span = " to ".join(f"{fx:g}" for fx in dict.fromkeys((packings[0].fx, packings[-1].fx)))
+        what = "undamped run" if series is not None else "equilibria"
+        title = f"{file.name}: {what} of {len(packings[0])} disks, Fₓ = {span}"
     if seconds(packings) > 5:
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
     write_view(packings, output, title, series, lambda them: progress(them, "loads"))
     print_line(f"{len(packings)} loads, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
+
+
+def _frames_of_spheres(
+    context: typer.Context, snapshot: Snapshot, which: str, output: Path, count: int, periods: int
+) -> None:
+    """The motion of a mode of spheres, for programs that show spheres."""
+    from faultgouge.pywrap.exchange.snapshot_export import check_mode_frames, modes_of_snapshot, write_mode_frames
+
+    check_mode_frames(output)
+    lock_output(context, output)
+    if is_root():
+        (mode,) = modes_of_snapshot(snapshot, which)
+        write_mode_frames(output, snapshot, mode, count, periods)
+        print_line(f"{count} frames of {mode.name}, lambda = {mode.eigenvalue:.8g}; written to {output}")
 
 
 def _cycle(file: Path) -> list[Packing]:
@@ -229,7 +266,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     return RampFilm(packings, count, color, dots=dots)
 
 
-def modes_of(packing: Packing, which: str) -> tuple[list[Mode], str]:
+def modes_of(packing: Packing | Snapshot, which: str) -> tuple[list[Mode], str]:
     """The modes that --mode asks for, and what they are."""
     from faultgouge.analysis import normal_modes, spectrum
     from faultgouge.figures.mode import Mode, ModeError, unstable_pair

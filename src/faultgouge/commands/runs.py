@@ -17,6 +17,8 @@ from .terminal import (
     Out,
     ScenePath,
     check_output,
+    growth_in,
+    lock_output,
     print_json,
     print_line,
     progress,
@@ -38,13 +40,17 @@ app = typer.Typer()
 
 @app.command(epilog="Example: faultgouge init -o scene.toml")
 def init(
+    context: typer.Context,
     output: Annotated[Path, typer.Option("-o", "--output", help="The scene to write.")] = Path("scene.toml"),
 ) -> None:
     """Write a scene with every section and key, commented."""
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
+    from faultgouge.analysis.files.atomic_write import write_text
+
+    lock_output(context, output)
     if is_root():
-        output.write_text((files("faultgouge") / "scenes" / "commented.toml").read_text())
+        write_text(output, (files("faultgouge") / "scenes" / "commented.toml").read_text())
         say(f"written to {output}; next: faultgouge onset {output}")
 
 
@@ -100,7 +106,9 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     print_line(f"F_x = {record.last.fx:g} reached; residual force {record.last.residual:.2g}; written to {output}")
     if left is not None:
         print_line(
-            f"F_x is back at {left.fx:g}: since F_x first had this value, the upper layer has moved by "
+            f"F_x is back at {left.fx:g}, and so is the upper layer: the path closes, to rounding"
+            if left.closes
+            else f"F_x is back at {left.fx:g}: since F_x first had this value, the upper layer has moved by "
             f"{left.remaining:.4g}, and the work of the loads is {left.work:.4g}"
         )
 
@@ -114,10 +122,8 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     was long enough. With several friction coefficients, the run uses the first.
     """
     from faultgouge.analysis import RunFile
-    from faultgouge.analysis.motion.growth import growth_of_run
     from faultgouge.pywrap import Record, reach
     from faultgouge.pywrap.runs.equilibrium_path import step_of
-    from faultgouge.pywrap.runs.undamped import sample_steps
     from faultgouge.pywrap.scenes.validation import require_section
 
     wanted = read_scene(scene, "perturb", "perturb")
@@ -144,8 +150,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         return
     with RunFile(output) as file:
         series, packing = file.series("undamped"), file.packing()
-    dt = sample_steps(settings, packing)[0]
-    growth = growth_of_run(packing, series["time"], series["msd"], series["friction"], dt)
+    growth = growth_in(output, series)
     if as_json:
         columns = {name: column.tolist() for name, column in series.items()}
         print_json({"mu": mus[0], "fx": packing.fx} | growth.as_dict() | columns)

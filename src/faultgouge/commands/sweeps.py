@@ -135,6 +135,13 @@ def modes(
         print_line(f"packings: {len(result['packings'])}, failed: {len(failed)}; written: {output}/modes.json")
         for sentence in failed[:1]:
             print_line(f"the first that failed: {sentence}")
+        short = [each for each in result["packings"] if each["says"] is None and each["ends"] != "until"]
+        for each in short[:1]:
+            why = "an eigenvalue is negative" if each["ends"] == "turning point" else "there is no equilibrium"
+            print_line(
+                f"packings whose branch ends before the last load, so that loads are left out: {len(short)}; the first "
+                f"of them goes to F_x = {each['reach']:g}, and {why} at the next load"
+            )
 
 
 def _show_modes(rows: list[dict[str, Any]]) -> None:

@@ -22,6 +22,7 @@ from ..mpi_rank import is_root
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing, Snapshot
+    from faultgouge.analysis.motion.growth import GrowthOfRun
     from faultgouge.pywrap import Equilibrium, Scene
     from faultgouge.pywrap.scenes.estimate import Task
 
@@ -64,17 +65,23 @@ def stored_snapshot(file: Path) -> Snapshot | None:
     return read_snapshot(file) if holds_snapshot(file) else None
 
 
-def refuse_snapshot(file: Path) -> None:
-    """Say of a run.h5 that holds a snapshot what shows it."""
+def snapshot_of_disks(file: Path) -> Snapshot | None:
+    """The snapshot of a run.h5 that holds one of disks; None of all other files.
+
+    Raises
+    ------
+    BadInputError
+        If it is one of spheres: what shows these.
+    """
     from faultgouge.analysis import BadInputError
 
     snapshot = stored_snapshot(file)
-    if snapshot is not None:
-        what = "spheres" if snapshot.dimension == 3 else "disks of another law"
+    if snapshot is not None and snapshot.dimension == 3:
         raise BadInputError(
-            f"{file} holds {what} as LAMMPS left them: `faultgouge export {file} --mode 0 -o packing.vtp` shows them "
-            "in ParaView, and -o packing.xyz in OVITO."
+            f"{file} holds spheres: `faultgouge export {file} --mode 0 -o packing.vtp` shows them in ParaView, and "
+            f"-o packing.xyz in OVITO; `faultgouge movie {file} --mode 0 -o mode.xyz` moves a mode."
         )
+    return snapshot
 
 
 def stored_files(scene: Scene) -> list[Path]:
@@ -107,11 +114,32 @@ def stored_series(file: Path) -> dict[str, Any] | None:
     return series if is_run and series is not None and len(series["time"]) > 1 else None
 
 
+def growth_in(file: Path, series: dict[str, Any]) -> GrowthOfRun:
+    """Growth of D in the undamped run of a perturb.h5, beside the spectrum's prediction at the time step of the run."""
+    from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.growth import growth_of_run
+    from faultgouge.pywrap.runs.undamped import time_step
+
+    with RunFile(file) as run:
+        packing, settings = run.packing(), json.loads(run.attributes.get("scene", "{}")).get("perturb") or {}
+    dt = time_step(packing, settings.get("time_step"))
+    return growth_of_run(packing, series["time"], series["msd"], series["friction"], dt)
+
+
 def check_output(output: Path, *inputs: Path) -> None:
     """Refuse a file that cannot be written, or is one of the inputs, before any work."""
     from faultgouge.analysis.files.atomic_write import check_output as check
 
     check(output, *inputs)
+
+
+def lock_output(context: typer.Context, output: Path, *inputs: Path) -> None:
+    """`check_output`, and keep other runs from the file until the command ends, on rank 0."""
+    from faultgouge.analysis.files.atomic_write import lock_output as lock
+
+    check_output(output, *inputs)
+    if is_root():
+        context.with_resource(lock(output))
 
 
 @contextmanager

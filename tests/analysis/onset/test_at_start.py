@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from faultgouge.analysis import Contacts, find_onset, spectrum
+from faultgouge.analysis import Contacts, Snapshot, find_onset, spectrum
 from faultgouge.analysis.errors import TurningPointError
 from faultgouge.analysis.onset import LIMITS
 
@@ -27,10 +27,12 @@ def ending(path, last):
     return lambda fx: path(fx) if fx < last else buckled(path, fx)
 
 
+@pytest.mark.parametrize("of_lammps", [False, True], ids=["packing", "snapshot"])
 @pytest.mark.parametrize("limits", [LIMITS, FEW], ids=["small", "large"])
-def test_a_packing_that_is_unstable_from_the_start(path, limits):
+def test_a_packing_that_is_unstable_from_the_start(path, limits, of_lammps):
     loads, pairs = [0.022, 0.0221], spectrum(path(0.022)).pairs
-    onset = find_onset(path, loads, first=True, limits=limits)
+    equilibrium = (lambda fx: Snapshot.of_packing(path(fx))) if of_lammps else path
+    onset = find_onset(equilibrium, loads, first=True, limits=limits)
     assert (onset.fx_c, onset.windows[0].kind) == (0.022, "start")
     unstable = onset.as_dict()["unstable_at_start"]
     assert (unstable["pairs"], unstable["negative"]) == (len(pairs), 0)

@@ -1,0 +1,80 @@
+"""Packings that settled with friction and are unstable before any shear: every command says so, and infers no more."""
+
+import json
+
+import pytest
+from reference_layer import toml
+
+from faultgouge.analysis import spectrum
+from faultgouge.pywrap import Scene, settle
+from faultgouge.studies.statistics import sign_test
+from faultgouge.studies.sweep.triggering import triggering
+from faultgouge.studies.sweep.triggering_summary import in_words, summary
+
+UNSTABLE = {
+    "packing": {"disks": 20, "top": 4, "width": 4.9, "seed": 1, "settle_friction": True},
+    "law": {"kn": 2e5, "mu": [0.5, 0.4]},
+    "load": {"fy": 3.0},
+    "ramp": {"step": 0.01, "until": 0.03},
+    "perturb": {"fx": 0.0, "time": 5.0, "amplitude": 1e-9, "omega": 0.01},
+    "friction": {"v0": 1e-7, "v_ss": "10 v0"},
+    "trigger": {"distance": [0.1], "omega": [14.0], "time": 1.0, "runs": 1},
+}
+BEFORE = "unstable at F_x = 0, before any shear is added"
+
+
+@pytest.fixture(autouse=True)
+def _scene(tmp_path):
+    (tmp_path / "scene.toml").write_text(toml(UNSTABLE))
+
+
+@pytest.fixture(scope="module")
+def pairs():
+    """Complex pairs at F_x = 0 of either friction coefficient."""
+    scene = Scene.from_mapping(UNSTABLE)
+    return [len(spectrum(settle(scene, mu).packing).pairs) for mu in scene.law.mus]
+
+
+@pytest.mark.slow
+def test_onset_counts_the_pairs_and_states_no_digits_of_zero(faultgouge_here, pairs):
+    said = faultgouge_here("onset", "scene.toml").stdout
+    for mu, count in zip((0.5, 0.4), pairs, strict=True):
+        assert f"mu = {mu}: {BEFORE}: {count} complex pairs; in the fastest motion D grows as exp(" in said
+    assert len(said.splitlines()) == 2
+    table = [line for line in faultgouge_here("onset", "scene.toml", "--all").stdout.splitlines() if "start" in line]
+    assert len(table) == sum(pairs)
+    assert {line.split()[0] for line in table} == {"0"}
+    found = json.loads(faultgouge_here("onset", "scene.toml", "--json").stdout)
+    assert (found["fx_c"], found["error"], found["unstable_at_start"]["pairs"]) == (0.0, 0.0, pairs[0])
+
+
+@pytest.mark.slow
+def test_perturb_and_trigger(faultgouge_here, refusal, pairs):
+    assert f"the packing is unstable ({pairs[0]} complex pairs" in faultgouge_here("perturb", "scene.toml").stdout
+    done = faultgouge_here("trigger", "scene.toml", code=2)
+    assert BEFORE in done.stderr
+    assert "before any shear is added the packing is unstable already" in done.stderr
+
+
+@pytest.mark.slow
+def test_a_sweep_infers_nothing_of_weakening():
+    """With mu = 0.4 the sweep finds no equilibrium at the next load: it was called a layer that flows."""
+    scene = Scene.from_mapping({name: UNSTABLE[name] for name in ("packing", "law", "load", "ramp")})
+    found = triggering(scene, lambda mu: settle(scene, mu))
+    assert [(each["ends"], each["reach"]) for each in found["ramps"]] == [("onset", 0.0)] * 2
+    assert found["lowered"] is None
+    assert "both packings are unstable" in "\n".join(in_words(summary([{"result": found, "says": None}])))
+
+
+def test_two_unstable_starts_do_not_tell_whether_the_onset_is_lower():
+    start, later = {"ends": "onset", "reach": 0.0}, {"ends": "onset", "reach": 0.01}
+    assert [sign_test(*each) for each in ((start, start), (later, start), (start, later))] == [None, True, False]
+
+
+@pytest.mark.long
+def test_reproduce(faultgouge_here, tmp_path, pairs):
+    done = faultgouge_here("reproduce", "scene.toml", "-o", "out")
+    assert f"mu = 0.5: {BEFORE}: {pairs[0]} complex pairs" in done.stderr
+    page = (tmp_path / "out/report.md").read_text()
+    assert "| 0.5 | unstable at 0 |" in page
+    assert f"At F_x = 0 the packing has {pairs[0]} complex pairs" in page
