@@ -2,19 +2,29 @@
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import eigvals
+from scipy.linalg import eig, eigvals
 
 from faultgouge.analysis import Snapshot, damping_matrix, spectrum, stiffness_matrix
+from faultgouge.analysis.packing.arrays import Floats
 from faultgouge.analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from faultgouge.pywrap import compare_motion, from_lammps
+from faultgouge.pywrap.granular.forked_look import in_a_copy
 
-KN, KT, MU, GAMMA = 1e5, 2e5 / 7, 0.5, 40.0
+KN, KT, GAMMA = 1e5, 2e5 / 7, 40.0
+MU = 0.5
+"""Friction of most packings; `CELLS` has those of the others."""
+
+NONE = 1e-12
+"""Dashpot in place of 0, with which fix wall/gran hertz/history has no forces (NaN)."""
+
 HOOKE = 2e-2
 """Stiffness of the linear laws as a share of that of Hertz's: overlaps are alike, some thousandth of a diameter."""
 
@@ -23,31 +33,59 @@ BALANCE = 1e-8
 """Residual over the mean contact force of a packing at rest: far below the couplings that make pairs (1e-3)."""
 
 
-def _granular(normal: float, model: str, word: str) -> tuple[str, str]:
-    kt = KT if word == "hertz" else HOOKE * KT
-    damping = "viscoelastic" if word == "hertz" else "mass_velocity"
-    line = f"{word} {normal} {GAMMA} tangential {model} {kt} 0.5 {MU} damping {damping}"
-    return f"pair_style granular\npair_coeff * * {line}", f"granular {line}"
+@dataclass(frozen=True)
+class Law:
+    """A contact law of LAMMPS: a style of gran, or the models of granular."""
+
+    style: str
+    model: str = ""
+
+    def lines(self, mu: float = MU, gamma: float = GAMMA) -> tuple[str, str]:
+        """Pair style with coefficients, and what fix wall/gran has of it."""
+        hertz = "hertz" in self.style
+        kn, kt = (KN, KT) if hertz else (HOOKE * KN, HOOKE * KT)
+        if not self.model:
+            words = f"{self.style}/history {kn} {kt} {gamma} {gamma / 2} {mu} 1"
+            return f"pair_style gran/{words}\npair_coeff * *", words
+        damping = "viscoelastic" if hertz else "mass_velocity"
+        line = f"{self.style} {kn} {gamma} tangential {self.model} {kt} 0.5 {mu} damping {damping}"
+        return f"pair_style granular\npair_coeff * * {line}", f"granular {line}"
 
 
-def _gran(word: str, kn: float, kt: float) -> tuple[str, str]:
-    words = f"{word}/history {kn} {kt} {GAMMA} {GAMMA / 2} {MU} 1"
-    return f"pair_style gran/{words}\npair_coeff * *", words
-
-
+MODELS = ("mindlin", "mindlin/force", "mindlin_rescale", "mindlin_rescale/force")
 LAWS = {
-    "gran/hooke/history": _gran("hooke", HOOKE * KN, HOOKE * KT),
-    "granular hooke, linear_history": _granular(HOOKE * KN, "linear_history", "hooke"),
-    "gran/hertz/history": _gran("hertz", KN, KT),
-    **{
-        f"granular hertz, {model}": _granular(KN, model, "hertz")
-        for model in ("mindlin", "mindlin/force", "mindlin_rescale", "mindlin_rescale/force")
-    },
+    "gran/hooke/history": Law("hooke"),
+    "granular hooke, linear_history": Law("hooke", "linear_history"),
+    "gran/hertz/history": Law("hertz"),
+    **{f"granular hertz, {model}": Law("hertz", model) for model in MODELS},
 }
-"""Pair style and wall by name."""
 
 
-def pour(law: str, d: int, count: int, seed: int, log: Path) -> Any:
+class Cell(NamedTuple):
+    """Packings of one size and friction: with which laws, in which dimensions, and up to which seed."""
+
+    count: int
+    mu: float
+    seeds: int
+    laws: tuple[str, ...] = tuple(LAWS)
+    dimensions: tuple[int, ...] = (2, 3)
+
+
+HERTZ = tuple(f"granular hertz, {model}" for model in MODELS)
+CELLS = (
+    Cell(50, MU, 20),
+    Cell(50, 0.3, 6, HERTZ),
+    Cell(50, 0.9, 6, HERTZ),
+    Cell(200, MU, 6, HERTZ, (3,)),
+    Cell(400, MU, 2, HERTZ, (3,)),
+)
+"""All cells, each of the seeds 1, 2, ..., M. M was set by what a packing costs, and not by what came out."""
+
+LARGE = 50
+"""Particles beyond which packings come after all others: one takes minutes."""
+
+
+def pour(law: str, d: int, count: int, mu: float, seed: int, log: Path, gamma: float = GAMMA) -> Any:
     """LAMMPS with a layer of particles of two sizes above a plane floor, five or six particles deep."""
     from mpi4py import MPI
 
@@ -58,7 +96,7 @@ def pour(law: str, d: int, count: int, seed: int, log: Path) -> Any:
     width, layer = 1.05 * across, across ** (d - 1)
     high = f"0 {width} 0 {width} 0 60" if d == 3 else f"0 {width} 0 60 -0.5 0.5"
     lmp = lammps_instance(MPI.COMM_SELF, log)
-    pair, wall = LAWS[law]
+    pair, wall = LAWS[law].lines(mu, gamma)
     places = []
     for k in range(count):
         x, y = (np.array([k % layer % across, k % layer // across]) + 0.5) * 1.05 + rng.uniform(-0.1, 0.1, 2)
@@ -96,22 +134,23 @@ def rest(lmp: Any, most: int = 25) -> Snapshot | None:
     return None
 
 
-def rows(law: str, d: int, count: int, seed: int) -> Iterator[dict[str, Any]]:
+def rows(law: str, d: int, count: int, mu: float, seed: int) -> Iterator[dict[str, Any]]:
     """One packing at all tilts, settled at none and tilted further and further."""
+    looked_at = seed <= 4 and count <= 50
     with TemporaryDirectory() as folder:
-        lmp = pour(law, d, count, seed, Path(folder) / "log")
+        lmp = pour(law, d, count, mu, seed, Path(folder) / "log")
         for tilt in TILTS:
             begin = time.process_time()
             lmp.command(f"variable slope equal {tilt}")
-            row = {"law": law, "d": d, "count": count, "seed": seed, "tilt": tilt}
+            row = {"law": law, "d": d, "count": count, "mu": mu, "seed": seed, "tilt": tilt}
             found = rest(lmp)
             if found is None:
                 yield row | {"rests": False, "cpu_seconds": time.process_time() - begin}
                 break
             row |= describe(found) | {"rests": True}
-            if seed <= 4 and not row["at_bound"]:
+            if looked_at and not row["at_bound"]:
                 row["motion"] = motion(lmp, found)
-            if tilt == TILTS[-1] and seed <= 4:
+            if tilt == TILTS[-1] and looked_at:
                 row["damping"] = damping_needed(found)
             yield row | {"cpu_seconds": time.process_time() - begin}
         lmp.close()
@@ -167,17 +206,140 @@ def damping_needed(found: Snapshot) -> dict[str, float] | None:
     }
 
 
-def compute(table: Path, count: int, seeds: range, watch: Any = print) -> None:
-    """Add the rows that a table lacks, seed by seed, all laws of a seed before the next."""
-    known = {(row["law"], row["d"], row["count"], row["seed"]) for row in read(table)}
-    for seed in seeds:
-        for d in (2, 3):
-            for law in LAWS:
-                if (law, d, count, seed) not in known:
-                    made = list(rows(law, d, count, seed))
-                    with table.open("a") as file:
-                        file.writelines(json.dumps(row) + "\n" for row in made)
-                    watch(f"{law}, d = {d}, N = {count}, seed {seed}: {[row.get('pairs') for row in made]}")
+PUSHED = ("gran/hertz/history", 3, 50, 0.1)
+"""Law, dimension, particles and tilt of the packings that are let go without loss, those of the seeds 1 to `LET_GO`."""
+
+LET_GO, PUSH = 12, 1e-11
+"""Packings, and standard deviation of the velocities with which they are let go."""
+
+LONGEST, LOOK, STEP = 80.0, 0.1, 5e-4
+"""Longest time, time between looks, time step: a fortieth of the shortest period."""
+
+FROM, LINEAR, TO = 1e-22, 1e-18, 1e-11
+"""D from which growth is fitted, up to where, and at which a run ends. Beyond `LINEAR` contacts that are near the bound
+begin to slide, and D grows faster or more slowly than the linearised packing."""
+
+
+def let_go(seed: int) -> dict[str, Any]:
+    """Growth of D in LAMMPS without any dashpot, from rest with noise, while D is below `LINEAR` and beyond ("late").
+
+    "linear" is the growth of the linearised packing after the same push in the same time, "predicted" the rate of its
+    fastest pair alone.
+    """
+    law, d, count, tilt = PUSHED
+    begin = time.process_time()
+    row: dict[str, Any] = {"law": law, "d": d, "count": count, "mu": MU, "seed": seed, "tilt": tilt, "rests": False}
+    with TemporaryDirectory() as folder:
+        lmp = pour(law, d, count, MU, seed, Path(folder) / "log", NONE)
+        for slope in TILTS[: TILTS.index(tilt) + 1]:
+            lmp.command(f"variable slope equal {slope}")
+            found = rest(lmp)
+            if found is None:
+                return row
+        said = describe(found)
+        row |= {"rests": True, "at_bound": said["at_bound"], "pairs": said["pairs"], "predicted": said["growth_rate"]}
+        for name in ("drag", "spin"):
+            lmp.command(f"unfix {name}")
+        push = PUSH * np.random.default_rng(seed).standard_normal((count, 3))
+        times, course = in_a_copy(lambda: _follow(lmp, push))
+        small = slice(beyond(course, FROM), beyond(course, LINEAR))
+        linear = linear_motion(found, push, times)
+        row |= {
+            "rate": fit_rate(times[small], course[small]),
+            "linear": fit_rate(times[small], linear[small]),
+            "late": fit_rate(times[small.stop :], course[small.stop :]),
+            "last": float(course[-1]),
+            "time": float(times[-1]),
+        }
+        lmp.close()
+    return row | {"cpu_seconds": time.process_time() - begin}
+
+
+def _follow(lmp: Any, push: Floats) -> tuple[Floats, Floats]:
+    """Times and D of the particles after a push, up to `TO` or `LONGEST`."""
+    lmp.commands_list(["log none", f"timestep {STEP}"])
+    low, high, *_ = lmp.extract_box()
+    size = np.subtract(high, low)
+
+    def by_id(name: str) -> tuple[Floats, Any]:
+        order = np.argsort(lmp.numpy.extract_atom("id")[: len(push)])
+        return lmp.numpy.extract_atom(name)[: len(push)], order
+
+    lmp.numpy.extract_atom("omega")[: len(push)] = 0.0  # what drag has left is of the size of the push
+    velocity, order = by_id("v")
+    velocity[order] = push
+    x, order = by_id("x")
+    start = x[order]
+    squares: list[float] = []
+    while len(squares) * LOOK < LONGEST and (not squares or squares[-1] < TO):
+        lmp.command(f"run {round(LOOK / STEP)} post no")
+        x, order = by_id("x")
+        away = x[order] - start
+        away -= size * np.round(away / size)
+        squares.append(float(np.mean(np.sum(away**2, axis=1))))
+    return LOOK * np.arange(1, len(squares) + 1), np.array(squares)
+
+
+def linear_motion(found: Snapshot, push: Floats, times: Floats) -> Floats:
+    """D of the linearised packing at some times after a push from rest, without dashpots."""
+    count = len(push)
+    root = np.sqrt(found.coordinate_mass)
+    start = np.zeros(found.coordinates)
+    start[: 3 * count] = push.T.ravel()
+    a = mass_weighted(stiffness_matrix(found), found)
+    active = active_coordinates(a)
+    squares, vectors = eig(a[active][:, active].toarray())
+    omega = np.sqrt(squares.astype(complex))
+    share = np.linalg.solve(vectors, (start * root)[active].astype(complex))
+    motion = np.zeros((found.coordinates, len(times)))
+    motion[active] = (vectors @ (share[:, None] * np.sin(np.outer(omega, times)) / omega[:, None])).real
+    motion = (motion / root[:, None])[: 3 * count]
+    return np.asarray(np.sum(motion**2, axis=0) / count)
+
+
+def beyond(course: Floats, bound: float) -> int:
+    """The look from which on D stays above a bound."""
+    below = np.flatnonzero(course < bound)
+    return int(below[-1]) + 1 if len(below) else 0
+
+
+def fit_rate(times: Floats, course: Floats) -> float | None:
+    """Rate at which D grows, 1 / time; None of fewer than three looks."""
+    return float(np.polyfit(times, np.log(course), 1)[0]) if len(times) > 2 else None
+
+
+def compute(table: Path, cells: Iterable[Cell] = CELLS, watch: Any = print) -> None:
+    """Add the rows that a table lacks, seed by seed: all laws of a seed in all cells before the next."""
+    known = {_key(row) for row in read(table)}
+    wanted = [
+        (cell.count > LARGE, seed, law, d, cell.count, cell.mu)
+        for cell in cells
+        for seed in range(1, cell.seeds + 1)
+        for d in cell.dimensions
+        for law in cell.laws
+    ]
+    for _, seed, law, d, count, mu in sorted(wanted, key=itemgetter(0, 1)):
+        if (law, d, count, mu, seed) not in known:
+            made = list(rows(law, d, count, mu, seed))
+            with table.open("a") as file:
+                file.writelines(json.dumps(row) + "\n" for row in made)
+            pairs = [row.get("pairs") for row in made]
+            watch(f"{law}, d = {d}, N = {count}, mu = {mu}, seed {seed}: {pairs}", flush=True)
+
+
+def compute_growth(table: Path, watch: Any = print) -> None:
+    """Add the packings that a table of those that are let go lacks."""
+    known = {row["seed"] for row in read(table)}
+    for seed in range(1, LET_GO + 1):
+        if seed not in known:
+            row = let_go(seed)
+            with table.open("a") as file:
+                file.write(json.dumps(row) + "\n")
+            watch(row, flush=True)
+
+
+def _key(row: dict[str, Any]) -> tuple[Any, ...]:
+    return row["law"], row["d"], row["count"], row["mu"], row["seed"]
 
 
 def read(table: Path) -> list[dict[str, Any]]:

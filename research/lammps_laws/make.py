@@ -1,13 +1,15 @@
 """The tables of the page on LAMMPS's laws computed, the page made from them, or a packing in ten computed again.
 
-python -m research.lammps_laws.make compute [COUNT SEEDS]    what the table lacks, on one core; 25 minutes
-python -m research.lammps_laws.make page                     README.md from the tables
-python -m research.lammps_laws.make check                    the first packing of each law once more, compared
+python -m research.lammps_laws.make compute    what the tables lack of all cells, on one core, resumable; hours
+python -m research.lammps_laws.make growth     the packings that are let go without loss; minutes
+python -m research.lammps_laws.make page       README.md from the tables
+python -m research.lammps_laws.make check      the first packings of 50 particles of each law once more, compared
 
 From the folder of the repository.
 """
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,10 +19,23 @@ import numpy as np
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.pages import render
 from faultgouge.studies.statistics import median, share
-from research.lammps_laws.compute import LAWS, TILTS, compute, read
+from research.lammps_laws.compute import CELLS, LAWS, MU, TILTS, TO, Cell, compute, compute_growth, let_go, read
+from research.lammps_laws.energy_cycle import energy_cycle
 
 HERE = Path(__file__).parent
-TABLE = HERE / "tables" / "packings.jsonl"
+TABLES = HERE / "tables"
+PACKINGS, GROWTH = "packings.jsonl", "growth.jsonl"
+
+USUAL = (50, MU)
+"""Particles and friction of the packings of which most is known."""
+
+AGREES = 1e-6
+"""Relative difference of numbers that are computed again: the motion of a packing that comes to rest is repeated to the
+bit on one machine, and its rounding ends at the balance of forces, 1e-8."""
+
+
+GROWN = TO / 10
+"""D beyond which a packing that has been let go has grown: a decade below the end of a run, twelve above the push."""
 
 
 def cell(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -39,9 +54,10 @@ def cell(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def numbers(table: Path = TABLE) -> dict[str, Any]:
+def numbers(tables: Path = TABLES) -> dict[str, Any]:
     """All numbers of the page."""
-    rows = read(table)
+    every = read(tables / PACKINGS)
+    rows = [row for row in every if (row["count"], row["mu"]) == USUAL]
     cells = [
         {"law": law, "d": d, "tilt": tilt}
         | cell([row for row in rows if (row["law"], row["d"], row["tilt"]) == (law, d, tilt)])
@@ -68,11 +84,58 @@ def numbers(table: Path = TABLE) -> dict[str, Any]:
     return {
         "cells": cells,
         "laws": by_law,
-        "seeds": max(row["seed"] for row in rows),
-        "rows": len(rows),
-        "restless": sum(not row["rests"] for row in rows),
+        "others": other_cells(every),
+        "seeds": full_seeds(rows),
+        "rows": len(every),
+        "restless": sum(not row["rests"] for row in every),
+        "pushed": growth(read(tables / GROWTH)),
+        "cycles": [energy_cycle(law) for law in LAWS],
         "wall": wall_alone(),
     }
+
+
+def full_seeds(rows: list[dict[str, Any]]) -> int:
+    """The last seed that all laws have in both dimensions."""
+    return min(max(row["seed"] for row in rows if row["law"] == law and row["d"] == d) for law in LAWS for d in (2, 3))
+
+
+def other_cells(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The first and the last tilt of the cells of other sizes and other friction, as far as they have been computed."""
+    found = []
+    for count, mu, _, laws, dimensions in CELLS:
+        for d in dimensions if (count, mu) != USUAL else ():
+            for law in laws:
+                for tilt in (TILTS[0], TILTS[-1]):
+                    key = (count, mu, d, law, tilt)
+                    own = [row for row in rows if tuple(row[k] for k in ("count", "mu", "d", "law", "tilt")) == key]
+                    if own:
+                        found.append({"count": count, "mu": mu, "d": d, "law": law, "tilt": tilt} | cell(own))
+    return found
+
+
+def growth(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Packings that are let go: growth in LAMMPS over that of the linearised packing, and beyond small motion."""
+    good = [row for row in rows if row["rests"]]
+    free = [row for row in good if not row["at_bound"]]
+    return {
+        "law": rows[0]["law"],
+        "d": rows[0]["d"],
+        "tilt": rows[0]["tilt"],
+        "packings": len(good),
+        "restless": len(rows) - len(good),
+        "pairs": sum(row["pairs"] > 0 for row in good),
+        "grown": sum(row["last"] > GROWN for row in good),
+        "rows": good,
+        "free": len(free),
+        "ratio": _middle(row["rate"] / row["linear"] for row in free),
+        "late": _middle(row["late"] / row["predicted"] for row in good),
+    }
+
+
+def _middle(values: Iterable[float]) -> list[float]:
+    """Median, least and largest."""
+    each = sorted(values)
+    return [float(np.median(each)), each[0], each[-1]]
 
 
 def wall_alone() -> dict[str, Any]:
@@ -106,33 +169,54 @@ def ranged(value: list[float] | None, digits: str = ".2g") -> str:
     return "-" if value is None else "{} ({} to {})".format(*(format(each, digits) for each in value))
 
 
-def write_page(folder: Path = HERE, table: Path = TABLE) -> Path:
-    """Write README.md of a folder from a table."""
-    text = render("research.lammps_laws", "README.md.j2", **numbers(table), ranged=ranged)
+def three(value: list[float]) -> str:
+    """A median with its range, to hundredths."""
+    return ranged(value, ".2f")
+
+
+def signed(value: float) -> str:
+    """A number with its sign; what is zero to eight digits has none."""
+    return "0" if abs(value) < 1e-8 else f"{value:+.4g}"
+
+
+def write_page(folder: Path = HERE, tables: Path = TABLES) -> Path:
+    """Write README.md of a folder from the tables."""
+    formats = {"ranged": ranged, "three": three, "signed": signed}
+    text = render("research.lammps_laws", "README.md.j2", **numbers(tables), **formats)
     write_text(folder / "README.md", text)
     return folder / "README.md"
 
 
 def check() -> list[str]:
-    """Cells of the first seed computed again that differ from the table by more than 1e-6."""
+    """Packings of the first seed computed again that differ from the tables."""
     with TemporaryDirectory() as folder:
-        again = Path(folder) / "again.jsonl"
-        compute(again, 50, range(1, 2))
-        known = {(row["law"], row["d"], row["tilt"]): row for row in read(TABLE) if row["seed"] == 1}
-        new = read(again)
-    return [
-        f"{row['law']}, d = {row['d']}, tilt {row['tilt']}"
+        again = Path(folder) / PACKINGS
+        known = {_key(row): row for row in read(TABLES / PACKINGS)}
+        there = {(count, mu) for _, _, count, mu, _, _ in known if count == USUAL[0]}
+        compute(again, [Cell(*cell[:2], 1, *cell[3:]) for cell in CELLS if cell[:2] in there])
+        new = [row for row in read(again) if _key(row) in known]
+    wrong = [
+        f"{row['law']}, d = {row['d']}, N = {row['count']}, mu = {row['mu']}, tilt {row['tilt']}"
         for row in new
-        if not np.isclose(row["growth_rate"], known[row["law"], row["d"], row["tilt"]]["growth_rate"], rtol=1e-6)
+        if row["rests"] != known[_key(row)]["rests"]
+        or not np.isclose(row.get("growth_rate", 0), known[_key(row)].get("growth_rate", 0), rtol=AGREES)
     ]
+    first = read(TABLES / GROWTH)[0]
+    if not np.isclose(let_go(1)["rate"], first["rate"], rtol=AGREES):
+        wrong.append("growth of seed 1")
+    return wrong
+
+
+def _key(row: dict[str, Any]) -> tuple[Any, ...]:
+    return tuple(row[name] for name in ("law", "d", "count", "mu", "seed", "tilt"))
 
 
 if __name__ == "__main__":
     match sys.argv[1:]:
-        case ["compute", *given]:
-            count, seeds = map(int, given or (50, 20))
-            TABLE.parent.mkdir(exist_ok=True)
-            compute(TABLE, count, range(1, seeds + 1))
+        case ["compute"]:
+            compute(TABLES / PACKINGS)
+        case ["growth"]:
+            compute_growth(TABLES / GROWTH)
         case ["page"]:
             print(write_page())
         case ["check"]:

@@ -14,16 +14,30 @@ from faultgouge.figures.pages import render
 from faultgouge.studies.result_rows import read_rows
 from faultgouge.studies.statistics import interval, median, median_interval, share
 from research.laws.both_laws import BRANCHES, RESTITUTIONS
+from research.laws.sets import sets as all_sets
 from research.modes.loss import GROWS
 from research.modes.page import finite, part
+from research.yielding.page import UNREST, rows_of
 
 Row = dict[str, Any]
+
+HERE = Path(__file__).parent
+YIELDING = HERE.parent / "yielding" / "tables"
 
 WORDS = {"smooth": "smoothed", "same": "standard, same equilibria", "loaded": "standard, own ramp"}
 STATES = tuple(WORDS)
 
+STOCK = {"granular": "stock LAMMPS", "coulomb": "this program, standard law", "smooth": "this program, smoothed law"}
+
+LOSS = 0.9
+"""Restitution of the lossy layers that noise may set flowing."""
+
 DRAG = 2.0
-"""1/tau of the drag with which the deck of stock LAMMPS loads (`stock_lammps`)."""
+"""1/tau of a drag that is strong for a deck that loads with it: pairs beyond it grow all the same."""
+
+FAST = 0.5
+"""Rate of D, 1 / time, beyond which a run of 50 units shows growth: nine decades need 0.41, and noise has only a part
+of the motion that grows."""
 
 MEDIANS = ("share", "growth_rate", "least_q", "drag_rate")
 
@@ -33,9 +47,13 @@ def write_page(tables: Path, folder: Path) -> Path:
     found = numbers(
         {path.stem: [row for row in read_rows(path) if row["says"] is None] for path in tables.glob("*.jsonl")}
     )
+    found["stock"] = stock(read_rows(HERE / "stock_lammps.jsonl"))
+    found["yielding"] = yields(read_rows(YIELDING / "standard_100.jsonl"))
+    smoothed, _ = rows_of(YIELDING / "quartz_100.jsonl")
+    found["yielding"]["smoothed"] = yields(smoothed)
     write_json(folder / "laws.json", finite(found))
     formats = {"middle": interval, "quality": partial(interval, digits=".3g"), "part": part, "across": across}
-    formats |= {"restitutions": RESTITUTIONS, "words": WORDS}
+    formats |= {"restitutions": RESTITUTIONS, "words": WORDS, "stock_words": STOCK, "asked": asked()}
     write_text(folder / "README.md", render("research.laws", "README.md.j2", **found, **formats))
     return folder / "README.md"
 
@@ -55,7 +73,8 @@ def numbers(tables: dict[str, list[Row]]) -> dict[str, Any]:
     }
     growth = tables.get("growth_100", [])
     onsets = {name.split("_")[1]: first_windows(rows) for name, rows in tables.items() if name.startswith("onset_")}
-    return {"sets": sets, "runs": runs(growth), "grown": len(growth), "onsets": onsets}
+    packings = {name.replace("_", " "): len(rows) for name, rows in tables.items()}
+    return {"sets": sets, "packings": packings, "runs": runs(growth), "grown": len(growth), "onsets": onsets}
 
 
 def by_load(rows: Sequence[Row]) -> dict[float, dict[str, Any]]:
@@ -105,6 +124,7 @@ def runs(rows: Sequence[Row]) -> dict[str, dict[float, dict[str, Any]]]:
             ]
             found.setdefault(name, {})[e] = {
                 "predicted": counted(run["predicted"] > 2 * GROWS for run in chosen),
+                "fast": counted(run["predicted"] > FAST for run in chosen),
                 "always": counted(map(all, rates)),
                 "ever": counted(map(any, rates)),
                 "ratio": [float(np.median(ratios)), min(ratios), max(ratios)] if ratios else None,
@@ -119,3 +139,43 @@ def first_windows(rows: Sequence[Row]) -> dict[str, Any]:
     """How many packings have a first window up to the end of the ramp, and the median of F_x^c."""
     reach, found = [row["reach"] for row in rows], [row["ends"] == "onset" for row in rows]
     return {"windows": counted(found), "median": median_interval(reach, found)}
+
+
+def stock(rows: Sequence[Row]) -> dict[str, dict[str, Any]]:
+    """By law: packings in which the spectrum and LAMMPS have growth, the ratio of rates, and how far D rises else."""
+    found = {}
+    for law in STOCK:
+        each = [row for row in rows if row["law"] == law]
+        grown = [[draw["rate"] is not None for draw in row["draws"]] for row in each]
+        draws = [(row, draw) for row in each for draw in row["draws"]]
+        ratios = sorted(draw["rate"] / row["predicted"] for row, draw in draws if draw["rate"] is not None)
+        found[law] = {
+            "packings": len(each),
+            "undamped": median([row["undamped"] for row in each]),
+            "predicted": counted(row["predicted"] > 2 * GROWS for row in each),
+            "always": counted(map(all, grown)),
+            "ever": counted(map(any, grown)),
+            "ratio": [float(np.median(ratios)), ratios[0], ratios[-1]] if ratios else None,
+            "most": max((draw["last_over_first"] for _, draw in draws if draw["rate"] is None), default=None),
+            "unseen": max(
+                (row["predicted"] for row, grows in zip(each, grown, strict=True) if not any(grows)), default=0.0
+            ),
+            "moved": max(row["moved"] for row in each),
+            "bound": max(row["at_bound"] for row in each),
+        }
+    return found
+
+
+def yields(rows: Sequence[Row]) -> dict[str, Any]:
+    """Layers of one law at shares of their static yield: those that end in each way from any load, by loss."""
+    found: dict[str, Any] = {"packings": len(rows), "static": median([row["static"] for row in rows])}
+    for name, loss in (("undamped", 1.0), ("lossy", LOSS)):
+        runs = [[run for run in row["dynamic"] if run["restitution"] == loss] for row in rows]
+        found[name] = {kind: counted(any(run["ends"] == kind for run in each) for each in runs) for kind in UNREST}
+        found[name]["grows"] = counted(any(run["rate"] > 2 * GROWS for run in each) for each in runs)
+    return found
+
+
+def asked() -> dict[str, int]:
+    """How many packings of each set were asked for."""
+    return {name: len(sweep.points) for name, sweep in all_sets().items()}

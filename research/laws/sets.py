@@ -27,7 +27,7 @@ QUARTZ = {"10 MPa": 10, "1 MPa": 10}
 
 QUARTZ_LOADS = (0.2, 0.3)
 
-GROWING, GROWTH_LOADS = 12, (0.2,)
+GROWING, GROWTH_LOADS = 20, (0.2,)
 """Packings whose growth is measured, and the load."""
 
 ONSETS, REACH = 20, 0.1

@@ -8,6 +8,7 @@ Without a SET, such as "loss 100", all of them.
 """
 
 import sys
+from collections.abc import Mapping
 from math import isclose
 from pathlib import Path
 from typing import Any
@@ -51,15 +52,26 @@ def check(folder: Path, names: list[str]) -> None:
     sys.exit(len(wrong) > 0)
 
 
-def different(one: Any, other: Any, name: str = "") -> list[str]:
-    """Names of what differs: numbers count as equal to six digits, and rates that were measured in runs to three."""
+MEASURED = {"measured": 1e-3}
+"""Relative difference that numbers whose name has this word may have: rates that were measured in runs."""
+
+
+def different(one: Any, other: Any, name: str = "", allowed: Mapping[str, float] = MEASURED) -> list[str]:
+    """Names of what differs: numbers count as equal to six digits, but for those of which more is allowed."""
     if isinstance(one, dict) and isinstance(other, dict):
         keys = one.keys() & other.keys()  # what an older row lacks was added later
-        return [each for key in sorted(keys) for each in different(one.get(key), other.get(key), f"{name} {key}")]
+        return [
+            each for key in sorted(keys) for each in different(one.get(key), other.get(key), f"{name} {key}", allowed)
+        ]
     if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
-        return [each for k, pair in enumerate(zip(one, other, strict=True)) for each in different(*pair, f"{name} {k}")]
+        pairs = enumerate(zip(one, other, strict=True))
+        return [each for k, pair in pairs for each in different(*pair, f"{name} {k}", allowed)]
     if isinstance(one, float) and isinstance(other, (int, float)):
-        return [] if isclose(one, other, rel_tol=1e-3 if "measured" in name else 1e-6) else [name.strip()]
+        return (
+            []
+            if isclose(one, other, rel_tol=max((allowed[word] for word in allowed if word in name), default=1e-6))
+            else [name.strip()]
+        )
     return [] if one == other else [name.strip()]
 
 

@@ -20,6 +20,7 @@ damped dynamics finds. The static yield is therefore computed with other increme
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,7 @@ def yielding(scene: Scene, settled: Equilibrium) -> dict[str, Any]:
         "static": last / fy,
         "static_by_increment": [[step, branch(settled, step).kept[-1].fx / fy] for step in INCREMENTS],
         "jumps": [[fx / fy, moved] for fx, moved in path.jumps],
-        "dynamic": dynamic_runs(scene, path),
+        "dynamic": list(dynamic_runs(scene, path)),
         "loading": [
             {"rate": rate, "restitution": loss} | raise_load(path, dashpots(scene, loss), rate)
             for rate, loss in LOADINGS
@@ -83,16 +84,30 @@ def yielding(scene: Scene, settled: Equilibrium) -> dict[str, Any]:
     }
 
 
-def dynamic_runs(scene: Scene, path: Branch) -> list[dict[str, Any]]:
-    """The runs from the equilibria at `SHARES` with each of `LOSSES`; loads between two that are borne may be none."""
+def dynamic_runs(
+    scene: Scene, path: Branch, losses: Sequence[float] = LOSSES, draws: int = 1
+) -> Iterator[dict[str, Any]]:
+    """The runs from the equilibria at `SHARES` with each loss; loads between two that are borne may be none.
+
+    A run that noise decides is made with several draws of the noise; a stable layer has one row.
+    """
     seed, last = scene.packing.model_dump().get("seed", 0), path.kept[-1].fx
-    return [
-        {"share": share, "restitution": loss, "fx_over_fy": here.fx / scene.load.fy}
-        | dynamic(here, dashpots(scene, loss), seed)
-        for share in SHARES
-        if (here := path.borne(share * last)) is not None
-        for loss in LOSSES
-    ]
+    for share in SHARES:
+        here = path.borne(share * last)
+        if here is None:
+            continue
+        for loss in losses:
+            known = {"share": share, "restitution": loss, "fx_over_fy": here.fx / scene.load.fy}
+            for draw in range(draws):
+                row = known | dynamic(here, dashpots(scene, loss), noise_seed(seed, draw))
+                yield row | ({"draw": draw} if draws > 1 else {})
+                if row["ends"] == "stable":
+                    break
+
+
+def noise_seed(seed: int, draw: int) -> int:
+    """Of the noise of a packing: its own seed, and others for further draws."""
+    return seed + 1000 * draw
 
 
 def dashpots(scene: Scene, restitution: float) -> float:

@@ -1,7 +1,9 @@
 """Lossy layers left to themselves with both histories of the slip, and layers of 400 disks: the tables of further.md.
 
 python -m research.yielding.further rest FOLDER [SEED ...]      rows of lasting.jsonl
+python -m research.yielding.further draws FOLDER [SEED ...]     rows of draws.jsonl: further draws, and the standard law
 python -m research.yielding.further large FOLDER [SEED ...]     rows of quartz_400.jsonl, as those of the task "yield"
+python -m research.yielding.further standard FOLDER [SEED ...]  rows of standard_100.jsonl, loaded by the standard law
 """
 
 import sys
@@ -17,13 +19,20 @@ from faultgouge.pywrap.runs.undamped import time_step
 from faultgouge.studies.packing_tools import distance_of_bearing_disks, shake_disks
 from faultgouge.studies.result_rows import append_row
 from faultgouge.studies.sweep.sweep_plan import read_toml
+from research.laws.both_laws import as_slider
 from research.modes.loss import with_dashpots
-from research.yielding.compute import NOISE, dashpots, dynamic, dynamic_runs
+from research.yielding.compute import NOISE, dashpots, dynamic, dynamic_runs, noise_seed
 from research.yielding.static import branch, layer_slip
 
 SCENE = Path(__file__).parent / "yield.toml"
 HISTORIES = ("total", "rescaled")
 TIME, WINDOW = 300, 50
+DRAWS = 3
+"""Draws of noise of a layer, where a run decides."""
+
+STANDARD_LOSSES = (1.0, 0.9)
+"""Restitutions of the runs with the standard law."""
+
 LARGE = {"disks": 400, "width": 23.8, "top": 20}
 
 
@@ -35,7 +44,9 @@ def scene(seed: int, **packing: Any) -> Scene:
 
 
 def with_history(start: Equilibrium, history: str) -> Equilibrium:
-    """The same state: the force is one function of overlap and slip, and only what the slip does later differs."""
+    """The same disks and forces; only what the slip does later differs, and with "coulomb" a contact at the bound."""
+    if history == "coulomb":
+        return replace(start, packing=as_slider(start.packing))
     law = replace(start.packing.law, rescaled=history == "rescaled")
     return replace(start, packing=replace(start.packing, law=law))
 
@@ -80,17 +91,46 @@ def left_alone(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
     return {"time": TIME, "early": early, "late": late, "moves": float(np.ptp(slips[WINDOW + 1 :]))} | last
 
 
+def draws(seed: int) -> Iterator[dict[str, Any]]:
+    """Lossy runs at 0.97 of the static yield: further draws with total slips, all draws with the standard law."""
+    given = scene(seed)
+    path = branch(settle(given))
+    here = path.borne(0.97 * path.kept[-1].fx)
+    if here is None:
+        return
+    cn = dashpots(given, 0.9)
+    for history, first in (("total", 1), ("coulomb", 0)):
+        start = with_history(here, history)
+        known = {"seed": seed, "share": 0.97, "fx_over_fy": here.fx / given.load.fy, "history": history}
+        for draw in range(first, DRAWS):
+            yield known | {"restitution": 0.9, "draw": draw} | left_alone(start, cn, noise_seed(seed, draw))
+
+
+def standard(seed: int) -> Iterator[dict[str, Any]]:
+    """Static yield and dynamic runs of 100 disks that the standard law has loaded."""
+    given = scene(seed)
+    given = given.model_copy(update={"law": given.law.model_copy(update={"history": "coulomb"})})
+    path = branch(settle(given))
+    known = {"seed": seed, "newton": path.newton / given.load.fy, "static": path.kept[-1].fx / given.load.fy}
+    yield known | {"dynamic": list(dynamic_runs(given, path, STANDARD_LOSSES, DRAWS))}
+
+
 def large(seed: int) -> Iterator[dict[str, Any]]:
     """Static yield and dynamic runs of 400 disks."""
     given = scene(seed, **LARGE)
     path = branch(settle(given))
     known = {"seed": seed, "newton": path.newton / given.load.fy, "static": path.kept[-1].fx / given.load.fy}
-    yield known | {"dynamic": dynamic_runs(given, path)}
+    yield known | {"dynamic": list(dynamic_runs(given, path))}
 
 
 if __name__ == "__main__":
     kind, folder, *seeds = sys.argv[1:]
-    compute, name = {"rest": (lasting, "lasting"), "large": (large, "quartz_400")}[kind]
+    compute, name = {
+        "rest": (lasting, "lasting"),
+        "draws": (draws, "draws"),
+        "large": (large, "quartz_400"),
+        "standard": (standard, "standard_100"),
+    }[kind]
     for seed in map(int, seeds or range(1, 21)):
         for row in compute(seed):
             append_row(Path(folder) / f"{name}.jsonl", row)

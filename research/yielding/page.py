@@ -18,7 +18,7 @@ from faultgouge.figures.pages import render
 from faultgouge.figures.style import INK, save, styled
 from faultgouge.studies.result_rows import read_rows, row_columns
 from faultgouge.studies.statistics import interval, median, share
-from research.yielding.compute import CONTROLLED, LOADINGS, LOSSES, SHARES
+from research.yielding.compute import CONTROLLED, LOADINGS, LOSSES, SHARES, TIME
 
 UNREST = ("flows", "bursts", "fails at rest")
 """How a run ends after which the layer does not rest: it flows in the run; it throws a disk out of the box; or it finds
@@ -132,10 +132,11 @@ def _rising(rows: list[dict[str, Any]], rate: float, loss: float) -> dict[str, A
     }
 
 
-def text(found: dict[str, Any], packings: int, failed: int) -> str:
-    """The page."""
+def text(found: dict[str, Any], packings: int, failed: int, loaded: list[dict[str, Any]]) -> str:
+    """The page; `loaded` are the rows of layers that the standard law has loaded."""
     unrest = [share(each["unrest"], packings) for each in found["yields"]]
     names = {"packings": packings, "failed": failed, "unrest": unrest, "interval": interval, "percent": percent}
+    names["standard"] = standard(loaded)
     names["slow"] = [row for row in found["loading"] if row["rate"] == CONTROLLED]
     return render("research.yielding", "README.md.j2", **found, **names)
 
@@ -187,20 +188,83 @@ def write_page(folder: Path) -> Path:
     (folder / "pictures").mkdir(exist_ok=True)
     save(figure(found), folder / "pictures" / "yield")
     page = folder / "README.md"
-    page.write_text(text(found, len(rows), failed))
+    page.write_text(text(found, len(rows), failed, read_rows(folder / "tables" / "standard_100.jsonl")))
     return page
 
 
+def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Layers that the standard law has loaded, each with several draws of noise where a run decides.
+
+    "runs" are by share of the static yield and restitution: packings; those whose spectrum has growth; those that end
+    in each way of `UNREST`, and those that rest elsewhere, in all draws and in any. "flows" are packings that flow in
+    any run, by restitution.
+    """
+    losses = sorted({run["restitution"] for row in rows for run in row["dynamic"]}, reverse=True)
+    runs = []
+    for load in SHARES:
+        for loss in losses:
+            each = [
+                [run for run in row["dynamic"] if (run["share"], run["restitution"]) == (load, loss)] for row in rows
+            ]
+            each = [draws for draws in each if draws]
+            cell: dict[str, Any] = {"share": load, "restitution": loss, "packings": len(each)}
+            cell["grows"] = sum(draws[0]["rate"] > 0 for draws in each)
+            for kind in UNREST:
+                which = [[run["ends"] == kind for run in draws] for draws in each]
+                cell[kind] = [sum(map(all, which)), sum(map(any, which))]
+            which = [[run.get("D", 0.0) > ELSEWHERE for run in draws] for draws in each]
+            cell["elsewhere"] = [sum(map(all, which)), sum(map(any, which))]
+            slips = [abs(run["slip"]) for draws in each for run in draws if run["ends"] not in UNREST]
+            cell["slip"] = float(np.median(slips)) if slips else None
+            cell["largest"] = float(np.median([run["largest_D"] for draws in each for run in draws])) if each else None
+            cell["decades"] = (
+                float(np.median([draws[0]["rate"] for draws in each])) * TIME / np.log(10) if each else None
+            )
+            runs.append(cell)
+    flows = {
+        loss: share(
+            sum(any(run["ends"] == "flows" for run in row["dynamic"] if run["restitution"] == loss) for row in rows),
+            len(rows),
+        )
+        for loss in losses
+    }
+    return {"static": median([row["static"] for row in rows]), "of": len(rows), "runs": runs, "flows": flows}
+
+
+def drawn_again(lasting: list[dict[str, Any]], further: list[dict[str, Any]]) -> dict[str, Any] | None:
+    """Lossy layers with three draws of noise: how many vibrate on in how many draws, by history; None without rows.
+
+    Of the seeds whose draws have all been computed.
+    """
+    found: dict[str, dict[int, list[bool]]] = {"total": {}, "coulomb": {}}
+    first = [row for row in lasting if (row["history"], row["share"], row["restitution"]) == ("total", 0.97, 0.9)]
+    for row in [*first, *further]:
+        found[row["history"]].setdefault(row["seed"], []).append(lasts(row))
+    draws = max((row["draw"] + 1 for row in further), default=0)
+    seeds = [seed for seed, each in found["coulomb"].items() if len(each) == len(found["total"][seed]) == draws]
+    if not seeds:
+        return None
+    counts = {
+        history: [sum(sum(each[seed]) == k for seed in seeds) for k in range(draws + 1)]
+        for history, each in found.items()
+    }
+    late = max(row["late"] for row in further if row["history"] == "coulomb" and row["seed"] in seeds)
+    return {"seeds": seeds, "draws": draws, "counts": counts, "late": late}
+
+
 def write_lasting(folder: Path) -> Path:
-    """further.md of a folder with tables/lasting.jsonl, quartz_100.jsonl and quartz_400.jsonl."""
+    """further.md of a folder with the tables of `research.yielding.further` and quartz_100.jsonl."""
     tables = folder / "tables"
     rows, large = (read_rows(tables / f"{name}.jsonl") for name in ("lasting", "quartz_400"))
+    further = tables / "draws.jsonl"
     lossy = [row for row in rows if row["restitution"] < 1]
     page = render(
         "research.yielding",
         "further.md.j2",
         percent=percent,
         lossy=lossy,
+        again=drawn_again(rows, read_rows(further) if further.exists() else []),
+        standard=standard(read_rows(tables / "standard_100.jsonl")),
         **_lasting(lossy),
         free=_without_loss(rows, tables / "quartz_100.jsonl"),
         large=[of_runs(large, load, loss) for load in SHARES for loss in LOSSES],

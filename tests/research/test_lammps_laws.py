@@ -1,23 +1,47 @@
-"""The page on LAMMPS's own laws: it comes out of the committed table, and the table bears what it says."""
+"""The page on LAMMPS's own laws: it comes out of the committed tables, and the tables bear what it says."""
 
 import pytest
 
-from research.lammps_laws.make import HERE, TABLE, check, numbers, write_page
+from research.lammps_laws.compute import LAWS
+from research.lammps_laws.energy_cycle import energy_cycle
+from research.lammps_laws.make import HERE, check, numbers, write_page
 
 NEVER = ("granular hooke, linear_history", "granular hertz, mindlin/force")
 
 
 @pytest.mark.slow
-def test_the_page_is_what_the_table_makes(tmp_path):
+def test_the_page_is_what_the_tables_make(tmp_path):
     assert write_page(tmp_path).read_text() == (HERE / "README.md").read_text()
-    found = numbers(TABLE)
-    for cell in found["cells"]:
+    found = numbers()
+    for cell in found["cells"] + found["others"]:
         assert cell["negative"] == 0
         if cell["law"] in NEVER:
             assert cell["with_pairs"]["count"] == 0
         elif "hertz" in cell["law"]:
-            assert cell["with_pairs"]["count"] >= 0.7 * cell["packings"]
+            assert cell["with_pairs"]["count"] >= 0.5 * cell["packings"]
     assert found["wall"]["power"] == pytest.approx(0.5)
+    pushed = found["pushed"]
+    assert pushed["grown"] == pushed["pairs"] == pushed["packings"]
+    # while no contact slides LAMMPS grows as the linearised packing does; beats of pairs are left in a fit
+    assert all(abs(ratio - 1) < 0.05 for ratio in pushed["ratio"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", LAWS)
+def test_a_contact_creates_the_energy_of_the_formula(law):
+    """Rounding of the normal work, 1e4 times the tangential one, leaves 1e-11."""
+    found = energy_cycle(law)
+    for name in ("closing", "parting"):
+        assert found[name] == pytest.approx(found[f"{name}_formula"], abs=1e-9)
+        assert found[f"{name}_left"] == pytest.approx(0, abs=1e-12)
+    creates = {name for name in ("closing", "parting") if found[name] > 1e-9}
+    assert creates == (
+        {"parting"}
+        if law == "granular hertz, mindlin/force"
+        else {"closing"}
+        if "hertz" in law and law != "granular hertz, mindlin_rescale/force"
+        else set()
+    )
 
 
 @pytest.mark.long

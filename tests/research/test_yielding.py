@@ -3,15 +3,17 @@
 import shutil
 from pathlib import Path
 
+from faultgouge.studies.result_rows import read_rows
 from research.yielding.compute import CONTROLLED
-from research.yielding.page import numbers, rows_of, text, worst_ends, write_lasting
+from research.yielding.page import UNREST, drawn_again, numbers, rows_of, standard, text, worst_ends, write_lasting
 
 YIELDING = Path(__file__).parents[2] / "research" / "yielding"
 ROWS, FAILED = rows_of(YIELDING / "tables" / "quartz_100.jsonl")
+STANDARD = read_rows(YIELDING / "tables" / "standard_100.jsonl")
 
 
 def test_the_page_of_yield_is_that_of_its_table():
-    assert (YIELDING / "README.md").read_text() == text(numbers(ROWS), len(ROWS), FAILED)
+    assert (YIELDING / "README.md").read_text() == text(numbers(ROWS), len(ROWS), FAILED, STANDARD)
 
 
 def test_flow_is_told_from_a_layer_that_finds_no_rest_under_drag():
@@ -20,6 +22,35 @@ def test_flow_is_told_from_a_layer_that_finds_no_rest_under_drag():
     flowing = sum(any(run["ends"] == "flows" for run in each) for each in runs)
     assert worst["counts"]["flows"]["count"] == flowing == 9
     assert sum(each["count"] for each in worst["counts"].values()) == numbers(ROWS)["yields"][0]["unrest"]
+
+
+def test_the_standard_law_loads_the_same_packings_and_lossy_layers_rest():
+    assert [row["seed"] for row in STANDARD] == list(range(1, len(STANDARD) + 1))
+    found = standard(STANDARD)
+    assert found["flows"][0.9]["count"] == 0
+    for cell in found["runs"]:
+        assert all(every <= anyhow <= cell["packings"] for every, anyhow in (cell[kind] for kind in UNREST))
+    # a run that noise decides has three draws, a stable layer one
+    for row in STANDARD:
+        for share, loss in {(run["share"], run["restitution"]) for run in row["dynamic"]}:
+            runs = [run for run in row["dynamic"] if (run["share"], run["restitution"]) == (share, loss)]
+            assert len(runs) == (1 if runs[0]["ends"] == "stable" else 3)
+
+
+def test_draws_are_counted_by_layer():
+    lasting = [
+        {"seed": s, "history": "total", "share": 0.97, "restitution": 0.9, "early": 1, "late": 1} for s in (1, 2)
+    ]
+    further = [
+        {"seed": 1, "history": history, "draw": draw, "early": 1.0, "late": late}
+        for history, lates in (("total", {1: 1.0, 2: 0.1}), ("coulomb", {0: 0.1, 1: 0.1, 2: 0.2}))
+        for draw, late in lates.items()
+    ]
+    found = drawn_again(lasting, further)
+    assert found["seeds"] == [1]  # seed 2 has one draw alone
+    assert found["counts"] == {"total": [0, 0, 1, 0], "coulomb": [1, 0, 0, 0]}
+    assert found["late"] == 0.2
+    assert drawn_again(lasting, []) is None
 
 
 def test_layers_without_loss_do_not_rest_below_their_static_yield_and_lossy_ones_do():
