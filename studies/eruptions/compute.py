@@ -65,6 +65,10 @@ RISES = 1e4
 """Factor from the D of the first time unit from which D of a linearly stable packing has risen: rounding alone drifts
 by a few hundred times in `QUIET`."""
 
+WALK = 10.0
+"""Factor from the D of a random walk, one rounding of a coordinate a time step, below which D has not risen: strong
+drag leaves D at 1e-30 in the first time unit, and the walk is at 3e-25 after fifty."""
+
 Ends = Literal["opens", "slides", "law", "flows", "stable", "rises", "cut off"]
 
 
@@ -223,7 +227,8 @@ def _noise(columns: dict[str, Floats], unit: float) -> float:
 def _ending(start: Start, looks: list[Look], columns: dict[str, Floats], rate: float, unit: float) -> dict[str, Any]:
     """When and by what the growth ended, see the module."""
     ended: float | None = None
-    ends: Ends = "stable" if columns["msd"].max() <= RISES * _noise(columns, unit) else "rises"
+    drift = WALK * start.packing.coordinate_rounding**2 * columns["time"][-1] / time_step(start.packing)
+    ends: Ends = "stable" if columns["msd"].max() <= max(RISES * _noise(columns, unit), drift) else "rises"
     if rate > 0:
         place = int(np.argmax(columns["msd"] >= TENTH * columns["msd"].max()))
         ended = float(columns["time"][place])
