@@ -158,7 +158,7 @@ CASES = [
 
 @pytest.mark.parametrize(("law", "damped", "d"), CASES)
 def test_motion_of_lammps(beds, law, damped, d):
-    """The difference falls as the square of the time step, or in proportion to it with dashpots."""
+    """The difference falls as the square of the time step, or in proportion to it with dashpots, down to 1e-6."""
     from faultgouge.pywrap import compare_motion, from_lammps
 
     lmp = beds(law, d, damped)
@@ -167,24 +167,26 @@ def test_motion_of_lammps(beds, law, damped, d):
     assert len(contacts) > len(snapshot)
     assert snapshot.damped
     steps = [(2e-4 if damped else 8e-4) / 2**k for k in range(4)]
-    # at most a twentieth of the smallest overlap, beyond which the forces' cubic terms are seen; but with `granular`,
-    # which turns its history beyond 1e-10 of the bound alone, a smaller motion is seen less well
-    amplitude = min(4e-5, 0.05 * float(contacts.overlap.min())) if law.startswith("gran/") else 4e-5
-    runs = [compare_motion(lmp, snapshot, 0.2, amplitude, timestep=step) for step in steps]
-    error = [run.difference for run in runs]
+    # displacements are a fifth of these velocities, and no contact opens
+    large = min(3.2e-4, 4 * float(contacts.overlap.min()))
     if law in RESCALED:
         # the mean of two derivatives: what is left is of second order in their difference
-        assert error[-1] < 0.1
+        assert compare_motion(lmp, snapshot, 0.2, large / 8, timestep=steps[-1]).difference < 0.1
         return
     assert not contacts.at_bound.any()
+    runs = [[compare_motion(lmp, snapshot, 0.2, a, timestep=h) for a in (large, large / 2)] for h in steps]
+    predicted = runs[0][0].predicted / large
+    # extrapolated to no amplitude, without the forces' cubic terms, so that the amplitude can be large beside that of
+    # 1e-10 of Coulomb's bound, below which `granular` does not turn a history
+    linear = [(8 * half.measured - one.measured) / (3 * large) for one, half in runs]
+    size = np.linalg.norm(predicted)
+    error = [np.linalg.norm(each - predicted) / size for each in linear]
     order = 1 if damped else 2
     assert error[2] / error[3] == pytest.approx(2**order, rel=0.1)
-    # extrapolated to a step of zero: without the terms in h and h^2, or in h^2 and h^4
-    # `granular` turns a history that leaves its plane by 1e-10 of the bound, 5e-6 of what this motion adds to forces
-    tolerance = 1e-6 if law.startswith("gran/") else 5e-6
-    first, second, third = (run.measured for run in runs[1:])
+    # extrapolated to a step of zero, too: without the terms in h and h^2, or in h^2 and h^4
+    first, second, third = linear[1:]
     rest = (8 * third - 6 * second + first) / 3 if damped else (64 * third - 20 * second + first) / 45
-    assert np.linalg.norm(rest - runs[0].predicted) < tolerance * np.linalg.norm(rest)
+    assert np.linalg.norm(rest - predicted) < 1e-6 * size
 
 
 def test_a_look_changes_nothing(beds, tmp_path):
