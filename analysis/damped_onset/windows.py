@@ -35,7 +35,7 @@ from ..onset.window_edges import LostTrackError
 from ..packing.packing import Floats, Packing
 from .all_windows import Growing
 from .modes import Pencil
-from .perturbation_screening import Screen
+from .perturbation_screening import GrowthScreen
 from .window_edges import DampedWindow
 
 Known = Callable[[tuple[DampedWindow, ...], float], None]
@@ -123,7 +123,7 @@ def growing_windows(
     loads = check_increasing(forces)
     narrowest = LIMITS.narrowest * float(np.abs(loads).max())
     try:
-        return march_along_ramp(Growing(pencil, narrowest, Screen()), loads, look, first, watch, known)
+        return march_along_ramp(Growing(pencil, narrowest, GrowthScreen()), loads, look, first, watch, known)
     except LostTrackError:
         return march_along_ramp(Growing(pencil, narrowest, None), loads, look, first, watch, known)
 

@@ -32,13 +32,12 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from ...analysis import Packing, mean_square_displacement, nearest_image, spectrum
-from ...analysis.motion.propagator import SLOW
-from ...analysis.motion.state_space import StateSpace
+from ...analysis.motion.growth import unstable_rates
 from ...analysis.packing.packing import Floats
 from ...pywrap import Engine
 from ...pywrap.lammps.dynamics import Dynamics, Motion
 from ...pywrap.runs.undamped import time_step
-from ..packing_tools import contact_pairs, sliding_contacts, unit_of_time
+from ..packing_tools import contact_pairs, unit_of_time
 
 DECADES = 24.0
 """Decades of D between its noise, 1e-27 in the first steps, and the square of a tenth of an overlap."""
@@ -135,11 +134,9 @@ def erupt(start: Start) -> dict[str, Any]:
 
 def growth_rate(packing: Packing) -> float:
     """Of D, from K or, with dissipation, from K, C and M, 1 / time; 0 of a stable packing."""
-    if not packing.law.damped and packing.drag_time is None:
+    if not packing.damped:
         return spectrum(packing).growth_rate()
-    rates = np.linalg.eigvals(StateSpace.of(packing).matrix)
-    fastest = float(rates.real.max(initial=0.0))
-    return 2 * fastest if fastest > SLOW * np.abs(rates).max() else 0.0
+    return 2 * float(unstable_rates(packing).real.max(initial=0.0))
 
 
 def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[float, Motion]]:
@@ -199,7 +196,7 @@ class _Watch:
             "time": time,
             "msd": float(msd),
             "slip": float(self._moved[first.top, 0].mean()),
-            "kinetic_energy": _kinetic_energy(first, motion),
+            "kinetic_energy": motion.kinetic_energy(first),
             "lost": len(self._contacts - there),
             "gained": len(there - contact_pairs(first)),
             "sliding": len((_sliding(now) - self._slid) & self._contacts),
@@ -207,19 +204,14 @@ class _Watch:
 
 
 def _sliding(packing: Packing) -> set[tuple[int, int]]:
-    return contact_pairs(packing, sliding_contacts(packing)) if packing.law.frictional else set()
-
-
-def _kinetic_energy(packing: Packing, motion: Motion) -> float:
-    inertia = packing.inertia_factor * packing.mass * packing.radius**2
-    return float(0.5 * (packing.mass @ np.sum(motion.velocity**2, axis=1) + inertia @ motion.spin**2))
+    return contact_pairs(packing, packing.sliding)
 
 
 def _balance(dynamics: Dynamics, packing: Packing) -> float:
     """Change of the kinetic energy less work, relative."""
-    before = _kinetic_energy(packing, dynamics.advance(0))
+    before = dynamics.advance(0).kinetic_energy(packing)
     motion, work = dynamics.work(WORK_STEPS)
-    after = _kinetic_energy(packing, motion)
+    after = motion.kinetic_energy(packing)
     return float(abs(after - before - work) / max(abs(work), after, before))
 
 

@@ -149,7 +149,7 @@ def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[st
             if len(real)
             else "no disk touches another disk or the floor: stability is not defined"
         )
-    if not isinstance(packing, Snapshot) and (packing.law.damped or packing.drag_time is not None):
+    if not isinstance(packing, Snapshot) and packing.damped:
         print("dashpots and drag are left out here: `faultgouge onset` of the scene includes them")
     if gain is not None:
         print(
