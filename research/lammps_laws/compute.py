@@ -231,11 +231,14 @@ def let_go(seed: int) -> dict[str, Any]:
     row: dict[str, Any] = {"law": law, "d": d, "count": count, "mu": MU, "seed": seed, "tilt": tilt, "rests": False}
     with TemporaryDirectory() as folder:
         lmp = pour(law, d, count, MU, seed, Path(folder) / "log", NONE)
+        found = None
         for slope in TILTS[: TILTS.index(tilt) + 1]:
             lmp.command(f"variable slope equal {slope}")
             found = rest(lmp)
             if found is None:
-                return row
+                break
+        if found is None:
+            return row
         said = describe(found)
         row |= {"rests": True, "at_bound": said["at_bound"], "pairs": said["pairs"], "predicted": said["growth_rate"]}
         for name in ("drag", "spin"):
@@ -277,7 +280,7 @@ def _follow(lmp: Any, push: Floats) -> tuple[Floats, Floats]:
         away = x[order] - start
         away -= size * np.round(away / size)
         squares.append(float(np.mean(np.sum(away**2, axis=1))))
-    return LOOK * np.arange(1, len(squares) + 1), np.array(squares)
+    return LOOK * np.arange(1, len(squares) + 1, dtype=float), np.array(squares, dtype=float)
 
 
 def linear_motion(found: Snapshot, push: Floats, times: Floats) -> Floats:
