@@ -64,7 +64,7 @@ LAWS = {
 class Cell(NamedTuple):
     """Packings of one size and friction: with which laws, in which dimensions, and up to which seed."""
 
-    count: int
+    particles: int
     mu: float
     seeds: int
     laws: tuple[str, ...] = tuple(LAWS)
@@ -315,7 +315,7 @@ def compute(table: Path, cells: Iterable[Cell] = CELLS, watch: Any = print) -> N
     """Add the rows that a table lacks, seed by seed: all laws of a seed in all cells before the next."""
     known = {_key(row) for row in read(table)}
     wanted = [
-        (cell.count > LARGE, seed, law, d, cell.count, cell.mu)
+        (cell.particles > LARGE, seed, law, d, cell.particles, cell.mu)
         for cell in cells
         for seed in range(1, cell.seeds + 1)
         for d in cell.dimensions
