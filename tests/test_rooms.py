@@ -170,3 +170,10 @@ def test_analysis_needs_numpy_scipy_and_h5py_alone():
     others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
     assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.motion.response") & others == set()
     assert loaded_by("import faultgouge.analysis, faultgouge.pywrap") & SLOW_OF_SCIPY == set()
+
+
+def test_one_module_makes_sparse_factors():
+    """SciPy's solvers of sparse matrices are called in analysis/factors/sparse_lu.py alone."""
+    called = re.compile(r"\b(splu|spilu|spsolve|factorized)\b")
+    users = {name for name, path in modules().items() if called.search(path.read_text())}
+    assert users == {"faultgouge.analysis.factors.sparse_lu"}

@@ -27,8 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig
 from scipy.sparse import csc_array, csr_array, eye_array
-from scipy.sparse.linalg import LinearOperator, SuperLU, eigs, splu
+from scipy.sparse.linalg import LinearOperator, eigs
 
+from ..factors.sparse_lu import SingularMatrixError, SuperLUFactors, general_lu
 from ..motion.state_space import StateSpace
 from ..onset import force_bearing
 from ..onset.modes import assign_columns
@@ -349,13 +350,13 @@ def _quotient(s: complex, stiffness: complex, damping: complex, mass: complex) -
     return s
 
 
-def _factors(matrix: csc_array) -> SuperLU:
+def _factors(matrix: csc_array) -> SuperLUFactors:
     """LU factors; where s is an eigenvalue to the last bit, a shift by rounding stands for a pivot that is zero."""
     try:
-        return splu(matrix)
-    except RuntimeError:
+        return general_lu(matrix)
+    except SingularMatrixError:
         rounding = np.finfo(float).eps * np.abs(matrix.data).max()
-        return splu(csc_array(matrix + rounding * eye_array(matrix.shape[0])))
+        return general_lu(csc_array(matrix + rounding * eye_array(matrix.shape[0])))
 
 
 def _normalise(vectors: NDArray) -> Complexes:
