@@ -7,13 +7,13 @@ that dt = 2/mu with the largest mu of :math:`\mu^2 M - \mu C - K`.
 Of many coordinates mu is found by Arnoldi's iteration (ARPACK) with :math:`M^{-1/2} (K + \mu C) M^{-1/2}`, whose
 largest eigenvalue is :math:`\mu^2`. Masses and mu are applied to vectors, which spares copies of K and C.
 
-**What is guaranteed.** The residual of the iteration says how far an eigenvalue is, for K and C that are symmetric; that
-it is the largest one, no iteration can prove. What is sure is that no eigenvalue exceeds the largest sum of a row in
-absolute value (Gershgorin). With k and c these sums of :math:`M^{-1/2} K M^{-1/2}` and :math:`M^{-1/2} C M^{-1/2}`,
+**What is guaranteed.** For symmetric K and C the residual of the iteration says how far an eigenvalue is. No iteration
+can prove that this eigenvalue is the largest. What is sure is that none exceeds the largest sum of a row in absolute
+value (Gershgorin). With k and c these sums of :math:`M^{-1/2} K M^{-1/2}` and :math:`M^{-1/2} C M^{-1/2}`,
 
 .. math:: \mu^2 \le k + \mu c, \qquad \mu \le \tfrac12 \left(c + \sqrt{c^2 + 4k}\right) .
 
-The step 2/mu of this bound is stable for certain, and shorter than the limit, by a factor of about 2 for spheres.
+The step 2/mu of this bound is stable for certain, and shorter than the limit.
 """
 
 import numpy as np
