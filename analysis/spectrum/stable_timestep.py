@@ -5,7 +5,8 @@ of LAMMPS: a motion begins to alternate in sign and to grow when :math:`4 M - 2\
 that dt = 2/mu with the largest mu of :math:`\mu^2 M - \mu C - K`.
 
 Of many coordinates mu is found by Arnoldi's iteration (ARPACK) with :math:`M^{-1/2} (K + \mu C) M^{-1/2}`, whose
-largest eigenvalue is :math:`\mu^2`. Masses and mu are applied to vectors, so that the iteration needs no copies of K and C.
+largest eigenvalue is :math:`\mu^2`. Masses and mu are applied to vectors, so that the iteration needs no
+copies of K and C.
 
 **What is guaranteed.** For symmetric K and C the residual of the iteration says how far an eigenvalue is. No iteration
 can prove that this eigenvalue is the largest. What is sure is that none exceeds the largest sum of a row in absolute
