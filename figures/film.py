@@ -43,7 +43,7 @@ MOVED = LinearSegmentedColormap.from_list("moved", [BULK, "#f0b090", "#c0392b"])
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RunMotion:
     """Displacements of an undamped run.
 
     Attributes
@@ -61,7 +61,7 @@ class Motion:
     displacement: Floats
 
     @classmethod
-    def of(cls, packing: Packing, time: Floats, position: Floats, position_low: Floats | None = None) -> "Motion":
+    def of(cls, packing: Packing, time: Floats, position: Floats, position_low: Floats | None = None) -> "RunMotion":
         """From positions, shape (T, N, 2), and their low parts if there are any."""
         displacement = nearest_image(position - packing.position, packing.box_length)
         if position_low is not None:
@@ -70,7 +70,7 @@ class Motion:
         return cls(packing, time, displacement)
 
     @classmethod
-    def read(cls, run: RunFile) -> "Motion | None":
+    def read(cls, run: RunFile) -> "RunMotion | None":
         """The undamped run of an open file; None if the file has no trajectory."""
         if "trajectory" not in run.names_of_series:
             return None
@@ -82,7 +82,7 @@ class Motion:
             low = np.insert(low, 0, packing.position_low, axis=0)
         return cls.of(packing, time, position, low)
 
-    def between(self, first: float, last: float) -> "Motion":
+    def between(self, first: float, last: float) -> "RunMotion":
         """A part of the run.
 
         Raises
@@ -96,7 +96,7 @@ class Motion:
                 f"the run has {part.sum()} samples from t = {first:g} to {last:g}, and two are needed: its times go "
                 f"from {self.time[0]:g} to {self.time[-1]:g}"
             )
-        return Motion(self.packing, self.time[part], self.displacement[part])
+        return RunMotion(self.packing, self.time[part], self.displacement[part])
 
     @property
     def msd(self) -> Floats:
@@ -167,14 +167,14 @@ class RunFilm(Film):
 
     Parameters
     ----------
-    motion : Motion
+    motion : RunMotion
         The run.
     frames : int
         How many frames; the samples of the run are taken at even intervals of time.
     """
 
     @styled
-    def __init__(self, motion: Motion, frames: int, dots: int = DOTS) -> None:
+    def __init__(self, motion: RunMotion, frames: int, dots: int = DOTS) -> None:
         wanted = np.linspace(motion.time[0], motion.time[-1], frames)
         self._sample = np.clip(np.searchsorted(motion.time, wanted), 0, len(motion.time) - 1)
         self._motion, self._factor, self._msd = motion, motion.magnification(), motion.msd

@@ -186,28 +186,28 @@ struct FixedPointGrid {
   }
 
   // the closest multiple of g
-  FAULTGOUGE_INLINE double whole(double a) const
+  FAULTGOUGE_INLINE double to_spacing(double a) const
   {
     const double shift = 0x1.8p52 * spacing;
     return (a + shift) - shift;
   }
 
   // the closest multiple of 2^-52 g, for |a| <= g/2
-  FAULTGOUGE_INLINE double fine(double a) const { return (a + 1.5 * spacing) - 1.5 * spacing; }
+  FAULTGOUGE_INLINE double to_finest(double a) const { return (a + 1.5 * spacing) - 1.5 * spacing; }
 
   // a coordinate, with its high part a multiple of g again, after it has moved by d, which is rounded to 2^-52 g first:
   // all that follows is exact, however the coordinate was divided into high and low part before
-  FAULTGOUGE_INLINE Compensated moved(Compensated x, double d) const
+  FAULTGOUGE_INLINE Compensated displace(Compensated x, double d) const
   {
-    const double step = whole(d), rest = x.low + fine(d - step), carry = whole(rest);
+    const double step = to_spacing(d), rest = x.low + to_finest(d - step), carry = to_spacing(rest);
     return {x.high + (step + carry), rest - carry};
   }
 
   // any coordinate as a multiple of g and a rest that is a multiple of 2^-52 g
   FAULTGOUGE_INLINE Compensated split(Compensated x) const
   {
-    const double high = whole(x.high);
-    return moved(moved({high, 0.0}, x.high - high), x.low);
+    const double high = to_spacing(x.high);
+    return displace(displace({high, 0.0}, x.high - high), x.low);
   }
 };
 
@@ -224,10 +224,10 @@ struct SummationGrid {
   }
 
   // however the number was divided into high and low part before
-  FAULTGOUGE_INLINE Compensated rounded(Compensated x) const
+  FAULTGOUGE_INLINE Compensated round_to_grids(Compensated x) const
   {
-    const double whole = high.whole(x.high + x.low);
-    return {whole, low.whole((x.high - whole) + x.low)};
+    const double leading_part = high.to_spacing(x.high + x.low);
+    return {leading_part, low.to_spacing((x.high - leading_part) + x.low)};
   }
 };
 

@@ -93,13 +93,13 @@ FAULTGOUGE_INLINE void add(PairForce &sum, const Four &more)
   std::memcpy(&sum, &total, sizeof(Four));
 }
 
-FAULTGOUGE_INLINE void give_force(ContactPairs &pairs, int p, int, double x, double y, double tangential)
+FAULTGOUGE_INLINE void store_force(ContactPairs &pairs, int p, int, double x, double y, double tangential)
 {
   pairs.force[p] = PairForce{x, y, tangential, 0.0};
 }
 
-FAULTGOUGE_INLINE void give_force(ContactPairs &pairs, int p, int owned, Compensated x, Compensated y,
-                                  Compensated tangential)
+FAULTGOUGE_INLINE void store_force(ContactPairs &pairs, int p, int owned, Compensated x, Compensated y,
+                                   Compensated tangential)
 {
   const int i = pairs.first[p], j = pairs.second[p];
   const Four high{x.high, y.high, tangential.high, 0.0}, low{x.low, y.low, tangential.low, 0.0};
@@ -234,7 +234,7 @@ FAULTGOUGE_INLINE double summand(double force, const SummationGrid &)
 }
 FAULTGOUGE_INLINE Compensated summand(Compensated force, const SummationGrid &grid)
 {
-  return grid.rounded(force);
+  return grid.round_to_grids(force);
 }
 
 template <class V> FAULTGOUGE_INLINE void components(Batch<V> &batch, const Grids grids)

@@ -25,7 +25,7 @@ namespace faultgouge {
 
 // puts the results where they belong; returns a pair with one centre inside of the other disk, or else what it is given
 template <class V>
-FAULTGOUGE_INLINE int empty(Batch<V> &batch, ContactPairs &pairs, int owned, int crushed, bool energy)
+FAULTGOUGE_INLINE int flush_batch(Batch<V> &batch, ContactPairs &pairs, int owned, int crushed, bool energy)
 {
   using Number = typename V::Number;
   for (int k = 0; k < batch.count; k++) {
@@ -36,7 +36,7 @@ FAULTGOUGE_INLINE int empty(Batch<V> &batch, ContactPairs &pairs, int owned, int
       continue;
     }
     const Number tangential = V::FRICTION ? batch.tangential.load(k) : Number(0.0);
-    give_force(pairs, p, owned, batch.force_x.load(k), batch.force_y.load(k), tangential);
+    store_force(pairs, p, owned, batch.force_x.load(k), batch.force_y.load(k), tangential);
     if constexpr (V::ADVANCE)
       if (energy) pairs.dissipated[p] = batch.dissipated[k] + (pairs.touching[p] ? pairs.dissipated[p] : 0.0);
     if constexpr (V::FRICTION) {
@@ -74,10 +74,10 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
     add(batch, pairs, p, r, disks, dt);
     if (batch.count < BATCH) continue;
     evaluate(batch, law, dt, grids, energy);
-    crushed = empty(batch, pairs, disks.owned, crushed, energy);
+    crushed = flush_batch(batch, pairs, disks.owned, crushed, energy);
   }
   evaluate(batch, law, dt, grids, energy);
-  return empty(batch, pairs, disks.owned, crushed, energy);
+  return flush_batch(batch, pairs, disks.owned, crushed, energy);
 }
 
 template <class Number, Exponent P, bool DAMPED, class... Rest>

@@ -132,7 +132,7 @@ template <bool ROTATION, bool COMPENSATED>
 FAULTGOUGE_INLINE void FixDiscIntegrator::move(const Disks &disks, int i, const Velocity &velocity)
 {
   const double dx = disks.dt * velocity.x, dy = disks.dt * velocity.y, radius = disks.radius[i];
-  if (!(dx * dx + dy * dy <= radius * radius)) refuse(i, dx, dy);
+  if (!(dx * dx + dy * dy <= radius * radius)) stop_at_long_step(i, dx, dy);
   if constexpr (COMPENSATED) {
     low_parts->move(i, dx, dy);
   } else {
@@ -148,7 +148,7 @@ double *FixDiscIntegrator::angles() const
   return angle >= 0 ? atom->dvector[angle] : nullptr;
 }
 
-void FixDiscIntegrator::refuse(int i, double dx, double dy) const
+void FixDiscIntegrator::stop_at_long_step(int i, double dx, double dy) const
 {
   error->one(
       FLERR,
@@ -209,9 +209,9 @@ FAULTGOUGE_INLINE void FixNVEDisc::decay(Velocity &velocity, double kept)
   velocity.spin *= kept;
 }
 
-template <class Work> void FixNVEDisc::choose_all(Work work) const
+template <class Work> void FixNVEDisc::dispatch_with_drag(Work work) const
 {
-  choose([this, work](auto rotates, auto compensates) {
+  dispatch([this, work](auto rotates, auto compensates) {
     if (drag_time > 0.0)
       work(rotates, compensates, std::true_type());
     else
@@ -221,7 +221,7 @@ template <class Work> void FixNVEDisc::choose_all(Work work) const
 
 void FixNVEDisc::initial_integrate(int /*vflag*/)
 {
-  choose_all([this](auto rotates, auto compensates, auto drags) {
+  dispatch_with_drag([this](auto rotates, auto compensates, auto drags) {
     constexpr bool ROTATION = decltype(rotates)::value;
     const Disks all = disks();
     const double drag = kept;
@@ -237,7 +237,7 @@ void FixNVEDisc::initial_integrate(int /*vflag*/)
 void FixNVEDisc::final_integrate()
 {
   complete_forces();
-  choose_all([this](auto rotates, auto /*compensates*/, auto drags) {
+  dispatch_with_drag([this](auto rotates, auto /*compensates*/, auto drags) {
     constexpr bool ROTATION = decltype(rotates)::value;
     const Disks all = disks();
     const double drag = kept;
@@ -262,10 +262,10 @@ int FixDisplaceDisc::setmask()
 void FixDisplaceDisc::init()
 {
   FixDiscIntegrator::init();
-  take_given();
+  read_given_state();
 }
 
-bool FixDisplaceDisc::take_given()
+bool FixDisplaceDisc::read_given_state()
 {
   bool given = false;
   double *const theta = angles();
@@ -300,8 +300,8 @@ void FixDisplaceDisc::post_run()
 // depends on what was given alone, with or without a setup in between.
 void FixDisplaceDisc::initial_integrate(int /*vflag*/)
 {
-  if (take_given()) wrap();
-  choose([this](auto rotates, auto compensates) {
+  if (read_given_state()) wrap();
+  dispatch([this](auto rotates, auto compensates) {
     const Disks all = disks();
     for (int i = 0; i < all.count; i++)
       if (all.mask[i] & groupbit)
@@ -319,7 +319,7 @@ FixOverdampedDisc::FixOverdampedDisc(LAMMPS *lmp, int narg, char **arg) : FixDis
 
 void FixOverdampedDisc::initial_integrate(int /*vflag*/)
 {
-  choose([this](auto rotates, auto compensates) {
+  dispatch([this](auto rotates, auto compensates) {
     const Disks all = disks();
     for (int i = 0; i < all.count; i++) {
       if (!(all.mask[i] & groupbit)) continue;

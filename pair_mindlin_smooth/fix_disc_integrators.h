@@ -68,12 +68,12 @@ protected:
   // by v dt and omega dt
   template <bool ROTATION, bool COMPENSATED> void move(const Disks &disks, int i, const Velocity &velocity);
   void complete_forces();
-  void wrap();                                                    // all disks into the periodic box
-  [[noreturn]] void refuse(int i, double dx, double dy) const;    // disk i cannot move so far
-  double *angles() const;                                         // null: there are none
+  void wrap();                                                               // all disks into the periodic box
+  [[noreturn]] void stop_at_long_step(int i, double dx, double dy) const;    // disk i cannot move so far
+  double *angles() const;                                                    // null: there are none
 
   // work(rotates, compensates) with both known at compile time
-  template <class Work> void choose(Work work) const
+  template <class Work> void dispatch(Work work) const
   {
     using Yes = std::true_type;
     using No = std::false_type;
@@ -110,7 +110,7 @@ private:
   // work(i, velocity of disk i, function that adds half a step's forces to a velocity)
   template <bool ROTATION, class Work> void for_each_disk(const Disks &disks, Work work) const;
   // work(rotates, compensates, drags) with all known at compile time
-  template <class Work> void choose_all(Work work) const;
+  template <class Work> void dispatch_with_drag(Work work) const;
 };
 
 class FixDisplaceDisc : public FixDiscIntegrator {
@@ -122,7 +122,7 @@ public:
   void post_run() override;
 
 private:
-  bool take_given();    // true if there was any
+  bool read_given_state();    // true if there was any
 
   enum Column { GIVEN, X, Y, THETA, VX, VY, OMEGA, FX, FY, TORQUE, COLUMNS };
 };

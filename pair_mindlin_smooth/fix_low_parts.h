@@ -37,7 +37,8 @@ public:
   void move(int i, double dx, double dy)
   {
     double *const high = atom->x[i], *const low = array_atom[i];
-    const faultgouge::Compensated x = spacing.moved({high[0], low[X]}, dx), y = spacing.moved({high[1], low[Y]}, dy);
+    const faultgouge::Compensated x = spacing.displace({high[0], low[X]}, dx),
+                                  y = spacing.displace({high[1], low[Y]}, dy);
     high[0] = x.high;
     high[1] = y.high;
     low[X] = x.low;

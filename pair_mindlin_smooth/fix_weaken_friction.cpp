@@ -80,9 +80,9 @@ double FixWeakenFriction::friction(double velocity) const
   return mu * (b * static_cast<double>(std::exp(static_cast<long double>(-w * (speed - v0) / v_ss))) + mu_ss);
 }
 
-void FixWeakenFriction::feel(double velocity)
+void FixWeakenFriction::set_velocity(double velocity)
 {
-  felt = velocity;
+  friction_velocity = velocity;
   const double now = friction(velocity);
   for (const auto &floor : floors) floor->change_mu(now);
   if (now == *of_pair) return;
@@ -93,12 +93,12 @@ void FixWeakenFriction::feel(double velocity)
 void FixWeakenFriction::setup_pre_force(int /*vflag*/)
 {
   const double velocity = mean();
-  feel(has_last && velocity == last ? felt : velocity);
+  set_velocity(has_last && velocity == last ? friction_velocity : velocity);
 }
 
 void FixWeakenFriction::pre_force(int /*vflag*/)
 {
-  feel(mean());
+  set_velocity(mean());
 }
 
 void FixWeakenFriction::post_run()
@@ -109,7 +109,7 @@ void FixWeakenFriction::post_run()
 
 void FixWeakenFriction::write_restart(FILE *fp)
 {
-  const double state[] = {felt, mean()};
+  const double state[] = {friction_velocity, mean()};
   if (comm->me != 0) return;
   const int size = sizeof(state);
   fwrite(&size, sizeof(size), 1, fp);
@@ -118,7 +118,7 @@ void FixWeakenFriction::write_restart(FILE *fp)
 
 void FixWeakenFriction::restart(char *stored)
 {
-  std::memcpy(&felt, stored, sizeof(double));
+  std::memcpy(&friction_velocity, stored, sizeof(double));
   std::memcpy(&last, stored + sizeof(double), sizeof(double));
   has_last = true;
 }

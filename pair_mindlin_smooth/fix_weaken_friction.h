@@ -38,15 +38,15 @@ public:
 
 private:
   double mu, b, w, mu_ss, v0, v_ss;
-  double felt = 0.0;    // velocity of the last forces' friction
-  double last = 0.0;    // mean velocity when the last run ended
+  double friction_velocity = 0.0;    // velocity of the last forces' friction
+  double last = 0.0;                 // mean velocity when the last run ended
   bool has_last = false;
   double *of_pair = nullptr;
   std::vector<class FixWallMindlinSmooth *> floors;
 
   double friction(double velocity) const;
   double mean() const;
-  void feel(double velocity);
+  void set_velocity(double velocity);
 };
 
 // Whether there is such a fix: friction that is zero now may come back.

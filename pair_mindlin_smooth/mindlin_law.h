@@ -150,27 +150,27 @@ struct MindlinLaw {
   // the same with the exponent looked up, for what is not done in every step
   double growth(double overlap) const
   {
-    return chosen([&](auto p) { return growth<p()>(overlap); });
+    return with_exponent([&](auto p) { return growth<p()>(overlap); });
   }
   double normal_force(double overlap) const
   {
-    return chosen([&](auto p) { return normal_force<p()>(overlap); });
+    return with_exponent([&](auto p) { return normal_force<p()>(overlap); });
   }
   double normal_energy(double overlap) const
   {
-    return chosen([&](auto p) { return normal_energy<p()>(overlap); });
+    return with_exponent([&](auto p) { return normal_energy<p()>(overlap); });
   }
   double damped_normal(double normal, double overlap, double rate) const
   {
-    return chosen([&](auto p) { return damped_normal<p()>(normal, overlap, rate); });
+    return with_exponent([&](auto p) { return damped_normal<p()>(normal, overlap, rate); });
   }
   double damped_tangential(double tangential, double normal, double overlap, double rate) const
   {
-    return chosen([&](auto p) { return damped_tangential<p()>(tangential, normal, overlap, rate); });
+    return with_exponent([&](auto p) { return damped_tangential<p()>(tangential, normal, overlap, rate); });
   }
 
 private:
-  template <class Work> double chosen(Work work) const
+  template <class Work> double with_exponent(Work work) const
   {
     if (exponent == Exponent::HARMONIC) return work(std::integral_constant<Exponent, Exponent::HARMONIC>());
     return work(std::integral_constant<Exponent, Exponent::HERTZ>());

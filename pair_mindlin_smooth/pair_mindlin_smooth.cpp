@@ -51,14 +51,14 @@ void PairMindlinSmooth::load_slips()
 void PairMindlinSmooth::compute(int eflag, int vflag)
 {
   ev_init(eflag, vflag);
-  if (damped) collect_felt();
+  if (damped) sum_forces_on_owned();
   if (comm->nprocs > 1 && (compensated || damped || domain->xperiodic || domain->yperiodic)) communicate_originals();
   if (neighbor->ago == 0) rebuild_pairs();
   if (has_friction && slips_in_fix) load_slips();    // somebody may have written others
 
   // at setup the disks have not moved since the slips were last advanced
   const int crushed = contact_forces(!update->setupflag);
-  if (crushed >= 0) refuse(crushed);
+  if (crushed >= 0) stop_at_crushed_pair(crushed);
 
   const faultgouge::Forces forces{atom->f,         atom->torque,    compensated ? low_parts->array_atom : nullptr,
                                   FixLowParts::FX, FixLowParts::FY, FixLowParts::TORQUE};
@@ -73,7 +73,7 @@ void PairMindlinSmooth::compute(int eflag, int vflag)
     tally<double>();
 }
 
-void PairMindlinSmooth::collect_felt()
+void PairMindlinSmooth::sum_forces_on_owned()
 {
   felt.resize(FixDashpotVelocities::FELT * (atom->nlocal + atom->nghost));
   for (int i = 0; i < atom->nlocal; i++)
@@ -151,7 +151,7 @@ int PairMindlinSmooth::contact_forces(bool advance)
                                                 {low_parts->grid(), force_grid, tangential_grid});
 }
 
-void PairMindlinSmooth::refuse(int p) const
+void PairMindlinSmooth::stop_at_crushed_pair(int p) const
 {
   const auto r = faultgouge::leading_branch(pairs, p, disks(), period());
   const double distance = std::sqrt(r.x * r.x + r.y * r.y);

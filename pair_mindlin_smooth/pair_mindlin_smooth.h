@@ -85,13 +85,13 @@ private:
   double measure_radii();
   void set_force_grids();
   void rebuild_pairs();
-  void load_slips();      // from the fix
-  void collect_felt();    // of owned disks
+  void load_slips();             // from the fix
+  void sum_forces_on_owned();    // of owned disks
   void communicate_originals();
   faultgouge::Disks disks() const;
   faultgouge::Period period() const;
   int contact_forces(bool advance);
-  void refuse(int pair) const;
+  void stop_at_crushed_pair(int pair) const;
   template <class NUMBER> void tally();
   int pair_of(int i, int j) const;
   template <class NUMBER> double measure(int pair, int i);

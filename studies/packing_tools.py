@@ -1,4 +1,4 @@
-"""Tools of studies for a packing: its path of equilibria in this process alone, its contacts, its sliding contacts."""
+"""Tools of studies for a packing: its path of equilibria in this process alone, and its contacts."""
 
 from __future__ import annotations
 
@@ -15,9 +15,6 @@ from ..pywrap.runs.equilibrium_path import EquilibriumPath
 
 Start = Callable[[float], Equilibrium]
 """mu -> the settled packing of a scene with this friction coefficient."""
-
-AT_LIMIT = 1 - 1e-9
-"""Share of the slip limit from which a contact slides: it is clamped to the limit, to rounding."""
 
 
 def with_seed(scene: Scene, seed: int) -> Scene:
@@ -55,8 +52,3 @@ def contact_pairs(packing: Packing, chosen: NDArray[np.bool_] | slice = slice(No
     """The contacts of a packing, or some of them, as (i, j)."""
     contacts = packing.contacts
     return set(zip(contacts.i[chosen].tolist(), contacts.j[chosen].tolist(), strict=True))
-
-
-def sliding_contacts(packing: Packing) -> NDArray[np.bool_]:
-    """Which contacts are at Coulomb's bound."""
-    return np.abs(packing.contacts.slip) >= AT_LIMIT * packing.law.slip_limit(packing.geometry.overlap)

@@ -80,7 +80,7 @@ class Work(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Study:
+class SceneStudy:
     """A study of one scene, which is called with the scene and a folder.
 
     Attributes

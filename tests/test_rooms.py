@@ -118,6 +118,18 @@ def test_nothing_of_the_program_imports_research():
     assert len([*(ROOT.resolve().parents[1] / "research").glob("*/make.py")]) >= 4
 
 
+def test_every_class_has_a_name_of_its_own():
+    """One name stands for one idea wherever it is read."""
+    names = [
+        node.name
+        for path in modules().values()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef)
+    ]
+    assert len(names) > 200
+    assert {name for name in names if names.count(name) > 1} == set()
+
+
 def test_every_module_is_imported():
     """A name that has moved is then noticed, whatever else is tested."""
     failed = {}
@@ -158,3 +170,10 @@ def test_analysis_needs_numpy_scipy_and_h5py_alone():
     others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
     assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.motion.response") & others == set()
     assert loaded_by("import faultgouge.analysis, faultgouge.pywrap") & SLOW_OF_SCIPY == set()
+
+
+def test_one_module_makes_sparse_factors():
+    """SciPy's solvers of sparse matrices are called in analysis/factors/sparse_lu.py alone."""
+    called = re.compile(r"\b(splu|spilu|spsolve|factorized)\b")
+    users = {name for name, path in modules().items() if called.search(path.read_text())}
+    assert users == {"faultgouge.analysis.factors.sparse_lu"}

@@ -19,9 +19,9 @@ from ..errors import NoEquilibriumError
 from ..onset.march import look_between, march
 from ..onset.modes import assign_columns
 from ..onset.window_edges import LostPairError, LostTrackError, track_pair
-from .load_step import Step, excursion
+from .load_step import GrowthStep, excursion
 from .modes import DampedMode, DampedModes, Pencil
-from .perturbation_screening import Cluster, Screen
+from .perturbation_screening import Cluster, GrowthScreen
 from .window_edges import Crossing, DampedWindow, solve_edge, window_of
 
 DEPTH = 4
@@ -58,7 +58,7 @@ class Growing:
 
     finished = False
 
-    def __init__(self, pencil: Callable[[float], Pencil], narrowest: float, screen: Screen | None) -> None:
+    def __init__(self, pencil: Callable[[float], Pencil], narrowest: float, screen: GrowthScreen | None) -> None:
         self.at, self.narrowest, self.screen = pencil, narrowest, screen
         self.open: Open | None = None  # at the load reached so far
         self.closed: list[DampedWindow] = []
@@ -134,7 +134,7 @@ class Growing:
             divide = look_between(self.at, here.fx, candidates, there.fx)
             if divide:
                 return None, divide
-        step = Step.of(here.modes, there.modes)
+        step = GrowthStep.of(here.modes, there.modes)
         middle = 0.5 * (here.fx + there.fx)
         divisible = there.fx - here.fx > self.narrowest
         look = None if not divisible else middle if step.lost else self.unclear(step)
@@ -149,7 +149,7 @@ class Growing:
         divide = [] if look is None else look_between(self.at, here.fx, look, there.fx)
         return (None if divide else self.carried(step, crossings)), divide
 
-    def unclear(self, step: Step) -> float | None:
+    def unclear(self, step: GrowthStep) -> float | None:
         """A load at which all modes have to be looked at, as a pair grows there or cannot be followed; else None."""
         for pair in step.suspects(self.narrowest):
             here = [step.here.mode(k) for k in pair]
@@ -196,7 +196,7 @@ class Growing:
         except (LostPairError, NoEquilibriumError):
             return None
 
-    def carried(self, step: Step, crossings: dict[tuple[int, int], Crossing]) -> Course:
+    def carried(self, step: GrowthStep, crossings: dict[tuple[int, int], Crossing]) -> Course:
         """The open windows over an increment, by where modes, by their numbers at both ends, cross the axis.
 
         Raises
@@ -278,7 +278,7 @@ def drop_duplicates(modes: Sequence[DampedMode]) -> list[DampedMode]:
     return found
 
 
-def _split_halfway(step: Step, modes: DampedModes, number: int) -> Crossing:
+def _split_halfway(step: GrowthStep, modes: DampedModes, number: int) -> Crossing:
     """An edge that could not be solved for."""
     half = 0.5 * (step.there.fx - step.here.fx)
     return Crossing(step.here.fx + half, half, float(modes.rates[number].imag), "contact change")

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..onset.modes import neighbours
 from ..packing.packing import Floats, Indices
 from .modes import DampedModes
 
@@ -23,7 +24,7 @@ PLACES = np.linspace(0, 1, 41)[1:-1]
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class GrowthStep:
     """Two neighbouring loads, which mode is which, and the modes' slopes."""
 
     here: DampedModes
@@ -31,7 +32,7 @@ class Step:
     forward: Indices
 
     @classmethod
-    def of(cls, here: DampedModes, there: DampedModes) -> "Step":
+    def of(cls, here: DampedModes, there: DampedModes) -> "GrowthStep":
         forward = here.assigned(there)
         grows = np.isin(np.arange(len(there)), there.growing)
         ends = [k for k in here.growing if forward[k] >= 0 and not grows[forward[k]]]
@@ -66,7 +67,7 @@ class Step:
         finite = np.isfinite(slope_a) & np.isfinite(slope_b)
         known = known[finite]
         a, b, slope_a, slope_b = (each[finite] for each in (a, b, slope_a, slope_b))
-        p, q = _neighbours(a.imag, b.imag)
+        p, q = neighbours(a.imag, b.imag, 2)
         width, _ = excursion(*((each[p], each[q]) for each in (a, slope_a, b, slope_b)))
         wide = np.flatnonzero(width * (self.there.fx - self.here.fx) > narrowest)
         return [(int(known[p[k]]), int(known[q[k]])) for k in wide]
@@ -109,16 +110,6 @@ def _same_modes(here: DampedModes, there: DampedModes, forward: Indices, a: int,
 
     crossed = weight(a, forward[b]) * weight(b, forward[a])
     return crossed > ALIKE * weight(a, forward[a]) * weight(b, forward[b])
-
-
-def _neighbours(before: Floats, after: Floats) -> tuple[Indices, Indices]:
-    """Pairs of modes that are neighbours by frequency at an end, or change order in between."""
-    p, q = np.triu_indices(len(before), 1)
-    ranks = [np.argsort(np.argsort(each, kind="stable")) for each in (before, after)]
-    near = [np.abs(rank[p] - rank[q]) <= 2 for rank in ranks]
-    swapped = (ranks[0][p] < ranks[0][q]) != (ranks[1][p] < ranks[1][q])
-    kept = near[0] | near[1] | swapped
-    return p[kept], q[kept]
 
 
 def _cubic(a: Any, slope_a: Any, b: Any, slope_b: Any) -> Any:

@@ -28,19 +28,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig
 from scipy.sparse import csc_array, csr_array, eye_array
-from scipy.sparse.linalg import LinearOperator, SuperLU, eigs, splu
+from scipy.sparse.linalg import LinearOperator, eigs
 
+from ..factors.sparse_lu import SingularMatrixError, SuperLUFactors, general_lu
 from ..motion.state_space import StateSpace
 from ..onset import force_bearing
 from ..onset.modes import assign_columns
 from ..onset.search import unit_of
-from ..onset.window_edges import load_error
 from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
 from ..spectrum.spectrum import SAFETY, Complexes, active_coordinates, mass_weighted, unit_rounding
 
-STEADY = 1e-3
+NEGLIGIBLE = 1e-3
 """Digits of an eigenvalue smaller than this share of |Z|_F are not asked for."""
 
 STEPS = 12
@@ -77,7 +77,7 @@ class Pencil:
         """That of a packing with dashpots or drag."""
         bearing = force_bearing(packing)
         a, g = (mass_weighted(each(bearing), bearing) for each in (stiffness_matrix, damping_matrix))
-        return cls(packing.fx, a, g, load_error(packing))
+        return cls(packing.fx, a, g, packing.load_error)
 
     @property
     def matrices(self) -> tuple[csr_array, csr_array]:
@@ -321,7 +321,7 @@ def refine_mode(pencil: Pencil, x: Complexes, y: Complexes, s: complex) -> Dampe
     """The mode nearest to some vectors and an eigenvalue, by the two-sided iteration; None if it does not converge."""
     a, g, unit = pencil.stiffness, pencil.damping, eye_array(len(x))
     mirror = a.T, g.T
-    floor = pencil.rounding / np.finfo(float).eps * STEADY  # of a steady mode s is zero
+    floor = pencil.rounding / np.finfo(float).eps * NEGLIGIBLE  # of a steady mode s is zero
     for _ in range(STEPS):
         factors = _factors(csc_array(a + s * g + s * s * unit))
         x = _normalise(factors.solve(2 * s * x + g @ x))
@@ -351,13 +351,13 @@ def _quotient(s: complex, stiffness: complex, damping: complex, mass: complex) -
     return s
 
 
-def _factors(matrix: csc_array) -> SuperLU:
+def _factors(matrix: csc_array) -> SuperLUFactors:
     """LU factors; where s is an eigenvalue to the last bit, a shift by rounding stands for a pivot that is zero."""
     try:
-        return splu(matrix)
-    except RuntimeError:
+        return general_lu(matrix)
+    except SingularMatrixError:
         rounding = np.finfo(float).eps * np.abs(matrix.data).max()
-        return splu(csc_array(matrix + rounding * eye_array(matrix.shape[0])))
+        return general_lu(csc_array(matrix + rounding * eye_array(matrix.shape[0])))
 
 
 def _normalise(vectors: NDArray) -> Complexes:

@@ -175,7 +175,7 @@ class Cluster:
         return replace(mode, right=x / np.linalg.norm(x), left=y / np.linalg.norm(y))
 
 
-class Screen:
+class GrowthScreen:
     """The clusters that may change along a ramp, from one basis for as many increments as it serves."""
 
     def __init__(self) -> None:

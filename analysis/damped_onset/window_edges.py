@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..onset.window_edges import LostPairError, sign_change
+from ..onset.window_edges import GrowthWindow, LostPairError, sign_change
 from .modes import DampedMode
 
 STEADY = 1e-9
@@ -25,56 +25,39 @@ class Crossing:
     kind: Kind
 
 
-@dataclass(frozen=True)
-class DampedWindow:
-    """An interval of loads on which one motion grows.
+@dataclass(frozen=True, kw_only=True)
+class DampedWindow(GrowthWindow):
+    """An interval of loads on which Re s of one motion is positive; other attributes are those of `GrowthWindow`.
 
     Attributes
     ----------
-    fx_onset : float
-        Load at which Re s becomes positive, force per top disk.
-    fx_end : float or None
-        Load at which it is negative again; None if it grows at the largest load.
     frequency : float
         Im s at the onset, radian / time.
-    error : float
-        Uncertainty of fx_onset: twice the scatter of Re s over its slope, or the bracket, and what the residual of the
-        equilibria amounts to, as of :class:`~faultgouge.analysis.Window`.
     kind : {"hopf", "steady", "contact change", "start"}
-        What begins the window: Re s that goes through zero with Im s or without, a jump of the equilibrium, or nothing:
-        the motion grows at the smallest load.
-    path_error : float or None
-        As of :class:`~faultgouge.analysis.Window`.
+        Re s that goes through zero with Im s or without; a jump of the equilibrium; or nothing, as the motion grows at
+        the smallest load.
     """
 
-    fx_onset: float
-    fx_end: float | None
     frequency: float
-    error: float
     kind: Kind
-    path_error: float | None = None
 
     def in_time(self, unit: float) -> "DampedWindow":
         """The same of pencils of s / unit."""
         return replace(self, frequency=unit * self.frequency)
 
     def as_dict(self) -> dict[str, Any]:
-        """The keys of the JSON contract."""
-        names = ("fx_onset", "fx_end", "frequency", "error", "kind")
-        return {name: getattr(self, name) for name in names} | {"error_of_path": self.path_error}
+        """The keys of the JSON contract: besides those of all windows, frequency."""
+        return super().as_dict() | {"frequency": self.frequency}
 
 
 def solve_edge(mode: Callable[[float], DampedMode], below: float, above: float) -> Crossing:
     """The root of Re s, or a bracket where Re s jumps."""
-    ends = mode(below), mode(above)
-    if ends[0].rate.real * ends[1].rate.real >= 0:
-        # One end is within rounding of the crossing: that is there, to within Re s over its slope.
-        end = min(ends, key=lambda each: abs(each.rate.real))
-        slope = abs(ends[1].rate.real - ends[0].rate.real) / (above - below)
-        return _bracket_zero(end.fx, abs(end.rate.real) / slope, end)
     change = sign_change(lambda fx: mode(fx).rate.real, below, above)
     if change.smooth:
-        return _bracket_zero(change.fx, change.error, mode(change.loads[2]))
+        near = mode(change.loads[len(change.loads) // 2])
+        steady = near.rate.imag <= STEADY * float(np.sqrt(np.abs(near.pencil.stiffness).max()))
+        error = change.error + near.pencil.balance
+        return Crossing(change.fx, error, near.rate.imag, "steady" if steady else "hopf")
     left, right = (mode(fx) for fx in change.loads)
     across = left.at(right.pencil)
     if across is None or (across.rate.real > 0) != (right.rate.real > 0):
@@ -82,12 +65,12 @@ def solve_edge(mode: Callable[[float], DampedMode], below: float, above: float) 
     return Crossing(change.fx, change.error, right.rate.imag, "contact change")
 
 
-def _bracket_zero(fx: float, error: float, mode: DampedMode) -> Crossing:
-    """Where a mode crosses the axis, known at a load next to it."""
-    steady = mode.rate.imag <= STEADY * float(np.sqrt(np.abs(mode.pencil.stiffness).max()))
-    return Crossing(fx, error + mode.pencil.balance, mode.rate.imag, "steady" if steady else "hopf")
-
-
 def window_of(onset: Crossing, end: Crossing | None) -> DampedWindow:
     """The window from one edge to another, or to none."""
-    return DampedWindow(onset.fx, None if end is None else end.fx, onset.frequency, onset.error, onset.kind)
+    return DampedWindow(
+        fx_onset=onset.fx,
+        fx_end=None if end is None else end.fx,
+        frequency=onset.frequency,
+        error=onset.error,
+        kind=onset.kind,
+    )

@@ -35,7 +35,7 @@ from ..onset.window_edges import LostTrackError
 from ..packing.packing import Floats, Packing
 from .all_windows import Growing
 from .modes import Pencil, in_own_time
-from .perturbation_screening import Screen
+from .perturbation_screening import GrowthScreen
 from .window_edges import DampedWindow
 
 Known = Callable[[tuple[DampedWindow, ...], float], None]
@@ -131,7 +131,7 @@ def growing_windows(
         known(in_time(windows), fx)
 
     try:
-        return in_time(march_along_ramp(Growing(own, narrowest, Screen()), loads, look, first, watch, so_far))
+        return in_time(march_along_ramp(Growing(own, narrowest, GrowthScreen()), loads, look, first, watch, so_far))
     except LostTrackError:
         return in_time(march_along_ramp(Growing(own, narrowest, None), loads, look, first, watch, so_far))
 

@@ -101,6 +101,20 @@ def symmetric_lu(
     return factors or SuperLUFactors(_superlu(matrix, "NATURAL" if ordered else "MMD_AT_PLUS_A", pivoting))
 
 
+def general_lu(matrix: csc_array) -> SuperLUFactors:
+    """The factors of any square matrix, with pivots from its columns.
+
+    Raises
+    ------
+    SingularMatrixError
+        If a pivot is zero.
+    """
+    try:
+        return SuperLUFactors(splu(matrix))
+    except RuntimeError as error:  # SuperLU's only word for it
+        raise SingularMatrixError.of(matrix, error) from error
+
+
 def minimum_degree(matrix: csc_array) -> Indices:
     """Places of the rows of a symmetric, diagonally dominant matrix in an order of elimination, shape (n,)."""
     return np.asarray(_superlu(matrix, "MMD_AT_PLUS_A", 0.0).perm_c)

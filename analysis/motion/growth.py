@@ -35,7 +35,7 @@ from numpy.typing import ArrayLike
 
 from ..packing.compensated import separation
 from ..packing.packing import Floats, Packing
-from ..spectrum.spectrum import spectrum
+from ..spectrum.spectrum import Complexes, spectrum
 from .power_law import fit_line
 from .propagator import SLOW
 from .state_space import StateSpace
@@ -283,7 +283,7 @@ def growth_of_run(
         packing = _with_friction(packing, weakened)
         begin = int(np.argmax(weaker))
         t, d = t[begin:], d[begin:]
-    damped = packing.law.damped or packing.drag_time is not None
+    damped = packing.damped
     rate, pairs, negative = None, 0, 0
     if len(packing) <= (MOST_DISKS // 2 if damped else MOST_DISKS):
         rate, pairs, negative = _damped_growth(packing) if damped else _undamped_growth(packing, dt)
@@ -346,8 +346,7 @@ def _bounds(packing: Packing, time: Floats, msd: Floats, rate: float | None, jum
     if jumped:
         window = time <= time[0] + JUMP_SHARE * (time[-1] - time[0])
         return 10 * float(msd[window].max()), 0.1 * top
-    overlap = packing.loaded(packing.residual).geometry.overlap
-    ceiling = (LINEAR * float(overlap.min(initial=np.inf))) ** 2
+    ceiling = (LINEAR * packing.smallest_overlap) ** 2
     # while it still grows in the end, it has not levelled off: the last decade is reached within the last e-foldings
     late = time[int(np.argmax(msd >= 0.1 * top))]
     grows_on = rate is not None and (time[-1] - late) * rate < 2 * np.log(10)
@@ -382,10 +381,15 @@ def _undamped_growth(packing: Packing, dt: float | None) -> tuple[float, int, in
     return modes.growth_rate(dt), len(modes.pairs), len(modes.negative)
 
 
+def unstable_rates(packing: Packing) -> Complexes:
+    """The eigenvalues s with Re s > 0 of a packing with dissipation, from all eigenvalues; 1 / time."""
+    rates = np.linalg.eigvals(StateSpace.of(packing).matrix)
+    return np.asarray(rates[rates.real > SLOW * np.abs(rates).max(initial=0.0)], dtype=np.complex128)
+
+
 def _damped_growth(packing: Packing) -> tuple[float, int, int]:
     """Growth rate of D, and the motions that grow: with and without oscillation."""
-    rates = np.linalg.eigvals(StateSpace.of(packing).matrix)
-    grows = rates[rates.real > SLOW * np.abs(rates).max(initial=0.0)]
+    grows = unstable_rates(packing)
     fastest = 2 * float(grows.real.max(initial=0.0))
     return fastest, int(np.count_nonzero(grows.imag > 0)), int(np.count_nonzero(grows.imag == 0))
 

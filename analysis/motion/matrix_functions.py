@@ -58,7 +58,7 @@ def first_order(middle: complex, time: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class BlockDiagonal:
     """A matrix as A = X diag(lambda.., B_1, B_2, ..) X^(-1) with well-conditioned X.
 
     Attributes
@@ -80,7 +80,7 @@ class Modes:
     reach: Reach = second_order
 
     @classmethod
-    def of(cls, matrix: ArrayLike, reach: Reach = second_order) -> "Modes":
+    def of(cls, matrix: ArrayLike, reach: Reach = second_order) -> "BlockDiagonal":
         """Decompose a square matrix.
 
         Parameters
@@ -92,7 +92,7 @@ class Modes:
 
         Returns
         -------
-        Modes
+        BlockDiagonal
 
         Raises
         ------
@@ -177,12 +177,12 @@ class Modes:
             found += left[:, pair] @ cores[0] @ right[pair]
         return np.asarray(found)
 
-    def some(self, columns: Indices) -> "Modes":
+    def some(self, columns: Indices) -> "BlockDiagonal":
         """Some of the columns of X and rows of its inverse, in ascending order, both of a pair or none."""
         blocks = {int(np.searchsorted(columns, k)): block for k, block in self.blocks.items() if k in columns}
-        return Modes(self.basis[:, columns], self.inverse[columns], self.values[columns], blocks, self.reach)
+        return BlockDiagonal(self.basis[:, columns], self.inverse[columns], self.values[columns], blocks, self.reach)
 
-    def oscillating(self) -> "Modes":
+    def oscillating(self) -> "BlockDiagonal":
         """The modes of the system (z, z')' = ((0, 1), (-A, 0)) (z, z'), which has the rates +-i sqrt(A)."""
         root = 1j * np.sqrt(self.values)
         rate, inverse = np.diag(root), np.diag(1 / root)
@@ -195,7 +195,7 @@ class Modes:
         size = len(root)
         outward: Complexes = np.block([[self.basis, self.basis], [turned, -turned]])
         inward: Complexes = np.block([[self.inverse, back], [self.inverse, -back]])
-        return Modes(
+        return BlockDiagonal(
             outward,
             0.5 * inward,
             np.concatenate([root, -root]),

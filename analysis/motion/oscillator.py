@@ -29,7 +29,7 @@ from ..packing.packing import Floats
 from ..spectrum.spectrum import Complexes, discrete_frequency
 
 
-class Motion(NamedTuple):
+class OscillatorMotion(NamedTuple):
     """Displacement and velocity of an oscillator; arrays of complex numbers."""
 
     displacement: Complexes
@@ -60,7 +60,7 @@ class Oscillator:
         if self.dt is not None and not 0 < self.dt < np.inf:
             raise ValueError(f"dt = {self.dt} must be positive and finite.")
 
-    def released(self, eigenvalue: ArrayLike, time: ArrayLike) -> Motion:
+    def released(self, eigenvalue: ArrayLike, time: ArrayLike) -> OscillatorMotion:
         """From x = 1 at rest, without forcing.
 
         Parameters
@@ -72,15 +72,15 @@ class Oscillator:
 
         Returns
         -------
-        Motion
+        OscillatorMotion
         """
         value, t = np.asarray(eigenvalue, dtype=np.complex128), np.asarray(time, dtype=np.float64)
         frequency = self._frequency(value)
         # (sin(Omega dt) / dt)^2 of Verlet's velocity is lambda itself at dt = 0
         squared = value if self.dt is None else value * (1 - 0.25 * value * self.dt**2)
-        return Motion(np.cos(frequency * t), -squared * _sine_over(frequency, t, self.dt))
+        return OscillatorMotion(np.cos(frequency * t), -squared * _sine_over(frequency, t, self.dt))
 
-    def driven(self, eigenvalue: ArrayLike, time: ArrayLike) -> Motion:
+    def driven(self, eigenvalue: ArrayLike, time: ArrayLike) -> OscillatorMotion:
         """From rest at x = 0 under the force cos(omega t); parameters as those of `released`."""
         value, t = np.asarray(eigenvalue, dtype=np.complex128), np.asarray(time, dtype=np.float64)
         frequency, half = self._frequency(value), None if self.dt is None else 0.5 * self.dt
@@ -89,7 +89,7 @@ class Oscillator:
         cos_fast, cos_slow = np.cos(0.5 * fast * t), np.cos(0.5 * slow * t)
         if half is not None:  # central differences of the sines in the displacement
             cos_fast, cos_slow = cos_fast * np.cos(slow * half), cos_slow * np.cos(fast * half)
-        return Motion(2 * of_fast * of_slow, of_fast * cos_slow + cos_fast * of_slow)
+        return OscillatorMotion(2 * of_fast * of_slow, of_fast * cos_slow + cos_fast * of_slow)
 
     def _frequency(self, value: Complexes) -> Complexes:
         return np.sqrt(value) if self.dt is None else discrete_frequency(value, self.dt)

@@ -11,7 +11,7 @@ from ..errors import FaultgougeError
 from ..packing.packing import Floats, Indices, Packing
 from ..packing.snapshot import Snapshot
 from ..spectrum.spectrum import Complexes
-from .matrix_functions import WELL_CONDITIONED, Function, Modes, second_order
+from .matrix_functions import WELL_CONDITIONED, BlockDiagonal, Function, second_order
 from .oscillator import Oscillator
 from .response import LinearMotion
 from .state_space import released_motion
@@ -77,7 +77,7 @@ def stable_motion(packing: Packing | Snapshot) -> LinearMotion:
 class Propagator:
     """P(t) = O f(t) I of modes: from starts, by I, to amplitudes, and by O to what is measured."""
 
-    modes: Modes
+    modes: BlockDiagonal
     outward: Complexes
     inward: Complexes
     function: Function

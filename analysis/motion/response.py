@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..packing.packing import Floats, Packing
 from ..packing.snapshot import Snapshot
-from .matrix_functions import Modes, first_order
+from .matrix_functions import BlockDiagonal, first_order
 from .oscillator import Oscillator
 from .state_space import StateSpace, driven_motion, released_motion
 
@@ -77,21 +77,21 @@ class LinearMotion:
         The equilibrium.
     system : StateSpace
         Its matrices.
-    modes : Modes
+    modes : BlockDiagonal
         Of A without dissipation, of the first-order system with it.
     """
 
     packing: Packing | Snapshot
     system: StateSpace
-    modes: Modes
+    modes: BlockDiagonal
 
     @classmethod
     def of(cls, packing: Packing | Snapshot) -> "LinearMotion":
         """Decompose a packing; errors as of `linear_response`."""
         system = StateSpace.of(packing)
         if packing.damped:
-            return cls(packing, system, Modes.of(system.matrix, first_order))
-        return cls(packing, system, Modes.of(system.stiffness))
+            return cls(packing, system, BlockDiagonal.of(system.matrix, first_order))
+        return cls(packing, system, BlockDiagonal.of(system.stiffness))
 
     @property
     def dissipative(self) -> bool:

@@ -180,7 +180,7 @@ def _refine_maxima(propagator: Propagator, brackets: list[tuple[float, float]]) 
     _, left, right = (
         np.array(part).T for part in zip(*(propagator.largest(t[GRID // 2], LOOSE) for t in grid), strict=True)
     )
-    seen = np.zeros(len(grid))
+    seen, last = np.zeros(len(grid)), grid.max()
     best = 0.0, 0.0, right[:, 0]
     for _ in range(LOOKS):
         left, right = np.linalg.qr(left)[0], np.linalg.qr(right)[0]
@@ -194,6 +194,8 @@ def _refine_maxima(propagator: Propagator, brackets: list[tuple[float, float]]) 
         time = _top(small, grid[place, max(top - 1, 0)], grid[place, min(top + 1, GRID - 1)])
         size, out, start = propagator.largest(time)
         seen[place] = size
+        if top in (0, GRID - 1):  # the few modes of the samples had their maximum elsewhere: go on where it rises
+            grid[place] = np.clip(grid[place] + grid[place, top] - grid[place, GRID // 2], 0.0, last)
         best = max(best, (time, size, start), key=lambda each: each[1])
         left, right = np.column_stack([left, out]), np.column_stack([right, start])
     return best

@@ -28,8 +28,8 @@ from ..packing.packing import Floats, Indices
 from ..spectrum.spectrum import Complexes
 from .eigenvalue_pair import Pair, continue_pair, deepest_dip, dip_between
 from .march import look_between, march
-from .modes import Members, Modes, Place, assign_modes
-from .perturbation_screening import Screen, Screening
+from .modes import Members, Modes, Place, assign_modes, neighbours
+from .perturbation_screening import PairScreen, Screening
 from .window_edges import DoubtError, Edge, Family, LostPairError, LostTrackError, Window, locate_edge, other_sign
 
 Ends = tuple[Pair, Pair]
@@ -73,7 +73,7 @@ class Dense:
         courses = None if candidates is None else self._few(candidates)
         if courses is not None:
             return courses, []
-        step = Step(here.modes, there.modes, self._arrival(here, there))
+        step = PairStep(here.modes, there.modes, self._arrival(here, there))
         courses = self._all(step, depth)
         if courses is None and there.fx - here.fx > self.family.narrowest:
             share = self.family.limits.share
@@ -143,7 +143,7 @@ class Dense:
 
     # All modes
 
-    def _all(self, step: "Step", depth: int) -> list[Course] | None:
+    def _all(self, step: "PairStep", depth: int) -> list[Course] | None:
         """The courses of all pairs that are complex somewhere on a step; None if that is in doubt."""
         near = step.near(self.family)
         recognised = [(before, after, ends) for before, after, ends in step.fates if ends is not None]
@@ -231,7 +231,7 @@ class Dense:
             return None
 
 
-class Step:
+class PairStep:
     """Two neighbouring loads, which mode of one is which of the other, and what becomes of the complex pairs.
 
     Attributes
@@ -344,12 +344,9 @@ class Step:
     def _neighbours(self, known: Indices, image: Indices) -> tuple[Indices, Indices]:
         """Two real modes each that can meet: neighbours at one end, and those that change order."""
         here, there = self.ends
-        p, q = np.triu_indices(len(known), 1)
-        rank = np.empty(len(known), int)
-        rank[np.argsort(there.values[image].real)] = np.arange(len(known))
-        near = (q - p == 1) | (np.abs(rank[q] - rank[p]) == 1) | (rank[q] < rank[p])
+        p, q = neighbours(here.values[known].real, there.values[image].real, 1)
         alone = (here.partner[known] < 0) & (there.partner[image] < 0)
-        kept = near & alone[p] & alone[q]
+        kept = alone[p] & alone[q]
         return p[kept], q[kept]
 
 
@@ -382,9 +379,9 @@ def all_windows(
 ) -> tuple[Window, ...]:
     """All windows of a family of matrices between the first and the last of increasing loads.
 
-    `screening` names the pairs that may meet, a `Screen` by default. It is of finite order: should all modes contradict
-    it, the ramp is walked again without it. If the `first` window alone is sought, the walk ends with it, and no load
-    beyond the increment in which it begins is asked for; the windows are then those that begin up to there.
+    `screening` names the pairs that may meet, a `PairScreen` by default. It is of finite order: should all modes
+    contradict it, the ramp is walked again without it. If the `first` window alone is sought, the walk ends with it,
+    and no load beyond the increment in which it begins is asked for; the windows are then those that begin up to there.
     """
     *_, (_, windows) = windows_along(family, loads, screening, first)
     return windows
@@ -398,7 +395,7 @@ def windows_along(
     The walk ends where an eigenvalue is found to be negative: the branch of equilibria has ended before that load.
     """
     reached = float(loads[0])
-    ways = screening or Screen(family.limits), _without_screening
+    ways = screening or PairScreen(family.limits), _without_screening
     for way in ways:
         try:
             for load, windows in _march_along_ramp(Dense(family, way, first), loads):

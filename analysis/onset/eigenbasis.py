@@ -24,7 +24,7 @@ from .slice_store import NEW_PASS, Pass, Slice
 
 
 @dataclass(frozen=True, eq=False)
-class Cluster:
+class ModeCluster:
     """Neighbouring modes of a basis, margins included; no other cluster owns the first to the last mode of its core.
 
     `modes` are counted within the basis, `core` within the cluster.
@@ -51,7 +51,7 @@ class Levels:
     diagonal: Floats
     coupling: NDArray[np.float32]
 
-    def block(self, cluster: Cluster) -> Floats:
+    def block(self, cluster: ModeCluster) -> Floats:
         """The operator in a cluster, with the second order of the modes outside; 1 / time^2."""
         diagonal = self.diagonal[cluster.modes]
         # Modes of the margin may lie close to modes outside: what these do is right for the core.
@@ -104,12 +104,12 @@ class Basis(Slice):
         return cls(0, values, vectors, slice(0, len(values)), matrix.shape[0], active, limits)
 
     @property
-    def clusters(self) -> list[Cluster]:
+    def clusters(self) -> list[ModeCluster]:
         """Overlapping clusters whose cores cover all modes of its own."""
         core, margin, found = self.limits.core, self.limits.margin, []
         for first in range(self.own.start, self.own.stop, core):
             start, stop = max(0, first - margin), min(len(self.values), first + core + margin)
-            found.append(Cluster(slice(start, stop), (first - start, min(first + core, self.own.stop) - 1 - start)))
+            found.append(ModeCluster(slice(start, stop), (first - start, min(first + core, self.own.stop) - 1 - start)))
         return found
 
     def covers(self, matrix: csr_array) -> bool:

@@ -22,14 +22,14 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import chain, pairwise
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing.packing import Floats
 from .all_windows import all_windows
-from .eigenbasis import Bases, Basis, Cluster, Levels, width_and_mixing
+from .eigenbasis import Bases, Basis, Levels, ModeCluster, width_and_mixing
 from .eigenvalue_pair import Pair, continue_pair
 from .limits import LIMITS, Limits
 from .march import march
@@ -41,6 +41,7 @@ from .window_edges import (
     DoubtError,
     Edge,
     Family,
+    GrowthWindow,
     LostPairError,
     Window,
     edge_from_inside,
@@ -57,16 +58,8 @@ Increments = tuple[tuple[float, float], ...]
 """From load to load."""
 
 
-class Begun(Protocol):
-    """A window: it begins at a load."""
-
-    @property
-    def fx_onset(self) -> float:
-        """The load, force per top disk."""
-
-
 P = TypeVar("P", bound=Looked)
-W = TypeVar("W", bound=Begun)
+W = TypeVar("W", bound=GrowthWindow)
 
 
 class Sliced(ABC, Generic[P, W]):
@@ -251,7 +244,7 @@ class SlicedPairs(Sliced[Place, Window]):
             if np.any((named >= first) & (named <= last)):
                 yield from self._search_cluster(basis, cluster, here, there)
 
-    def _search_cluster(self, basis: Basis, cluster: Cluster, here: At, there: At) -> Iterator[Candidate]:
+    def _search_cluster(self, basis: Basis, cluster: ModeCluster, here: At, there: At) -> Iterator[Candidate]:
         """The windows of one cluster, with its blocks interpolated between two loads."""
         increment = there[0] - here[0]
         before, after = (levels.block(cluster) for _, levels in (here, there))

@@ -154,6 +154,16 @@ def assign_modes(here: Modes, there: Modes) -> Indices:
     return partner
 
 
+def neighbours(before: Floats, after: Floats, places: int) -> tuple[Indices, Indices]:
+    """Pairs of modes at most so many places apart in either order, before or after, or in another order after."""
+    p, q = np.triu_indices(len(before), 1)
+    ranks = [np.argsort(np.argsort(each, kind="stable")) for each in (before, after)]
+    near = [np.abs(rank[p] - rank[q]) <= places for rank in ranks]
+    swapped = (ranks[0][p] < ranks[0][q]) != (ranks[1][p] < ranks[1][q])
+    kept = near[0] | near[1] | swapped
+    return p[kept], q[kept]
+
+
 def assign_columns(weight: Floats) -> Indices:
     """A column for each row, none twice, with the largest sum of weights; -1 where columns are too few."""
     from scipy.optimize import linear_sum_assignment

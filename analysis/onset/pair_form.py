@@ -16,7 +16,7 @@ import numpy as np
 from ..packing.packing import Floats, Packing
 from ..spectrum.normal_form import ORTHOGONAL, NormalForm
 from ..spectrum.spectrum import Complexes
-from .eigenvalue_pair import Pair
+from .eigenvalue_pair import Pair, continue_pair
 from .modes import Modes, full_operator
 
 
@@ -129,9 +129,13 @@ def pair_eigenvalues(packings: Sequence[Packing], eigenvalue: float) -> Complexe
 
 
 def _follow_pair(packings: Sequence[Packing], eigenvalue: float) -> Iterator[Pair]:
-    """The pair at each load."""
+    """The pair at each load: followed from the load before, and sought among all modes where that leads nowhere."""
     pair: Pair | None = None
     for packing in packings:
-        modes = Modes.of(packing.fx, full_operator(packing))
-        pair = modes.pair(modes.nearest(pair) if pair else modes.about(eigenvalue))
+        matrix = full_operator(packing)
+        image = None if pair is None else continue_pair(pair, packing.fx, matrix)
+        if image is None:
+            modes = Modes.of(packing.fx, matrix)
+            image = modes.pair(modes.nearest(pair) if pair else modes.about(eigenvalue))
+        pair = image
         yield pair

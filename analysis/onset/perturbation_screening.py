@@ -104,7 +104,7 @@ Screening = Callable[[csr_array, csr_array, int], list[Floats] | None]
 they are more than a few, or not known. The number is that of the pairs that are complex at the first operator."""
 
 
-class Screen:
+class PairScreen:
     """Pairs that may meet along a ramp, from one basis for as many increments as it serves."""
 
     def __init__(self, limits: Limits = LIMITS) -> None:

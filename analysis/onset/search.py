@@ -22,7 +22,7 @@ from .limits import LIMITS, Limits
 from .march import check_increasing
 from .modes import Operator, contact_states, force_bearing, full_operator
 from .ranks import ALONE, Ranks
-from .window_edges import Family, Window, load_error
+from .window_edges import Edge, Family, Window
 
 
 class OnsetError(FaultgougeError):
@@ -260,7 +260,7 @@ def find_onset(
     negative = negative_eigenvalues(force_bearing(start, limits))
     if len(negative):
         at_start = Unstable.of(start) if takes_all else None
-        window = Window(start.fx, None, float(negative[0]), 0.0, None, 1.0, "start")
+        window = _at_start(start, float(negative[0]), 1.0)
         return Onset((window,), False, (), modes, at_start, start.fx)
     unbalanced: dict[float, float] = {}
     states: dict[float, bytes] = {}
@@ -275,7 +275,7 @@ def find_onset(
                 f"no pair of eigenvalues becomes complex before F_x = {fx:.10g}, where one is negative: the branch of "
                 "stable equilibria ends before, at a turning point, and the packing leaves it without oscillation"
             )
-        unbalanced[fx], states[fx] = load_error(packing), contact_states(packing, limits)
+        unbalanced[fx], states[fx] = packing.load_error, contact_states(packing, limits)
         return full_operator(packing, limits) / unit
 
     doubtful: Increments = ()
@@ -326,7 +326,12 @@ def _symmetric(matrix: csr_array) -> bool:
 def _fastest(start: Packing | Snapshot, found: Spectrum) -> Window:
     """The window of the complex pair that grows fastest at the smallest load."""
     pair = max(found.pairs, key=lambda each: each.growth_rate)
-    return Window(start.fx, None, pair.eigenvalue.real, 0.0, None, pair.overlap, "start")
+    return _at_start(start, pair.eigenvalue.real, pair.overlap)
+
+
+def _at_start(start: Packing | Snapshot, eigenvalue: float, overlap: float) -> Window:
+    """A window that is open at the smallest load."""
+    return Window.between(Edge(start.fx, 0.0, eigenvalue, overlap, "start"), None)
 
 
 def _with_imbalance(window: Window, unbalanced: dict[float, float]) -> Window:

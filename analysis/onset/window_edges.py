@@ -16,8 +16,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..errors import FaultgougeError
-from ..packing.packing import Floats, Packing
-from ..packing.snapshot import Snapshot
+from ..packing.packing import Floats
 from .eigenvalue_pair import Pair, continue_pair, dip_between
 from .limits import LIMITS, Limits
 from .march import look_between
@@ -68,29 +67,21 @@ class Edge:
         return cls(0.5 * (one + other), half, pairs[-1].mean, overlap, "contact change")
 
 
-@dataclass(frozen=True)
-class Window:
-    """An interval of loads on which one pair of eigenvalues is complex.
+@dataclass(frozen=True, kw_only=True)
+class GrowthWindow:
+    """An interval of loads on which one motion grows.
 
     Attributes
     ----------
     fx_onset : float
-        Load at which the pair becomes complex, force per top disk.
+        Load at which the motion begins to grow, force per top disk.
     fx_end : float or None
-        Load at which it is real again; None if it is complex at the largest load that was looked at.
-    eigenvalue : float
-        The double eigenvalue at the onset (the real part of the pair if it does not coalesce there), 1 /
-        time^2.
+        Load at which it ends to; None if it grows at the largest load that was looked at.
     error : float
-        Uncertainty of fx_onset: twice the scatter of the discriminant over its slope for a coalescence, the bracket
-        otherwise; and the `load_error` of the equilibria; and `path_error`, if that is known. 0 at a "start".
-    end_error : float or None
-        The same for fx_end.
-    overlap : float
-        Smallest |y^H x| met at the onset; at an exceptional point it is the root of the rounding error.
-    kind : {"coalescence", "contact change", "start"}
-        What begins the window: two real eigenvalues that meet; a jump of the equilibrium; or nothing, as the pair is
-        complex at the smallest load.
+        Uncertainty of fx_onset: that of the root, twice the scatter over the slope, or the bracket of a jump; and the
+        `load_error` of the equilibria; and `path_error`, if that is known. 0 at a "start".
+    kind : str
+        What begins the window.
     path_error : float or None
         What of the error comes from the increments in which the path of equilibria was taken, force. One path cannot
         tell: None of a search, a number where another path was taken as well.
@@ -98,12 +89,38 @@ class Window:
 
     fx_onset: float
     fx_end: float | None
-    eigenvalue: float
     error: float
+    kind: str
+    path_error: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """The keys of the JSON contract that all windows have: fx_onset, fx_end, error, error_of_path, kind."""
+        names = ("fx_onset", "fx_end", "error", "kind")
+        return {name: getattr(self, name) for name in names} | {"error_of_path": self.path_error}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Window(GrowthWindow):
+    """An interval of loads on which one pair of eigenvalues is complex; further attributes are those of `GrowthWindow`.
+
+    Attributes
+    ----------
+    eigenvalue : float
+        The double eigenvalue at the onset (the real part of the pair if it does not coalesce there), 1 /
+        time^2.
+    end_error : float or None
+        Uncertainty of fx_end.
+    overlap : float
+        Smallest |y^H x| met at the onset; at an exceptional point it is the root of the rounding error.
+    kind : {"coalescence", "contact change", "start"}
+        Two real eigenvalues that meet; a jump of the equilibrium; or nothing, as the pair is complex at the smallest
+        load.
+    """
+
+    eigenvalue: float
     end_error: float | None
     overlap: float
     kind: Kind
-    path_error: float | None = None
 
     @classmethod
     def between(cls, onset: Edge, end: Edge | None) -> "Window":
@@ -119,20 +136,8 @@ class Window:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """The keys of the JSON contract: fx_onset, fx_end, lambda, error, error_of_path, kind."""
-        return {
-            "fx_onset": self.fx_onset,
-            "fx_end": self.fx_end,
-            "lambda": self.eigenvalue,
-            "error": self.error,
-            "error_of_path": self.path_error,
-            "kind": self.kind,
-        }
-
-
-def load_error(packing: Packing | Snapshot) -> float:
-    """Error of the load that goes with what is out of balance."""
-    return packing.load_error
+        """The keys of the JSON contract: besides those of all windows, lambda."""
+        return super().as_dict() | {"lambda": self.eigenvalue}
 
 
 Followed = TypeVar("Followed")
@@ -225,7 +230,7 @@ class SignChange(NamedTuple):
     """Where a function of the load changes its sign: a root, or a jump.
 
     The error is twice the scatter over the slope of a root, and half of the bracket of a jump. Its loads are the five
-    that give the root, or the two on either side of the jump.
+    that give the root, or the one that is the root to within rounding, or the two on either side of the jump.
     """
 
     fx: float
@@ -235,7 +240,15 @@ class SignChange(NamedTuple):
 
 
 def sign_change(value: Callable[[float], float], below: float, above: float, limits: Limits = LIMITS) -> SignChange:
-    """Where a function of the load that has opposite signs at two loads goes through zero, or jumps."""
+    """Where a function of the load goes through zero, or jumps, between two loads at which it has opposite signs.
+
+    Where its signs there are the same, it is within rounding of zero at one of them: the root is that load, to within
+    the function over its slope.
+    """
+    ends = value(below), value(above)
+    if ends[0] * ends[1] >= 0:
+        fx = below if abs(ends[0]) <= abs(ends[1]) else above
+        return SignChange(fx, min(map(abs, ends)) / (abs(ends[1] - ends[0]) / (above - below)), [fx], smooth=True)
     known: dict[float, float] = {}
 
     def looked(fx: float) -> float:
@@ -295,11 +308,6 @@ def locate_edge(family: Family, here: Pair, there: Pair) -> tuple[Edge, Pair, Pa
 
     A LostPairError is raised if the ends are not one pair.
     """
-    if here.discriminant * there.discriminant >= 0:
-        # One end is within rounding of the coalescence: the edge is there, to within D over its slope.
-        end = min(here, there, key=lambda pair: abs(pair.discriminant))
-        slope = abs(there.discriminant - here.discriminant) / (there.fx - here.fx)
-        return Edge(end.fx, abs(end.discriminant) / slope, end.mean, end.overlap, "coalescence"), here, there
     pair = family.track({here.fx: here, there.fx: there})
     change = sign_change(lambda fx: pair(fx).discriminant, here.fx, there.fx, family.limits)
     points = [pair(fx) for fx in change.loads]

@@ -170,9 +170,14 @@ class Packing:
         return self.law.damped or self.drag_time is not None
 
     @property
+    def sliding(self) -> NDArray[np.bool_]:
+        """Which contacts are at Coulomb's bound, shape (C,); none without friction."""
+        return self.law.at_bound(self.geometry.overlap, self.contacts.slip)
+
+    @property
     def contact_states(self) -> bytes:
         """State of the contacts: their disks, which of them slide, and in which direction; equal for equal states."""
-        slides = np.sign(self.contacts.slip) * self.law.at_bound(self.geometry.overlap, self.contacts.slip)
+        slides = np.sign(self.contacts.slip) * self.sliding
         return np.array([self.contacts.i, self.contacts.j, slides], dtype=np.int64).tobytes()
 
     @property
@@ -317,6 +322,11 @@ class Packing:
             self.contacts.i[kept], self.contacts.j[kept], self.contacts.slip[kept], None if low is None else low[kept]
         )
         return replace(self, contacts=contacts)
+
+    @property
+    def smallest_overlap(self) -> float:
+        """Of the contacts that carry more than the packing's own imbalance, length; infinite if there are none."""
+        return float(self.loaded(self.residual).geometry.overlap.min(initial=np.inf))
 
     @property
     def residual(self) -> float:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csc_array, eye_array
-from scipy.sparse.linalg import LinearOperator, eigs, splu
+from scipy.sparse.linalg import LinearOperator, eigs
 
+from ..factors.sparse_lu import general_lu
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Packing
 from ..packing.snapshot import Snapshot
@@ -142,7 +143,7 @@ def eigenpairs(packing: Packing | Snapshot, near: complex, count: int, tolerance
     shift = near if number is np.complex128 else complex(near).real
     matrix = matrix.astype(number)
     shifted = csc_array(matrix - shift * eye_array(size, dtype=number))
-    factor = splu(shifted)
+    factor = general_lu(shifted)
     # A fixed start vector makes ARPACK, and with it every result, reproducible.
     start = np.ones(size, dtype=number)
     solves = 0

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from ...figures.style import INK, styled
-from .coverage.stated_errors import Case
+from .coverage.stated_errors import CoverageCase
 from .methods.work_precision_study import Point, StatedError, Study
 
 MARKERS = "osD^vP"
@@ -161,7 +161,7 @@ def coverage_figure(cases: Sequence[StatedError]) -> Figure:
 
 
 @styled
-def changing_figure(cases: Sequence[Case]) -> Figure:
+def changing_figure(cases: Sequence[CoverageCase]) -> Figure:
     """The same of scenes in which contacts change before the onset, a colour a kind of onset.
 
     Scenes that were drawn after the rule of the stated errors was made are open markers.

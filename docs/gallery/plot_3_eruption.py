@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from faultgouge.analysis import spectrum
 from faultgouge.figures import draw_series
-from faultgouge.figures.film import Motion, RunFilm
+from faultgouge.figures.film import RunFilm, RunMotion
 from faultgouge.pywrap import Scene, perturb, reach
 
 scene = Scene.from_mapping(
@@ -37,7 +37,7 @@ growth = draw_series(time, msd)
 # %%
 # Three frames of the film that ``faultgouge movie`` makes: displacements times a power of ten.
 
-run = Motion.of(start.packing, np.array([each[0] for each in moments]), np.array([each[1] for each in moments]))
+run = RunMotion.of(start.packing, np.array([each[0] for each in moments]), np.array([each[1] for each in moments]))
 film = RunFilm(run, frames=3)
 frames = Figure(figsize=(film.size[0] / 130, 3 * film.size[1] / 130))
 for number in range(3):

@@ -31,7 +31,7 @@ import numpy as np
 from ...analysis import Packing, nearest_image, touching
 from ...analysis.packing.arrays import Floats, Indices
 from ..lammps.trial_state import EPSILON, Trial
-from .newton_matrix import IDLE, Factors, factor_stiffness
+from .newton_matrix import IDLE, StiffnessFactors, factor_stiffness
 from .rattlers import middle_of_cage
 
 ITERATIONS = 40
@@ -86,14 +86,14 @@ class Guess(NamedTuple):
     ----------
     displacement : ndarray, shape (3N,)
         (dx.., dy.., R dtheta..), length.
-    factors : Factors, optional
+    factors : StiffnessFactors, optional
         Those of K that it was found with.
     answers : float
         The largest force that it answers.
     """
 
     displacement: Floats
-    factors: Factors | None = None
+    factors: StiffnessFactors | None = None
     answers: float = np.inf
 
 

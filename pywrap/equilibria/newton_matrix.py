@@ -37,7 +37,7 @@ BANDED = 3000
 (1000 disks in a square)."""
 
 
-class Factors(NamedTuple):
+class StiffnessFactors(NamedTuple):
     """The factors of K at a trial.
 
     Attributes
@@ -57,8 +57,8 @@ class Factors(NamedTuple):
 
 
 def factor_stiffness(
-    trial: Trial, floor: float, since: ContactGraph | None = None, nearby: Factors | None = None
-) -> Factors | None:
+    trial: Trial, floor: float, since: ContactGraph | None = None, nearby: StiffnessFactors | None = None
+) -> StiffnessFactors | None:
     """Factor K; None if nothing is held.
 
     Parameters
@@ -69,7 +69,7 @@ def factor_stiffness(
         Force that a contact has to exceed.
     since : ContactGraph, optional
         The contacts where the displacement began; by default they are those of the trial.
-    nearby : Factors, optional
+    nearby : StiffnessFactors, optional
         Those of another trial nearby, which a large packing is solved with.
     """
     graph, law = trial.graph, trial.derivatives
@@ -89,9 +89,9 @@ def factor_stiffness(
     idle = graph.count(matters) == 0  # disks with none but contacts that carry nothing that matters
     expelled = _find_expelled(graph, loaded, old) & ~trial.still.top
     if unknowns <= BANDED:
-        return Factors(_band_matrix(graph.band(active), terms, idle), expelled)
+        return StiffnessFactors(_band_matrix(graph.band(active), terms, idle), expelled)
     near = nearby.solver if nearby is not None and isinstance(nearby.solver, SparseSolver) else None
-    return Factors(_sparse(graph, loaded, terms, idle, near), expelled)
+    return StiffnessFactors(_sparse(graph, loaded, terms, idle, near), expelled)
 
 
 def _find_expelled(graph: ContactGraph, loaded: Booleans, old: Booleans | None) -> Booleans:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...analysis import NoEquilibriumError, Packing, nearest_image
+from ...analysis.packing.arrays import Indices
 from ..lammps.contact_graph import ContactGraph
 from ..lammps.engine import Engine
 from ..lammps.trial_state import rounding
@@ -90,6 +91,11 @@ def rounding_floor(packing: Packing) -> float:
     """
     graph = ContactGraph(packing.contacts, packing.radius)
     return rounding(packing.law.normal_stiffness(packing.geometry.overlap), graph, packing.coordinate_rounding)
+
+
+def idle_disks(packing: Packing) -> Indices:
+    """Disks whose contacts carry no more than the rounding of a packing."""
+    return packing.loaded(rounding_floor(packing)).rattlers
 
 
 def equilibrate(

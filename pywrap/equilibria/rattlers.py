@@ -33,22 +33,21 @@ GAIN = 0.05
 """Share by which a linear program has to widen the narrowest gap for another one to follow."""
 
 
-def clear_rattlers(packing: Packing, least: float) -> Packing:
-    """Move every disk whose contacts carry no more than a given force to the middle of its cage.
+def clear_rattlers(packing: Packing, idle: Indices) -> Packing:
+    """Move disks whose contacts carry nothing to the middle of their cages.
 
     Parameters
     ----------
     packing : Packing
         At rest, without friction: its contacts have no history that could be lost.
-    least : float
-        Normal force up to which a contact counts as carrying nothing.
+    idle : ndarray of int, shape (D,)
+        The disks.
 
     Returns
     -------
     Packing
         The same but for the positions of these disks, and their contacts, which are gone.
     """
-    idle = packing.loaded(least).rattlers
     position = packing.position.copy()
     position[idle] = middle_of_cage(packing, idle)
     return place_disks(packing, position)

@@ -56,7 +56,7 @@ class State(NamedTuple):
 
 
 @dataclass(frozen=True)
-class PowerLaw:
+class PowerOfOverlap:
     """factor m^mass (R delta)^overlap."""
 
     factor: float
@@ -76,7 +76,7 @@ class MeasuredLaw:
     ----------
     exponent : float
         p of f_n.
-    stiffness, tangential, normal_dashpot, tangential_dashpot : PowerLaw
+    stiffness, tangential, normal_dashpot, tangential_dashpot : PowerOfOverlap
         f_n/delta, k_t', c_n and c_t.
     closing, parting : float
         d ln f_t / d ln delta at constant slip.
@@ -87,10 +87,10 @@ class MeasuredLaw:
     """
 
     exponent: float
-    stiffness: PowerLaw
-    tangential: PowerLaw
-    normal_dashpot: PowerLaw
-    tangential_dashpot: PowerLaw
+    stiffness: PowerOfOverlap
+    tangential: PowerOfOverlap
+    normal_dashpot: PowerOfOverlap
+    tangential_dashpot: PowerOfOverlap
     closing: float
     parting: float
     mu: float
@@ -207,10 +207,10 @@ def measure_law(bench: TwoParticleLammps, state: State, types: tuple[int, int], 
     size = np.log(states[3].radius / states[0].radius)
     weight = np.log(states[2].mass / states[0].mass)
 
-    def power(name: str) -> PowerLaw:
+    def power(name: str) -> PowerOfOverlap:
         values = [getattr(each, name) for each in (here, shallow, heavier, smaller)]
         if values[0] == 0 and not any(values):
-            return PowerLaw(0.0)
+            return PowerOfOverlap(0.0)
         if min(values) <= 0:
             raise SnapshotError(
                 f"{who} has a {name.replace('_', ' ')} that changes its sign, which no contact law does."
@@ -222,7 +222,7 @@ def measure_law(bench: TwoParticleLammps, state: State, types: tuple[int, int], 
         if by_depth != by_size:
             raise SnapshotError(f"The {name.replace('_', ' ')} of {who} is no power of its contact radius.")
         first = found[0][0]
-        return PowerLaw(
+        return PowerOfOverlap(
             values[0] / (first.mass**by_mass * (first.radius * first.overlap) ** by_depth), by_depth, by_mass
         )
 

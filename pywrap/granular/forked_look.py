@@ -3,8 +3,8 @@
 LAMMPS hands out contacts in a run alone, and a run of zero steps sorts particles, may cut a history once more at
 Coulomb's bound, and scales a rescaled one. So the look is taken in a copy of the process (`fork`), at rest and
 with dumps, averages and log closed, and the instance stays as it is. A copy of one of several ranks could not speak
-with the others: there, and where LAMMPS has threads, the instance itself runs zero steps, with its velocities taken
-away and given back.
+with the others: there, and where LAMMPS has threads, the instance itself runs zero steps, and coordinates, velocities
+and forces are given back to the bit. Histories cannot be: those of contacts at Coulomb's bound are cut.
 """
 
 import ctypes
@@ -27,6 +27,10 @@ Arrays = dict[str, Any]
 
 PER_STEP = ("ave/", "print", "vector", "halt", "balance", "adapt", "dt/reset", "record")
 """Fixes that write or change something in a run of zero steps, by the beginnings of their styles."""
+
+KEPT = ("x", "image", "v", "omega", "f", "torque")
+"""What is given back after zero steps of the instance itself, which round the coordinates in a sheared box and wrap
+those that have left the box."""
 
 DRAG = ("viscous", "langevin", "nve/limit", "overdamped")
 """Fixes that take energy away."""
@@ -201,8 +205,8 @@ def _owned_array(lmp: Any, name: str) -> Floats:
 
 
 def in_place(lmp: Any, work: Callable[[], Found], groups: dict[str, str]) -> Found:
-    """What some work finds in the instance itself; velocities and forces are given back, and its computes go."""
-    kept = {name: np.array(_owned_array(lmp, name)) for name in ("id", "v", "omega", "f", "torque")}
+    """What some work finds in the instance itself; what moves is given back to the bit, and its computes go."""
+    kept = {name: np.array(_owned_array(lmp, name)) for name in ("id", *KEPT)}
     world = communicator(lmp)
     whole = {name: np.concatenate(world.allgather(values)) for name, values in kept.items()}
     order = np.argsort(whole["id"])
@@ -210,7 +214,7 @@ def in_place(lmp: Any, work: Callable[[], Found], groups: dict[str, str]) -> Fou
         return work()
     finally:
         place = order[np.searchsorted(whole["id"][order], _owned_array(lmp, "id"))] if len(order) else order
-        for name in ("v", "omega", "f", "torque"):
+        for name in KEPT:
             _owned_array(lmp, name)[:] = whole[name][place]
         for name in ("faultgouge_c", "faultgouge_i"):
             if lmp.has_id("compute", name):

@@ -59,8 +59,8 @@ def from_lammps(
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
     The instance does not change: its next run is the same to the bit as without the look. (On several ranks, or with
-    threads, LAMMPS itself runs zero steps. It sorts particles, so that forces are then summed in another order, and it
-    cuts the history of contacts at Coulomb's bound: where there are any, a warning says so.)
+    threads, LAMMPS itself runs zero steps. It cuts the history of contacts at Coulomb's bound then: where there are
+    any, a warning says so.)
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def _warn_of_cut(lmp: Any, snapshot: Snapshot) -> None:
     """Say that zero steps of the instance itself may have changed its next run.
 
     Setting up a run LAMMPS takes the force of each contact anew, and a slip beyond Coulomb's bound becomes that at the
-    bound, with the velocities of that moment. What else a set-up changes is the order of sums, a rounding.
+    bound, with the velocities of that moment.
     """
     at_bound = int(snapshot.contacts.at_bound.sum())
     if at_bound and not forked_look.can_copy(lmp) and forked_look.communicator(lmp).rank == 0:

@@ -35,10 +35,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 from scipy.sparse import csc_array, eye_array
-from scipy.sparse.linalg import splu
 
 from ...analysis import NoEquilibriumError, Snapshot, negative_eigenvalues, stiffness_matrix
 from ...analysis.errors import FaultgougeError
+from ...analysis.factors.sparse_lu import general_lu
 from ...analysis.packing.arrays import Floats, derive_frozen
 from . import forked_look
 from .from_lammps import INTEGRATORS, from_lammps
@@ -299,7 +299,7 @@ class _Relaxation:
         """Displacements to the balance, and the packing there, if it is an equilibrium like that of a relaxation."""
         stiffness = stiffness_matrix(start)
         # what no contact feels has zero rows, and stays where it is
-        solver = splu(csc_array(stiffness + 1e-9 * abs(stiffness).max() * eye_array(start.coordinates)))
+        solver = general_lu(csc_array(stiffness + 1e-9 * abs(stiffness).max() * eye_array(start.coordinates)))
         allowed = self.balance * float(start.contacts.normal_force.mean())
         moves: list[Floats] = []
         sizes: list[float] = []

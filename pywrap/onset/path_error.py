@@ -42,10 +42,11 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, eigvals
 from scipy.sparse.linalg import ArpackError
 
-from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, dynamical_matrix, eigenpairs
+from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, eigenpairs
 from ...analysis.damped_onset.modes import DampedMode, Pencil, nearest_mode
 from ...analysis.damped_onset.windows import DampedWindow
 from ...analysis.onset import force_bearing
+from ...analysis.onset.window_edges import GrowthWindow
 from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
 from ..runs.equilibrium_path import EquilibriumPath
@@ -165,7 +166,7 @@ def with_damped_path_error(
     return tuple(_whole_error(window, crossing(window.frequency, dissipation), others) for window in windows)
 
 
-W = TypeVar("W", Window, DampedWindow)
+W = TypeVar("W", bound=GrowthWindow)
 
 
 def _whole_error(window: W, vanishes: Vanishes, others: OtherPaths) -> W:
@@ -271,8 +272,7 @@ def bearing_contacts(packing: Packing) -> frozenset[tuple[int, int, bool]]:
     """The contacts (i, j, whether it slides) that carry a force; j = -1 for the floor."""
     carrying = packing.loaded(CARRIES * packing.fy)
     contacts = carrying.contacts
-    slides = carrying.law.at_bound(carrying.geometry.overlap, contacts.slip)
-    return frozenset(zip(contacts.i.tolist(), contacts.j.tolist(), slides.tolist(), strict=True))
+    return frozenset(zip(contacts.i.tolist(), contacts.j.tolist(), carrying.sliding.tolist(), strict=True))
 
 
 def _thin_loads(loads: Floats, changed: NDArray[np.bool_]) -> Floats:

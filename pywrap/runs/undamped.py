@@ -203,11 +203,10 @@ def _sample_run(time: float, motion: Motion, packing: Packing) -> Sample:
     displaced = mean_square_displacement(
         motion.position, packing.position, packing.box_length, motion.position_low, packing.position_low
     )
-    inertia = packing.inertia_factor * packing.mass * packing.radius**2
     return Sample(
         time=time,
         msd=float(displaced),
-        kinetic_energy=float(0.5 * (packing.mass @ np.sum(motion.velocity**2, axis=1) + inertia @ motion.spin**2)),
+        kinetic_energy=motion.kinetic_energy(packing),
         layer_velocity=float(motion.velocity[packing.top, 0].mean()),
         friction=motion.friction,
     )

@@ -7,7 +7,7 @@ from pydantic import Discriminator, PrivateAttr, Tag, ValidationInfo, field_vali
 
 from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
 from .sections import Damping, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax
-from .study_sections import Eruptions, Modes, Trigger
+from .study_sections import Eruptions, ModesSection, Trigger
 from .units_section import Units
 from .validation import Section
 
@@ -42,7 +42,7 @@ class SceneKeys(Section):
     friction: Friction | None = None
     trigger: Trigger | None = None
     eruptions: Eruptions | None = None
-    modes: Modes | None = None
+    modes: ModesSection | None = None
     units: Units | None = None
     damping: Damping | None = None
     output: Output | None = None

@@ -50,7 +50,7 @@ class Eruptions(Section):
     time: Positive = 3000.0
 
 
-class Modes(Section):
+class ModesSection(Section):
     """[modes] the complex pairs along the ramp.
 
     Attributes

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...analysis import BadInputError, NoEquilibriumError, Packing, nearest_image
-from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
+from ..equilibria.quasistatic import Equilibrium, equilibrate, idle_disks
 from ..equilibria.rattlers import clear_rattlers
 from ..lammps.engine import Engine
 from .minimize_energy import ABOVE_ROUNDING, TOLERANCES, Watch, contact_rounding, largest_force, settle_loose
@@ -52,7 +52,7 @@ def bring_to_rest(packing: Packing, watch: Watch = lambda says: None) -> tuple[E
             "ever: leave --fx out, and raise F_x by `faultgouge ramp`."
         )
     resting = _with_friction(packing) if slipped else _without(packing, watch)
-    idle = len(resting.loaded(rounding_floor(resting)).rattlers)
+    idle = len(idle_disks(resting))
     if idle > 0.5 * len(resting):
         raise NoEquilibriumError(
             f"the upper layer sank through the bed, and {idle} of {len(resting)} disks carry nothing: choose a layer "
@@ -83,9 +83,7 @@ def _without(packing: Packing, watch: Watch) -> Packing:
     smooth = replace(packing, law=law, mass=ones)
     with Engine(smooth) as engine:
         found = settle_loose(engine, smooth, watch, bed=False)
-    return replace(
-        clear_rattlers(found, rounding_floor(found)), law=packing.law, angle=packing.angle, mass=packing.mass
-    )
+    return replace(clear_rattlers(found, idle_disks(found)), law=packing.law, angle=packing.angle, mass=packing.mass)
 
 
 def _with_friction(packing: Packing) -> Packing:

@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from ...analysis import MindlinLaw, NoEquilibriumError, Packing
 from ...analysis.packing.arrays import Floats
-from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
+from ..equilibria.quasistatic import Equilibrium, equilibrate, idle_disks
 from ..equilibria.rattlers import clear_rattlers
 from ..exchange import packing_of
 from ..lammps.engine import Engine
@@ -160,7 +160,7 @@ def _settle_starts(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None,
         loose = packing_of(start, settling_law, start.top, **load_of(scene) | {"fy": fy})
         with Engine(loose, communicator) as engine:
             packing = settle_loose(engine, loose, watch)
-        idle = len(packing.loaded(rounding_floor(packing)).rattlers)
+        idle = len(idle_disks(packing))
         if idle <= 0.5 * len(packing):
             break
     else:
@@ -170,7 +170,7 @@ def _settle_starts(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None,
             "into it (leave packing.top out for as many as it takes)"
         )
     if not section.settle_friction:
-        packing = replace(clear_rattlers(packing, rounding_floor(packing)), angle=np.zeros(len(packing)))
+        packing = replace(clear_rattlers(packing, idle_disks(packing)), angle=np.zeros(len(packing)))
     return _in_scene(packing, scene, law, scene.packing.start(draw).radius)
 
 

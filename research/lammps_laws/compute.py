@@ -64,7 +64,7 @@ LAWS = {
 class Cell(NamedTuple):
     """Packings of one size and friction: with which laws, in which dimensions, and up to which seed."""
 
-    count: int
+    particles: int
     mu: float
     seeds: int
     laws: tuple[str, ...] = tuple(LAWS)
@@ -231,11 +231,14 @@ def let_go(seed: int) -> dict[str, Any]:
     row: dict[str, Any] = {"law": law, "d": d, "count": count, "mu": MU, "seed": seed, "tilt": tilt, "rests": False}
     with TemporaryDirectory() as folder:
         lmp = pour(law, d, count, MU, seed, Path(folder) / "log", NONE)
+        found = None
         for slope in TILTS[: TILTS.index(tilt) + 1]:
             lmp.command(f"variable slope equal {slope}")
             found = rest(lmp)
             if found is None:
-                return row
+                break
+        if found is None:
+            return row
         said = describe(found)
         row |= {"rests": True, "at_bound": said["at_bound"], "pairs": said["pairs"], "predicted": said["growth_rate"]}
         for name in ("drag", "spin"):
@@ -277,7 +280,7 @@ def _follow(lmp: Any, push: Floats) -> tuple[Floats, Floats]:
         away = x[order] - start
         away -= size * np.round(away / size)
         squares.append(float(np.mean(np.sum(away**2, axis=1))))
-    return LOOK * np.arange(1, len(squares) + 1), np.array(squares)
+    return LOOK * np.arange(1, len(squares) + 1, dtype=float), np.array(squares, dtype=float)
 
 
 def linear_motion(found: Snapshot, push: Floats, times: Floats) -> Floats:
@@ -312,7 +315,7 @@ def compute(table: Path, cells: Iterable[Cell] = CELLS, watch: Any = print) -> N
     """Add the rows that a table lacks, seed by seed: all laws of a seed in all cells before the next."""
     known = {_key(row) for row in read(table)}
     wanted = [
-        (cell.count > LARGE, seed, law, d, cell.count, cell.mu)
+        (cell.particles > LARGE, seed, law, d, cell.particles, cell.mu)
         for cell in cells
         for seed in range(1, cell.seeds + 1)
         for d in cell.dimensions

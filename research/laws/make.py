@@ -25,7 +25,7 @@ TABLES = HERE / "tables"
 ALLOWED = {"draws": 1e-2, "error": 0.5, "overlap": 0.5}
 """Relative difference of numbers whose name has one of these words. What a run measures: a coordinate is rounded by
 2e-15, which is 2e-4 of the push, and D is a square that beats; 2e-3 of D and 1e-5 of rates were seen. And stated errors
-and the overlap y^H x at an onset, which say where rounding ends the search for a root: F_x^c agrees within its error."""
+and the overlap y^H x at an onset, which say where rounding ends the search for a root; F_x^c agrees within it."""
 
 
 def compute(folder: Path, names: list[str], share: float = 1.0, tables: Path | None = None) -> None:

@@ -22,7 +22,7 @@ from faultgouge.pywrap import Engine, Equilibrium, Scene
 from faultgouge.pywrap.runs.undamped import time_step
 from faultgouge.pywrap.scenes.units import dashpot
 from faultgouge.studies.modes.count_pairs import along_ramp
-from faultgouge.studies.packing_tools import distance_of_bearing_disks, shake_disks, sliding_contacts
+from faultgouge.studies.packing_tools import distance_of_bearing_disks, shake_disks
 from research.modes.loss import TANGENTIAL, fastest, impact_velocity, with_dashpots
 
 RESTITUTIONS = (0.97, 0.9, 0.8)
@@ -60,7 +60,7 @@ def lossy_runs(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
                 if rate.real >= LEAST:
                     run: dict[str, Any] = {"restitution": each, "ct_over_cn": ratio, "predicted": 2 * rate.real}
                     runs.append(run | {"measured": measure_growth(damped, rate)})
-        return {"runs": runs, "sliding": int(np.count_nonzero(sliding_contacts(packing)))}
+        return {"runs": runs, "sliding": int(np.count_nonzero(packing.sliding))}
 
     return along_ramp(scene, rest, look)
 

@@ -32,13 +32,12 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from ...analysis import Packing, mean_square_displacement, nearest_image, spectrum
-from ...analysis.motion.propagator import SLOW
-from ...analysis.motion.state_space import StateSpace
+from ...analysis.motion.growth import unstable_rates
 from ...analysis.packing.packing import Floats
 from ...pywrap import Engine
 from ...pywrap.lammps.dynamics import Dynamics, Motion
 from ...pywrap.runs.undamped import time_step
-from ..packing_tools import contact_pairs, sliding_contacts, unit_of_time
+from ..packing_tools import contact_pairs, unit_of_time
 
 DECADES = 24.0
 """Decades of D between its noise, 1e-27 in the first steps, and the square of a tenth of an overlap."""
@@ -65,6 +64,10 @@ Look = dict[str, float]
 RISES = 1e4
 """Factor from the D of the first time unit from which D of a linearly stable packing has risen: rounding alone drifts
 by a few hundred times in `QUIET`."""
+
+WALK = 10.0
+"""Factor from the D of a random walk, one rounding of a coordinate a time step, below which D has not risen: strong
+drag leaves D at 1e-30 in the first time unit, and the walk is at 3e-25 after fifty."""
 
 Ends = Literal["opens", "slides", "law", "flows", "stable", "rises", "cut off"]
 
@@ -135,11 +138,9 @@ def erupt(start: Start) -> dict[str, Any]:
 
 def growth_rate(packing: Packing) -> float:
     """Of D, from K or, with dissipation, from K, C and M, 1 / time; 0 of a stable packing."""
-    if not packing.law.damped and packing.drag_time is None:
+    if not packing.damped:
         return spectrum(packing).growth_rate()
-    rates = np.linalg.eigvals(StateSpace.of(packing).matrix)
-    fastest = float(rates.real.max(initial=0.0))
-    return 2 * fastest if fastest > SLOW * np.abs(rates).max() else 0.0
+    return 2 * float(unstable_rates(packing).real.max(initial=0.0))
 
 
 def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[float, Motion]]:
@@ -199,7 +200,7 @@ class _Watch:
             "time": time,
             "msd": float(msd),
             "slip": float(self._moved[first.top, 0].mean()),
-            "kinetic_energy": _kinetic_energy(first, motion),
+            "kinetic_energy": motion.kinetic_energy(first),
             "lost": len(self._contacts - there),
             "gained": len(there - contact_pairs(first)),
             "sliding": len((_sliding(now) - self._slid) & self._contacts),
@@ -207,19 +208,14 @@ class _Watch:
 
 
 def _sliding(packing: Packing) -> set[tuple[int, int]]:
-    return contact_pairs(packing, sliding_contacts(packing)) if packing.law.frictional else set()
-
-
-def _kinetic_energy(packing: Packing, motion: Motion) -> float:
-    inertia = packing.inertia_factor * packing.mass * packing.radius**2
-    return float(0.5 * (packing.mass @ np.sum(motion.velocity**2, axis=1) + inertia @ motion.spin**2))
+    return contact_pairs(packing, packing.sliding)
 
 
 def _balance(dynamics: Dynamics, packing: Packing) -> float:
     """Change of the kinetic energy less work, relative."""
-    before = _kinetic_energy(packing, dynamics.advance(0))
+    before = dynamics.advance(0).kinetic_energy(packing)
     motion, work = dynamics.work(WORK_STEPS)
-    after = _kinetic_energy(packing, motion)
+    after = motion.kinetic_energy(packing)
     return float(abs(after - before - work) / max(abs(work), after, before))
 
 
@@ -231,7 +227,8 @@ def _noise(columns: dict[str, Floats], unit: float) -> float:
 def _ending(start: Start, looks: list[Look], columns: dict[str, Floats], rate: float, unit: float) -> dict[str, Any]:
     """When and by what the growth ended, see the module."""
     ended: float | None = None
-    ends: Ends = "stable" if columns["msd"].max() <= RISES * _noise(columns, unit) else "rises"
+    drift = WALK * start.packing.coordinate_rounding**2 * columns["time"][-1] / time_step(start.packing)
+    ends: Ends = "stable" if columns["msd"].max() <= max(RISES * _noise(columns, unit), drift) else "rises"
     if rate > 0:
         place = int(np.argmax(columns["msd"] >= TENTH * columns["msd"].max()))
         ended = float(columns["time"][place])

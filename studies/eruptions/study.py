@@ -18,7 +18,7 @@ from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle
 from ..packing_tools import path_from
 from ..result_rows import Rows
-from ..study import Figures, Result, Study, Work
+from ..study import Figures, Result, SceneStudy, Work
 from .compute import DECADES, OVER, QUIET, Start, erupt
 from .draw import WORDS, course_figure, size_figure
 
@@ -129,7 +129,7 @@ def _starts(scene: Scene, wanted: list[float], time: float) -> tuple[list[Start]
     return starts, None
 
 
-eruptions = Study(
+eruptions = SceneStudy(
     package=__package__ or "",
     name="eruptions",
     beside="eruptions",

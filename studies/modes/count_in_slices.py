@@ -45,7 +45,7 @@ leave the symmetric pattern: of 10,000 disks the factors then take 1,000 times a
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _SlicePart:
     """A slice with its neighbours: vectors in columns, and between which levels the slice lies."""
 
     vectors: Floats
@@ -86,7 +86,7 @@ def count_in_slices(packing: Packing, limits: Limits = LIMITS) -> tuple[Complexe
     return np.concatenate(found), error
 
 
-def _parts(matrix: csr_array, limits: Limits) -> Iterator[_Part]:
+def _parts(matrix: csr_array, limits: Limits) -> Iterator[_SlicePart]:
     """Each slice of the symmetric part with its neighbours."""
     near: deque[_Block] = deque(maxlen=3)
     for block in _blocks(csc_array(0.5 * (matrix + matrix.T)), limits):
@@ -109,16 +109,16 @@ def _blocks(symmetric: csc_array, limits: Limits) -> Iterator[_Block]:
         yield values[own], vectors[:, own]
 
 
-def _part(blocks: list[_Block], which: int) -> _Part:
+def _part(blocks: list[_Block], which: int) -> _SlicePart:
     levels, vectors = (np.concatenate([each[k] for each in blocks], axis=-1) for k in (0, 1))
     start = sum(len(each[0]) for each in blocks[:which])
     stop = start + len(blocks[which][0])
     low = -np.inf if start == 0 else 0.5 * (levels[start - 1] + levels[start])
     high = np.inf if stop == len(levels) else 0.5 * (levels[stop - 1] + levels[stop])
-    return _Part(vectors, low, high, 0.5 * (levels[start] + levels[stop - 1]))
+    return _SlicePart(vectors, low, high, 0.5 * (levels[start] + levels[stop - 1]))
 
 
-def _projections(matrix: csr_array, part: _Part) -> Iterator[Floats]:
+def _projections(matrix: csr_array, part: _SlicePart) -> Iterator[Floats]:
     """The operator in the space of a part, after each iteration."""
     shifted = csc_array(matrix - part.shift * eye_array(matrix.shape[0]))
     factors = symmetric_lu(shifted, pivoting=PIVOTING, mumps=False)
@@ -133,7 +133,7 @@ def _solve_slice(solution: Callable[..., Floats], vectors: Floats, trans: str) -
     return np.asarray(qr(solution(np.ascontiguousarray(vectors), trans=trans), mode="economic")[0])
 
 
-def _choose_within(projected: Floats, part: _Part, noise: float) -> Complexes:
+def _choose_within(projected: Floats, part: _SlicePart, noise: float) -> Complexes:
     """Complex eigenvalues with positive imaginary part beyond rounding, and with a real part between the levels."""
     values = np.asarray(eigvals(projected, check_finite=False), dtype=np.complex128)
     surely = np.sqrt(noise * np.abs(values).max(initial=0.0))

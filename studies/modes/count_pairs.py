@@ -66,9 +66,9 @@ from ...analysis.spectrum.spectrum import (
 )
 from ...pywrap import Equilibrium, Scene
 from ...pywrap.runs.equilibrium_path import EquilibriumPath
-from ...pywrap.scenes.study_sections import Modes
+from ...pywrap.scenes.study_sections import ModesSection
 from ...pywrap.scenes.validation import require_section
-from ..packing_tools import Start, path_from, sliding_contacts
+from ..packing_tools import Start, path_from
 from .count_in_slices import count_in_slices
 
 ALL = 1000
@@ -169,7 +169,7 @@ def antisymmetric_norm(packing: Packing) -> float:
 
 def count_with_part_of_b(packing: Packing) -> dict[str, dict[str, Any]]:
     """The complex pairs with b of sticking contacts alone, of sliding contacts alone, and of none."""
-    slides = sliding_contacts(packing)
+    slides = packing.sliding
     return {
         name: PairCounts.of(_values(packing, coupled)).as_dict()
         for name, coupled in (("sticking", ~slides), ("sliding", slides), ("none", np.zeros_like(slides)))
@@ -219,7 +219,7 @@ def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[s
     look : callable
         Packing -> the numbers of one load.
     """
-    step, wanted = require_section(scene.ramp, "ramp").step, (scene.modes or Modes()).fx_over_fy
+    step, wanted = require_section(scene.ramp, "ramp").step, (scene.modes or ModesSection()).fx_over_fy
     row: dict[str, Any] = {"ends": "until", "loads": []}
     with path_from(rest, scene) as path:
         for share in sorted(wanted):
@@ -250,7 +250,7 @@ def _load(packing: Packing) -> dict[str, Any]:
     row = found.as_dict() | {
         "modes": found.modes,
         "contacts": len(packing.contacts),
-        "sliding": int(np.count_nonzero(sliding_contacts(packing))),
+        "sliding": int(np.count_nonzero(packing.sliding)),
         "rattlers": len(packing.rattlers),
         "bound": antisymmetric_norm(packing),
     }

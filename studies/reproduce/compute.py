@@ -128,7 +128,7 @@ def growth_run(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
     predicted = modes.growth_rate(dt)
     settings = Perturb(fx=start.fx, time=min(EFOLDS / predicted, LONGEST_RUN * dt), inertia_factor=scene.inertia_factor)
     # disks that have moved by a tenth of the smallest overlap certainly move otherwise than the spectrum says
-    ceiling = (0.1 * start.packing.loaded(start.residual).geometry.overlap.min()) ** 2
+    ceiling = (0.1 * start.packing.smallest_overlap) ** 2
     samples: list[Sample] = []
     with RunFile(path, "a") as file:
         for sample in perturb(scene.model_copy(update={"perturb": settings}), start, samples=4000, early=0):

@@ -33,7 +33,7 @@ from ...pywrap import Scene, SceneError
 from ...pywrap.onset.path_error import with_path_error
 from ...pywrap.runs.equilibrium_path import EquilibriumPath, loads
 from ...pywrap.scenes.validation import require_section
-from ..packing_tools import Start, contact_pairs, path_from, sliding_contacts
+from ..packing_tools import Start, contact_pairs, path_from
 
 Ends = Literal["onset", "until", "flows"]
 
@@ -95,7 +95,7 @@ def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
         "rotation": float(axes[2].sum()),
         "layer": float(weight[packing.top].sum()),
         "disks": np.argsort(weight)[::-1][:3].tolist(),
-        "sliding": int(np.count_nonzero(sliding_contacts(packing))),
+        "sliding": int(np.count_nonzero(packing.sliding)),
         "opened": len(before - now),
         "closed": len(now - before),
     }

@@ -35,7 +35,7 @@ MOST_POINTS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Point:
+class SweepPoint:
     """One scene of a sweep.
 
     Attributes
@@ -154,11 +154,11 @@ class Sweep:
         return [name for key in self.axes for name in _split_keys(key)]
 
     @cached_property
-    def points(self) -> tuple[Point, ...]:
+    def points(self) -> tuple[SweepPoint, ...]:
         """Every point, in the order of the table."""
         return tuple(self._point(number, values) for number, values in enumerate(product(*self.axes.values())))
 
-    def _point(self, number: int, chosen: tuple[Any, ...]) -> Point:
+    def _point(self, number: int, chosen: tuple[Any, ...]) -> SweepPoint:
         values: dict[str, Any] = {}
         for key, value in zip(self.axes, chosen, strict=True):
             names = _split_keys(key)
@@ -170,8 +170,10 @@ class Sweep:
         try:
             scene = Scene.from_mapping(mapping, command=self.task)
         except SceneError as error:
-            return Point(number, values, None, str(error).removeprefix("scene: "), digest([self._known_as, mapping]))
-        return Point(number, values, scene, None, digest([self._known_as, scene.resolved()]))
+            return SweepPoint(
+                number, values, None, str(error).removeprefix("scene: "), digest([self._known_as, mapping])
+            )
+        return SweepPoint(number, values, scene, None, digest([self._known_as, scene.resolved()]))
 
     @property
     def _known_as(self) -> str:
@@ -183,7 +185,7 @@ class Sweep:
         return {"task": self.task, "sweep": self.axes, "scene": self.scene} | ({"code": self.code} if self.code else {})
 
 
-def shard(points: tuple[Point, ...], part: tuple[int, int]) -> tuple[Point, ...]:
+def shard(points: tuple[SweepPoint, ...], part: tuple[int, int]) -> tuple[SweepPoint, ...]:
     """Part K of N of the points, counted from 1: whole settlings, so that no two parts settle the same packing."""
     mine, of = part
     order: dict[str, int] = {}

@@ -14,14 +14,14 @@ from statistics import median
 from typing import Any
 
 from ...pywrap import Scene
-from ...pywrap.scenes.study_sections import Modes
+from ...pywrap.scenes.study_sections import ModesSection
 from ..eruptions.study import eruptions_of
 from ..modes.count_pairs import modes
 from ..packing_tools import Start
 from ..trigger.compute import settings
 from ..trigger.study import trigger
 from .onset import onset
-from .sweep_plan import Point
+from .sweep_plan import SweepPoint
 from .table import Row
 from .triggering import triggering
 from .user_function import UserFunction, is_user_function, user_function
@@ -72,7 +72,7 @@ def _eruptions(scene: Scene) -> float:
 
 
 def _loads(scene: Scene) -> int:
-    return len((scene.modes or Modes()).fx_over_fy)
+    return len((scene.modes or ModesSection()).fx_over_fy)
 
 
 def _modes(scene: Scene) -> float:
@@ -94,7 +94,7 @@ def task_of(name: str) -> Task | UserFunction:
     return user_function(name) if is_user_function(name) else TASKS[name]
 
 
-def estimate(task: str, points: Sequence[Point], known: Iterable[Row] = ()) -> list[str]:
+def estimate(task: str, points: Sequence[SweepPoint], known: Iterable[Row] = ()) -> list[str]:
     """The cost of points that are not known yet, in plain words: CPU time of the task, and of settling packings.
 
     Of a function of the user's, the known rows tell it.

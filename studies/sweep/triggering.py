@@ -145,9 +145,9 @@ def eruption(
         growth rate of D with the weakened friction at fx, from the spectrum, 1 / time, 0 if it is stable; unperturbed,
         perturbed, weakening, control : largest D, length^2, of the three runs at fx, and with mu(v) at fx_control;
         verdict, weakens_at, jump : whether D grows after its jump, when friction weakens, and the largest D shortly
-        after that (`Outcome` of :mod:`~faultgouge.studies.triggering.compute`); fitted_rate : of D after the jump, or
-        None; foreseen_jump : by linear theory, length^2; perturbation_shows : whether the perturbed run differs from
-        the unperturbed one.
+        after that (`TriggeringOutcome` of :mod:`~faultgouge.studies.triggering.compute`); fitted_rate : of D after the
+        jump, or None; foreseen_jump : by linear theory, length^2; perturbation_shows : whether the perturbed run
+        differs from the unperturbed one.
     """
     middle = 0.5 * (window[0] + window[1])
     loads = middle, max(0.0, 2 * window[0] - middle)

@@ -25,7 +25,7 @@ from ...pywrap import Equilibrium, Scene, settle
 from ...pywrap.settling.settle import settle_bed
 from ..executors import Processes
 from ..packing_tools import Start
-from .sweep_plan import Point
+from .sweep_plan import SweepPoint
 from .table import Row
 from .tasks import task_of
 from .user_function import UserFunctionError
@@ -41,9 +41,9 @@ class WorkerError(FaultgougeError):
     """Workers are killed again and again."""
 
 
-def compute_points(pool: Executor | None, task: str, points: Sequence[Point]) -> Generator[Row, None, None]:
+def compute_points(pool: Executor | None, task: str, points: Sequence[SweepPoint]) -> Generator[Row, None, None]:
     """The rows of points as they end; closing the generator takes back those that no worker has begun."""
-    groups: dict[str, deque[Point]] = defaultdict(deque)
+    groups: dict[str, deque[SweepPoint]] = defaultdict(deque)
     for point in points:
         groups[point.settling].append(point)
     if pool is not None and len(points) > 1:
@@ -61,8 +61,8 @@ class _Shared:
 
     def __init__(self, pool: Executor, task: str) -> None:
         self._pool, self._task = pool, task
-        self._running: dict[Future[Any], tuple[Point, Packing | None, deque[Point]]] = {}
-        self._lost: list[tuple[Point, Packing | None, deque[Point]]] = []
+        self._running: dict[Future[Any], tuple[SweepPoint, Packing | None, deque[SweepPoint]]] = {}
+        self._lost: list[tuple[SweepPoint, Packing | None, deque[SweepPoint]]] = []
 
     def rows(self, groups: Any) -> Iterator[Row]:
         """Rows as they end; the first point of a group is handed out before the others."""
@@ -89,7 +89,7 @@ class _Shared:
             for future in self._running:
                 future.cancel()
 
-    def _hand_out(self, point: Point, bed: Packing | None, group: deque[Point]) -> None:
+    def _hand_out(self, point: SweepPoint, bed: Packing | None, group: deque[SweepPoint]) -> None:
         try:
             future = self._pool.submit(compute_point, self._task, point, bed, bool(group))
         except BrokenExecutor:
@@ -109,7 +109,7 @@ class _Shared:
             self._hand_out(point, bed, group)
 
 
-def compute_point(task: str, point: Point, bed: Packing | None, keep: bool) -> tuple[Row, Packing | None]:
+def compute_point(task: str, point: SweepPoint, bed: Packing | None, keep: bool) -> tuple[Row, Packing | None]:
     """One point: its row, and if it is to be kept the packing as it settled.
 
     What goes wrong with a point is in its row under "says".

@@ -12,7 +12,7 @@ from ...pywrap.onset.undamped import onset_run
 from ...pywrap.scenes.units import real_units
 from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start
-from ..study import Result, Study, Work
+from ..study import Result, SceneStudy, Work
 from ..sweep.onset import onset
 from .compute import (
     Row,
@@ -165,7 +165,7 @@ def trigger(scene: Scene, start: Start) -> Row:
     }
 
 
-trigger_map = Study(
+trigger_map = SceneStudy(
     package=__package__ or "",
     name="trigger",
     beside="output",

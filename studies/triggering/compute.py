@@ -98,7 +98,7 @@ class Triggering:
         Of the linearised packing to that perturbation, time step included.
     foreseen : Forecast
         Of the run with mu(v) after friction has weakened, by linear theory.
-    outcome : Outcome
+    outcome : TriggeringOutcome
         What the run with mu(v) shows.
     control_rate : float or None
         Growth rate of D with the weakened friction where the control starts, from the spectrum; 0 if it is stable.
@@ -112,7 +112,7 @@ class Triggering:
     runs: dict[str, Series]
     response: Response
     foreseen: Forecast
-    outcome: Outcome
+    outcome: TriggeringOutcome
     control_rate: float | None
     sensitive: Sensitivity
 
@@ -190,7 +190,7 @@ Verdict = Literal["does not weaken", "too short", "jump alone", "grows", "unexpl
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TriggeringOutcome:
     """What a run with mu(v) shows.
 
     Attributes
@@ -216,7 +216,7 @@ class Outcome:
     fitted: Growth | None = None
 
 
-def judge(run: Series, v0: float, foreseen: Forecast) -> Outcome:
+def judge(run: Series, v0: float, foreseen: Forecast) -> TriggeringOutcome:
     """Whether a run with mu(v) shows an instability, or the jump of the equilibrium alone.
 
     Parameters
@@ -230,11 +230,11 @@ def judge(run: Series, v0: float, foreseen: Forecast) -> Outcome:
     """
     when = crossing(run, v0)
     if when is None:
-        return Outcome("does not weaken")
+        return TriggeringOutcome("does not weaken")
     time, msd = run["time"], run["msd"]
     over = when + JUMP_SHARE * time[-1]
     if over >= time[-1]:
-        return Outcome("too short", when)
+        return TriggeringOutcome("too short", when)
     jump = float(msd[(time >= when) & (time <= over)].max())
     later = time >= when
     top = float(msd[later].max())
@@ -248,7 +248,7 @@ def judge(run: Series, v0: float, foreseen: Forecast) -> Outcome:
     elif fitted is not None and foreseen.rate > 0:
         off = abs(fitted.rate - foreseen.rate)
         verdict = "grows" if off <= max(AGREES * foreseen.rate, 3 * fitted.error) else "unexplained"
-    return Outcome(verdict, when, jump, float(np.log10(top / jump)), fitted)
+    return TriggeringOutcome(verdict, when, jump, float(np.log10(top / jump)), fitted)
 
 
 def foresee(start: Equilibrium, mu: float, run: Series, v0: float) -> Forecast:

@@ -78,11 +78,10 @@ def forecast(start: Equilibrium, mu: float, time: float, window: float | None = 
         msd = LinearMotion.of(weak).response(times, force=weak.net_force - packing.net_force).msd
     msd = np.fmin(msd, np.finfo(float).max)
     first = float(msd[times <= (JUMP_SHARE * time if window is None else window)].max(initial=msd[0]))
-    overlap = packing.loaded(start.residual).geometry.overlap.min()
     return Forecast(
         jump=first,
         growth=float(np.log10(msd.max() / first)),
-        room=float(np.log10((LINEAR * overlap) ** 2 / first)),
+        room=float(np.log10((LINEAR * packing.smallest_overlap) ** 2 / first)),
         rate=spectrum(weak).growth_rate(),
     )
 

@@ -240,6 +240,8 @@ def test_the_analysis_takes_a_snapshot_as_a_packing(bed):
     step = stable_timestep(bed)
     assert step == pytest.approx(2 / mu, rel=1e-7)
     assert abs(step - 2 / mu) <= step.error + 1e-12 * step
+    # the sums of rows are a bound for all eigenvalues, and no useless one
+    assert 0.3 * step < step.certain <= 2 / mu * (1 + 1e-12)
     # the matrices that are handed in are those that count
     assert stable_timestep(bed, stiffness_matrix(bed), damping_matrix(bed)) == step
     assert stable_timestep(bed, 4 * stiffness_matrix(bed), 2 * damping_matrix(bed)) == pytest.approx(step / 2, rel=1e-7)

@@ -106,6 +106,8 @@ def test_contacts_that_slide_use_all_of_the_bound(cluster):
     limit = law.slip_limit(cluster.geometry.overlap)
     sliding = replace(cluster, law=law, contacts=cluster.contacts.slipped(2 * limit))
     np.testing.assert_allclose(sliding.mobilised, limit > 0, rtol=1e-14)
+    np.testing.assert_array_equal(sliding.sliding, limit > 0)
+    assert not replace(cluster, law=replace(cluster.law, mu=0.0)).sliding.any()
 
 
 def test_residual_leaves_out_rattlers_of_the_upper_layer():

@@ -11,7 +11,7 @@ from scipy.linalg import block_diag, expm
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import mean_square_displacement
-from faultgouge.analysis.motion.matrix_functions import Modes, first_order
+from faultgouge.analysis.motion.matrix_functions import BlockDiagonal, first_order
 from faultgouge.analysis.motion.oscillator import Oscillator
 from faultgouge.analysis.motion.response import layer_force, linear_response
 from faultgouge.analysis.motion.state_space import StateSpace, driven_motion, released_motion
@@ -61,13 +61,13 @@ def by_digits(matrix, force, start, time, tau):
 def motion_of(matrix, force, start, time, tau=None, dt=None):
     time, size = np.asarray(time, dtype=float), len(matrix)
     if tau is None:
-        modes, oscillator = Modes.of(matrix), Oscillator(OMEGA, dt)
+        modes, oscillator = BlockDiagonal.of(matrix), Oscillator(OMEGA, dt)
         pairs = ((oscillator.driven, force), (oscillator.released, start))
         return np.sum([modes.apply(function, time, vector) for function, vector in pairs], axis=0)
     system = StateSpace.of_matrices(csr_array(matrix), csr_array(np.eye(size) / tau), np.ones(size))
     rows, rest = block_diag(system.unweight, np.eye(size)), np.zeros(size)
     pairs = ((partial(driven_motion, OMEGA), system.state(rest, force)), (released_motion, system.state(start, rest)))
-    modes = Modes.of(system.matrix, first_order)
+    modes = BlockDiagonal.of(system.matrix, first_order)
     found = sum(modes.apply(function, time, vector, rows)[0] for function, vector in pairs)
     return found[:, :size], found[:, size:]
 
@@ -92,7 +92,7 @@ def test_two_pairs_and_a_pair_among_other_modes():
     inner[2:4, 2:4] = [[2.0, 200.0], [0.0, 4.0]]  # overlap 2/200
     inner[4, 4], inner[5, 5] = 3.0, 5.0
     matrix, (force, start) = turned(inner), vectors(6)
-    assert len(Modes.of(matrix).blocks) == 2
+    assert len(BlockDiagonal.of(matrix).blocks) == 2
     found = motion_of(matrix, force, start, [20.0])
     for part, expected in zip(found, by_digits(matrix, force, start, 20.0, None), strict=True):
         # |A| = 250 rounds to 3e-14, and t^2/2 |A| u is what a coalescence makes of it
@@ -102,7 +102,7 @@ def test_two_pairs_and_a_pair_among_other_modes():
 def test_three_coalescing_eigenvalues_are_refused():
     matrix = np.diag([2.0, 2.0, 2.0, 5.0]) + np.diag([1.0, 1.0, 0.0], 1)
     with pytest.raises(np.linalg.LinAlgError, match="more than two"):
-        Modes.of(matrix)
+        BlockDiagonal.of(matrix)
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.4])

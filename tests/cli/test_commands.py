@@ -259,6 +259,25 @@ def test_a_bed_is_settled_once_for_all_friction_coefficients(faultgouge_here, tm
     assert len(list(tmp_path.glob("True.*.disks"))) == 5
 
 
+@pytest.mark.slow
+def test_onset_names_the_friction_coefficients_without_one(faultgouge_here, tmp_path):
+    """Those that follow are searched, too; a scene of which none has an onset ends with the exit code 1."""
+    small = SMALL | {"packing": SMALL["packing"] | {"seed": 2}, "ramp": {"step": 5e-3, "until": 0.015}}
+    (tmp_path / "scene.toml").write_text(toml(small | {"law": {"kn": 2e5, "mu": [1.0, 0.3, 0.8]}}))
+    said = faultgouge_here("onset", "scene.toml").stdout.splitlines()
+    none = "no onset: No pair of eigenvalues is complex up to F_x = 0.015: raise the largest load."
+    assert said[0] == f"mu = 1: {none}"
+    assert said[1].startswith("mu = 0.3: F_x^c = 0.01394557")
+    assert said[-1] == f"mu = 0.8: {none}"
+    found = json.loads(faultgouge_here("onset", "scene.toml", "--json").stdout)
+    assert found["fx_c"] == pytest.approx(0.01394557065, abs=1e-10)
+    assert [each["fx_c"] for each in found["each_mu"]] == [None, found["fx_c"], None]
+    (tmp_path / "scene.toml").write_text(toml(small | {"law": {"kn": 2e5, "mu": [1.0, 0.8]}}))
+    done = faultgouge_here("onset", "scene.toml", code=1)
+    assert "None of the 2 friction coefficients has an onset on this ramp." in done.stderr
+    assert [line.split(":")[0] for line in done.stdout.splitlines()] == ["mu = 1", "mu = 0.8"]
+
+
 def ramps_that_end(beds):
     """A ramp of which no more is asked than the bed that it is given; the third one ends the command."""
 

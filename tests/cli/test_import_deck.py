@@ -109,3 +109,34 @@ def test_refused_before_the_run(faultgouge_here, tmp_path):
     (tmp_path / "in.wrong").write_text("units nothing\n")
     assert "LAMMPS stopped: " in faultgouge_here("import", "in.wrong", code=1).stderr
     assert not (tmp_path / "packing.h5").exists()
+
+
+def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):
+    """Friction a little below what the packing uses: LAMMPS cuts these contacts to the bound."""
+    from faultgouge.analysis.files.snapshot_file import read_snapshot
+
+    # a row of three in a periodic box, and two above
+    layers = [(-1.0, 0.5), (0.0, 0.5), (1.0, 0.5), (-0.5, 1.36), (0.5, 1.36)]
+    body = DECK.format(**FLAT, word="contacts").replace("boundary f", "boundary p")
+    body = body.replace("block -2 2", "block -1.51 1.51").replace("run 6000", "run 20000")
+    lines = [line for line in body.splitlines() if "create_atoms" not in line]
+    at = lines.index("create_box 1 box") + 1
+    lines[at:at] = [f"create_atoms 1 single {x} {y} 0 units box" for x, y in layers]
+    deck = "\n".join(lines) + "\n"
+    (tmp_path / "rough.in").write_text(deck)
+    faultgouge_here("import", "rough.in", "-o", "rough.h5")
+    c = read_snapshot(tmp_path / "rough.h5").contacts
+    used = np.linalg.norm(c.tangential_force, axis=1) / c.normal_force
+    mu = used[~c.wall].max() * (1 - 1e-7)
+    (tmp_path / "slid.in").write_text(f"{deck}pair_style gran/hertz/history 1e3 NULL 10 NULL {mu:.17g} 1\nrun 0\n")
+    found = {}
+    for acts, more in (("stick", ()), ("slide", ("--slides",))):
+        faultgouge_here("import", "slid.in", "-o", f"{acts}.h5", *more)
+        snapshot = read_snapshot(tmp_path / f"{acts}.h5")
+        count = int(snapshot.contacts.at_bound.sum())
+        assert count > 0
+        assert snapshot.contacts.sliding.sum() == (count if more else 0)
+        done = faultgouge_here("spectrum", f"{acts}.h5")
+        assert f"{count} of {len(c)} contacts are at Coulomb's bound; they {acts} here" in done.stdout + done.stderr
+        found[acts] = json.loads(faultgouge_here("spectrum", f"{acts}.h5", "--json").stdout)["eigenvalues"]
+    assert found["stick"] != found["slide"]

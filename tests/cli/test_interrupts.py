@@ -231,16 +231,16 @@ from faultgouge.cli import main
 from faultgouge.commands import program
 from faultgouge.pywrap import Engine, EngineError
 
-displaced, calls, wanted, failing_rank = Engine.displaced, 0, 0, -1
+try_displacement, calls, wanted, failing_rank = Engine.try_displacement, 0, 0, -1
 
 def failing(self, *arguments):
     global calls
     calls += 1
     if calls == wanted and failing_rank in (-1, MPI.COMM_WORLD.rank):
         raise EngineError(f"LAMMPS stopped: it was told to at call {wanted}.")
-    return displaced(self, *arguments)
+    return try_displacement(self, *arguments)
 
-Engine.displaced = failing
+Engine.try_displacement = failing
 """
 
 ONCE = """

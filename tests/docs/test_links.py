@@ -63,6 +63,18 @@ def test_explanations_are_two_screens_with_a_picture_before_any_number(page):
     assert re.findall(r"\d\.\d|10\^|\b\d\d+", before) == []
 
 
+def test_each_paragraph_on_complex_pairs_names_the_file_that_has_it():
+    text = (ROOT / "docs" / "complex_pairs.md").read_text().split("**The discriminant.**")[1].split("*References.*")[0]
+    rows = [row for row in text.splitlines() if row.startswith("| ") and not row.startswith("| the pair")]
+    paragraphs = [each for each in text.split("\n\n") if each.startswith("**") and not each.endswith("pass:")]
+    assert (len(rows), len(paragraphs)) == (6, 8)
+    for passage in [*rows, text.split("\n\n**")[0], *paragraphs]:
+        ((name, places),) = re.findall(r"`(\w+\.py)`:\s((?:`[\w.]+`(?:, )?)+)", passage)
+        source = (ROOT / "analysis" / "onset" / name).read_text()
+        for place in re.findall(r"[\w.]+", places):
+            assert all(re.search(rf"^ *(class|def) {part}\b", source, re.MULTILINE) for part in place.split(".")), place
+
+
 def test_a_wrong_page_is_found_out(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("```console\n$ echo mu = 1.01\nmu = 1.0\n$ echo mu = 1.0001\nmu = 1.0\n$ false\n```\n")

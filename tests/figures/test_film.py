@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from faultgouge.analysis import Packing
-from faultgouge.figures.film import LARGEST_SHOWN, Motion, RampFilm, RunFilm
+from faultgouge.figures.film import LARGEST_SHOWN, RampFilm, RunFilm, RunMotion
 from faultgouge.figures.writers import UNSEEN, write_film
 
 
@@ -17,13 +17,13 @@ def packing(reference_packing) -> Packing:
 
 
 @pytest.fixture(scope="module")
-def motion(packing) -> Motion:
+def motion(packing) -> RunMotion:
     """Displacements that grow tenfold with every unit of time, from rest."""
     shape = np.random.default_rng(1).standard_normal((100, 2))
     shape /= np.linalg.norm(shape, axis=1).max()
     time = np.linspace(0, 8, 81)
     size = np.where(time > 0, 1e-9 * 10.0**time, 0.0)
-    return Motion(packing, time, size[:, None, None] * shape)
+    return RunMotion(packing, time, size[:, None, None] * shape)
 
 
 def test_magnification_is_a_power_of_ten_that_only_falls(motion):
@@ -38,7 +38,7 @@ def test_magnification_is_a_power_of_ten_that_only_falls(motion):
 
 def test_displacements_are_those_of_the_nearest_image(packing):
     position = np.stack([packing.position, packing.position + np.array([packing.box_length + 1e-3, 0.0])])
-    moved = Motion.of(packing, np.array([0.0, 1.0]), position).displacement
+    moved = RunMotion.of(packing, np.array([0.0, 1.0]), position).displacement
     np.testing.assert_allclose(moved[1], np.tile([1e-3, 0.0], (100, 1)), atol=1e-13)
 
 

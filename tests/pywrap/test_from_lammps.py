@@ -158,7 +158,7 @@ CASES = [
 
 @pytest.mark.parametrize(("law", "damped", "d"), CASES)
 def test_motion_of_lammps(beds, law, damped, d):
-    """The difference falls as the square of the time step, or in proportion to it with dashpots."""
+    """The difference falls as the square of the time step, or in proportion to it with dashpots, down to 1e-6."""
     from faultgouge.pywrap import compare_motion, from_lammps
 
     lmp = beds(law, d, damped)
@@ -167,24 +167,28 @@ def test_motion_of_lammps(beds, law, damped, d):
     assert len(contacts) > len(snapshot)
     assert snapshot.damped
     steps = [(2e-4 if damped else 8e-4) / 2**k for k in range(4)]
-    # at most a twentieth of the smallest overlap, beyond which the forces' cubic terms are seen; but with `granular`,
-    # which turns its history beyond 1e-10 of the bound alone, a smaller motion is seen less well
-    amplitude = min(4e-5, 0.05 * float(contacts.overlap.min())) if law.startswith("gran/") else 4e-5
-    runs = [compare_motion(lmp, snapshot, 0.2, amplitude, timestep=step) for step in steps]
-    error = [run.difference for run in runs]
+    # displacements are a fifth of these velocities: no contact opens, nor do the forces of Hertz need more than cubic
+    # terms
+    hertz = "hertz" in LAWS[law][0] + LAWS[law][1][0]
+    large = min(3.2e-4, (0.5 if hertz else 4.0) * float(contacts.overlap.min()))
     if law in RESCALED:
         # the mean of two derivatives: what is left is of second order in their difference
-        assert error[-1] < 0.1
+        assert compare_motion(lmp, snapshot, 0.2, large / 8, timestep=steps[-1]).difference < 0.1
         return
     assert not contacts.at_bound.any()
+    runs = [[compare_motion(lmp, snapshot, 0.2, a, timestep=h) for a in (large, large / 2)] for h in steps]
+    predicted = runs[0][0].predicted / large
+    # extrapolated to no amplitude, without the forces' cubic terms, so that the amplitude can be large beside that of
+    # 1e-10 of Coulomb's bound, below which `granular` does not turn a history
+    linear = [(8 * half.measured - one.measured) / (3 * large) for one, half in runs]
+    size = np.linalg.norm(predicted)
+    error = [np.linalg.norm(each - predicted) / size for each in linear]
     order = 1 if damped else 2
     assert error[2] / error[3] == pytest.approx(2**order, rel=0.1)
-    # extrapolated to a step of zero: without the terms in h and h^2, or in h^2 and h^4
-    # `granular` turns a history that leaves its plane by 1e-10 of the bound, 5e-6 of what this motion adds to forces
-    tolerance = 1e-6 if law.startswith("gran/") else 5e-6
-    first, second, third = (run.measured for run in runs[1:])
+    # extrapolated to a step of zero, too: without the terms in h and h^2, or in h^2 and h^4
+    first, second, third = linear[1:]
     rest = (8 * third - 6 * second + first) / 3 if damped else (64 * third - 20 * second + first) / 45
-    assert np.linalg.norm(rest - runs[0].predicted) < tolerance * np.linalg.norm(rest)
+    assert np.linalg.norm(rest - predicted) < 1e-6 * size
 
 
 def test_a_look_changes_nothing(beds, tmp_path):
@@ -448,13 +452,13 @@ def run(law, steps, looks, drag=1.5):
     lmp.close()
     return whole, found, said
 for law in ("gran/hertz/history", "mindlin"):
-    # particles that move, while no contact slides: the next run changes by the order of sums alone
+    # particles that move, while no contact slides: in a sheared box zero steps round coordinates, which are given back
     (there, found, said), (other, *_) = (run(law, 3000, looks) for looks in (2, 0))
     assert len(found[0].contacts) > 5 and found[0].contacts.wall.any()
     assert not found[0].contacts.at_bound.any() and not said
     one, two = (np.sort(each.contacts.overlap) for each in found)
     assert np.abs(one - two).max() < 1e-14  # LAMMPS may list them in another order, and round images otherwise
-    assert np.abs(there - other).max() < 1e-11  # 200 steps of roundings of 1e-16, of an unstable motion
+    assert np.array_equal(there, other)
     # what is left of the forces without those of all contacts is the weight
     slope = np.array([0.1, 0, -1]) / np.hypot(0.1, 1)
     assert np.abs(found[0].load[:, 0] - found[0].mass[:, None] * slope).max() < 1e-9
@@ -481,3 +485,37 @@ def test_on_two_ranks(tmp_path):
     words = [BIN / "mpiexec", "-n", "2", sys.executable, "look.py", *paths]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("d", [2, 3])
+def test_analysis_of_packings_of_lammps(beds, tmp_path, d):
+    """Two types, of spheres in a sheared box: a file to the bit, and motion and gains as those of dense matrices."""
+    from scipy.linalg import expm
+
+    from faultgouge.analysis import eigenvalues, linear_response, transient_gain
+    from faultgouge.analysis.files.snapshot_file import read_snapshot, write_snapshot
+    from faultgouge.pywrap import from_lammps
+
+    found = from_lammps(beds("mindlin/force", d, True))
+    assert set(found.kind) == {1, 2}
+    assert (found.box[1, 0] != 0) == (d == 3)
+    write_snapshot(tmp_path / "run.h5", found)
+    assert read_snapshot(tmp_path / "run.h5") == found
+    k, c = stiffness_matrix(found).toarray(), damping_matrix(found).toarray()
+    active = np.flatnonzero(np.any(k != 0, axis=1))
+    k, c, mass = k[np.ix_(active, active)], c[np.ix_(active, active)], found.coordinate_mass[active]
+    values = np.sort_complex(np.linalg.eigvals(k / mass[:, None]))
+    assert np.sort_complex(eigenvalues(found)) == pytest.approx(values, abs=1e-9 * np.abs(values).max())
+    n = len(active)
+    system = np.block([[np.zeros((n, n)), np.eye(n)], [-k / mass[:, None], -c / mass[:, None]]])
+    push = np.zeros(found.coordinates)
+    push[active] = np.random.default_rng(0).normal(size=n)
+    moved = (expm(2.0 * system)[:n, :n] @ push[active]).ravel()
+    response = linear_response(found, [2.0], initial=push)
+    assert response.displacement[0, active] == pytest.approx(moved, abs=1e-9 * np.abs(moved).max())
+    gain = transient_gain(found)
+    most = np.linalg.norm(expm(gain.time * system)[:n, :n], 2) ** 2
+    assert gain.gain == pytest.approx(most, rel=1e-6)
+    times = np.linspace(0, 3 * gain.time, 61)[1:]
+    assert max(np.linalg.norm(expm(t * system)[:n, :n], 2) ** 2 for t in times) <= gain.gain * (1 + 1e-6)

@@ -82,7 +82,7 @@ def test_rattlers_are_moved_clear_and_nothing_else_is(reference_packing):
     packing = reference_packing(1.0)
     rattler, pushed = beside(packing, 0, -1e-9)
     assert rattler not in pushed.rattlers
-    cleared = clear_rattlers(pushed, least=1e-6)
+    cleared = clear_rattlers(pushed, pushed.loaded(1e-6).rattlers)
     assert rattler in cleared.rattlers
     loaded = np.setdiff1d(np.arange(len(packing)), packing.rattlers)
     assert np.array_equal(cleared.position[loaded], packing.position[loaded])

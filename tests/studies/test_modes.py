@@ -13,7 +13,6 @@ from faultgouge.analysis.onset import LIMITS
 from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 from faultgouge.studies.modes.count_in_slices import count_in_slices
 from faultgouge.studies.modes.count_pairs import antisymmetric_norm, count_pairs, count_with_part_of_b, modes
-from faultgouge.studies.packing_tools import sliding_contacts
 from research.modes.sets import sets
 
 SCENE = SMALL | {
@@ -79,7 +78,7 @@ def test_without_b_no_pair_is_complex(loaded):
     same = stiffness_matrix(packing, coupled=every) - stiffness_matrix(packing)
     assert abs(same).max() == 0
     # the law is flat at its bound: what is within 1e-9 of the slip limit has the bound's force but for a rounding
-    np.testing.assert_array_equal(sliding_contacts(packing), packing.mobilised > 1 - 1e-13)
+    np.testing.assert_array_equal(packing.sliding, packing.mobilised > 1 - 1e-13)
     found = count_with_part_of_b(packing)
     assert found["none"]["pairs"] == 0
     assert found["sticking"]["pairs"] > 0

@@ -10,7 +10,7 @@ from faultgouge.analysis import discrete_frequency, spectrum
 from faultgouge.assessment import work_precision as page
 from faultgouge.assessment.work_precision.methods import dumps, relaxation
 from faultgouge.assessment.work_precision.methods.extended import refine_eigenvalue
-from faultgouge.assessment.work_precision.methods.frequency_and_growth import Mode, correct_dispersion
+from faultgouge.assessment.work_precision.methods.frequency_and_growth import FastestMode, correct_dispersion
 from faultgouge.assessment.work_precision.methods.work_precision_study import Settings, compensate
 from faultgouge.pywrap import Engine, Scene, ramp
 
@@ -56,7 +56,7 @@ def test_all_ways_lead_to_one_equilibrium_and_a_relaxations_time_step_is_its_own
 
 @pytest.mark.parametrize(("fx", "growing", "least"), [(0.01, False, 1e-9), (0.024, True, 1e-6)])
 def test_runs_show_velocity_verlets_frequency(settings, fx, growing, least):
-    mode = Mode.of(compensate(settings.at(fx)).packing, growing)
+    mode = FastestMode.of(compensate(settings.at(fx)).packing, growing)
     dt = 0.4 * mode.limit
     with Engine(mode.packing) as engine:
         found = mode.measured(engine, dt, 3.0)

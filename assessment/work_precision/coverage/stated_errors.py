@@ -57,7 +57,7 @@ NAMED = {
 
 
 @dataclass(frozen=True)
-class Case:
+class CoverageCase:
     """A scene, what its onset states, and what the limit of small increments is.
 
     Attributes
@@ -210,13 +210,15 @@ class FirstOnset:
         return damped.fx_onset, damped.error
 
 
-def compute_cases(number: int) -> list[Case]:
+def compute_cases(number: int) -> list[CoverageCase]:
     """The undamped and the damped case of a draw."""
     scene = draw_scene(number)
     bare = scene.model_copy(update={"damping": None})
     step = require_section(scene.ramp, "ramp").step
     undamped, damped = (
-        Case(kind, number, getattr(scene.packing, "disks", 100), scene.law.mus[0], scene.precision, step, fresh=True)
+        CoverageCase(
+            kind, number, getattr(scene.packing, "disks", 100), scene.law.mus[0], scene.precision, step, fresh=True
+        )
         for kind in get_args(Kind)
     )
     try:
@@ -230,7 +232,7 @@ def compute_cases(number: int) -> list[Case]:
     return [undamped, damped]
 
 
-def _compare_case(onset: FirstOnset, case: Case) -> Case:
+def _compare_case(onset: FirstOnset, case: CoverageCase) -> CoverageCase:
     """The case with what its onset states and the limit of small increments, if contacts change before the onset."""
     found = onset.found()
     changes = 0 if found is None else onset.changes(found[0], found[1].fx_onset)
@@ -246,7 +248,7 @@ def _compare_case(onset: FirstOnset, case: Case) -> Case:
     return replace(case, limit=limit, uncertain=abs(coarser[1].fx_onset - limit))
 
 
-def restate_case(case: Case) -> Case:
+def restate_case(case: CoverageCase) -> CoverageCase:
     """The case with the onset, and the error, that are stated today; the limit stays what it is.
 
     The onset is looked for from some increments before on, which saves most of the time.
@@ -264,13 +266,13 @@ def restate_case(case: Case) -> Case:
         return replace(case, changes=onset.changes(found[0], found[1].fx_onset), fx_c=fx_c, stated=stated)
 
 
-def read(path: Path = TABLE) -> list[Case]:
+def read(path: Path = TABLE) -> list[CoverageCase]:
     """The cases of a table, in the order in which they were computed."""
     lines = path.read_text().splitlines() if path.exists() else []
-    return [Case(**json.loads(line)) for line in lines]
+    return [CoverageCase(**json.loads(line)) for line in lines]
 
 
-def cases(path: Path, scenes: int) -> Iterator[Case]:
+def cases(path: Path, scenes: int) -> Iterator[CoverageCase]:
     """Cases until there are so many scenes of either kind that count; those of the file first, the others into it."""
     known = read(path)
     counts = dict.fromkeys(get_args(Kind), 0)

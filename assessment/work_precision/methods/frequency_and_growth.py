@@ -42,7 +42,7 @@ far below the overlaps, 1e-5 and more, so that the packing is nearly linear."""
 
 
 @dataclass(frozen=True, eq=False)
-class Mode:
+class FastestMode:
     """A mode of a packing's operator in mass-weighted coordinates.
 
     Attributes
@@ -70,7 +70,7 @@ class Mode:
     limit: float
 
     @classmethod
-    def of(cls, packing: Packing, growing: bool) -> Mode:
+    def of(cls, packing: Packing, growing: bool) -> FastestMode:
         """Solve the eigenproblem of a packing and choose."""
         sparse, active = dynamical_matrix(packing)
         matrix = sparse.toarray()
@@ -134,7 +134,7 @@ def correct_dispersion(frequency: complex, dt: float) -> complex:
 def frequency(settings: Settings) -> Study:
     """The frequency of the fastest mode of a stable packing."""
     equilibrium = settings.at(0.01)
-    mode = Mode.of(equilibrium.packing, growing=False)
+    mode = FastestMode.of(equilibrium.packing, growing=False)
     periods = 50 if settings.quick else 100
     return _study("frequency", settings, equilibrium, mode, periods, periods * 2 * np.pi / mode.exact)
 
@@ -143,13 +143,15 @@ def growth(settings: Settings) -> Study:
     """The growth rate of D in a packing above its onset."""
     equilibrium = settings.at(0.024)
     time = 5.0 if settings.quick else 10.0
-    return _study("growth", settings, equilibrium, Mode.of(equilibrium.packing, growing=True), time, time)
+    return _study("growth", settings, equilibrium, FastestMode.of(equilibrium.packing, growing=True), time, time)
 
 
-def _study(name: str, settings: Settings, equilibrium: Equilibrium, mode: Mode, length: float, time: float) -> Study:
+def _study(
+    name: str, settings: Settings, equilibrium: Equilibrium, mode: FastestMode, length: float, time: float
+) -> Study:
     """Runs of a time, which is called a length in the words, over the time step."""
     steps = mode.limit * np.array(SHARES[: len(SHARES) - settings.quick])
-    fine_mode = Mode.of(compensate(equilibrium).packing, mode.growing)
+    fine_mode = FastestMode.of(compensate(equilibrium).packing, mode.growing)
     points = _points(settings, mode, fine_mode, steps, time)
     noise, careful_noise = (
         float(np.median([point.error for point in points if point.method == method]))
@@ -179,7 +181,9 @@ def _study(name: str, settings: Settings, equilibrium: Equilibrium, mode: Mode, 
     )
 
 
-def _points(settings: Settings, mode: Mode, fine_mode: Mode, steps: Floats, time: float) -> tuple[Point, ...]:
+def _points(
+    settings: Settings, mode: FastestMode, fine_mode: FastestMode, steps: Floats, time: float
+) -> tuple[Point, ...]:
     """The runs in both arithmetics, as they are and with the dispersion taken out, and K's eigenvalue."""
     with Engine(mode.packing) as engine, Engine(fine_mode.packing) as fine_engine:
         runs = [(RUN, mode, engine, dt) for dt in steps.tolist()]
@@ -201,12 +205,12 @@ def _points(settings: Settings, mode: Mode, fine_mode: Mode, steps: Floats, time
     return *plain, *out, Point(SPECTRUM, None, _relative_error(mode, alone.real), seconds[-1], None)
 
 
-def _relative_error(mode: Mode, quantity: float) -> float:
+def _relative_error(mode: FastestMode, quantity: float) -> float:
     """Relative error, no less than the rounding of a number."""
     return max(abs(quantity / mode.exact - 1), float(np.finfo(float).eps))
 
 
-def _dispersion(mode: Mode, steps: Floats) -> Theory:
+def _dispersion(mode: FastestMode, steps: Floats) -> Theory:
     """What velocity Verlet makes of a mode of a frozen K."""
     fine = np.geomspace(steps[-1], steps[0], 60).tolist()
     predicted = [abs(mode.quantity(complex(discrete_frequency(mode.eigenvalue, dt))) / mode.exact - 1) for dt in fine]

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from ....analysis.motion.power_law import fit_power_law
 from ....pywrap import Engine, Equilibrium, Scene, equilibrate
 from ...timing import Progress, in_turns
-from ..coverage.stated_errors import Case
+from ..coverage.stated_errors import CoverageCase
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -186,9 +186,9 @@ class Study:
         What else the reader has to know, one sentence each.
     covered : tuple of StatedError
         Stated against true errors, where the result states one.
-    changing : tuple of Case
+    changing : tuple of CoverageCase
         The same of many scenes in which contacts change before the onset.
-    again : tuple of Case
+    again : tuple of CoverageCase
         Some of these, computed anew.
     """
 
@@ -206,8 +206,8 @@ class Study:
     theory: tuple[Theory, ...] = ()
     remarks: tuple[str, ...] = ()
     covered: tuple[StatedError, ...] = ()
-    changing: tuple[Case, ...] = ()
-    again: tuple[Case, ...] = ()
+    changing: tuple[CoverageCase, ...] = ()
+    again: tuple[CoverageCase, ...] = ()
 
     def of(self, method: str) -> list[Point]:
         """The points of one method."""

@@ -149,7 +149,7 @@ def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[st
             if len(real)
             else "no disk touches another disk or the floor: stability is not defined"
         )
-    if not isinstance(packing, Snapshot) and (packing.law.damped or packing.drag_time is not None):
+    if not isinstance(packing, Snapshot) and packing.damped:
         print("dashpots and drag are left out here: `faultgouge onset` of the scene includes them")
     if gain is not None:
         print(
@@ -216,8 +216,10 @@ def onset(
     Two eigenvalues become complex at F_x^c. With a section [damping], F_x^c is the
     load beyond which some motion grows in spite of the dissipation, or because of
     it; the command then also prints the undamped onset. --all gives all windows up
-    to the end of the ramp.
+    to the end of the ramp. Of several friction coefficients those without an onset
+    are named; the exit code is 1 if none has one.
     """
+    from faultgouge.analysis import DampedOnsetError, NoEquilibriumError, OnsetError
     from faultgouge.pywrap.settling.settle import shared_bed
 
     wanted = read_scene(scene, "onset", "onset --all" if every else "onset")
@@ -232,10 +234,18 @@ def onset(
         bed = shared_bed(wanted, watch=lambda what: show(f"settling: {what}"))
     found: list[dict[str, Any]] = []
     for mu in wanted.law.mus:
-        if wanted.damping is not None:
-            found.append(_damped_onset(wanted, mu, bed, not every, tell, output, folder, found))
-        else:
-            found.append(_undamped_onset(part, folder, wanted, mu, bed, not every, tell))
+        try:
+            if wanted.damping is not None:
+                found.append(_damped_onset(wanted, mu, bed, not every, tell, output, folder, found))
+            else:
+                found.append(_undamped_onset(part, folder, wanted, mu, bed, not every, tell))
+        except (OnsetError, DampedOnsetError, NoEquilibriumError) as error:
+            if len(wanted.law.mus) == 1:
+                raise
+            tell(f"mu = {mu:g}: no onset: {error}")
+            found.append({"mu": mu, "fx_c": None, "no_onset": str(error)})
+    if all(each["fx_c"] is None for each in found):
+        raise OnsetError(f"None of the {len(found)} friction coefficients has an onset on this ramp.")
     result = _write_result(output, found)
     if is_root() and folder is not None and not slices:
         shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
@@ -244,10 +254,11 @@ def onset(
 
 
 def _write_result(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]:
-    """The JSON of all friction coefficients, written if there is a file for it."""
+    """The JSON of all friction coefficients, beside that of the first with an onset, written if there is a file."""
     from faultgouge.analysis.files.atomic_write import write_json
 
-    result = found[0] | ({"each_mu": found} if len(found) > 1 else {})
+    first = next((each for each in found if each["fx_c"] is not None), found[0])
+    result = first | ({"each_mu": found} if len(found) > 1 else {})
     if output and is_root():
         write_json(output, result)
     return result

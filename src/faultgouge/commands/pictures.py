@@ -249,12 +249,12 @@ def _cycle(file: Path) -> list[Packing]:
 def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int) -> Film:
     """The run if the file has its trajectory, else its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
-    from faultgouge.figures.film import Motion, RampFilm, RunFilm
+    from faultgouge.figures.film import RampFilm, RunFilm, RunMotion
 
     if file.suffix == ".disks":
         raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
     with RunFile(file) as run:
-        motion = Motion.read(run)
+        motion = RunMotion.read(run)
         packings = [] if motion is not None else [run.packing(k) for k in range(len(run))]
     if motion is not None:
         return RunFilm(motion if span is None else motion.between(*span), count, dots=dots)

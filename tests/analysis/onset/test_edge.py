@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 
 from faultgouge.analysis.onset import Family, Limits, LostPairError, Modes, Pair
 from faultgouge.analysis.onset.eigenvalue_pair import continue_pair
-from faultgouge.analysis.onset.window_edges import edge_from_inside, load_error, locate_edge
+from faultgouge.analysis.onset.window_edges import edge_from_inside, locate_edge, sign_change
 
 BASIS = np.eye(12) + 0.1 * np.random.default_rng(2).normal(size=(12, 12))
 INVERSE = np.linalg.inv(BASIS)
@@ -84,9 +84,17 @@ def test_edge_where_the_equilibrium_jumps():
     assert edge.error < 1e-9
 
 
+def test_a_function_within_rounding_of_zero_at_an_end_has_its_root_there():
+    """Loads in either order of the two values; the slope is that between the ends."""
+    for small, large in ((0.0, 1.0), (1.0, 0.0)):
+        root = sign_change({small: 2e-12, large: 1.0 + 2e-12}.__getitem__, 0.0, 1.0)
+        assert (root.fx, root.loads, root.smooth) == (small, [small], True)
+        assert root.error == pytest.approx(2e-12, rel=1e-12)
+
+
 def test_forces_out_of_balance_at_random_are_an_error_of_the_load(path):
     packing = path(0.02)
-    assert load_error(packing) < 1e-10
+    assert packing.load_error < 1e-10
     forces = 1e-6 * np.random.default_rng(1).uniform(-1, 1, (10_000, packing.top.sum()))
     off = replace(packing, fx=packing.fx + np.abs(forces).max())
-    assert load_error(off) == pytest.approx(np.sqrt(3) * forces.mean(axis=1).std(), rel=0.02)
+    assert off.load_error == pytest.approx(np.sqrt(3) * forces.mean(axis=1).std(), rel=0.02)

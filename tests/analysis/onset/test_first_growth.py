@@ -1,6 +1,7 @@
 """The first window of growing motion in slices of the spectrum: against all modes, cut off, and on several ranks."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -187,7 +188,8 @@ def test_packings_against_all_eigenvalues(disks, seed, kind, grows):
 
 def test_all_announced_modes_are_looked_at_also_beside_one_that_grew_before():
     """Clusters do not tell where modes begin to grow: the second may have begun in an earlier increment still."""
-    begun = {0.5: DampedWindow(-1.0, None, 1.0, 0.0, "hopf"), 0.9: DampedWindow(-2.0, None, 1.0, 0.0, "hopf")}
+    hopf = partial(DampedWindow, fx_end=None, frequency=1.0, error=0.0, kind="hopf")
+    begun = {0.5: hopf(fx_onset=-1.0), 0.9: hopf(fx_onset=-2.0)}
 
     class Told(SlicedGrowing):
         def _confirm_window(self, candidate, there, first):

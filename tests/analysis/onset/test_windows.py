@@ -19,7 +19,7 @@ from faultgouge.analysis.onset import Family, Limits, Modes, force_bearing, full
 from faultgouge.analysis.onset.all_windows import all_windows
 from faultgouge.analysis.onset.eigenvalue_pair import deepest_dip
 from faultgouge.analysis.onset.modes import assign_modes
-from faultgouge.analysis.onset.perturbation_screening import Screen
+from faultgouge.analysis.onset.perturbation_screening import PairScreen
 from faultgouge.analysis.uncertain_digits import with_uncertainty
 
 
@@ -209,7 +209,7 @@ def test_open_windows_keep_their_names_over_increments_that_are_skipped():
 def test_what_the_screening_misses_is_walked_again():
     """A window that opens on increments said to be quiet is found as soon as anything makes us look."""
 
-    screen = Screen()
+    screen = PairScreen()
 
     def blind(here, there, known):
         return [] if there[1, 0] > -5.0 else screen(here, there, known)
