@@ -43,7 +43,7 @@ import numpy as np
 from scipy.linalg import eigvals
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
-from faultgouge.analysis.damped_onset.all_windows import Growing
+from faultgouge.analysis.damped_onset.all_windows import AllGrowth
 from faultgouge.analysis.damped_onset.first_window import first_growing
 from faultgouge.analysis.damped_onset.modes import Pencil
 from faultgouge.analysis.damped_onset.window_edges import DampedWindow
@@ -94,7 +94,7 @@ def compare_searches(ramp: RampPath, kind: dict[str, float]) -> tuple[Row, bool]
     times.append(time.process_time())
     loads = np.unique(np.concatenate([ramp.forces, [fx for fx in look if fx < ramp.forces[-1]]]))
     narrowest = LIMITS.narrowest * float(ramp.forces[-1])
-    every = march_along_ramp(Growing(lambda fx: Pencil.of(path(fx)), narrowest, None), loads)
+    every = march_along_ramp(AllGrowth(lambda fx: Pencil.of(path(fx)), narrowest, None), loads)
     times.append(time.process_time())
     undamped, seconds, whole = np.diff(times)
     differences, stated = edges(few, every)

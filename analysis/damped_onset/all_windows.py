@@ -53,7 +53,7 @@ Announced = Course | float | None
 """What the few modes do, or a load at which more is to be seen of them, or neither."""
 
 
-class Growing:
+class AllGrowth:
     """The oracle of growing motion; it is sure of the course of an increment."""
 
     finished = False
@@ -248,10 +248,10 @@ def describe_search(cluster: Cluster) -> list[DampedMode] | float:
     return [cluster.lifted(mode) for mode in nearly_growing(cluster, there.modes)]
 
 
-def search_cluster(cluster: Cluster) -> tuple[Growing, Pencil]:
+def search_cluster(cluster: Cluster) -> tuple[AllGrowth, Pencil]:
     """The oracle of a cluster after its walk from its lower load to its upper one, and the pencil there."""
     below, above = cluster.loads
-    oracle = Growing(cluster.pencil, CLUSTER * (above - below), None)
+    oracle = AllGrowth(cluster.pencil, CLUSTER * (above - below), None)
     here, there = oracle.at(below), oracle.at(above)
     march(oracle, [here, there])
     return oracle, there

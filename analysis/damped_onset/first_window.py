@@ -30,7 +30,7 @@ from ..onset.eigenbasis import Basis, Levels
 from ..onset.first_window import Increments, Sliced, Watch, search_along
 from ..onset.limits import LIMITS, Limits
 from ..onset.ranks import ALONE, Ranks
-from ..onset.slice_store import Border, Candidate, Found
+from ..onset.slice_store import Border, Candidate, SliceResult
 from ..onset.window_edges import DoubtError, LostPairError, LostTrackError, track_pair
 from ..packing.packing import Floats
 from ..spectrum.spectrum import active_coordinates
@@ -162,7 +162,7 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
         self._passing = not self.bases.keeps(places[0].stiffness)
         return super().candidates(places, depth)
 
-    def _found_by_all(self, places: Sequence[Pencil]) -> list[Found]:
+    def _found_by_all(self, places: Sequence[Pencil]) -> list[SliceResult]:
         found = super()._found_by_all(places)
         self._borders = [each.border for each in found]
         self.crowded = self.crowded or any(each.crowded for each in found)
@@ -173,7 +173,7 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
                 self._borne[slice(*each.border.modes)] = TRUSTED * each.bears
         return found
 
-    def _look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[Pencil]) -> Found:
+    def _look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[Pencil]) -> SliceResult:
         here, found, crowded = project_pencil(basis, levels, places[0]), [], False
         for before, after in pairwise(places):
             there = shift_load(basis, before, here, after)
@@ -184,7 +184,7 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
             given_up = crowded and self._few_enough(after)
             found.append([] if given_up else list(chain.from_iterable(map(find_growing, loud))))
             here = there
-        return Found(basis.border, found, here.bears * antisymmetric(places[-1]), crowded)
+        return SliceResult(basis.border, found, here.bears * antisymmetric(places[-1]), crowded)
 
     # What the operator has
 

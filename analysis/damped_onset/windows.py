@@ -33,7 +33,7 @@ from ..onset.limits import LIMITS
 from ..onset.march import check_increasing, march
 from ..onset.window_edges import LostTrackError
 from ..packing.packing import Floats, Packing
-from .all_windows import Growing
+from .all_windows import AllGrowth
 from .modes import Pencil, in_own_time
 from .perturbation_screening import GrowthScreen
 from .window_edges import DampedWindow
@@ -131,13 +131,13 @@ def growing_windows(
         known(in_time(windows), fx)
 
     try:
-        return in_time(march_along_ramp(Growing(own, narrowest, GrowthScreen()), loads, look, first, watch, so_far))
+        return in_time(march_along_ramp(AllGrowth(own, narrowest, GrowthScreen()), loads, look, first, watch, so_far))
     except LostTrackError:
-        return in_time(march_along_ramp(Growing(own, narrowest, None), loads, look, first, watch, so_far))
+        return in_time(march_along_ramp(AllGrowth(own, narrowest, None), loads, look, first, watch, so_far))
 
 
 def march_along_ramp(
-    oracle: Growing,
+    oracle: AllGrowth,
     loads: Floats,
     look: Look = lambda below, above: (),
     first: bool = False,

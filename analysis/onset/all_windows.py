@@ -30,7 +30,16 @@ from .eigenvalue_pair import Pair, continue_pair, deepest_dip, dip_between
 from .march import look_between, march
 from .modes import Members, Modes, Place, assign_modes, neighbours
 from .perturbation_screening import PairScreen, Screening
-from .window_edges import DoubtError, Edge, Family, LostPairError, LostTrackError, Window, locate_edge, other_sign
+from .window_edges import (
+    DoubtError,
+    Edge,
+    Family,
+    LostPairError,
+    LostTrackError,
+    Window,
+    locate_edge,
+    other_sign,
+)
 
 Ends = tuple[Pair, Pair]
 """A pair at both ends of an increment."""
@@ -42,7 +51,7 @@ Fate = tuple[Pair | None, Pair | None, Ends | None]
 """A pair at the lower and at the upper load where it is complex there, and at both loads if recognised at both."""
 
 
-class Dense:
+class AllPairs:
     """The oracle; what it is sure of are the courses of all pairs that are complex at either end of an increment."""
 
     def __init__(self, family: Family, screening: Screening, first: bool = False) -> None:
@@ -398,7 +407,7 @@ def windows_along(
     ways = screening or PairScreen(family.limits), _without_screening
     for way in ways:
         try:
-            for load, windows in _march_along_ramp(Dense(family, way, first), loads):
+            for load, windows in _march_along_ramp(AllPairs(family, way, first), loads):
                 if load > reached or (first and windows):  # the second walk may find what the first one missed
                     reached = max(reached, load)
                     yield load, windows
@@ -412,7 +421,7 @@ def _without_screening(here: csr_array, there: csr_array, known: int) -> None:
     """No pairs are named: all modes tell."""
 
 
-def _march_along_ramp(oracle: Dense, loads: Floats) -> Iterator[tuple[float, tuple[Window, ...]]]:
+def _march_along_ramp(oracle: AllPairs, loads: Floats) -> Iterator[tuple[float, tuple[Window, ...]]]:
     """The loads of a ramp as an oracle reaches them, and the windows up to there."""
     here = oracle.family.at(loads[0])
     for load in loads[1:]:

@@ -32,7 +32,7 @@ from ..factors.sparse_lu import minimum_degree, symmetric_lu
 from ..packing.packing import Floats, Indices
 from .limits import LIMITS, Limits
 from .ranks import ALONE, Ranks
-from .slice_store import NEW_PASS, Border, Pass, Shift, Slice, Take
+from .slice_store import NEW_PASS, Border, Shift, Slice, SlicePass, Take
 
 
 class SliceError(FaultgougeError):
@@ -62,7 +62,7 @@ def slices(
     limits: Limits = LIMITS,
     factorise: Callable[[csc_array, float], Factored] | None = None,
     ranks: Ranks = ALONE,
-    known: Pass = NEW_PASS,
+    known: SlicePass = NEW_PASS,
 ) -> Iterator[Slice]:
     """Eigenvalues and eigenvectors of a symmetric matrix, slice by slice in the order of the spectrum.
 
@@ -79,7 +79,7 @@ def slices(
     ranks : Ranks
         Who shares the slices; those of this rank are found. Its threads are also the slices at the most that are under
         way beyond the one that is asked for. All ranks must come to the end of their slices.
-    known : Pass
+    known : SlicePass
         The slices in it are left out, and those that another search takes. The shifts are taken from it; if it has
         none, the first rank keeps them there.
 

@@ -20,7 +20,7 @@ from ..packing.packing import Floats, Indices
 from ..spectrum.spectrum import active_coordinates
 from .limits import LIMITS, Limits
 from .ranks import Ranks
-from .slice_store import NEW_PASS, Pass, Slice
+from .slice_store import NEW_PASS, Slice, SlicePass
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +195,7 @@ class Bases:
         margins = 2 * (limits.margin + limits.beyond) * max(1, round((stop - first) / limits.own))
         return (stop - first + margins) * matrix.shape[0] <= limits.kept
 
-    def at(self, matrix: csr_array, known: Pass = NEW_PASS) -> Iterable[tuple[Basis, Levels]]:
+    def at(self, matrix: csr_array, known: SlicePass = NEW_PASS) -> Iterable[tuple[Basis, Levels]]:
         """The bases, those of an earlier load as long as all ranks' serve, and the operator in them.
 
         Where they are not kept, those of the slices that are known are left out.
@@ -217,7 +217,7 @@ class Bases:
         mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
         return known if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing else None
 
-    def _make_bases(self, matrix: csr_array, known: Pass) -> Iterator[Basis]:
+    def _make_bases(self, matrix: csr_array, known: SlicePass) -> Iterator[Basis]:
         """The bases of slices of the spectrum; a small operator has one, which the first rank makes."""
         limits, active = self.limits, active_coordinates(matrix)
         if len(active) <= limits.one_basis:

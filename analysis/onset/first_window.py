@@ -36,7 +36,7 @@ from .march import march
 from .modes import Place
 from .perturbation_screening import may_meet
 from .ranks import ALONE, Ranks
-from .slice_store import NEW_PASS, Candidate, Found, Looked, Pass, pass_folder
+from .slice_store import NEW_PASS, Candidate, OperatorAtLoad, SlicePass, SliceResult, pass_folder
 from .window_edges import (
     DoubtError,
     Edge,
@@ -58,7 +58,7 @@ Increments = tuple[tuple[float, float], ...]
 """From load to load."""
 
 
-P = TypeVar("P", bound=Looked)
+P = TypeVar("P", bound=OperatorAtLoad)
 W = TypeVar("W", bound=GrowthWindow)
 
 
@@ -93,7 +93,7 @@ class Sliced(ABC, Generic[P, W]):
         self._passed: list[P] = []
 
     @abstractmethod
-    def _look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[P]) -> Found:
+    def _look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[P]) -> SliceResult:
         """What a basis announces between some places; the operator at the first of them is given in the basis."""
 
     @abstractmethod
@@ -125,7 +125,7 @@ class Sliced(ABC, Generic[P, W]):
         increments = zip(*(each.candidates for each in self._found_by_all(places)), strict=True)
         return [sorted(chain(*each), key=lambda candidate: candidate.onset) for each in increments]
 
-    def _found_by_all(self, places: Sequence[P]) -> list[Found]:
+    def _found_by_all(self, places: Sequence[P]) -> list[SliceResult]:
         """What the slices of all ranks have, by the order of the spectrum; those of other searches are waited for."""
         first, stop = self.bases.range(places[0].matrices[0])
         while True:
@@ -137,17 +137,17 @@ class Sliced(ABC, Generic[P, W]):
             if not any(fresh):
                 time.sleep(self.limits.wait)
 
-    def _known(self, places: Sequence[P]) -> Pass:
+    def _known(self, places: Sequence[P]) -> SlicePass:
         """What other searches have left; nothing if bases are kept, as the increments beyond need these."""
         matrix = places[0].matrices[0]
         if self.folder is None or self.bases.keeps(matrix):
             return NEW_PASS
         folder = pass_folder(self.folder, places, self.bases.range(matrix), self.limits)
-        return self.ranks.together(lambda: Pass.read(folder) if self.ranks.rank == 0 else NEW_PASS)[0]
+        return self.ranks.together(lambda: SlicePass.read(folder) if self.ranks.rank == 0 else NEW_PASS)[0]
 
-    def _found(self, places: Sequence[P], known: Pass) -> list[Found]:
+    def _found(self, places: Sequence[P], known: SlicePass) -> list[SliceResult]:
         """What this rank's slices have, without those that are known."""
-        found: list[Found] = []
+        found: list[SliceResult] = []
         first, stop = self.bases.range(places[0].matrices[0])
         before = sum(each.size for each in known.borders)
         done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
@@ -228,13 +228,13 @@ class SlicedPairs(Sliced[Place, Window]):
         super().__init__(family.at, modes, watch, ranks, folder, family.limits)
         self.family = family
 
-    def _look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[Place]) -> Found:
+    def _look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[Place]) -> SliceResult:
         """The pairs of a basis that turn complex in their clusters."""
         found = []
         for here, there in pairwise(places):
             before, levels = levels, basis.change(levels, there.matrix - here.matrix)
             found.append(list(self._announce_pairs(basis, (here.fx, before), (there.fx, levels))))
-        return Found(basis.border, found)
+        return SliceResult(basis.border, found)
 
     def _announce_pairs(self, basis: Basis, here: At, there: At) -> Iterator[Candidate]:
         """The pairs of a basis that turn complex in their clusters."""

@@ -52,7 +52,7 @@ def windows_rows(windows: Sequence[Window]) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class Unstable:
+class Instability:
     """What makes a packing unstable.
 
     Attributes
@@ -70,12 +70,12 @@ class Unstable:
     growth_rate: float
 
     @classmethod
-    def of(cls, packing: Packing | Snapshot) -> "Unstable":
+    def of(cls, packing: Packing | Snapshot) -> "Instability":
         """Count what all eigenvalues of a packing show, without contacts whose force is unknown."""
         return cls.counted(spectrum(force_bearing(packing)))
 
     @classmethod
-    def counted(cls, found: Spectrum) -> "Unstable":
+    def counted(cls, found: Spectrum) -> "Instability":
         """The same of a spectrum that is known."""
         return cls(len(found.pairs), len(found.negative), found.growth_rate())
 
@@ -99,7 +99,7 @@ class Onset(TableDisplay):
         Of a large packing, increments before the onset in which a pair was expected and not found: take smaller ones.
     modes : tuple of (int, int) or None
         Modes among which the onset was sought; None for all.
-    at_start : Unstable or None
+    at_start : Instability or None
         What makes the packing unstable at the smallest load already; None if it is stable there, or too large for all
         of its eigenvalues to be counted.
     ends : float or None
@@ -111,7 +111,7 @@ class Onset(TableDisplay):
     complete: bool = True
     doubtful: Increments = ()
     modes: tuple[int, int] | None = None
-    at_start: Unstable | None = None
+    at_start: Instability | None = None
     ends: float | None = None
 
     def __repr__(self) -> str:
@@ -259,7 +259,7 @@ def find_onset(
     takes_all = takes_all_modes(start, modes, limits)
     negative = negative_eigenvalues(force_bearing(start, limits))
     if len(negative):
-        at_start = Unstable.of(start) if takes_all else None
+        at_start = Instability.of(start) if takes_all else None
         window = _at_start(start, float(negative[0]), 1.0)
         return Onset((window,), False, (), modes, at_start, start.fx)
     unbalanced: dict[float, float] = {}
@@ -301,7 +301,7 @@ def find_onset(
     windows = tuple(_with_imbalance(window, unbalanced) for window in windows)
     unstable = None
     if windows[0].kind == "start" and (all_modes or takes_all):
-        unstable = Unstable.counted(all_modes) if all_modes else Unstable.of(start)
+        unstable = Instability.counted(all_modes) if all_modes else Instability.of(start)
     complete = takes_all and not first
     return Onset(windows, complete, doubtful, modes, unstable, float(ends) if ends < np.inf else None)
 

@@ -108,7 +108,7 @@ class Slice:
         return Border.of(self.first, self.values, self.own)
 
 
-class Looked(Protocol):
+class OperatorAtLoad(Protocol):
     """A load that was looked at, and the operator there."""
 
     @property
@@ -140,7 +140,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SliceResult:
     """What a search has found in a slice.
 
     Attributes
@@ -162,25 +162,25 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Pass:
+class SlicePass:
     """What is known of a pass, on all ranks, and the folder in which more is kept; none by default.
 
     Attributes
     ----------
     folder : Path or None
         Of the files.
-    found : sequence of Found
+    found : sequence of SliceResult
         The slices that need not be searched again, by the order of the spectrum.
     shifts : sequence of Shift
         Those of all slices; empty where they have to be found.
     """
 
     folder: Path | None = None
-    found: Sequence[Found] = ()
+    found: Sequence[SliceResult] = ()
     shifts: Sequence[Shift] = ()
 
     @classmethod
-    def read(cls, folder: Path) -> "Pass":
+    def read(cls, folder: Path) -> "SlicePass":
         """What a folder has, if it is there; a DamagedSliceError if a file is not one of these."""
         found = sorted((_read_candidates(path) for path in folder.glob("*-*.npz")), key=lambda each: each.border.modes)
         shifts = folder / SHIFTS
@@ -214,7 +214,7 @@ class Pass:
 
             yield take
 
-    def keep(self, found: Found) -> None:
+    def keep(self, found: SliceResult) -> None:
         """Write what has been found in a slice, if there is a folder; an OutputError if that cannot be."""
         flat = [(k, each) for k, candidates in enumerate(found.candidates) for each in candidates]
         self._write(
@@ -243,11 +243,11 @@ class Pass:
             own.replace(self.folder / name)
 
 
-NEW_PASS = Pass()
+NEW_PASS = SlicePass()
 """Of which nothing is known, nor kept."""
 
 
-def pass_folder(parent: Path, places: Sequence[Looked], modes: tuple[int, int], limits: Limits) -> Path:
+def pass_folder(parent: Path, places: Sequence[OperatorAtLoad], modes: tuple[int, int], limits: Limits) -> Path:
     """Where what is found on the increments between some loads is kept."""
     digest = hashlib.sha256(repr((version("faultgouge"), modes, limits)).encode())
     for place in places:
@@ -263,14 +263,14 @@ def _name(modes: tuple[int, int]) -> str:
     return f"{modes[0]}-{modes[1]}.npz"
 
 
-def _read_candidates(path: Path) -> Found:
+def _read_candidates(path: Path) -> SliceResult:
     with _open_slice(path) as data:
         first, stop = (int(number) for number in data["modes"])
         candidates: list[list[Candidate]] = [[] for _ in range(int(data["increments"]))]
         for k, loads, planes in zip(data["increment"], data["loads"], data["planes"], strict=True):
             candidates[int(k)].append(Candidate(float(loads[0]), float(loads[1]), *planes))
         border = Border((first, stop), *(float(each) for each in data["border"]))
-        return Found(border, candidates, float(data["bears"]), bool(data["crowded"]))
+        return SliceResult(border, candidates, float(data["bears"]), bool(data["crowded"]))
 
 
 def _shifts(path: Path) -> list[Shift]:

@@ -126,7 +126,7 @@ def dashpot_on_all(fx):
 
 @pytest.mark.slow
 def test_where_dashpots_couple_all_modes_what_grows_is_followed_back_to_its_onset():
-    """The motion is seen at the last load, and begins two loads before it; all eigenvalues tell where."""
+    """The motion is seen at the last load, and begins before it; all eigenvalues tell where."""
     loads = np.array([0.5, 0.55, 0.575, 0.62, 0.65])
     window, doubtful = first_growing(dashpot_on_all, loads[[0, 1, 2, 4]])
     assert doubtful == ()

@@ -16,7 +16,7 @@ from faultgouge.analysis.errors import OutputError
 from faultgouge.analysis.onset import Family, Ranks, full_operator
 from faultgouge.analysis.onset.block_lanczos import SliceError
 from faultgouge.analysis.onset.first_window import first_window
-from faultgouge.analysis.onset.slice_store import Border, Candidate, DamagedSliceError, Found, Pass
+from faultgouge.analysis.onset.slice_store import Border, Candidate, DamagedSliceError, SlicePass, SliceResult
 
 PASSING = replace(FEW, kept=0, wait=0.1)
 """Slices of 24 modes, in bases that are not kept in memory."""
@@ -150,7 +150,7 @@ def test_damaged_file_is_named(search, whole, tmp_path, content):
 @pytest.mark.slow
 def test_kept_slices_are_compared_with_the_others(search, tmp_path):
     kept = cut_off(search(), 3, tmp_path)
-    known = Pass.read(kept[0].parent)
+    known = SlicePass.read(kept[0].parent)
     last = known.found[-1]
     known.keep(replace(last, border=last.border._replace(beyond=last.border.beyond + last.border.spacing)))
     with pytest.raises(SliceError, match=rf"number {last.border.modes[1]} .* one is missing in between"):
@@ -197,16 +197,16 @@ def test_no_flipped_bit_goes_unnoticed(tmp_path_factory, data):
     """What is read is what was written (some bytes of a zip file mean nothing), or the damage is said."""
     folder = tmp_path_factory.mktemp("pass")
     plane = np.arange(6.0).reshape(3, 2)
-    written = Found(Border((3, 9), 1.5, 2.5, 0.1), [[Candidate(0.1, 0.2, plane, -plane)], []])
-    Pass(folder).keep(written)
-    (kept,) = Pass.read(folder).found
+    written = SliceResult(Border((3, 9), 1.5, 2.5, 0.1), [[Candidate(0.1, 0.2, plane, -plane)], []])
+    SlicePass(folder).keep(written)
+    (kept,) = SlicePass.read(folder).found
     assert numbers(kept) == numbers(written)
     (path,) = folder.iterdir()
     content = bytearray(path.read_bytes())
     content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.sampled_from([1, 16, 128]))
     path.write_bytes(content)
     try:
-        (back,) = Pass.read(folder).found
+        (back,) = SlicePass.read(folder).found
     except DamagedSliceError:
         return
     assert numbers(back) == numbers(written)
