@@ -61,8 +61,17 @@ SECONDS_A_PASS = 6e-3, 2.2e-6
 """Of a pass over all slices of the spectrum: for each disk, and for each disk squared."""
 DAMPED_PASS = 1.5
 """Of a pass for growing motion, in units of one for complex pairs."""
-FIRST = 1.0, 3.5
-"""Load of the first window without and with dissipation, in units of F_y/N."""
+FIRST = 1.0
+"""Load of the first window without dissipation, in units of F_y/N."""
+DASHPOTS = 0.013, 1.5e-3
+"""Load of the first window with strong dashpots, in units of F_y: 0.010 to 0.013 for 100 and 1,000 disks with cn from 5
+to 171; and the c/(k m)^(1/2), at a contact that carries F_y, from which on dashpots are strong."""
+DRAG = 3.5
+"""Load of the first window with drag, in units of F_y/N, for any tau."""
+CROWDED = 0.02
+"""The c/(k m)^(1/2) from which on dashpots couple more modes than a cluster has: cn = 50 and 171 do."""
+SECONDS_OF_LOOKS = 3e-5
+"""Of the three looks at all motions that grow, with such dashpots, for each disk squared."""
 AGAIN = 0.05
 """Of an increment with bases that are kept, in units of a pass."""
 GROWTH = 300_000
@@ -155,7 +164,7 @@ def estimate_work(scene: SceneKeys, task: Task) -> Estimate:
             way = min(way, max(scene.law.mus) * scene.load.fy + ramp.step)
         increments = way / ramp.step
         if task == "onset":
-            first = FIRST[scene.damping is not None] * scene.load.fy / disks
+            first = _first_load(scene) * scene.load.fy / disks
             increments = min(increments, math.ceil(first / ramp.step))
     if task == "perturb" and perturb is not None:
         increments = perturb.fx / (ramp.step if ramp is not None else scene.load.fy / 3000)
@@ -260,11 +269,32 @@ def _search_seconds(scene: SceneKeys, increments: float, damped: bool) -> float:
         return search * (1 + DAMPED if damped else 1)
     one = disks * (SECONDS_A_PASS[0] + SECONDS_A_PASS[1] * disks)
     kept, seconds = BYTES_OF_BASES[0] * disks**2 < BYTES_OF_BASES[1], 0.0
-    for first, share in list(zip(FIRST, (1.0, DAMPED_PASS), strict=True))[: 1 + damped]:
+    if damped and _dashpot_share(scene) > CROWDED:
+        seconds += SECONDS_OF_LOOKS * disks**2
+    for first, share in [(FIRST, 1.0), (_first_load(scene), DAMPED_PASS)][: 1 + damped]:
         searched = min(increments, first * unit / step) if step else 0.0
         # a basis that is not kept serves twice as many increments each time
         seconds += share * one * (1 + (AGAIN * searched if kept else math.log2(1 + 0.5 * searched)))
     return seconds
+
+
+def _first_load(scene: SceneKeys) -> float:
+    """Load of the first window, in units of F_y/N."""
+    if scene.damping is None:
+        return FIRST
+    strong, share = DASHPOTS
+    dashpots = strong * scene.packing.disks * min(1.0, _dashpot_share(scene) / share)
+    return max(FIRST, dashpots, DRAG if scene.damping.tau is not None else 0.0)
+
+
+def _dashpot_share(scene: SceneKeys) -> float:
+    """c/(k m)^(1/2) of a normal dashpot at a contact that carries F_y."""
+    if scene.damping is None:
+        return 0.0
+    overlap = _law(scene).overlap_of_force(scene.load.fy)
+    mass = (isinstance(scene.packing, GeneratedPacking) and scene.packing.mass) or 1.0
+    dashpot = scene.damping.cn * overlap ** (scene.law.exponent - 1)
+    return dashpot / math.sqrt(_stiffness(scene, scene.load.fy) * mass)
 
 
 def _searched_bytes(disks: int) -> float:
