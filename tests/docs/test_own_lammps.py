@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from textwrap import dedent
 
 import pytest
 
@@ -18,9 +19,9 @@ def test_script_of_the_page(tmp_path):
     for name, block in blocks.items():
         (tmp_path / name).write_text(block)
     compile(blocks["mode.py"], "mode.py", "exec")  # pyvista is not installed for tests
-    first = re.search(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)[1]
+    first = re.search(r"^(?: {4}.*\n|\n)+", text[text.index("    from ") :])[0]
     with (tmp_path / "look.py").open("a") as script:  # the three lines at the top of the page
-        script.write(first)
+        script.write(dedent(first))
     done = subprocess.run([sys.executable, "look.py"], cwd=tmp_path, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     assert "40 spheres" in done.stdout
