@@ -217,7 +217,10 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
             known = self._passed[-1].fx
         first: DampedWindow | None = None
         while growing:
-            first = self._earliest_of(growing, first, known)
+            earlier = self._earliest_of(growing, first, known)
+            if earlier is first:  # nothing that grows there was followed back: the increments are named as in doubt
+                break
+            first = earlier
             below = [each for each in self._passed if first is not None and known < each.fx < first.fx_onset]
             growing = self._all_growing(below[-1]) if below else []
         return first, (*doubtful, *self.doubtful)

@@ -6,10 +6,13 @@ far to the left. So the imaginary axis is covered by discs, from zero to the lar
 of them Arnoldi's iteration with :math:`(Z - \sigma)^{-1}` finds the eigenvalues next to the middle :math:`\sigma`. A
 disc reaches as far as these have converged.
 
-**What is covered** is the whole right half-plane. With :math:`s = p + i \omega` the imaginary part of
-:math:`x^H (s^2 + s G + A) x = 0` says that 2 p is no more than the largest eigenvalue of :math:`-G - i A_a / \omega`,
-with the antisymmetric part of A: it falls with :math:`\omega`, as G takes energy. And the real part says that
-:math:`p^2` is no more than :math:`\omega^2` less the lowest eigenvalue of the symmetric part. Where the discs on the
+**What is covered** is the whole right half-plane. With :math:`s = p + i \omega` the imaginary part of :math:`x^H (s^2
++ s G + A) x = 0` says that 2 p is no more than the largest eigenvalue of :math:`-G - i A_a / \omega`, with the
+antisymmetric part of A: it falls with :math:`\omega`, as G takes energy. And the real part says that :math:`p^2` is
+no more than :math:`\omega^2` less the lowest eigenvalue of the symmetric part. With both, and :math:`\beta` for the
+largest eigenvalue of :math:`i A_a`, :math:`\omega^2 \le \max x^H A_s x + \beta^2/4\omega^2`: the axis is covered up
+to there.
+Where the discs on the
 axis do not reach as far to the right, rectangles are covered with further discs, and halved as long as a disc does not
 hold one of them. Both bounds are Lanczos's, taken larger by as much as they may be wrong.
 
@@ -176,9 +179,11 @@ def growing_modes(pencil: Pencil) -> list[DampedMode]:
             found.extend(_solve(pencil, x, complex(disc.values[k]) * unit, abs(disc.values[k] - middle) * unit))
         return disc.radius
 
+    # with Re s > 0 the frequency exceeds the largest undamped one by no more than what feeds the motion allows
+    end = float(np.sqrt(1 + 0.25 * np.abs(feed).sum(axis=1).max() ** 2))
     covered, radius = 0.0, 0.05
     beside: list[tuple[complex, complex]] = []  # lower left and upper right corners
-    while covered < 1:
+    while covered < end:
         middle = covered + AHEAD * radius
         reach = look(1j * middle)
         if middle - TOUCH * reach > covered:

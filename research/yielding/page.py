@@ -28,6 +28,9 @@ flow."""
 ELSEWHERE = 1e-8
 """D beyond which the layer rests in another equilibrium: a ten-thousandth of a small disk's diameter, squared."""
 
+QUIET = 1e-18
+"""Kinetic energy at the end, force length, below which nothing moves: noise of 1e-12 begins with some 1e-20."""
+
 LASTS = 0.5
 """Share of its early kinetic energy from which on a layer vibrates without slowing down; the others lose 57 % and more
 in the same time."""
@@ -277,8 +280,8 @@ def write_lasting(folder: Path) -> Path:
 
 
 def lasts(row: dict[str, Any]) -> bool:
-    """Whether a layer vibrates without slowing down."""
-    return bool(row["late"] > LASTS * row["early"])
+    """Whether a layer vibrates without slowing down, by more than what the noise and rounding leave."""
+    return bool(row["late"] > LASTS * row["early"] and row["late"] > QUIET)
 
 
 def _lasting(lossy: list[dict[str, Any]]) -> dict[str, Any]:
