@@ -46,7 +46,7 @@ from faultgouge.pywrap.lammps.instance import lammps_instance
 from faultgouge.pywrap.scenes.units import dashpot
 from faultgouge.studies.result_rows import append_row, read_rows
 from research.laws.both_laws import as_slider
-from research.laws.growth import DRAWS, FROM, LOOK, TIME, TO
+from research.laws.growth import DRAWS, LOOK, TIME, TO, growth_of_course
 from research.laws.sets import sets
 from research.modes.loss import TANGENTIAL, impact_velocity
 
@@ -237,12 +237,7 @@ def let_go(lmp: Any, bearing: Indices, draw: int) -> dict[str, Any]:
         away = (x - start)[bearing, :2]
         away[:, 0] -= period * np.round(away[:, 0] / period)
         squares.append(float(np.mean(np.sum(away**2, axis=1))))
-    course = np.array(squares)
-    row: dict[str, Any] = {"last_over_first": float(course[-1] / course[0]), "time": times[-1], "rate": None}
-    if course[-1] >= TO:
-        begin = int(np.flatnonzero(course < FROM)[-1]) + 1
-        row["rate"] = float(np.polyfit(times[begin:], np.log(course[begin:]), 1)[0])
-    return row
+    return growth_of_course(times, squares)
 
 
 def rows(seed: int) -> Iterator[dict[str, Any]]:

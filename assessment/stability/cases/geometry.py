@@ -35,7 +35,7 @@ def _disks(position: list[tuple[float, float]], contacts: Contacts | None = None
         "law": law(),
     }
     # mypy cannot know which key has which type; Packing checks them
-    return Packing(**(values | changes))  # type: ignore[arg-type]
+    return Packing(**(values | changes))  # type: ignore[arg-type]  # the values of a dict have many types
 
 
 def _one_disk() -> Outcome:
