@@ -18,11 +18,11 @@ FORCE: dict[int, tuple[int, tuple[float, ...]]] = {
     100: (20, (0.03, 0.1, 0.2, 0.3)),
     50: (10, (0.03, 0.1, 0.2, 0.3)),
     200: (10, (0.1, 0.2)),
-    400: (3, (0.2,)),
+    400: (10, (0.1, 0.2)),
 }
 """Packings by number of disks, mu = 1 and a fixed force, and F_x/F_y."""
 
-QUARTZ = {"10 MPa": 10, "1 MPa": 10}
+QUARTZ = {"10 MPa": 10, "1 MPa": 10, "100 MPa": 10}
 """Packings of the shipped scenes of quartz."""
 
 QUARTZ_LOADS = (0.2, 0.3)
