@@ -30,7 +30,7 @@ FLOORS = {
         ("__main__",),
     ),
     "faultgouge.analysis": (
-        ("uncertain_digits", "errors", "table_display"),
+        ("uncertain_digits", "errors", "progress", "table_display"),
         ("packing",),
         ("operators",),
         ("factors",),

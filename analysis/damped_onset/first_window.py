@@ -27,12 +27,13 @@ from scipy.sparse.linalg import ArpackError
 
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..onset.eigenbasis import Basis, Levels
-from ..onset.first_window import Increments, Sliced, Watch, search_along
+from ..onset.first_window import Increments, Sliced, search_along
 from ..onset.limits import LIMITS, Limits
 from ..onset.ranks import ALONE, Ranks
 from ..onset.slice_store import Border, Candidate, SliceResult
 from ..onset.window_edges import DoubtError, LostPairError, LostTrackError, track_pair
 from ..packing.packing import Floats
+from ..progress import report_progress
 from ..spectrum.spectrum import active_coordinates
 from .all_windows import nearly_growing, search_cluster
 from .imaginary_axis import growing_modes
@@ -66,7 +67,6 @@ SETTLED = 0.02
 def first_growing(
     pencil: Callable[[float], Pencil],
     loads: Floats,
-    watch: Watch = lambda says: None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
     limits: Limits = LIMITS,
@@ -79,7 +79,7 @@ def first_growing(
         fx -> Pencil. Loads beyond the one above the onset are asked for as by `search_along`.
     loads : ndarray, shape (S,)
         The increasing loads of the ramp, force per top disk.
-    watch, ranks, folder, limits
+    ranks, folder, limits
         As of :func:`~faultgouge.analysis.find_onset`.
 
     Returns
@@ -98,7 +98,7 @@ def first_growing(
         If clusters miss motions, and those of the operator cannot be told from each other or followed.
     """
     own, unit = in_own_time(pencil, float(loads[0]))
-    oracle = SlicedGrowing(own, None, watch, ranks, folder, limits)
+    oracle = SlicedGrowing(own, None, ranks, folder, limits)
     first, doubtful = search_along(oracle, loads)
     if oracle.crowded:
         first, doubtful = oracle.look_at_all(loads, doubtful)
@@ -236,7 +236,7 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
 
     def _all_growing(self, place: Pencil) -> list[DampedMode]:
         """All motions that grow at a load, the fastest first."""
-        self.watch(f"all motions that grow at F_x = {place.fx:.6g}, as the dashpots couple many modes")
+        report_progress(f"all motions that grow at F_x = {place.fx:.6g}, as the dashpots couple many modes")
         return sorted(growing_modes(place), key=lambda mode: -mode.rate.real)
 
     def _earliest_of(self, growing: list[DampedMode], first: DampedWindow | None, known: float) -> DampedWindow | None:
@@ -256,7 +256,7 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
         return first
 
     def _confirm_window(self, candidate: Candidate, there: Pencil, first: DampedWindow | None) -> DampedWindow | None:
-        self.watch(f"a motion that grows from about F_x = {candidate.onset:.6g}: its onset")
+        report_progress(f"a motion that grows from about F_x = {candidate.onset:.6g}: its onset")
         place = there if candidate.inside == there.fx else self.at(candidate.inside)
         guess = predict_mode(candidate, place)
         self._lost = guess.rate.imag

@@ -33,6 +33,7 @@ from ..onset.limits import LIMITS
 from ..onset.march import check_increasing, march
 from ..onset.window_edges import LostTrackError
 from ..packing.packing import Floats, Packing
+from ..progress import Watch, report_progress, show_progress
 from .all_windows import AllGrowth
 from .modes import Pencil, in_own_time
 from .perturbation_screening import GrowthScreen
@@ -55,7 +56,7 @@ def damped_windows(
     *,
     look: Iterable[float] = (),
     first: bool = False,
-    watch: Callable[[str], None] = lambda says: None,
+    watch: Watch | None = None,
     known: Known = lambda windows, fx: None,
 ) -> tuple[DampedWindow, ...]:
     """The windows of loads on which some motion of a packing with dashpots or drag grows.
@@ -91,14 +92,12 @@ def damped_windows(
     if not start.damped:
         raise ValueError("The packing has no dissipation: find_onset is what it needs.")
     further = [float(fx) for fx in look]
-    return growing_windows(
-        lambda fx: Pencil.of(equilibrium(fx)),
-        loads,
-        lambda below, above: [fx for fx in further if below < fx < above],
-        first,
-        watch,
-        known,
-    )
+
+    def between(below: float, above: float) -> list[float]:
+        return [fx for fx in further if below < fx < above]
+
+    with show_progress(watch):
+        return growing_windows(lambda fx: Pencil.of(equilibrium(fx)), loads, between, first, known)
 
 
 def growing_windows(
@@ -106,7 +105,6 @@ def growing_windows(
     forces: ArrayLike,
     look: Look = lambda below, above: (),
     first: bool = False,
-    watch: Callable[[str], None] = lambda says: None,
     known: Known = lambda windows, fx: None,
 ) -> tuple[DampedWindow, ...]:
     """The same of a family of pencils s^2 + s G + A, in coordinates that do not depend on the load.
@@ -115,7 +113,7 @@ def growing_windows(
     ----------
     pencil : callable
         fx -> Pencil.
-    forces, first, watch, known
+    forces, first, known
         As of `damped_windows`.
     look : callable, optional
         Two neighbouring loads -> further loads between them that are to be looked at.
@@ -131,9 +129,9 @@ def growing_windows(
         known(in_time(windows), fx)
 
     try:
-        return in_time(march_along_ramp(AllGrowth(own, narrowest, GrowthScreen()), loads, look, first, watch, so_far))
+        return in_time(march_along_ramp(AllGrowth(own, narrowest, GrowthScreen()), loads, look, first, so_far))
     except LostTrackError:
-        return in_time(march_along_ramp(AllGrowth(own, narrowest, None), loads, look, first, watch, so_far))
+        return in_time(march_along_ramp(AllGrowth(own, narrowest, None), loads, look, first, so_far))
 
 
 def march_along_ramp(
@@ -141,7 +139,6 @@ def march_along_ramp(
     loads: Floats,
     look: Look = lambda below, above: (),
     first: bool = False,
-    watch: Callable[[str], None] = lambda says: None,
     known: Known = lambda windows, fx: None,
 ) -> tuple[DampedWindow, ...]:
     """The windows that an oracle finds along a ramp; a load to be looked at besides may have no equilibrium."""
@@ -150,7 +147,7 @@ def march_along_ramp(
     for below, above in pairwise(loads.tolist()):
         for load in [*sorted(look(below, above)), above]:
             so_far = f"; {len(windows)} windows so far, the first from {windows[0].fx_onset:.8g}" if windows else ""
-            watch(f"motion that grows up to F_x = {load:.6g} of {loads[-1]:.6g}{so_far}")
+            report_progress(f"motion that grows up to F_x = {load:.6g} of {loads[-1]:.6g}{so_far}")
             try:
                 there = oracle.at(load)
             except NoEquilibriumError:

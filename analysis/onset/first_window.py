@@ -28,6 +28,7 @@ import numpy as np
 
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..packing.packing import Floats
+from ..progress import report_progress
 from .all_windows import all_windows
 from .eigenbasis import Bases, Basis, Levels, ModeCluster, width_and_mixing
 from .eigenvalue_pair import Pair, continue_pair
@@ -49,8 +50,6 @@ from .window_edges import (
     returns_to_start,
 )
 
-Watch = Callable[[str], None]
-
 At = tuple[float, Levels]
 """A load and the operator there in a basis."""
 
@@ -69,7 +68,7 @@ class Sliced(ABC, Generic[P, W]):
     ----------
     at : callable
         Load -> the operator there.
-    modes, watch, ranks, folder, limits
+    modes, ranks, folder, limits
         As of :func:`~faultgouge.analysis.find_onset`.
     """
 
@@ -80,12 +79,11 @@ class Sliced(ABC, Generic[P, W]):
         self,
         at: Callable[[float], P],
         modes: tuple[int, int] | None = None,
-        watch: Watch = lambda says: None,
         ranks: Ranks = ALONE,
         folder: Path | None = None,
         limits: Limits = LIMITS,
     ) -> None:
-        self.at, self.limits, self.watch, self.ranks = at, limits, watch, ranks
+        self.at, self.limits, self.ranks = at, limits, ranks
         self.folder = folder
         self.bases = Bases(modes, ranks, limits)
         self.first: W | None = None
@@ -153,10 +151,12 @@ class Sliced(ABC, Generic[P, W]):
         done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
         failure: FaultgougeError | None = None
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
-        self.watch(f"{where}: {f'{before} of {stop - first} modes are known' if known.shifts else 'modes are counted'}")
+        report_progress(
+            f"{where}: {f'{before} of {stop - first} modes are known' if known.shifts else 'modes are counted'}"
+        )
         for basis, levels in self.bases.at(places[0].matrices[0], known):
             done += basis.own.stop - basis.own.start
-            self.watch(f"{where}: {min(done, wanted)} of {wanted} modes")
+            report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
             try:
                 found.append(self._look_at_basis(basis, levels, places))
             except FaultgougeError as error:
@@ -222,10 +222,8 @@ class Sliced(ABC, Generic[P, W]):
 class SlicedPairs(Sliced[Place, Window]):
     """The oracle of complex pairs of a family of matrices."""
 
-    def __init__(
-        self, family: Family, modes: tuple[int, int] | None, watch: Watch, ranks: Ranks, folder: Path | None
-    ) -> None:
-        super().__init__(family.at, modes, watch, ranks, folder, family.limits)
+    def __init__(self, family: Family, modes: tuple[int, int] | None, ranks: Ranks, folder: Path | None) -> None:
+        super().__init__(family.at, modes, ranks, folder, family.limits)
         self.family = family
 
     def _look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[Place]) -> SliceResult:
@@ -272,7 +270,7 @@ class SlicedPairs(Sliced[Place, Window]):
 
     def _confirm_window(self, candidate: Candidate, there: Place, first: Window | None) -> Window | None:
         """The window of the operator itself in place of that of a cluster; None if it is none, or not the first."""
-        self.watch(f"a pair that turns complex about F_x = {candidate.onset:.6g}: its onset")
+        report_progress(f"a pair that turns complex about F_x = {candidate.onset:.6g}: its onset")
         inside = self._complex_pair(candidate, there)
         if inside is None or (first is not None and self._opens_later(inside, first)):
             return None
@@ -319,7 +317,6 @@ def first_window(
     family: Family,
     loads: Floats,
     modes: tuple[int, int] | None = None,
-    watch: Watch = lambda says: None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
 ) -> tuple[Window | None, Increments]:
@@ -328,7 +325,7 @@ def first_window(
     Its end is None where the pair is complex at the next load. On increments in doubt clusters announce a pair that the
     operator was not seen to have. Arguments and errors are those of `find_onset`; of loads those of `search_along`.
     """
-    return search_along(SlicedPairs(family, modes, watch, ranks, folder), loads)
+    return search_along(SlicedPairs(family, modes, ranks, folder), loads)
 
 
 def search_along(oracle: Sliced[P, W], loads: Floats) -> tuple[W | None, Increments]:

@@ -12,12 +12,13 @@ from scipy.sparse import csr_array
 from ..errors import FaultgougeError, NoEquilibriumError, TurningPointError
 from ..packing.packing import Floats, Packing
 from ..packing.snapshot import Snapshot
+from ..progress import Watch, show_progress
 from ..spectrum.buckling import negative_eigenvalues
 from ..spectrum.spectrum import Spectrum, spectrum
 from ..table_display import TableDisplay
 from ..uncertain_digits import with_uncertainty
 from .all_windows import all_windows
-from .first_window import Increments, Watch, first_window
+from .first_window import Increments, first_window
 from .limits import LIMITS, Limits
 from .march import check_increasing
 from .modes import Operator, contact_states, force_bearing, full_operator
@@ -204,7 +205,7 @@ def find_onset(
     narrowest: float | None = None,
     modes: tuple[int, int] | None = None,
     first: bool = False,
-    watch: Watch = lambda says: None,
+    watch: Watch | None = None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
     limits: Limits = LIMITS,
@@ -294,7 +295,8 @@ def find_onset(
     elif modes is None and (all_modes := _complex_at_start(start, limits)):
         windows = (_fastest(start, all_modes),)
     else:
-        one, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, watch, ranks, folder)
+        with show_progress(watch):
+            one, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, ranks, folder)
         windows = (_in_units(one, unit),) if one else ()
     if not windows:
         raise OnsetError.among(modes, float(loads[-1]), doubtful)

@@ -135,7 +135,7 @@ def _from_blocks(rows: Indices, columns: Indices, blocks: Floats, count: int) ->
         indices[place] = axis * count + columns
         data[:, place] = values[:, axis]
     pointers = (axes * starts[:-1] + np.arange(axes)[:, None] * axes * len(rows)).ravel()
-    pointers = np.append(pointers, axes * axes * len(rows))
+    pointers = np.append(pointers, axes * axes * len(rows)).astype(indices.dtype)  # else all indices take 8 bytes
     size = axes * count
     matrix = csr_array((data.ravel(), np.tile(indices, axes), pointers), shape=(size, size))
     matrix.eliminate_zeros()

@@ -4,7 +4,7 @@ LAMMPS hands out contacts in a run alone, and a run of zero steps sorts particle
 Coulomb's bound, and scales a rescaled one. So the look is taken in a copy of the process (`fork`), at rest and
 with dumps, averages and log closed, and the instance stays as it is. A copy of one of several ranks could not speak
 with the others: there, and where LAMMPS has threads, the instance itself runs zero steps, and coordinates, velocities
-and forces are given back to the bit. Histories cannot be: those of contacts at Coulomb's bound are cut.
+and forces are given back to the bit, and by fix keep/histories of the plugin the histories of contacts, too.
 """
 
 import ctypes
@@ -20,6 +20,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis.packing.arrays import Floats
+from ..lammps.instance import load_plugin
 from .granular_commands import SnapshotError
 
 Found = TypeVar("Found")
@@ -205,17 +206,21 @@ def _owned_array(lmp: Any, name: str) -> Floats:
 
 
 def in_place(lmp: Any, work: Callable[[], Found], groups: dict[str, str]) -> Found:
-    """What some work finds in the instance itself; what moves is given back to the bit, and its computes go."""
+    """What some work finds in the instance itself; what moves, and histories, are given back, and its computes go."""
+    load_plugin(lmp)
     kept = {name: np.array(_owned_array(lmp, name)) for name in ("id", *KEPT)}
     world = communicator(lmp)
     whole = {name: np.concatenate(world.allgather(values)) for name, values in kept.items()}
     order = np.argsort(whole["id"])
+    lmp.command("fix faultgouge_h all keep/histories")
     try:
         return work()
     finally:
         place = order[np.searchsorted(whole["id"][order], _owned_array(lmp, "id"))] if len(order) else order
         for name in KEPT:
             _owned_array(lmp, name)[:] = whole[name][place]
+        lmp.command("fix_modify faultgouge_h restore")
+        lmp.command("unfix faultgouge_h")
         for name in ("faultgouge_c", "faultgouge_i"):
             if lmp.has_id("compute", name):
                 lmp.command(f"uncompute {name}")

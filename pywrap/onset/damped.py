@@ -28,12 +28,12 @@ from ...analysis.onset.all_windows import windows_along
 from ...analysis.onset.modes import contact_states
 from ...analysis.onset.search import unit_of
 from ...analysis.packing.arrays import Floats
+from ...analysis.progress import Watch, report_progress, show_progress
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
 from ..runs.equilibrium_path import EquilibriumPath, loads
 from ..scenes.scene import Scene
 from ..scenes.validation import require_section
-from ..settling.minimize_energy import Watch
 from ..settling.settle import settle
 from .path_error import with_damped_path_error, with_path_error
 from .search_ranks import search_ranks
@@ -117,11 +117,11 @@ class RampPath:
     whole: bool
     flows: bool
 
-    def undamped(self, watch: Watch = lambda says: None, folder: Path | None = None) -> Onset | None:
+    def undamped(self, folder: Path | None = None) -> Onset | None:
         """All windows without dissipation, or the first one of a ramp that is not whole; None if there is none."""
         path, first = without_dissipation(self.path), not self.whole
         try:
-            return find_onset(path, self.forces, first=first, watch=watch, ranks=search_ranks(), folder=folder)
+            return find_onset(path, self.forces, first=first, ranks=search_ranks(), folder=folder)
         except (OnsetError, NoEquilibriumError):
             return None
 
@@ -139,7 +139,6 @@ class RampPath:
 def ramp_scene(
     scene: Scene,
     mu: float | None = None,
-    watch: Watch = lambda says: None,
     first: bool = False,
     bed: Packing | None = None,
 ) -> Iterator[RampPath]:
@@ -157,13 +156,14 @@ def ramp_scene(
     """
     wanted = loads(require_section(scene.ramp, "ramp"))
     scene = scene.model_copy(update={"damping": None})
-    start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"), bed=bed)
+    with show_progress(what="settling: "):
+        start = settle(scene, mu, bed=bed)
     with Engine(start.packing) as engine:
         path = EquilibriumPath(engine, start, scene, onward=True)
         forces, all_modes = wanted, takes_all_modes(start.packing)
         whole = all_modes and not first
         if whole:
-            watch(f"ramp up to F_x = {wanted[-1]:g}")
+            report_progress(f"ramp up to F_x = {wanted[-1]:g}")
             for _ in path.climb(wanted[1:]):
                 pass
             forces = np.array([each.fx for each in path.kept])
@@ -180,7 +180,7 @@ Known = Callable[[DampedOnset, float], None]
 def damped_onset_run(
     scene: Scene,
     mu: float,
-    watch: Watch = lambda says: None,
+    watch: Watch | None = None,
     known: Known = lambda found, fx: None,
     folder: Path | None = None,
     first: bool = False,
@@ -219,23 +219,23 @@ def damped_onset_run(
     """
     damping = require_section(scene.damping, "damping")
     dissipation = partial(with_dissipation, cn=damping.cn, ct=damping.ct, drag_time=damping.tau)
-    with ramp_scene(scene, mu, watch, first, bed) as ramp:
+    with show_progress(watch), ramp_scene(scene, mu, first, bed) as ramp:
         if ramp.whole:
-            found = _all_windows(ramp, mu, dissipation, watch, known)
+            found = _all_windows(ramp, mu, dissipation, known)
         elif ramp.all_modes:
-            found = _first_of_all_modes(ramp, mu, dissipation, watch)
+            found = _first_of_all_modes(ramp, mu, dissipation)
         else:
-            found = _first_in_slices(ramp, mu, dissipation, watch, known, folder)
+            found = _first_in_slices(ramp, mu, dissipation, known, folder)
         equilibria = tuple(ramp.path.kept)
-        watch("the path once more, with other increments")
+        report_progress("the path once more, with other increments")
         undamped = None if found.undamped is None else with_path_error(found.undamped, ramp.path)
         windows = with_damped_path_error(found.windows, dissipation, ramp.path)
         return replace(found, windows=windows, undamped=undamped, equilibria=equilibria)
 
 
-def _all_windows(ramp: RampPath, mu: float, dissipation: Dissipation, watch: Watch, known: Known) -> DampedOnset:
+def _all_windows(ramp: RampPath, mu: float, dissipation: Dissipation, known: Known) -> DampedOnset:
     """All windows of a ramp that is solved for, without the errors of the path."""
-    watch(f"pairs that become complex without dissipation, up to F_x = {ramp.forces[-1]:.6g}")
+    report_progress(f"pairs that become complex without dissipation, up to F_x = {ramp.forces[-1]:.6g}")
     undamped = ramp.undamped()
 
     def so_far(windows: tuple[DampedWindow, ...], fx: float) -> None:
@@ -243,16 +243,16 @@ def _all_windows(ramp: RampPath, mu: float, dissipation: Dissipation, watch: Wat
             known(DampedOnset(mu, windows, undamped, None), fx)
 
     look = () if undamped is None else loads_inside(undamped.windows)
-    found = damped_windows(lambda fx: dissipation(ramp.path(fx)), ramp.forces, look=look, watch=watch, known=so_far)
+    found = damped_windows(lambda fx: dissipation(ramp.path(fx)), ramp.forces, look=look, known=so_far)
     last = float(ramp.forces[-1])
     if not found:
         raise _nothing_grows(last, ramp.flows)
     return DampedOnset(mu, found, undamped, last if ramp.flows else None)
 
 
-def _first_of_all_modes(ramp: RampPath, mu: float, dissipation: Dissipation, watch: Watch) -> DampedOnset:
+def _first_of_all_modes(ramp: RampPath, mu: float, dissipation: Dissipation) -> DampedOnset:
     """The first window of either kind of a packing whose modes are all searched, without the errors of the path."""
-    watch("the first pair that becomes complex without dissipation")
+    report_progress("the first pair that becomes complex without dissipation")
     undamped = ramp.undamped()
     beneath = Undamped(ramp, np.inf if undamped is None else undamped.fx_c)
 
@@ -260,7 +260,7 @@ def _first_of_all_modes(ramp: RampPath, mu: float, dissipation: Dissipation, wat
         return Pencil.of(dissipation(ramp.path(fx)))
 
     try:
-        found = growing_windows(pencil, ramp.forces, beneath.look, first=True, watch=watch)
+        found = growing_windows(pencil, ramp.forces, beneath.look, first=True)
     except NoEquilibriumError as error:
         raise _nothing_grows(ramp.path.kept[-1].fx, True) from error
     if not found:
@@ -311,25 +311,24 @@ class Undamped:
 
 
 def _first_in_slices(
-    ramp: RampPath, mu: float, dissipation: Dissipation, watch: Watch, known: Known, folder: Path | None
+    ramp: RampPath, mu: float, dissipation: Dissipation, known: Known, folder: Path | None
 ) -> DampedOnset:
     """The first window of either kind of a large packing, without the errors of the path; all ranks search."""
 
     def pencil(fx: float) -> Pencil:
         return Pencil.of(dissipation(ramp.path(fx)))
 
-    def growing(says: str) -> None:
-        watch(f"with dissipation, {says}")
-
     try:
-        first, doubtful = first_growing(pencil, ramp.forces, growing, search_ranks(), folder)
+        with show_progress(what="with dissipation, "):
+            first, doubtful = first_growing(pencil, ramp.forces, search_ranks(), folder)
     except NoEquilibriumError as error:
         raise _nothing_grows(ramp.path.kept[-1].fx, True) from error
     if first is None:
         raise _nothing_grows(float(ramp.forces[-1]), False)
     found = DampedOnset(mu, (first,), None, None, doubtful)
     known(found, first.fx_onset)
-    return replace(found, undamped=ramp.undamped(lambda says: watch(f"without dissipation, {says}"), folder))
+    with show_progress(what="without dissipation, "):
+        return replace(found, undamped=ramp.undamped(folder))
 
 
 def _nothing_grows(last: float, flows: bool) -> DampedOnsetError | NoEquilibriumError:

@@ -13,6 +13,7 @@ from ...analysis.errors import TurningPointError
 from ...analysis.onset import full_operator, takes_all_modes
 from ...analysis.onset.search import windows_rows
 from ...analysis.packing.arrays import Floats
+from ...analysis.progress import Watch, report_progress, show_progress
 from ...analysis.spectrum.spectrum import active_coordinates
 from ...analysis.table_display import TableDisplay
 from ..equilibria.quasistatic import Equilibrium
@@ -20,7 +21,6 @@ from ..lammps.engine import Engine
 from ..runs.equilibrium_path import EquilibriumPath, loads
 from ..scenes.scene import Scene
 from ..scenes.validation import SceneError, require_section
-from ..settling.minimize_energy import Watch
 from ..settling.settle import settle
 from .path_error import with_path_error
 from .search_ranks import search_ranks
@@ -68,7 +68,7 @@ def onset_run(
     modes: tuple[int, int] | None = None,
     first: bool = False,
     bed: Packing | None = None,
-    watch: Watch = lambda says: None,
+    watch: Watch | None = None,
     folder: Path | None = None,
 ) -> OnsetRun:
     """Ramp a scene for one friction coefficient and find the onset.
@@ -110,22 +110,23 @@ def onset_run(
         negative before any is complex.
     """
     wanted = loads(require_section(scene.ramp, "ramp"))
-    start = settle(scene, mu, watch=lambda what: watch(f"settling: {what}"), bed=bed)
+    with show_progress(watch, "settling: "):
+        start = settle(scene, mu, bed=bed)
     _check_modes(start.packing, modes)
     whole = reached is not None or (takes_all_modes(start.packing, modes) and not first)
     reached = reached or (lambda _: None)
     reached(start)
-    with Engine(start.packing) as engine:
+    with show_progress(watch), Engine(start.packing) as engine:
         path = EquilibriumPath(engine, start, scene, onward=True)
         forces = wanted
         if whole:
-            watch(f"ramp up to F_x = {wanted[-1]:g}")
+            report_progress(f"ramp up to F_x = {wanted[-1]:g}")
             for equilibrium in path.climb(wanted[1:]):
                 reached(equilibrium)
             forces = np.array([each.fx for each in path.kept])
         flows = len(forces) < len(wanted)
         try:
-            onset = find_onset(path, forces, modes=modes, first=first, watch=watch, ranks=search_ranks(), folder=folder)
+            onset = find_onset(path, forces, modes=modes, first=first, ranks=search_ranks(), folder=folder)
         except TurningPointError:
             raise
         except (OnsetError, NoEquilibriumError) as error:
@@ -138,7 +139,7 @@ def onset_run(
         last = path.kept[-1].fx
         extra = [] if near_onset is None else [fx for fx in onset.fx_c + near_onset if 0 <= fx <= last]
         between = {float(fx): path(float(fx)) for fx in extra}
-        watch("the path once more, with other increments")
+        report_progress("the path once more, with other increments")
         onset = with_path_error(onset, path)
     return OnsetRun(mu, tuple(path.kept), onset, last if flows else None, between)
 

@@ -25,9 +25,7 @@ All of this is NumPy on the whole packing, the same on every rank. If Newton's m
 continues from there, down to a tenth of the previous force.
 """
 
-from collections.abc import Callable
 from itertools import pairwise
-from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import csc_array, diags_array
@@ -35,11 +33,10 @@ from scipy.sparse import csc_array, diags_array
 from ...analysis import NoEquilibriumError, Packing, stiffness_matrix
 from ...analysis.factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
 from ...analysis.packing.arrays import Floats
+from ...analysis.progress import report_progress
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
 from ..equilibria.rattlers import place_disks
 from ..lammps.engine import Engine
-
-Watch: TypeAlias = Callable[[str], None]
 
 SMALL = 300
 """Disks up to which dynamics goes all the way: a second or two."""
@@ -78,7 +75,7 @@ packing that has hardly more contacts than it needs resists compression, and she
 is the least, within a factor of two in the damping, for 1000, 3000 and 10,000 disks."""
 
 
-def settle_loose(engine: Engine, loose: Packing, watch: Watch = lambda says: None, bed: bool = True) -> Packing:
+def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
     """A loose start at rest on the floor, under the load on its upper layer.
 
     Parameters
@@ -87,8 +84,6 @@ def settle_loose(engine: Engine, loose: Packing, watch: Watch = lambda says: Non
         LAMMPS with the loose start.
     loose : Packing
         The start: no contacts, at F_x = 0.
-    watch : callable, optional
-        Told in words what begins.
     bed : bool
         Whether to lay a bed first, by a pull on every disk. Without, the load begins at once: for disks without
         friction that lie on each other already.
@@ -110,7 +105,7 @@ def settle_loose(engine: Engine, loose: Packing, watch: Watch = lambda says: Non
             return equilibrate(engine, Equilibrium.of(packing), 0.0).packing
         except NoEquilibriumError:
             return packing if loose.law.frictional else minimize_energy(packing)[0]
-    watch(f"dynamics down to {TOLERANCES[0]:.0e} F_y on a disk")
+    report_progress(f"dynamics down to {TOLERANCES[0]:.0e} F_y on a disk")
     if bed:
         engine.settle(TOLERANCES[0] * loose.fy, _height(loose) / loose.position[:, 1].max(), _viscosity(loose), STEPS)
     else:
@@ -119,11 +114,11 @@ def settle_loose(engine: Engine, loose: Packing, watch: Watch = lambda says: Non
         packing = engine.packing
         if largest_force(packing) > (1 + 1e-6) * tolerance * loose.fy:  # but for the rounding of forces
             return packing  # out of steps: the layer sinks
-        watch("Newton's method")
+        report_progress("Newton's method")
         packing, found = minimize_energy(packing)
         if found:
             return packing
-        watch(f"dynamics down to {finer:.0e} F_y on a disk")
+        report_progress(f"dynamics down to {finer:.0e} F_y on a disk")
         engine.damp(packing, finer * loose.fy, STEPS)
     return minimize_energy(engine.packing)[0]
 

@@ -12,16 +12,17 @@ from dataclasses import replace
 import numpy as np
 
 from ...analysis import BadInputError, NoEquilibriumError, Packing, nearest_image
+from ...analysis.progress import Watch, show_progress
 from ..equilibria.quasistatic import Equilibrium, equilibrate, idle_disks
 from ..equilibria.rattlers import clear_rattlers
 from ..lammps.engine import Engine
-from .minimize_energy import ABOVE_ROUNDING, TOLERANCES, Watch, contact_rounding, largest_force, settle_loose
+from .minimize_energy import ABOVE_ROUNDING, TOLERANCES, contact_rounding, largest_force, settle_loose
 
 SEEN = 0.01
 """Displacement, in radii of the disk, from which a disk counts as moved."""
 
 
-def bring_to_rest(packing: Packing, watch: Watch = lambda says: None) -> tuple[Equilibrium, str]:
+def bring_to_rest(packing: Packing, watch: Watch | None = None) -> tuple[Equilibrium, str]:
     """Bring a packing to rest under its law and load.
 
     Parameters
@@ -51,7 +52,8 @@ def bring_to_rest(packing: Packing, watch: Watch = lambda says: None) -> tuple[E
             f"without slips the disks rest without friction first, and F_x = {packing.fx:g} would push them along for "
             "ever: leave --fx out, and raise F_x by `faultgouge ramp`."
         )
-    resting = _with_friction(packing) if slipped else _without(packing, watch)
+    with show_progress(watch):
+        resting = _with_friction(packing) if slipped else _without(packing)
     idle = len(idle_disks(resting))
     if idle > 0.5 * len(resting):
         raise NoEquilibriumError(
@@ -77,12 +79,12 @@ def _what_moved(before: Packing, found: Equilibrium) -> str:
     )
 
 
-def _without(packing: Packing, watch: Watch) -> Packing:
+def _without(packing: Packing) -> Packing:
     # where disks rest does not depend on their masses, and the time step of dynamics is that of masses of one
     law, ones = replace(packing.law, mu=0.0, ct=0.0), np.ones(len(packing))
     smooth = replace(packing, law=law, mass=ones)
     with Engine(smooth) as engine:
-        found = settle_loose(engine, smooth, watch, bed=False)
+        found = settle_loose(engine, smooth, bed=False)
     return replace(clear_rattlers(found, idle_disks(found)), law=packing.law, angle=packing.angle, mass=packing.mass)
 
 

@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 from ...analysis import MindlinLaw, NoEquilibriumError, Packing
 from ...analysis.packing.arrays import Floats
+from ...analysis.progress import Watch, report_progress, show_progress
 from ..equilibria.quasistatic import Equilibrium, equilibrate, idle_disks
 from ..equilibria.rattlers import clear_rattlers
 from ..exchange import packing_of
@@ -21,7 +22,7 @@ from ..lammps.engine import Engine
 from ..scenes.packing_section import GeneratedPacking
 from ..scenes.scene import Scene
 from ..scenes.validation import SceneError
-from .minimize_energy import Watch, settle_loose
+from .minimize_energy import settle_loose
 
 OUT_OF_BALANCE = 1e-3
 """Residual of a stored packing, in units of F_y, above which it counts as not settled: the packing would
@@ -46,7 +47,7 @@ def settle(
     scene: Scene,
     mu: float | None = None,
     communicator: MPI.Comm | None = None,
-    watch: Watch = lambda says: None,
+    watch: Watch | None = None,
     bed: Packing | None = None,
 ) -> Equilibrium:
     """Settle the packing of a scene to equilibrium at F_x = 0.
@@ -83,11 +84,11 @@ def settle(
     NoEquilibriumError
         If the packing does not come to rest.
     """
-    packing = (
-        settle_bed(scene, mu, communicator, watch)
-        if bed is None
-        else replace(bed, law=law_of(scene, scene.law.mus[0] if mu is None else mu))
-    )
+    if bed is None:
+        with show_progress(watch):
+            packing = settle_bed(scene, mu, communicator)
+    else:
+        packing = replace(bed, law=law_of(scene, scene.law.mus[0] if mu is None else mu))
     packing = _in_arithmetic(packing, scene.precision)
     with Engine(packing, communicator) as engine:
         try:
@@ -116,7 +117,6 @@ def settle_bed(
     scene: Scene,
     mu: float | None = None,
     communicator: MPI.Comm | None = None,
-    watch: Watch = lambda says: None,
 ) -> Packing:
     """The packing of a scene as it has settled, not yet balanced to the rounding floor; arguments as of `settle`.
 
@@ -124,14 +124,14 @@ def settle_bed(
     """
     law = law_of(scene, scene.law.mus[0] if mu is None else mu)
     generated = isinstance(scene.packing, GeneratedPacking)
-    return _settle_starts(scene, law, communicator, watch) if generated else _take_stored(scene, law)
+    return _settle_starts(scene, law, communicator) if generated else _take_stored(scene, law)
 
 
-def shared_bed(scene: Scene, watch: Watch = lambda says: None) -> Packing | None:
+def shared_bed(scene: Scene) -> Packing | None:
     """The bed that all friction coefficients of a scene begin from; None if each has its own, or there is one alone."""
     alone = len(scene.law.mus) == 1
     own = isinstance(scene.packing, GeneratedPacking) and scene.packing.settle_friction
-    return None if alone or own else settle_bed(scene, watch=watch)
+    return None if alone or own else settle_bed(scene)
 
 
 def law_of(scene: Scene, mu: float) -> MindlinLaw:
@@ -147,19 +147,19 @@ def load_of(scene: Scene) -> dict[str, Any]:
     return {"fy": scene.load.fy, "inertia_factor": scene.inertia_factor, "drag_time": drag_time}
 
 
-def _settle_starts(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None, watch: Watch) -> Packing:
+def _settle_starts(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None) -> Packing:
     """The first of the seed's loose starts whose upper layer stays on top, settled in `own_units`."""
     assert isinstance(scene.packing, GeneratedPacking)
     section, own, fy = own_units(scene.packing, law, scene.load.fy)
     settling_law = own if section.settle_friction else replace(own, mu=0.0)
     for draw in range(STARTS):
         if draw:
-            watch(f"the upper layer sank through the bed: loose start {draw + 1} of {STARTS}")
+            report_progress(f"the upper layer sank through the bed: loose start {draw + 1} of {STARTS}")
         start = section.start(draw)
         assert start.top is not None
         loose = packing_of(start, settling_law, start.top, **load_of(scene) | {"fy": fy})
         with Engine(loose, communicator) as engine:
-            packing = settle_loose(engine, loose, watch)
+            packing = settle_loose(engine, loose)
         idle = len(idle_disks(packing))
         if idle <= 0.5 * len(packing):
             break

@@ -53,7 +53,7 @@ def equilibria(reference_packing):
 
 
 def opened(path, said):
-    return Record(path, Scene.from_mapping(SCENE), saved=said.append)
+    return Record(path, Scene.from_mapping(SCENE), saved=lambda says, path: said.append(says))
 
 
 @pytest.fixture(scope="module")

@@ -220,6 +220,7 @@ def onset(
     are named; the exit code is 1 if none has one.
     """
     from faultgouge.analysis import DampedOnsetError, NoEquilibriumError, OnsetError
+    from faultgouge.analysis.progress import show_progress
     from faultgouge.pywrap.settling.settle import shared_bed
 
     wanted = read_scene(scene, "onset", "onset --all" if every else "onset")
@@ -230,8 +231,8 @@ def onset(
         lock_output(context, output, scene, *stored_files(wanted))
     folder = _search_folder(slices, output)
     tell = say if as_json else print_line
-    with status("settling") as show:
-        bed = shared_bed(wanted, watch=lambda what: show(f"settling: {what}"))
+    with status("settling") as show, show_progress(show, "settling: "):
+        bed = shared_bed(wanted)
     found: list[dict[str, Any]] = []
     for mu in wanted.law.mus:
         try:

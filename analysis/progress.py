@@ -1,0 +1,29 @@
+"""What a long computation is doing, in words: who works reports, and who shows need not be passed on to who works.
+
+Reports go to the innermost `show_progress` of the thread; without one, as in a process of a pool, to nobody.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+Watch = Callable[[str], None]
+"""Told in words what begins."""
+
+_watch: ContextVar[Watch] = ContextVar("watch", default=lambda says: None)
+
+
+def report_progress(says: str) -> None:
+    """Say what begins, to whoever shows it."""
+    _watch.get()(says)
+
+
+@contextmanager
+def show_progress(watch: Watch | None = None, what: str = "") -> Iterator[None]:
+    """Show what is reported inside, with a few words before; None passes it on to who showed it outside."""
+    beyond = watch or _watch.get()
+    before = _watch.set(lambda says: beyond(what + says))
+    try:
+        yield
+    finally:
+        _watch.reset(before)
