@@ -88,6 +88,7 @@ def numbers(tables: Path = TABLES) -> dict[str, Any]:
         "seeds": full_seeds(rows),
         "rows": len(every),
         "restless": sum(not row["rests"] for row in every),
+        "negative": [row for row in every if row["rests"] and row["negative"]],
         "pushed": growth(read(tables / GROWTH)),
         "cycles": [energy_cycle(law) for law in LAWS],
         "wall": wall_alone(),
