@@ -18,6 +18,7 @@ from faultgouge.analysis.damped_onset.window_edges import DampedWindow
 from faultgouge.analysis.damped_onset.windows import damped_windows, growing_windows, without_dissipation
 from faultgouge.analysis.onset.limits import LIMITS
 from faultgouge.analysis.onset.slice_store import Candidate
+from faultgouge.analysis.progress import show_progress
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.onset.damped import ramp_scene
 
@@ -37,7 +38,12 @@ def search(path):
     def make(kind, limits=FEW):
         damped = without_dissipation(path, **KINDS[kind])
         loads = np.array(path.grid[18:])
-        return lambda **how: first_growing(lambda fx: Pencil.of(damped(fx)), loads, limits=limits, **how)
+
+        def search(watch=None, **how):
+            with show_progress(watch):
+                return first_growing(lambda fx: Pencil.of(damped(fx)), loads, limits=limits, **how)
+
+        return search
 
     return make
 

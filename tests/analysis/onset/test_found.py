@@ -17,6 +17,7 @@ from faultgouge.analysis.onset import Family, Ranks, full_operator
 from faultgouge.analysis.onset.block_lanczos import SliceError
 from faultgouge.analysis.onset.first_window import first_window
 from faultgouge.analysis.onset.slice_store import Border, Candidate, DamagedSliceError, SlicePass, SliceResult
+from faultgouge.analysis.progress import show_progress
 
 PASSING = replace(FEW, kept=0, wait=0.1)
 """Slices of 24 modes, in bases that are not kept in memory."""
@@ -58,7 +59,12 @@ def search(ramp):
     def make(mu=1.0):
         path = ramp(mu, 1e-3, 22)
         family = Family(lambda fx: full_operator(path(fx)), 0.0, PASSING)
-        return lambda **how: first_window(family, np.array(path.grid[18:]), **how)
+
+        def search(watch=None, **how):
+            with show_progress(watch):
+                return first_window(family, np.array(path.grid[18:]), **how)
+
+        return search
 
     return make
 
