@@ -34,8 +34,9 @@ LIMIT_OF_FEW, LIMIT_OF_MANY = 1e-8, 1e-3
 digit more takes twice the time, and nobody runs within a thousandth of the limit."""
 
 CROWDING = 50
-"""Power of the sums of rows in the first vector. The fastest motions are of few particles, with many stiff contacts; a
-packing of 36,000 spheres took half the steps so, and with dashpots a larger mu was found than without."""
+"""Power of the sums of rows in the first vector. Chosen from 0, 4, 20, 50, 100 and 200 on one packing, a jittered
+lattice of 36,000 spheres: without dashpots 85 products in place of the 187 of a vector without weights; with
+dashpots 117 in place of 99, and a mu^2 that is larger by 8e-4."""
 
 LOOKS = 6
 """Steps of the iteration for mu: each squares its error."""

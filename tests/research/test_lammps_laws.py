@@ -14,7 +14,9 @@ def test_the_page_is_what_the_tables_make(tmp_path):
     assert write_page(tmp_path).read_text() == (HERE / "README.md").read_text()
     found = numbers()
     for cell in found["cells"] + found["others"]:
-        if cell["law"] != "granular hertz, mindlin_rescale":  # of which K has the mean of two far derivatives
+        if (
+            cell["law"] != "granular hertz, mindlin_rescale"
+        ):  # one packing has a negative one, which the page names; why is not known
             assert cell["negative"] == 0
         if cell["law"] in NEVER:
             assert cell["with_pairs"]["count"] == 0
