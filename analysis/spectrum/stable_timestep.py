@@ -33,11 +33,6 @@ LIMIT_OF_FEW, LIMIT_OF_MANY = 1e-8, 1e-3
 """Relative errors of mu^2 for a time step. Packings have many modes near the fastest one: among 200,000 coordinates a
 digit more takes twice the time, and nobody runs within a thousandth of the limit."""
 
-CROWDING = 50
-"""Power of the sums of rows in the first vector. Chosen from 0, 4, 20, 50, 100 and 200 on one packing, a jittered
-lattice of 36,000 spheres: without dashpots 85 products in place of the 187 of a vector without weights; with
-dashpots 117 in place of 99, and a mu^2 that is larger by 8e-4."""
-
 LOOKS = 6
 """Steps of the iteration for mu: each squares its error."""
 
@@ -95,21 +90,15 @@ def stable_timestep(
     if damping is None and of.damped:
         damping = damping_matrix(of)
     scale = 1.0 / np.sqrt(coordinate_mass(of))
-    k = scale * (abs(stiffness) @ scale)
-    c = None if damping is None else scale * (abs(damping) @ scale)
-    found = (
-        _of_all_eigenvalues(scale, stiffness, damping)
-        if len(scale) <= FEW
-        else _of_arnoldi(scale, stiffness, damping, (k / k.max()) ** CROWDING)
-    )
+    found = (_of_all_eigenvalues if len(scale) <= FEW else _of_arnoldi)(scale, stiffness, damping)
     # rounding may take the limit below the bound where the two are the same
-    return StableTimestep(found, found.error, min(float(found), 2.0 / _largest_mu(k, c)))
+    return StableTimestep(found, found.error, min(float(found), 2.0 / _largest_mu(scale, stiffness, damping)))
 
 
-def _largest_mu(k: Floats, c: Floats | None) -> float:
-    """What mu does not exceed, by the largest sums of rows of K and C, 1 / time."""
-    damping = 0.0 if c is None else float(c.max())
-    return 0.5 * (damping + float(np.sqrt(damping**2 + 4 * k.max())))
+def _largest_mu(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> float:
+    """What mu does not exceed, by the largest sums of rows, 1 / time."""
+    k, c = (0.0 if matrix is None else float(np.max(scale * (abs(matrix) @ scale))) for matrix in (stiffness, damping))
+    return 0.5 * (c + float(np.sqrt(c * c + 4 * k)))
 
 
 def _of_all_eigenvalues(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:
@@ -123,11 +112,11 @@ def _of_all_eigenvalues(scale: Floats, stiffness: csr_array, damping: csr_array 
     return StableTimestep(2.0 / float(eigvals(pencil).real.max()))
 
 
-def _of_arnoldi(scale: Floats, stiffness: csr_array, damping: csr_array | None, weights: Floats) -> StableTimestep:
-    """2/mu by Arnoldi's iteration from a random vector with weights, with the residual as its error."""
+def _of_arnoldi(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:
+    """2/mu by Arnoldi's iteration, with the residual as its error."""
     size = len(scale)
     tolerance = LIMIT_OF_MANY if size > MANY else LIMIT_OF_FEW
-    vector = weights * np.random.Generator(np.random.PCG64(0)).standard_normal(size)
+    vector = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
     mu = off = change = 0.0
     # without dashpots the first look is the last; with them it is at K alone, and rough
     for look in range(LOOKS + 1 if damping is not None else 1):

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linearised import matrices
+from scipy.linalg import block_diag
+from scipy.sparse import csr_array
 from tiling import tiled
 
 from faultgouge.analysis import (
@@ -22,6 +24,7 @@ from faultgouge.analysis import (
     spectrum,
     stable_timestep,
 )
+from faultgouge.analysis.operators.damping import coordinate_mass
 
 
 def test_eigenvalues_are_those_of_the_linearised_motion(cluster):
@@ -117,6 +120,19 @@ def test_discrete_frequency_is_that_of_velocity_verlet(value, dt):
     for factor in (np.exp(1j * omega * dt), np.exp(-1j * omega * dt)):
         assert np.abs(factors - factor).min() < 4 * tolerance
     assert omega == pytest.approx(np.sqrt(complex(value)), rel=abs(value) * dt**2 / 12)
+
+
+def test_the_fastest_motion_is_found_where_sums_of_rows_are_small(reference_packing):
+    """Two clusters that do not touch: the sums of rows are larger in one, and the eigenvalue in the other."""
+    packing = reference_packing(1.0)
+    half = packing.coordinates // 2
+    random = np.random.default_rng(1).normal(size=(half, half))
+    one = (random + random.T) @ (random + random.T)
+    other = np.diag(np.append(1.3 * np.linalg.eigvalsh(one)[-1], np.full(packing.coordinates - half - 1, 1e-3)))
+    root = np.sqrt(coordinate_mass(packing))
+    stiffness = csr_array(np.outer(root, root) * block_diag(one, other))
+    step = stable_timestep(packing, stiffness)
+    assert step == pytest.approx(2 / np.sqrt(other[0, 0]), rel=1e-8)
 
 
 def test_dispersion_changes_no_stability_below_the_limit():

@@ -34,7 +34,6 @@ def _disks(position: list[tuple[float, float]], contacts: Contacts | None = None
         "contacts": touching(np.array(position), radius, None) if contacts is None else contacts,
         "law": law(),
     }
-    # mypy cannot know which key has which type; Packing checks them
     return Packing(**(values | changes))  # type: ignore[arg-type]  # the values of a dict have many types
 
 
