@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from linearised import matrices
 from scipy.linalg import block_diag
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 from tiling import tiled
 
 from faultgouge.analysis import (
@@ -133,6 +133,29 @@ def test_the_fastest_motion_is_found_where_sums_of_rows_are_small(reference_pack
     stiffness = csr_array(np.outer(root, root) * block_diag(one, other))
     step = stable_timestep(packing, stiffness)
     assert step == pytest.approx(2 / np.sqrt(other[0, 0]), rel=1e-8)
+
+
+@pytest.mark.parametrize("dashpots", [0.0, 0.05], ids=["undamped", "damped"])
+@pytest.mark.parametrize("one_fast", [False, True], ids=["chain", "one fast coordinate"])
+def test_the_error_of_a_step_of_many_coordinates_covers_the_limit(reference_packing, dashpots, one_fast):
+    """A chain of springs, most of whose modes are near the fastest one; and one coordinate that no other is tied to."""
+    packing = tiled(reference_packing(1.0), 40)
+    n = packing.coordinates
+    assert n > 10_000
+    chain = 2.0 * np.ones(n)
+    link = -np.ones(n - 1)
+    largest = 4 * np.sin(0.5 * np.pi * n / (n + 1)) ** 2
+    if one_fast:
+        largest = chain[-1] = 6.0
+        link[-1] = 0.0
+    root = diags_array(np.sqrt(coordinate_mass(packing)))
+    stiffness = csr_array(root @ diags_array([link, chain, link], offsets=[-1, 0, 1]) @ root)
+    mu = 0.5 * (dashpots * largest + np.sqrt((dashpots * largest) ** 2 + 4 * largest))
+    step = stable_timestep(packing, stiffness, dashpots * stiffness if dashpots else None)
+    assert 0 <= step - 2 / mu < step.error < 0.05 * step
+    # what is missed is a tenth of the error, which holds for any matrix
+    assert step - 2 / mu < 0.1 * step.error
+    assert step.certain <= 2 / mu * (1 + 1e-12)
 
 
 def test_dispersion_changes_no_stability_below_the_limit():
