@@ -148,7 +148,7 @@ def _of_arnoldi(scale: Floats, stiffness: csr_array, damping: csr_array | None) 
 
 
 def _largest_eigenvalue(scale: Floats, matrix: csr_array, tolerance: float) -> tuple[float, Floats, float]:
-    """The largest eigenvalue of a matrix over the masses, its displacements with the norm 1 by mass, and the relative error."""
+    """The largest eigenvalue of a matrix over the masses, its mode as displacements (of norm 1 by mass), its error."""
     size = len(scale)
 
     def product(x: Floats) -> Floats:
