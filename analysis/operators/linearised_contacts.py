@@ -80,6 +80,34 @@ def assembled_damping(snapshot: Snapshot) -> csr_array:
     return _assemble(snapshot, dashpots, 0.5)
 
 
+def rescaling_operators(snapshot: Snapshot) -> tuple[csr_array, csr_array]:
+    r"""What K of the mean derivative lacks where a contact closes with another derivative than it parts with.
+
+    With :math:`\dot\delta = N \dot q` the forces change by :math:`-K \dot q + B\, |N \dot q|`.
+
+    Returns
+    -------
+    n : scipy.sparse.csr_array, shape (C, coordinates)
+        Rates of the overlaps by velocities.
+    b : scipy.sparse.csr_array, shape (coordinates, C)
+        Forces by absolute rates of the overlaps, half of the difference of both derivatives; force / length.
+    """
+    c, count = snapshot.contacts, len(snapshot)
+    difference = 0.5 * (c.overlap_derivative(0.0) - c.overlap_derivative(1.0))
+    turn = np.cross(c.normal, difference)
+    in_plane = np.arange(6) if snapshot.dimension == 3 else np.array([0, 1, 5])
+    contact = np.tile(np.arange(len(c)), len(in_plane))
+    n, b = (csr_array((len(c), snapshot.coordinates)) for _ in range(2))
+    for partner, arm, sign in ((c.i, c.lever_arm[:, 0], 1.0), (c.j, c.lever_arm[:, 1], -1.0)):
+        moves = (partner >= 0) & snapshot.free[partner]
+        rate = np.hstack([-sign * c.normal, np.zeros_like(turn)]) * moves[:, None]
+        force = np.hstack([sign * difference, -(arm / snapshot.radius[partner])[:, None] * turn]) * moves[:, None]
+        coordinate = (np.arange(len(in_plane))[:, None] * count + np.where(moves, partner, 0)).ravel()
+        n = n + csr_array((rate.T[in_plane].ravel(), (contact, coordinate)), shape=n.shape)
+        b = b + csr_array((force.T[in_plane].ravel(), (contact, coordinate)), shape=b.shape)
+    return n, csr_array(b.T)
+
+
 def _assemble(snapshot: Snapshot, contacts: LinearisedContacts, parting: ArrayLike) -> csr_array:
     """-dF/dq: rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact."""
     count, c, pair = len(snapshot), contacts, ~contacts.wall

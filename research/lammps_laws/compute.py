@@ -74,12 +74,13 @@ class Cell(NamedTuple):
 HERTZ = tuple(f"granular hertz, {model}" for model in MODELS)
 CELLS = (
     Cell(50, MU, 20),
-    Cell(50, 0.3, 6, HERTZ),
-    Cell(50, 0.9, 6, HERTZ),
-    Cell(200, MU, 6, HERTZ, (3,)),
-    Cell(400, MU, 2, HERTZ, (3,)),
+    Cell(50, 0.3, 20, HERTZ),
+    Cell(50, 0.9, 20, HERTZ),
+    Cell(200, MU, 20, HERTZ),
+    Cell(400, MU, 6, HERTZ),
 )
-"""All cells, each of the seeds 1, 2, ..., M. M was set by what a packing costs, and not by what came out."""
+"""All cells, each of the seeds 1, 2, ..., M, in two and three dimensions. The first rounds had fewer seeds; M grew by
+what a packing costs, and not by what came out."""
 
 LARGE = 50
 """Particles beyond which packings come after all others: one takes minutes."""

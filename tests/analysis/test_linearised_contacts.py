@@ -17,6 +17,7 @@ from faultgouge.analysis import (
     stiffness_matrix,
     transient_gain,
 )
+from faultgouge.analysis.operators.linearised_contacts import rescaling_operators
 from faultgouge.analysis.packing.arrays import derive_frozen
 from faultgouge.analysis.packing.snapshot import PER_CONTACT
 
@@ -245,6 +246,26 @@ def test_the_analysis_takes_a_snapshot_as_a_packing(bed):
     # the matrices that are handed in are those that count
     assert stable_timestep(bed, stiffness_matrix(bed), damping_matrix(bed)) == step
     assert stable_timestep(bed, 4 * stiffness_matrix(bed), 2 * damping_matrix(bed)) == pytest.approx(step / 2, rel=1e-7)
+
+
+def test_rescaling_is_half_of_the_difference_of_both_derivatives(bed):
+    """dF = -K dq + B |N dq|: with K of the mean, B N is what K while all contacts close lacks, and N is d delta."""
+    c = bed.contacts
+    bed = derive_frozen(bed, contacts=derive_frozen(c, closing=0.2 * c.closing, parting=1.3 * c.parting))
+    n, b = rescaling_operators(bed)
+    closing, mean, parting = (stiffness_matrix(bed, parting=share).toarray() for share in (0.0, 0.5, 1.0))
+    size = 1e-13 * np.abs(mean).max()
+    assert (b @ n).toarray() == pytest.approx(mean - closing, abs=size)
+    assert (b @ n).toarray() == pytest.approx(parting - mean, abs=size)
+    assert np.abs((b @ n).toarray()).max() > 1e-2 * np.abs(mean).max()
+    # springs along the normals alone have K = N^T k N
+    still = 0 * c.closing
+    bare = derive_frozen(
+        c, closing=still, parting=still, tangential_force=still, normal_force=0 * c.friction,
+        tangential_stiffness=0 * c.friction,
+    )  # fmt: skip
+    springs = stiffness_matrix(derive_frozen(bed, contacts=bare)).toarray()
+    assert (n.T * c.normal_stiffness) @ n.toarray() == pytest.approx(springs, abs=size)
 
 
 def test_onset_of_a_family_of_snapshots():

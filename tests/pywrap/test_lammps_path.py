@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from faultgouge.analysis import NoEquilibriumError, find_onset, spectrum
+from faultgouge.analysis import NoEquilibriumError, find_onset, spectrum, stiffness_matrix
 
 LAW = "hertz/history 1e5 3e4 40 20 0.5 1"
 
@@ -59,6 +59,62 @@ def test_tilt_of_a_slope(tmp_path):
     assert len(spectrum(found[0.1]).pairs) > 0
     assert onset.fx_c <= 0.02
     assert np.array_equal(lmp.numpy.extract_atom("x"), before)
+    lmp.close()
+
+
+def spheres(tmp_path):
+    """Spheres of two sizes at rest on a floor in LAMMPS."""
+    from faultgouge.pywrap import Engine  # loads what is needed, in order
+
+    assert Engine
+    from mpi4py import MPI
+
+    from faultgouge.pywrap.lammps.instance import lammps_instance
+
+    rng = np.random.default_rng(3)
+    corner = 1.05 * np.array([(k % 2, k // 2 % 2, k // 4) for k in range(16)])
+    places = corner + np.column_stack([rng.uniform(0.4, 0.6, (16, 2)), np.full(16, 0.6)])
+    lmp = lammps_instance(MPI.COMM_SELF, tmp_path / "log.lammps")
+    for line in [
+        "units lj", "atom_style sphere", "boundary p p f", "newton off", "comm_modify vel yes",
+        "region box block 0 2.1 0 2.1 0 40", "create_box 2 box",
+        *(f"create_atoms {1 + k % 2} single {x:.17g} {y:.17g} {z:.17g}" for k, (x, y, z) in enumerate(places)),
+        "set type 1 diameter 0.8", "set type 2 diameter 1.0", "set group all density 1.0",
+        f"pair_style gran/{LAW}", "pair_coeff * *", f"fix floor all wall/gran {LAW} zplane 0 NULL contacts",
+        "variable slope equal 0.0", "fix load all gravity 1.0 vector v_slope 0 -1",
+        "fix move all nve/sphere", "fix drag all viscous 1.0", "timestep 1e-3", "run 40000 post no",
+    ]:  # fmt: skip
+        lmp.command(line)
+    return lmp
+
+
+@pytest.mark.slow
+def test_windows_of_spheres_are_those_of_all_eigenvalues(tmp_path):
+    """At loads between, right below and right above all edges LAPACK has as many complex pairs as there are windows."""
+    from faultgouge.pywrap import lammps_path
+
+    lmp = spheres(tmp_path)
+
+    def pairs(snapshot) -> int:
+        root = np.sqrt(snapshot.coordinate_mass)
+        values = np.linalg.eigvals(stiffness_matrix(snapshot).toarray() / np.outer(root, root))
+        # imaginary parts at 1e-7 from an edge are some 1e-4 of the largest eigenvalue, those of rounding 1e-8
+        return int(np.sum(values.imag > 1e-6 * np.abs(values).max()))
+
+    with lammps_path(lmp, "slope") as path:
+        windows = find_onset(path, [0.0, 0.01, 0.02]).windows
+        edges = [
+            edge
+            for window in windows
+            for edge in (window.fx_onset, window.fx_end)
+            if edge is not None and 0 < edge < 0.02
+        ]
+        assert len(edges) >= 5
+        assert all(window.error < 1e-8 for window in windows)
+        for load in sorted([0.0, 0.01, 0.02, *(edge + away for edge in edges for away in (-1e-7, 1e-7))]):
+            ends = [np.inf if window.fx_end is None else window.fx_end for window in windows]
+            inside = sum(window.fx_onset <= load < end for window, end in zip(windows, ends, strict=True))
+            assert pairs(path(load)) == inside
     lmp.close()
 
 
