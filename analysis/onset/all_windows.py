@@ -28,7 +28,7 @@ from ..packing.packing import Floats, Indices
 from ..spectrum.spectrum import Complexes
 from .eigenvalue_pair import Pair, continue_pair, deepest_dip, dip_between
 from .march import look_between, march
-from .modes import Members, Modes, Place, assign_modes, neighbours
+from .modes import Members, Modes, LoadPoint, assign_modes, neighbours
 from .perturbation_screening import PairScreen, Screening
 from .window_edges import (
     DoubtError,
@@ -58,7 +58,7 @@ class AllPairs:
         self.family, self.screening, self._first = family, screening, first
         self._open: dict[Pair, Edge] | None = None  # the onsets of the windows that are open at the load reached so far
         self._closed: list[Window] = []
-        self._reached: tuple[Place, Place] | None = None  # the last step that was looked at
+        self._reached: tuple[LoadPoint, LoadPoint] | None = None  # the last step that was looked at
         self._known: list[Pair] = []  # the few pairs at the load reached so far
 
     @property
@@ -66,7 +66,7 @@ class AllPairs:
         """Whether the first window has been found, and is all that is sought."""
         return self._first and bool(self._open or self._closed)
 
-    def candidates(self, places: Sequence[Place], depth: int) -> Iterator[list[Ends] | None]:
+    def candidates(self, places: Sequence[LoadPoint], depth: int) -> Iterator[list[Ends] | None]:
         """The pairs that may meet; None where these are not few, or the increment has been divided."""
         for here, there in pairwise(places):
             planes = self.screening(here.matrix, there.matrix, len(self._open or {})) if depth == 0 else None
@@ -76,8 +76,8 @@ class AllPairs:
             yield pairs
 
     def confirm(
-        self, candidates: list[Ends] | None, here: Place, there: Place, depth: int
-    ) -> tuple[list[Course] | None, list[Place]]:
+        self, candidates: list[Ends] | None, here: LoadPoint, there: LoadPoint, depth: int
+    ) -> tuple[list[Course] | None, list[LoadPoint]]:
         """The courses of the few pairs if these are plain, else those of all, once nothing can hide any more."""
         courses = None if candidates is None else self._few(candidates)
         if courses is not None:
@@ -129,7 +129,7 @@ class AllPairs:
 
     # A few pairs
 
-    def _follow(self, planes: list[Floats], here: Place, there: Place) -> list[Ends] | None:
+    def _follow(self, planes: list[Floats], here: LoadPoint, there: LoadPoint) -> list[Ends] | None:
         """The pairs of these planes at both loads; None if one of them cannot be followed, or is within rounding."""
         pairs: list[Ends] = []
         for plane in planes:
@@ -169,7 +169,7 @@ class AllPairs:
         courses = self._courses(recognised)
         return None if courses is None else courses + hidden
 
-    def _arrival(self, here: Place, there: Place) -> csr_array | None:
+    def _arrival(self, here: LoadPoint, there: LoadPoint) -> csr_array | None:
         """The change of the operator over a step if it goes on as on the way to its beginning; None if not known."""
         before, self._reached = self._reached, (here, there)
         if before is None or before[1] is not here:
@@ -223,7 +223,9 @@ class AllPairs:
             return False
         return dip_between(here, there, self.family.limits)[0] <= self.family.narrowest
 
-    def _blunt(self, here: Place, there: Place, before: Pair | None, after: Pair | None, ends: Ends | None) -> Course:
+    def _blunt(
+        self, here: LoadPoint, there: LoadPoint, before: Pair | None, after: Pair | None, ends: Ends | None
+    ) -> Course:
         """The course of a pair over a step that is not divided: an edge that is not solved for is half of it wide."""
         if before and after:
             return before, after, ()

@@ -193,7 +193,7 @@ class Bases:
         first, stop = self.range(matrix)
         limits = self.limits
         margins = 2 * (limits.margin + limits.beyond) * max(1, round((stop - first) / limits.own))
-        return (stop - first + margins) * matrix.shape[0] <= limits.kept
+        return (stop - first + margins) * matrix.shape[0] <= limits.equilibria
 
     def at(self, matrix: csr_array, known: SlicePass = NEW_PASS) -> Iterable[tuple[Basis, Levels]]:
         """The bases, those of an earlier load as long as all ranks' serve, and the operator in them.

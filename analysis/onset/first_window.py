@@ -34,7 +34,7 @@ from .eigenbasis import Bases, Basis, Levels, ModeCluster, width_and_mixing
 from .eigenvalue_pair import Pair, continue_pair
 from .limits import LIMITS, Limits
 from .march import march
-from .modes import Place
+from .modes import LoadPoint
 from .perturbation_screening import may_meet
 from .ranks import ALONE, Ranks
 from .slice_store import NEW_PASS, Candidate, OperatorAtLoad, SlicePass, SliceResult, pass_folder
@@ -219,14 +219,14 @@ class Sliced(ABC, Generic[P, W]):
         return first, doubt
 
 
-class SlicedPairs(Sliced[Place, Window]):
+class SlicedPairs(Sliced[LoadPoint, Window]):
     """The oracle of complex pairs of a family of matrices."""
 
     def __init__(self, family: Family, modes: tuple[int, int] | None, ranks: Ranks, folder: Path | None) -> None:
         super().__init__(family.at, modes, ranks, folder, family.limits)
         self.family = family
 
-    def _look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[Place]) -> SliceResult:
+    def _look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[LoadPoint]) -> SliceResult:
         """The pairs of a basis that turn complex in their clusters."""
         found = []
         for here, there in pairwise(places):
@@ -268,7 +268,7 @@ class SlicedPairs(Sliced[Place, Window]):
         """The narrowest windows that are looked for on an increment, force."""
         return max(self.family.narrowest, self.limits.finest * increment)
 
-    def _confirm_window(self, candidate: Candidate, there: Place, first: Window | None) -> Window | None:
+    def _confirm_window(self, candidate: Candidate, there: LoadPoint, first: Window | None) -> Window | None:
         """The window of the operator itself in place of that of a cluster; None if it is none, or not the first."""
         report_progress(f"a pair that turns complex about F_x = {candidate.onset:.6g}: its onset")
         inside = self._complex_pair(candidate, there)
@@ -283,7 +283,7 @@ class SlicedPairs(Sliced[Place, Window]):
             inside = below
         return Window.between(Edge.start(inside), end)
 
-    def _follow(self, pair: Pair, place: Place) -> Pair:
+    def _follow(self, pair: Pair, place: LoadPoint) -> Pair:
         """A pair at the same load, or another one."""
         return pair if pair.fx == place.fx else self.family.followed(pair, place)
 
@@ -294,7 +294,7 @@ class SlicedPairs(Sliced[Place, Window]):
         below = self.family.followed(inside, self.family.at(first.fx_onset))
         return below.discriminant > 0 and returns_to_start(self.family, below, inside)
 
-    def _complex_pair(self, candidate: Candidate, there: Place) -> Pair | None:
+    def _complex_pair(self, candidate: Candidate, there: LoadPoint) -> Pair | None:
         """The pair at a load where it is complex; None if it is surely real, or not before these loads are passed."""
         place = there if candidate.inside == there.fx else self.family.at(candidate.inside)
         guess = Pair(place.fx, place.matrix, candidate.right, candidate.left)

@@ -124,7 +124,7 @@ class Modes:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class LoadPoint:
     """A load, the operator there, and all of its modes as soon as somebody asks for them."""
 
     fx: float

@@ -20,7 +20,7 @@ from ..packing.packing import Floats
 from .eigenvalue_pair import Pair, continue_pair, dip_between
 from .limits import LIMITS, Limits
 from .march import look_between
-from .modes import Operator, Place
+from .modes import Operator, LoadPoint
 
 Kind = Literal["coalescence", "contact change", "start"]
 
@@ -172,16 +172,16 @@ class Family:
     limits: Limits = LIMITS
     states: Callable[[float], bytes] = lambda fx: b""
 
-    def at(self, fx: float) -> Place:
+    def at(self, fx: float) -> LoadPoint:
         """The operator at a load."""
-        return Place(float(fx), csr_array(self.operator(float(fx))))
+        return LoadPoint(float(fx), csr_array(self.operator(float(fx))))
 
-    def steps(self, here: Place, load: float) -> list[Place]:
+    def steps(self, here: LoadPoint, load: float) -> list[LoadPoint]:
         """The steps that lead to a load: where the states change on the way, one about each change is a short one."""
         there = self.at(load)
         shortest = self.limits.bending * (load - here.fx)
 
-        def parted(below: Place, above: Place) -> list[Place]:
+        def parted(below: LoadPoint, above: LoadPoint) -> list[LoadPoint]:
             if above.fx - below.fx <= shortest or self.states(below.fx) == self.states(above.fx):
                 return [above]
             middle = look_between(self.at, below.fx, 0.5 * (below.fx + above.fx), above.fx)
@@ -203,14 +203,14 @@ class Family:
 
         return track_pair(known, follow)
 
-    def followed(self, pair: Pair, place: Place) -> Pair:
+    def followed(self, pair: Pair, place: LoadPoint) -> Pair:
         """A pair at another load: continued, found among all modes, or followed in small steps; else LostPairError."""
         image = continue_pair(pair, place.fx, place.matrix, self.limits)
         if image is None and place.matrix.shape[0] <= self.limits.all_modes:
             image = place.modes.pair(place.modes.nearest(pair))
         return image or self._in_steps(pair, place)
 
-    def _in_steps(self, pair: Pair, place: Place) -> Pair:
+    def _in_steps(self, pair: Pair, place: LoadPoint) -> Pair:
         """The pair at the end of a straight line of operators."""
         moving, done, step = pair, 0.0, 0.5
         while done < 1:
@@ -316,7 +316,7 @@ def locate_edge(family: Family, here: Pair, there: Pair) -> tuple[Edge, Pair, Pa
         mean, overlap = float(np.mean([point.mean for point in points])), min(point.overlap for point in points)
         return Edge(change.fx, change.error, mean, overlap, "coalescence"), below, above
     # Where the equilibrium does not jump, it is the pair that has become another one on the way.
-    across = family.followed(below, Place(above.fx, above.matrix))
+    across = family.followed(below, LoadPoint(above.fx, above.matrix))
     if across.discriminant * above.discriminant < 0 or not across.same_planes(above):
         raise LostPairError.of(above, f"at F_x = {above.fx:.10g}")
     return Edge.between(below.fx, above.fx, below, above), below, above

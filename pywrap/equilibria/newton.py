@@ -64,7 +64,7 @@ two iterations at 100 disks, and one or two more follow."""
 SPARING = 300
 """Disks beyond which factors of K are used on whatever is left to go: new ones cost ten force evaluations and more."""
 
-KEPT = 0.1
+REUSE_LIMIT = 0.1
 """Factor of the residual in one iteration up to which the factors of K are good for another one."""
 
 GAIN = 1e-2
@@ -212,7 +212,7 @@ class _Course:
         """Whether the factors of K at hand do for the next iteration."""
         if residual * (residual / self._last) ** SPARED < 0.1 * self.floor:
             return True
-        return disks > SPARING and residual <= KEPT * self._last
+        return disks > SPARING and residual <= REUSE_LIMIT * self._last
 
     def go_on(self, residual: float) -> None:
         """Another iteration is made from here."""

@@ -31,7 +31,7 @@ from .granular_commands import Commands, SnapshotError, wall_plane
 EXACT = 1e-6
 """Distance of a measured exponent from a multiple of 1/4: rounding of forces and overlaps leaves 1e-9 or less."""
 
-MEASURED = 1e-3, 0.1
+OVERLAP_RANGE = 1e-3, 0.1
 """Overlaps at which laws are measured, in units of a radius: an overlap of 1e-10, as of spheres that barely touch, has
 lost ten digits, and one beyond a tenth is that of no contact."""
 
@@ -196,7 +196,7 @@ def measure_law(bench: TwoParticleLammps, state: State, types: tuple[int, int], 
     SnapshotError
         If it is no power law of the kind above.
     """
-    least, most = (share * state.radii[0] for share in MEASURED)
+    least, most = (share * state.radii[0] for share in OVERLAP_RANGE)
     state = state._replace(overlap=min(max(state.overlap, least), most))
     heavy = (3 * state.masses[0], state.masses[1] if bench.wall else 2 * state.masses[1])
     small = State((0.5 * state.radii[0], 0.8 * state.radii[1]), state.masses, state.overlap)

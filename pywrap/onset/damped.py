@@ -166,7 +166,7 @@ def ramp_scene(
             report_progress(f"ramp up to F_x = {wanted[-1]:g}")
             for _ in path.climb(wanted[1:]):
                 pass
-            forces = np.array([each.fx for each in path.kept])
+            forces = np.array([each.fx for each in path.equilibria])
         yield RampPath(path, forces, all_modes, whole, len(forces) < len(wanted))
 
 
@@ -226,7 +226,7 @@ def damped_onset_run(
             found = _first_of_all_modes(ramp, mu, dissipation)
         else:
             found = _first_in_slices(ramp, mu, dissipation, known, folder)
-        equilibria = tuple(ramp.path.kept)
+        equilibria = tuple(ramp.path.equilibria)
         report_progress("the path once more, with other increments")
         undamped = None if found.undamped is None else with_path_error(found.undamped, ramp.path)
         windows = with_damped_path_error(found.windows, dissipation, ramp.path)
@@ -262,7 +262,7 @@ def _first_of_all_modes(ramp: RampPath, mu: float, dissipation: Dissipation) -> 
     try:
         found = growing_windows(pencil, ramp.forces, beneath.look, first=True)
     except NoEquilibriumError as error:
-        raise _nothing_grows(ramp.path.kept[-1].fx, True) from error
+        raise _nothing_grows(ramp.path.equilibria[-1].fx, True) from error
     if not found:
         raise _nothing_grows(float(ramp.forces[-1]), False)
     return DampedOnset(mu, found[:1], undamped, None)
@@ -322,7 +322,7 @@ def _first_in_slices(
         with show_progress(what="with dissipation, "):
             first, doubtful = first_growing(pencil, ramp.forces, search_ranks(), folder)
     except NoEquilibriumError as error:
-        raise _nothing_grows(ramp.path.kept[-1].fx, True) from error
+        raise _nothing_grows(ramp.path.equilibria[-1].fx, True) from error
     if first is None:
         raise _nothing_grows(float(ramp.forces[-1]), False)
     found = DampedOnset(mu, (first,), None, None, doubtful)

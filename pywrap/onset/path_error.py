@@ -171,7 +171,7 @@ W = TypeVar("W", bound=GrowthWindow)
 
 def _whole_error(window: W, vanishes: Vanishes, others: OtherPaths) -> W:
     """The window as the exact path has it; as it is where the ramp itself has no equilibrium at its onset."""
-    if not window.fx_onset > others.path.kept[0].fx:
+    if not window.fx_onset > others.path.equilibria[0].fx:
         return window
     try:
         part = others.error(window.fx_onset, vanishes, window.error)
@@ -196,8 +196,12 @@ class OtherPaths:
 
     def __init__(self, path: EquilibriumPath) -> None:
         self.path = path
-        self._states = [bearing_contacts(each.packing) for each in path.kept]
-        self._coarser, self._finer, self._moved = [path.kept[0]], [path.kept[0]], [[path.kept[0]] for _ in MOVED]
+        self._states = [bearing_contacts(each.packing) for each in path.equilibria]
+        self._coarser, self._finer, self._moved = (
+            [path.equilibria[0]],
+            [path.equilibria[0]],
+            [[path.equilibria[0]] for _ in MOVED],
+        )
 
     def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
         """What the increments do to the onset at fx, whose rounding error is known.
@@ -217,7 +221,7 @@ class OtherPaths:
             If the ramp has no equilibrium at fx.
         """
         changed = self.changes(fx)
-        ramp = np.array([*(each.fx for each in self.path.kept if each.fx < fx), fx])
+        ramp = np.array([*(each.fx for each in self.path.equilibria if each.fx < fx), fx])
         few = len(changed) < FEWEST
         other = _halve_loads(ramp) if few else _thin_loads(ramp, changed)
         increment = float(np.diff(ramp).max())
@@ -249,7 +253,7 @@ class OtherPaths:
         NoEquilibriumError
             If the ramp has no equilibrium at fx.
         """
-        before = self._states[: sum(each.fx < fx for each in self.path.kept)]
+        before = self._states[: sum(each.fx < fx for each in self.path.equilibria)]
         states = [*before, bearing_contacts(self.path(fx))]
         return np.array([a != b for a, b in pairwise(states)])
 
@@ -264,7 +268,7 @@ class OtherPaths:
             for load in inner[common:]:
                 path(float(load))
         finally:
-            known[:] = path.kept
+            known[:] = path.equilibria
         return path
 
 

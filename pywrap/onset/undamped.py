@@ -123,7 +123,7 @@ def onset_run(
             report_progress(f"ramp up to F_x = {wanted[-1]:g}")
             for equilibrium in path.climb(wanted[1:]):
                 reached(equilibrium)
-            forces = np.array([each.fx for each in path.kept])
+            forces = np.array([each.fx for each in path.equilibria])
         flows = len(forces) < len(wanted)
         try:
             onset = find_onset(path, forces, modes=modes, first=first, ranks=search_ranks(), folder=folder)
@@ -133,15 +133,15 @@ def onset_run(
             if not flows and isinstance(error, OnsetError):
                 raise
             raise NoEquilibriumError(
-                f"no pair of eigenvalues becomes complex up to F_x = {path.kept[-1].fx:.10g}, and no equilibrium was "
+                f"no pair of eigenvalues becomes complex up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was "
                 "found beyond: the packing flows before an onset"
             ) from error
-        last = path.kept[-1].fx
+        last = path.equilibria[-1].fx
         extra = [] if near_onset is None else [fx for fx in onset.fx_c + near_onset if 0 <= fx <= last]
         between = {float(fx): path(float(fx)) for fx in extra}
         report_progress("the path once more, with other increments")
         onset = with_path_error(onset, path)
-    return OnsetRun(mu, tuple(path.kept), onset, last if flows else None, between)
+    return OnsetRun(mu, tuple(path.equilibria), onset, last if flows else None, between)
 
 
 def _check_modes(packing: Packing, modes: tuple[int, int] | None) -> None:

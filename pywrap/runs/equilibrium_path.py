@@ -217,19 +217,19 @@ class EquilibriumPath:
         onward: bool = False,
     ) -> None:
         self.engine, self.scene, self._onward = engine, scene, onward
-        self.kept = [start, *further]
+        self.equilibria = [start, *further]
         self._beside: tuple[Equilibrium, Equilibrium] | None = None  # a kept one, and the last one found above it
 
     def __call__(self, fx: float) -> Packing:
         """The packing in equilibrium at fx."""
-        below = next((each for each in reversed(self.kept) if each.fx <= fx), self.kept[0])
+        below = next((each for each in reversed(self.equilibria) if each.fx <= fx), self.equilibria[0])
         if below.fx == fx:
             return below.packing
-        if fx > self.kept[-1].fx:
+        if fx > self.equilibria[-1].fx:
             # from the ramp alone, so that it does not depend on what is asked for in between
-            beside = self.kept[-2] if len(self.kept) > 1 else None
+            beside = self.equilibria[-2] if len(self.equilibria) > 1 else None
             found = next_equilibrium(self.engine, below, fx, self.scene, beside, self._onward)
-            self.kept.append(found)
+            self.equilibria.append(found)
             return found.packing
         beside = self._beside[1] if self._beside and self._beside[0] is below else None
         found = next_equilibrium(self.engine, below, fx, self.scene, beside, onward=False)
@@ -242,7 +242,7 @@ class EquilibriumPath:
             try:
                 self(float(fx))
             except NoEquilibriumError:
-                if len(self.kept) < 2:
+                if len(self.equilibria) < 2:
                     raise
                 return
-            yield self.kept[-1]
+            yield self.equilibria[-1]

@@ -52,11 +52,11 @@ def check(folder: Path, names: list[str]) -> None:
     sys.exit(len(wrong) > 0)
 
 
-MEASURED = {"measured": 1e-3}
+TOLERANCES = {"measured": 1e-3}
 """Relative difference that numbers whose name has this word may have: rates that were measured in runs."""
 
 
-def different(one: Any, other: Any, name: str = "", allowed: Mapping[str, float] = MEASURED) -> list[str]:
+def different(one: Any, other: Any, name: str = "", allowed: Mapping[str, float] = TOLERANCES) -> list[str]:
     """Names of what differs: numbers count as equal to six digits, but for those of which more is allowed."""
     if isinstance(one, dict) and isinstance(other, dict):
         keys = one.keys() & other.keys()  # what an older row lacks was added later

@@ -70,11 +70,11 @@ BOUNDS = (1e-3, 1e-2)
 def yielding(scene: Scene, settled: Equilibrium) -> dict[str, Any]:
     """One row: the static yield, the dynamic runs, the runs at finite rates."""
     path = branch(settled)
-    fy, last = scene.load.fy, path.kept[-1].fx
+    fy, last = scene.load.fy, path.equilibria[-1].fx
     return {
         "newton": path.newton / fy,
         "static": last / fy,
-        "static_by_increment": [[step, branch(settled, step).kept[-1].fx / fy] for step in INCREMENTS],
+        "static_by_increment": [[step, branch(settled, step).equilibria[-1].fx / fy] for step in INCREMENTS],
         "jumps": [[fx / fy, moved] for fx, moved in path.jumps],
         "dynamic": list(dynamic_runs(scene, path)),
         "loading": [
@@ -85,13 +85,14 @@ def yielding(scene: Scene, settled: Equilibrium) -> dict[str, Any]:
 
 
 def dynamic_runs(
-    scene: Scene, path: Branch, losses: Sequence[float] = LOSSES, draws: int = 1
+    scene: Scene, path: Branch, losses: Sequence[float] = LOSSES, draws: int = 1, *, all_layers: bool = False
 ) -> Iterator[dict[str, Any]]:
     """The runs from the equilibria at `SHARES` with each loss; loads between two that are borne may be none.
 
-    A run that noise decides is made with several draws of the noise; a stable layer has one row.
+    A run that noise decides is made with several draws of the noise; a stable layer has one row, unless all layers are
+    asked for.
     """
-    seed, last = scene.packing.model_dump().get("seed", 0), path.kept[-1].fx
+    seed, last = scene.packing.model_dump().get("seed", 0), path.equilibria[-1].fx
     for share in SHARES:
         here = path.borne(share * last)
         if here is None:
@@ -99,7 +100,7 @@ def dynamic_runs(
         for loss in losses:
             known = {"share": share, "restitution": loss, "fx_over_fy": here.fx / scene.load.fy}
             for draw in range(draws):
-                row = known | dynamic(here, dashpots(scene, loss), noise_seed(seed, draw))
+                row = known | dynamic(here, dashpots(scene, loss), noise_seed(seed, draw), all_layers=all_layers)
                 yield row | ({"draw": draw} if draws > 1 else {})
                 if row["ends"] == "stable":
                     break
@@ -115,12 +116,12 @@ def dashpots(scene: Scene, restitution: float) -> float:
     return dashpot(scene.law.kn, restitution, 1.0, impact_velocity(scene))
 
 
-def dynamic(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
-    """A run from an equilibrium with noise, and where it comes to rest."""
+def dynamic(start: Equilibrium, cn: float, seed: int, *, all_layers: bool = False) -> dict[str, Any]:
+    """A run from an equilibrium with noise, and where it comes to rest; of a stable layer only if it is asked for."""
     packing = with_dashpots(start.packing, cn)
     dt = time_step(packing)
     rate = growth_rate(packing)
-    if rate == 0:
+    if rate == 0 and not all_layers:
         return {"rate": rate, "ends": "stable", "largest_D": NOISE**2, "slip": 0.0, "D": NOISE**2}
     slip = largest = 0.0
     with Engine(packing) as engine:
@@ -167,8 +168,8 @@ def _bring_to_rest(engine: Engine, packing: Packing, slip: float, residual: floa
 
 def raise_load(path: Branch, cn: float, rate: float) -> dict[str, Any]:
     """The load rises at a rate up to the static yield: where the layer leaves the quasi-static path, where it flows."""
-    before = packing = with_dashpots(path.kept[0].packing, cn)
-    fy, last = packing.fy, path.kept[-1].fx
+    before = packing = with_dashpots(path.equilibria[0].packing, cn)
+    fy, last = packing.fy, path.equilibria[-1].fx
     duration = last / (rate * fy)
     dt = time_step(packing)
     looks = min(LOADING_LOOKS, int(duration / dt))
@@ -195,8 +196,8 @@ def raise_load(path: Branch, cn: float, rate: float) -> dict[str, Any]:
 
 def _distance_from_path(path: Branch, fx: float, now: Packing) -> float:
     """Root of D from the equilibrium at fx, disks that carry nothing there left out."""
-    place = max(1, next((k for k, each in enumerate(path.kept) if each.fx >= fx), len(path.kept) - 1))
-    below, above = path.kept[place - 1].packing, path.kept[place].packing
+    place = max(1, next((k for k, each in enumerate(path.equilibria) if each.fx >= fx), len(path.equilibria) - 1))
+    below, above = path.equilibria[place - 1].packing, path.equilibria[place].packing
     share = (fx - below.fx) / (above.fx - below.fx)
     between = below.position + share * nearest_image(above.position - below.position, below.box_length)
     away = nearest_image(now.position - between, below.box_length)

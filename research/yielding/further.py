@@ -4,11 +4,14 @@ python -m research.yielding.further rest FOLDER [SEED ...]      rows of lasting.
 python -m research.yielding.further draws FOLDER [SEED ...]     rows of draws.jsonl: further draws, and the standard law
 python -m research.yielding.further large FOLDER [SEED ...]     rows of quartz_400.jsonl, as those of the task "yield"
 python -m research.yielding.further standard FOLDER [SEED ...]  rows of standard_100.jsonl, loaded by the standard law
+python -m research.yielding.further bound FOLDER [SEED ...]     rows of bound_100.jsonl: all lossy ones of these
+python -m research.yielding.further sliding FOLDER [SEED ...]   rows of sliding_100.jsonl: what their growth needs
 """
 
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +24,8 @@ from faultgouge.studies.result_rows import append_row
 from faultgouge.studies.sweep.sweep_plan import read_toml
 from research.laws.both_laws import as_slider
 from research.modes.loss import with_dashpots
-from research.yielding.compute import NOISE, dashpots, dynamic, dynamic_runs, noise_seed
-from research.yielding.static import branch, layer_slip
+from research.yielding.compute import NOISE, SHARES, dashpots, dynamic, dynamic_runs, noise_seed
+from research.yielding.static import Branch, branch, layer_slip
 
 SCENE = Path(__file__).parent / "yield.toml"
 HISTORIES = ("total", "rescaled")
@@ -32,6 +35,12 @@ DRAWS = 3
 
 STANDARD_LOSSES = (1.0, 0.9)
 """Restitutions of the runs with the standard law."""
+
+FRICTION, RESTITUTIONS = (1.0, 1.01), (0.9, 0.7)
+"""Friction over that of the law, and restitutions, of the runs of `sliding`."""
+
+GROWN = 1e-15
+"""D in a run beyond which noise has grown. Contacts that shake down creep to 1e-18, and noise has 1e-24."""
 
 LARGE = {"disks": 400, "width": 23.8, "top": 20}
 
@@ -56,7 +65,7 @@ def lasting(seed: int) -> Iterator[dict[str, Any]]:
     given = scene(seed)
     path = branch(settle(given))
     for share in (0.97, 0.9):
-        here = path.borne(share * path.kept[-1].fx)
+        here = path.borne(share * path.equilibria[-1].fx)
         if here is None:
             continue
         for history in HISTORIES:
@@ -95,7 +104,7 @@ def draws(seed: int) -> Iterator[dict[str, Any]]:
     """Lossy runs at 0.97 of the static yield: further draws with total slips, all draws with the standard law."""
     given = scene(seed)
     path = branch(settle(given))
-    here = path.borne(0.97 * path.kept[-1].fx)
+    here = path.borne(0.97 * path.equilibria[-1].fx)
     if here is None:
         return
     cn = dashpots(given, 0.9)
@@ -108,18 +117,51 @@ def draws(seed: int) -> Iterator[dict[str, Any]]:
 
 def standard(seed: int) -> Iterator[dict[str, Any]]:
     """Static yield and dynamic runs of 100 disks that the standard law has loaded."""
+    given, path = with_slider(seed)
+    known = {"seed": seed, "newton": path.newton / given.load.fy, "static": path.equilibria[-1].fx / given.load.fy}
+    yield known | {"dynamic": list(dynamic_runs(given, path, STANDARD_LOSSES, DRAWS))}
+
+
+def bound(seed: int) -> Iterator[dict[str, Any]]:
+    """Runs of lossy layers that the standard law has loaded, whatever the spectrum says.
+
+    A contact at Coulomb's bound sticks in the spectrum. It slides on while a growing motion exceeds its last peak.
+    """
+    given, path = with_slider(seed)
+    known = {"seed": seed, "static": path.equilibria[-1].fx / given.load.fy}
+    yield known | {"dynamic": list(dynamic_runs(given, path, (0.9,), DRAWS, all_layers=True))}
+
+
+def sliding(seed: int) -> Iterator[dict[str, Any]]:
+    """The largest D of these runs with the friction that no contact reaches, and with more loss.
+
+    A little more friction changes no force of an equilibrium: it takes the contacts off the bound.
+    """
+    given, path = with_slider(seed)
+    for share in SHARES:
+        here = path.borne(share * path.equilibria[-1].fx)
+        if here is None:
+            continue
+        for friction, restitution in product(FRICTION, RESTITUTIONS):
+            law = replace(here.packing.law, mu=friction * here.packing.law.mu)
+            start = replace(here, packing=replace(here.packing, law=law))
+            known = {"seed": seed, "share": share, "friction": friction, "restitution": restitution}
+            known["at_bound"] = int(np.count_nonzero(start.packing.sliding))
+            yield known | dynamic(start, dashpots(given, restitution), seed, all_layers=True)
+
+
+def with_slider(seed: int) -> tuple[Scene, Branch]:
+    """The scene with the standard law, and the layer's path to its static yield."""
     given = scene(seed)
     given = given.model_copy(update={"law": given.law.model_copy(update={"history": "coulomb"})})
-    path = branch(settle(given))
-    known = {"seed": seed, "newton": path.newton / given.load.fy, "static": path.kept[-1].fx / given.load.fy}
-    yield known | {"dynamic": list(dynamic_runs(given, path, STANDARD_LOSSES, DRAWS))}
+    return given, branch(settle(given))
 
 
 def large(seed: int) -> Iterator[dict[str, Any]]:
     """Static yield and dynamic runs of 400 disks."""
     given = scene(seed, **LARGE)
     path = branch(settle(given))
-    known = {"seed": seed, "newton": path.newton / given.load.fy, "static": path.kept[-1].fx / given.load.fy}
+    known = {"seed": seed, "newton": path.newton / given.load.fy, "static": path.equilibria[-1].fx / given.load.fy}
     yield known | {"dynamic": list(dynamic_runs(given, path))}
 
 
@@ -130,6 +172,8 @@ if __name__ == "__main__":
         "draws": (draws, "draws"),
         "large": (large, "quartz_400"),
         "standard": (standard, "standard_100"),
+        "bound": (bound, "bound_100"),
+        "sliding": (sliding, "sliding_100"),
     }[kind]
     for seed in map(int, seeds or range(1, 21)):
         for row in compute(seed):

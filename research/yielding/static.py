@@ -56,7 +56,7 @@ class Branch:
 
     Attributes
     ----------
-    kept : list of Equilibrium
+    equilibria : list of Equilibrium
         By increasing F_x, the last one being the last that is borne.
     newton : float
         F_x of the last equilibrium before Newton's method first found none.
@@ -64,13 +64,13 @@ class Branch:
         F_x and distance of the layer, for each increment that dynamics took.
     """
 
-    kept: list[Equilibrium]
+    equilibria: list[Equilibrium]
     newton: float
     jumps: list[tuple[float, float]]
 
     def borne(self, fx: float) -> Equilibrium | None:
-        """The equilibrium at a load, from the kept one below it; None if the packing fails between two of these."""
-        below = next(each for each in reversed(self.kept) if each.fx <= fx)
+        """The equilibrium at a load, from the equilibrium below it; None if the packing fails between two of these."""
+        below = next(each for each in reversed(self.equilibria) if each.fx <= fx)
         try:
             return below if below.fx == fx else following(below, fx)[0]
         except FailedError:
@@ -79,20 +79,20 @@ class Branch:
 
 def branch(start: Equilibrium, increment: float = STEP) -> Branch:
     """Follow a packing from its first equilibrium to its static yield, in increments of F_x in units of F_y."""
-    kept = [start]
+    equilibria = [start]
     jumps: list[tuple[float, float]] = []
     newton: float | None = None
     step = increment * start.packing.fy
     while True:
-        last = kept[-1]
+        last = equilibria[-1]
         try:
-            found, moved = following(last, len(kept) * step)
+            found, moved = following(last, len(equilibria) * step)
         except FailedError:
-            return Branch(kept, last.fx if newton is None else newton, jumps)
+            return Branch(equilibria, last.fx if newton is None else newton, jumps)
         if moved is not None:
             newton = last.fx if newton is None else newton
             jumps.append((found.fx, moved))
-        kept.append(found)
+        equilibria.append(found)
 
 
 def following(last: Equilibrium, fx: float) -> tuple[Equilibrium, float | None]:

@@ -116,12 +116,12 @@ def _starts(scene: Scene, wanted: list[float], time: float) -> tuple[list[Start]
     with path_from(settle(scene, communicator=MPI.COMM_SELF), scene) as path:
         for fx in wanted:
             try:
-                for load in steps[(steps > path.kept[-1].fx) & (steps < fx)]:
+                for load in steps[(steps > path.equilibria[-1].fx) & (steps < fx)]:
                     path(float(load))
                 packing = path(fx)
             except NoEquilibriumError:
-                return starts, path.kept[-1].fx
-            residual = path.kept[-1].residual
+                return starts, path.equilibria[-1].fx
+            residual = path.equilibria[-1].residual
             free = replace(packing, law=replace(packing.law, cn=0.0, ct=0.0), drag_time=None)
             starts.append(Start(free, residual, time))
             if scene.damping is not None:

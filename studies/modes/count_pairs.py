@@ -232,15 +232,15 @@ def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[s
                 row["ends"] = "turning point"
                 break
             row["loads"].append({"fx_over_fy": share, "fx": packing.fx} | look(packing))
-    return row | {"reach": path.kept[-1].fx, "contacts": len(rest.packing.contacts)}
+    return row | {"reach": path.equilibria[-1].fx, "contacts": len(rest.packing.contacts)}
 
 
 def _climb_to(path: EquilibriumPath, fx: float, step: float) -> Packing:
     """The packing at fx, by multiples of the step up to there."""
-    for k in range(round(path.kept[-1].fx / step), int(fx / step) + 1):
-        if path.kept[-1].fx < k * step < fx:
+    for k in range(round(path.equilibria[-1].fx / step), int(fx / step) + 1):
+        if path.equilibria[-1].fx < k * step < fx:
             path(k * step)
-            del path.kept[:-2]  # thousands of equilibria of a large packing would fill the memory
+            del path.equilibria[:-2]  # thousands of equilibria of a large packing would fill the memory
     return path(fx)
 
 

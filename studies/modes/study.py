@@ -20,7 +20,7 @@ from .table import Table, medians_over_load
 
 COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q", "pairs_error")
 
-KEPT = ("ends", "reach", "contacts")
+PACKING_KEYS = ("ends", "reach", "contacts")
 """What modes.json has of a packing beside its loads."""
 
 PANELS = 4
@@ -77,7 +77,8 @@ def modes(
     by_key = {point.key: point for point in sweep.points}
     lines = [line for row in rows for line in _lines(row, by_key[row["key"]].scene)]
     ends = [
-        {"values": row["values"], "says": row["says"]} | {key: row["result"].get(key) for key in KEPT} for row in rows
+        {"values": row["values"], "says": row["says"]} | {key: row["result"].get(key) for key in PACKING_KEYS}
+        for row in rows
     ]
     result = {"asked": sweep.as_dict(), "rows": lines, "packings": ends}
     write_json(output / "modes.json", result)

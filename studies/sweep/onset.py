@@ -74,9 +74,9 @@ def first_window(path: EquilibriumPath, scene: Scene) -> tuple[Ends, float, Onse
     try:
         found = find_onset(path, loads(require_section(scene.ramp, "ramp")), first=True)
     except NoEquilibriumError:
-        return "flows", path.kept[-1].fx, None
+        return "flows", path.equilibria[-1].fx, None
     except OnsetError:
-        return "until", path.kept[-1].fx, None
+        return "until", path.equilibria[-1].fx, None
     return "onset", found.fx_c, found
 
 

@@ -126,7 +126,7 @@ def first_onset(scene: Scene, mu: float, start: Start) -> tuple[Row, tuple[Equil
         if found is not None:
             whole = with_path_error(found, path)
             reach, error = whole.fx_c, whole.error
-        return {"mu": mu, "ends": ends, "reach": reach, "error": error}, tuple(path.kept)
+        return {"mu": mu, "ends": ends, "reach": reach, "error": error}, tuple(path.equilibria)
 
 
 def eruption(

@@ -142,7 +142,7 @@ class OnceOnly(EquilibriumPath):
     failure: Exception
 
     def __call__(self, fx):
-        if all(each.fx != fx for each in self.kept):
+        if all(each.fx != fx for each in self.equilibria):
             raise self.failure
         return super().__call__(fx)
 
@@ -155,10 +155,10 @@ class OnceOnly(EquilibriumPath):
 def test_an_onset_is_kept_where_the_other_path_fails(failure):
     scene = scene_of(HUNDRED, "double", 5e-3, 0.02)
     with path_of(scene) as path:
-        start = path.kept[0]
+        start = path.equilibria[0]
         found = find_onset(path, np.array([0.0, 5e-3, 1e-2, 1.5e-2, 2e-2]))
         whole = with_path_error(found, path)
-        once = OnceOnly(path.engine, start, scene, path.kept[1:])
+        once = OnceOnly(path.engine, start, scene, path.equilibria[1:])
         once.failure = failure
         alone = with_path_error(found, once)
     assert alone.windows == found.windows

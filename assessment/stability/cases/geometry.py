@@ -147,7 +147,7 @@ def _wide(columns: int) -> Outcome:
 
 NARROW = {"packing": {"disks": 10, "top": 1, "width": 2.7}, "law": {"kn": KN}, "load": {"fy": 3.0}}
 
-REFUSED: dict[str, Callable[[], Outcome]] = {
+INVALID_GEOMETRY: dict[str, Callable[[], Outcome]] = {
     "box 2 wide": lambda: refused_outcome(lambda: crystal(2), "under two largest diameters"),
     "box under two diameters, a scene": lambda: refused_outcome(
         lambda: Scene.from_mapping(NARROW), "widen the box", SceneError
@@ -165,7 +165,7 @@ REFUSED: dict[str, Callable[[], Outcome]] = {
     "k_n infinite": lambda: refused_outcome(lambda: MindlinLaw(float("inf"), 1.0, 1.0), "must be finite"),
 }
 
-MEASURED: dict[str, Callable[[], Outcome]] = {
+VALID_GEOMETRY: dict[str, Callable[[], Outcome]] = {
     "one disk": _one_disk,
     "two disks": _two_disks,
     "three disks": _three_disks,
@@ -177,7 +177,7 @@ MEASURED: dict[str, Callable[[], Outcome]] = {
 }
 
 CASES = [
-    *(Case(GROUP, name, run, True) for name, run in MEASURED.items()),
+    *(Case(GROUP, name, run, True) for name, run in VALID_GEOMETRY.items()),
     *(Case(GROUP, f"box {wide} wide", partial(_wide, wide), wide < 100) for wide in (3, 10, 100, 1000, 10_000)),
-    *(Case(GROUP, name, run, "inside" not in name) for name, run in REFUSED.items()),
+    *(Case(GROUP, name, run, "inside" not in name) for name, run in INVALID_GEOMETRY.items()),
 ]

@@ -57,7 +57,7 @@ class OnsetMethods:
     def scan(self, increment: float, method: str = "newton") -> tuple[float, int]:
         """The onset in the middle of an increment, and the number of equilibria."""
         path, last = self._up(increment, method)
-        return (last - 0.5) * increment, len(path.kept) - 1
+        return (last - 0.5) * increment, len(path.equilibria) - 1
 
     def bisect(self, increment: float, halvings: int) -> tuple[float, int]:
         """The onset after a bisection of the scan's increment, and the number of equilibria."""
@@ -69,7 +69,7 @@ class OnsetMethods:
                 high = middle
             else:
                 low = middle
-        return 0.5 * (low + high), len(path.kept) - 1 + halvings
+        return 0.5 * (low + high), len(path.equilibria) - 1 + halvings
 
     def root(self, increment: float, beyond: float) -> tuple[float, int]:
         """The onset by the root of the discriminant on a ramp to the first increment beyond a force, and the number of
