@@ -28,7 +28,7 @@ from ..packing.packing import Floats, Indices
 from ..spectrum.spectrum import Complexes
 from .eigenvalue_pair import Pair, continue_pair, deepest_dip, dip_between
 from .march import look_between, march
-from .modes import Members, Modes, LoadPoint, assign_modes, neighbours
+from .modes import LoadPoint, Members, Modes, assign_modes, neighbours
 from .perturbation_screening import PairScreen, Screening
 from .window_edges import (
     DoubtError,

@@ -20,7 +20,7 @@ from ..packing.packing import Floats
 from .eigenvalue_pair import Pair, continue_pair, dip_between
 from .limits import LIMITS, Limits
 from .march import look_between
-from .modes import Operator, LoadPoint
+from .modes import LoadPoint, Operator
 
 Kind = Literal["coalescence", "contact change", "start"]
 

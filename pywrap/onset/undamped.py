@@ -132,9 +132,10 @@ def onset_run(
         except (OnsetError, NoEquilibriumError) as error:
             if not flows and isinstance(error, OnsetError):
                 raise
+            reached_load = path.equilibria[-1].fx
             raise NoEquilibriumError(
-                f"no pair of eigenvalues becomes complex up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was "
-                "found beyond: the packing flows before an onset"
+                f"no pair of eigenvalues becomes complex up to F_x = {reached_load:.10g}, and no equilibrium was found "
+                "beyond: the packing flows before an onset"
             ) from error
         last = path.equilibria[-1].fx
         extra = [] if near_onset is None else [fx for fx in onset.fx_c + near_onset if 0 <= fx <= last]
