@@ -40,14 +40,14 @@ class Stopwatch:
     def __call__(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """The same function, timed."""
 
-        def timed(*arguments: Any, **keywords: Any) -> Any:
+        def time_call(*arguments: Any, **keywords: Any) -> Any:
             begin = time.process_time()
             try:
                 return function(*arguments, **keywords)
             finally:
                 self.seconds += time.process_time() - begin
 
-        return timed
+        return time_call
 
 
 class TimedLammps:

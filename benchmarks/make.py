@@ -45,7 +45,7 @@ BENCHMARKS = {
 """By their names in the template."""
 
 
-def printed(command: str) -> str:
+def output_of(command: str) -> str:
     """What a command prints, run from the root of the repository with this Python."""
     print(f"$ {command}", file=sys.stderr, flush=True)
     words = shlex.split(command)
@@ -82,7 +82,7 @@ def main() -> None:
     chosen = {name: each.quick if options.quick else each.command for name, each in BENCHMARKS.items()}
     commands = {name: command for name, command in chosen.items() if command is not None}
     load = os.getloadavg()[0]
-    tables = {name: printed(command) for name, command in commands.items()}
+    tables = {name: output_of(command) for name, command in commands.items()}
     tables["parts"] = parts_table(tables["parts"])
     template = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True).from_string(
         (HERE / "benchmarks.md.j2").read_text()

@@ -47,7 +47,7 @@ create_atoms    1 box
 set             group all diameter 1.0
 """
 
-DISORDERED = """
+DISORDERED_SCENE = """
 read_data       {data}
 replicate       {times} 1 1
 """
@@ -98,7 +98,7 @@ def microseconds_per_step(style: str, disks: int, ranks: int, data: Path | None 
     pair, coefficients, integrator = STYLES[style]
     deck = DECK.format(
         y="p" if data is None else "f",
-        disks=hexagonal(disks) if data is None else DISORDERED.format(data=data, times=max(1, disks // 1000)),
+        disks=hexagonal(disks) if data is None else DISORDERED_SCENE.format(data=data, times=max(1, disks // 1000)),
         pair=pair,
         coefficients=coefficients,
         integrator=integrator,

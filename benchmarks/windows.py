@@ -108,7 +108,7 @@ def differences(here: Row, there: Row) -> list[str]:
     return found
 
 
-def opening(known: Row, found: Row) -> Row:
+def first_of(known: Row, found: Row) -> Row:
     """A row of the table with its first window alone; without the window's end where the search has not come so far."""
     windows = [dict(each) for each in known["windows"][:1]]
     if windows and found["windows"] and found["windows"][0]["fx_end"] is None:
@@ -155,7 +155,7 @@ def main() -> None:
                 options.table.write_text(json.dumps(table, indent=0) + "\n")
                 print(flush=True)
                 continue
-            known = opening(table[key], row) if options.first else table[key]
+            known = first_of(table[key], row) if options.first else table[key]
             found = differences(row, known)
             worst = max(worst, largest_shift(row, known))
             seconds = [seconds[0] + row["seconds"], seconds[1] + table[key]["seconds"]]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 FIRST, SECOND, OTHERS = "#0072b2", "#d55e00", "#8a949c"
 """The two of the pair, and all other eigenvalues: told apart by the colour-blind, on white and on black."""
 
-MOVED = {
+SOURCE_COLUMNS = {
     "disks": "x y radius face",
     "marks": "x0 y0 x1 y1",
     "chains": "x0 y0 x1 y1 px share",
@@ -100,7 +100,8 @@ def write_view(
     moved = layer_displacement(ramp)[:, 0] if ramp else np.zeros(len(packings))
     frames = [_frame(packing, course, k) | {"moved": moved[k]} for k, packing in enumerate(packings)]
     sources = {
-        name: ColumnDataSource({column: [] for column in columns.split()}, name=name) for name, columns in MOVED.items()
+        name: ColumnDataSource({column: [] for column in columns.split()}, name=name)
+        for name, columns in SOURCE_COLUMNS.items()
     }
     plots = [_packing_plot(packings, sources), _plane(course, sources)]
     if len(packings) > 1:

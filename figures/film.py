@@ -39,7 +39,7 @@ DOTS = 110
 LARGEST_SHOWN = 0.6
 """The largest displacement on the screen, in units of the smallest radius: disks stay beside their neighbours."""
 
-MOVED = LinearSegmentedColormap.from_list("moved", [BULK, "#f0b090", "#c0392b"])
+DISPLACEMENT_COLOURS = LinearSegmentedColormap.from_list("moved", [BULK, "#f0b090", "#c0392b"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +183,7 @@ class RunFilm(Film):
         view = View.of(packing, margin=2 * packing.radius.max())
         self._artist = PackingArtist(axes, packing, view=view, points=points)
         self._artist.chains.set(color=EDGE, linewidth=0.5, zorder=2)
-        self._artist.disks.set(array=np.zeros(len(view.disk)), cmap=MOVED, norm=Normalize(0, 1))
+        self._artist.disks.set(array=np.zeros(len(view.disk)), cmap=DISPLACEMENT_COLOURS, norm=Normalize(0, 1))
         self._says = axes.text(0.5, 1.01, "", transform=axes.transAxes, ha="center", va="bottom", fontsize=8)
         seen = self._msd > 0
         beside.plot(motion.time[seen], self._msd[seen], color=BULK, linewidth=1.2)

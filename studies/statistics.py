@@ -55,10 +55,10 @@ def exponent(
     """The exponent of a power law over the size, with its interval; of each sample `middle` gives the logarithm."""
     logs = np.log(sizes)
 
-    def fitted(groups: Sequence[Floats]) -> float:
+    def fit_slope(groups: Sequence[Floats]) -> float:
         return float(np.polyfit(logs, [middle(each) for each in groups], 1)[0])
 
-    return bootstrap_interval(fitted(samples), [fitted(each) for each in resample(samples, draws)])
+    return bootstrap_interval(fit_slope(samples), [fit_slope(each) for each in resample(samples, draws)])
 
 
 def median(values: Sequence[float] | Floats, draws: int = 2000) -> list[float]:

@@ -49,14 +49,14 @@ Open = list[tuple[DampedMode, Crossing]]
 Course = tuple[Open, list[DampedWindow]]
 """An increment: the modes that grow at its end, and the windows that end on it."""
 
-Announced = Course | float | None
+Announcement = Course | float | None
 """What the few modes do, or a load at which more is to be seen of them, or neither."""
 
 
 class AllGrowth:
     """The oracle of growing motion; it is sure of the course of an increment."""
 
-    finished = False
+    is_finished = False
 
     def __init__(self, pencil: Callable[[float], Pencil], narrowest: float, screen: GrowthScreen | None) -> None:
         self.at, self.narrowest, self.screen = pencil, narrowest, screen
@@ -70,24 +70,24 @@ class AllGrowth:
 
     # A few modes
 
-    def candidates(self, places: Sequence[Pencil], depth: int) -> Iterator[Announced]:
+    def candidates(self, places: Sequence[Pencil], depth: int) -> Iterator[Announcement]:
         """What the few modes do that may grow, or where to look for that; None where all modes have to tell."""
         for here, there in pairwise(places):
             clusters = self.screen(here, there) if self.screen and depth <= DEPTH else None
             if self.open is None:  # where no mode is a suspect, none grows
-                self.open = [] if clusters == [] else self.started(here)
+                self.open = [] if clusters == [] else self.find_growing_at_start(here)
             most = max(1, MOST * here.stiffness.shape[0] ** 2) / 2**depth
             if clusters is not None and len(clusters) > most:
                 clusters = None
-            course = None if clusters is None else self.followed(clusters, here, there)
+            course = None if clusters is None else self.follow_growing(clusters, here, there)
             yield None if depth == DEPTH and isinstance(course, float) else course
 
-    def started(self, here: Pencil) -> Open:
+    def find_growing_at_start(self, here: Pencil) -> Open:
         """The modes that grow at the smallest load."""
-        growing = [here.modes.mode(k) for k in here.modes.growing]
+        growing = [here.modes.mode(k) for k in here.modes.grows]
         return [(mode, Crossing(here.fx, 0.0, mode.rate.imag, "start")) for mode in growing]
 
-    def followed(self, clusters: list[Cluster], here: Pencil, there: Pencil) -> Course | float:
+    def follow_growing(self, clusters: list[Cluster], here: Pencil, there: Pencil) -> Course | float:
         """The modes that grow at either load, solved for; else a load in between, at which more is to be seen."""
         before, middle = self.open or [], 0.5 * (here.fx + there.fx)
         announced = [describe_search(cluster) for cluster in clusters]
@@ -97,7 +97,7 @@ class AllGrowth:
         after = [each.at(there, each.rate) for modes in announced if isinstance(modes, list) for each in modes]
         if any(mode is None for mode in after):
             return middle
-        growing = drop_duplicates([mode for mode in after if mode is not None and mode.growing])
+        growing = drop_duplicates([mode for mode in after if mode is not None and mode.grows])
         now: Open = []
         closed: list[DampedWindow] = []
         for mode, onset in before:
@@ -108,15 +108,15 @@ class AllGrowth:
             if known is not None:
                 now.append((growing.pop(known), onset))
                 continue
-            end = None if image.growing else self.crossing(mode, image)
+            end = None if image.grows else self.find_crossing(mode, image)
             if end is None:
                 return middle
             closed.append(window_of(onset, end))
         for mode in growing:
             origin = mode.at(here)
-            if origin is None or origin.growing or any(origin.same(each) for each, _ in before):
+            if origin is None or origin.grows or any(origin.same(each) for each, _ in before):
                 return middle
-            begin = self.crossing(origin, mode)
+            begin = self.find_crossing(origin, mode)
             if begin is None:
                 return middle
             now.append((mode, begin))
@@ -125,7 +125,7 @@ class AllGrowth:
     # All modes
 
     def confirm(
-        self, candidates: Announced, here: Pencil, there: Pencil, depth: int
+        self, candidates: Announcement, here: Pencil, there: Pencil, depth: int
     ) -> tuple[Course | None, list[Pencil]]:
         """What the few modes do, else the crossings of all, once nothing can hide in the increment any more."""
         if isinstance(candidates, tuple):
@@ -137,29 +137,29 @@ class AllGrowth:
         step = GrowthStep.of(here.modes, there.modes)
         middle = 0.5 * (here.fx + there.fx)
         divisible = there.fx - here.fx > self.narrowest
-        look = None if not divisible else middle if step.lost else self.unclear(step)
+        look = None if not divisible else middle if step.loses_growing_mode else self.unclear(step)
         crossings: dict[tuple[int, int], Crossing] = {}
         for pair in [] if look is not None else step.edges:
-            crossing = self.crossing(here.modes.mode(pair[0]), there.modes.mode(pair[1]))
+            crossing = self.find_crossing(here.modes.mode(pair[0]), there.modes.mode(pair[1]))
             if crossing is not None:
                 crossings[pair] = crossing
             elif divisible:
                 look = middle
                 break
         divide = [] if look is None else look_between(self.at, here.fx, look, there.fx)
-        return (None if divide else self.carried(step, crossings)), divide
+        return (None if divide else self.carry_windows(step, crossings)), divide
 
     def unclear(self, step: GrowthStep) -> float | None:
         """A load at which all modes have to be looked at, as a pair grows there or cannot be followed; else None."""
         for pair in step.suspects(self.narrowest):
             here = [step.here.mode(k) for k in pair]
             there = [step.there.mode(int(step.forward[k])) for k in pair]
-            fx = self.inspected(here, there)
+            fx = self.inspect_pair(here, there)
             if fx is not None:
                 return fx
         return None
 
-    def inspected(self, here: list[DampedMode], there: list[DampedMode]) -> float | None:
+    def inspect_pair(self, here: list[DampedMode], there: list[DampedMode]) -> float | None:
         """The same for one pair: it is followed to where the cubics see it grow, and from there to either side."""
         span = there[0].fx - here[0].fx
         slopes = [mode.change(there[0].pencil) for mode in here], [-mode.change(here[0].pencil) for mode in there]
@@ -175,12 +175,12 @@ class AllGrowth:
         modes = [mode for mode in found if mode is not None]
         if len(modes) < 2 or modes[0].same(modes[1]):
             return fx
-        ends = [sorted(mode.growing for mode in each) for each in (here, there)]
-        if sorted(mode.growing for mode in modes) not in ends:
+        ends = [sorted(mode.grows for mode in each) for each in (here, there)]
+        if sorted(mode.grows for mode in modes) not in ends:
             return fx
-        return self.inspected(here, modes) or self.inspected(modes, there)
+        return self.inspect_pair(here, modes) or self.inspect_pair(modes, there)
 
-    def crossing(self, here: DampedMode, there: DampedMode) -> Crossing | None:
+    def find_crossing(self, here: DampedMode, there: DampedMode) -> Crossing | None:
         """Where a mode crosses the axis between two loads; None if it cannot be followed or jumps."""
 
         def follow(nearest: list[DampedMode], fx: float) -> DampedMode:
@@ -196,7 +196,7 @@ class AllGrowth:
         except (LostPairError, NoEquilibriumError):
             return None
 
-    def carried(self, step: GrowthStep, crossings: dict[tuple[int, int], Crossing]) -> Course:
+    def carry_windows(self, step: GrowthStep, crossings: dict[tuple[int, int], Crossing]) -> Course:
         """The open windows over an increment, by where modes, by their numbers at both ends, cross the axis.
 
         Raises
@@ -204,7 +204,7 @@ class AllGrowth:
         LostTrackError
             If the modes that grow at its beginning are not those of the open windows.
         """
-        growing = set(step.there.growing.tolist())
+        growing = set(step.there.grows.tolist())
         now: dict[int, Crossing] = {}
         closed: list[DampedWindow] = []
         for k, onset in self._number_windows(step.here).items():
@@ -222,13 +222,13 @@ class AllGrowth:
     def _number_windows(self, here: DampedModes) -> dict[int, Crossing]:
         """The onsets of the open windows by the numbers of their modes."""
         known = self.open or []
-        if len(known) != len(here.growing):
+        if len(known) != len(here.grows):
             raise LostTrackError
         distances = np.abs(
-            np.subtract.outer(np.array([mode.rate for mode, _ in known], complex), here.rates[here.growing])
+            np.subtract.outer(np.array([mode.rate for mode, _ in known], complex), here.rates[here.grows])
         )
         places = assign_columns(1 / (distances + np.finfo(float).tiny))
-        return {int(here.growing[place]): onset for place, (_, onset) in zip(places, known, strict=True)}
+        return {int(here.grows[place]): onset for place, (_, onset) in zip(places, known, strict=True)}
 
     def record(self, sure: Course) -> None:
         """Take down the course of an increment."""
@@ -245,7 +245,7 @@ def describe_search(cluster: Cluster) -> list[DampedMode] | float:
     for each in oracle.closed:
         if each.kind != "start" and each.fx_end is not None and cluster.owns(each.frequency):
             return 0.5 * (each.fx_onset + each.fx_end)
-    return [cluster.lifted(mode) for mode in nearly_growing(cluster, there.modes)]
+    return [cluster.lift(mode) for mode in nearly_growing(cluster, there.modes)]
 
 
 def search_cluster(cluster: Cluster) -> tuple[AllGrowth, Pencil]:
@@ -263,10 +263,10 @@ def nearly_growing(cluster: Cluster, modes: DampedModes) -> list[DampedMode]:
     found = [modes.mode(int(k)) for k in near if cluster.owns(modes.rates[k].imag)]
     below, above = cluster.loads
     pencil = cluster.pencil(above + BEYOND * (above - below))
-    if np.count_nonzero(np.linalg.eigvals(pencil.system.matrix).real > 0) <= 2 * len(modes.growing):
+    if np.count_nonzero(np.linalg.eigvals(pencil.system.matrix).real > 0) <= 2 * len(modes.grows):
         return found
     further = DampedModes.of(pencil)
-    return found + [further.mode(int(k)) for k in further.growing if cluster.owns(further.rates[k].imag)]
+    return found + [further.mode(int(k)) for k in further.grows if cluster.owns(further.rates[k].imag)]
 
 
 def drop_duplicates(modes: Sequence[DampedMode]) -> list[DampedMode]:

@@ -6,8 +6,8 @@ are named, clusters about them announce where one begins to, and the operator co
 (:mod:`~faultgouge.analysis.damped_onset.perturbation_screening`).
 
 **Slices that are left out.** In each slice the antisymmetric part may be so many times larger before it can feed any
-motion as much as the motion loses (`Reduced.bears`). As long as it has not grown by `TRUSTED` of that, a slice is not
-looked at again.
+motion as much as the motion loses (`ReducedPencil.bears`). As long as it has not grown by `TRUSTED_SHARE` of that, a
+slice is not looked at again.
 
 **Strong dashpots** couple more modes than a cluster can have, and clusters may miss a motion. From the load on at which
 that is so, all motions that grow are looked for with the operator itself
@@ -27,7 +27,7 @@ from scipy.sparse.linalg import ArpackError
 
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..onset.eigenbasis import Basis, Levels
-from ..onset.first_window import Increments, Sliced, search_along
+from ..onset.first_window import Increments, SliceSearch, search_along
 from ..onset.limits import LIMITS, Limits
 from ..onset.ranks import ALONE, Ranks
 from ..onset.slice_store import Border, Candidate, SliceResult
@@ -41,7 +41,7 @@ from .modes import DampedMode, Pencil, find_growing_near, in_own_time
 from .perturbation_screening import LARGEST, Cluster, find_cores, group_clusters, may_grow, project_pencil, shift_load
 from .window_edges import Crossing, DampedWindow, solve_edge, window_of
 
-TRUSTED = 0.5
+TRUSTED_SHARE = 0.5
 """Share of what a slice bears up to which it is left out: its modes change on the way."""
 
 BEFOREHAND = 1.3
@@ -60,7 +60,7 @@ NEAREST = 12
 FARTHER = 2
 """Ratio of the numbers of two loads at which all motions are looked for: a look takes as long as two passes or more."""
 
-SETTLED = 0.02
+SETTLED_SHIFT = 0.02
 """Share of an increment by which the place of the largest growth may still move."""
 
 
@@ -98,14 +98,14 @@ def first_growing(
         If clusters miss motions, and those of the operator cannot be told from each other or followed.
     """
     own, unit = in_own_time(pencil, float(loads[0]))
-    oracle = SlicedGrowing(own, None, ranks, folder, limits)
+    oracle = SlicedGrowthSearch(own, None, ranks, folder, limits)
     first, doubtful = search_along(oracle, loads)
     if oracle.crowded:
         first, doubtful = oracle.look_at_all(loads, doubtful)
     return None if first is None else first.in_time(unit), doubtful
 
 
-class SlicedGrowing(Sliced[Pencil, DampedWindow]):
+class SlicedGrowthSearch(SliceSearch[Pencil, DampedWindow]):
     """The oracle of growing motion.
 
     Small differences of large couplings tell where weak dashpots begin to feed a mode. So clusters know that a mode is
@@ -122,9 +122,9 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
     _passing = False  # whether bases are not kept
 
     @property
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Whether the first window has been found, or all motions are to be looked for without clusters."""
-        return super().finished or (self.crowded and self._few_enough(self._passed[-1]))
+        return super().is_finished or (self.crowded and self._few_enough(self._passed[-1]))
 
     def _few_enough(self, place: Pencil) -> bool:
         """Whether all motions that grow at a load can be looked for."""
@@ -170,7 +170,7 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
             return [replace(each, candidates=[[] for _ in places[1:]]) for each in found]
         if self._borne is not None:
             for each in found:
-                self._borne[slice(*each.border.modes)] = TRUSTED * each.bears
+                self._borne[slice(*each.border.modes)] = TRUSTED_SHARE * each.bears
         return found
 
     def _look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[Pencil]) -> SliceResult:
@@ -264,19 +264,19 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
         announced = candidate.onset < there.fx  # else the mode nearly grows
         if mode is None and announced:
             mode = self._beside(guess, place, there)
-        if mode is not None and announced and not mode.growing:
+        if mode is not None and announced and not mode.grows:
             mode = self._most(mode, there)
-        if mode is None or not mode.growing or (first is not None and self._opens_later(mode, first)):
+        if mode is None or not mode.grows or (first is not None and self._opens_later(mode, first)):
             return None
         above = follow_mode(mode, there)
-        end = None if above.growing else self._edge(above, mode)
+        end = None if above.grows else self._edge(above, mode)
         return self._follow_back(mode, self._passed, end)
 
     def _follow_back(self, mode: DampedMode, passed: Sequence[Pencil], end: Crossing | None) -> DampedWindow:
         """The window of a mode that grows, followed back along the loads that were passed."""
         for place in reversed(passed):
             below = follow_mode(mode, place)
-            if not below.growing:
+            if not below.grows:
                 return window_of(self._edge(below, mode), end)
             mode = below
         return window_of(Crossing(mode.fx, 0.0, mode.rate.imag, "start"), end)
@@ -296,7 +296,7 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
                 except LostPairError:
                     pass
             middle = follow_mode(inside, self.at(0.5 * (outside.fx + inside.fx)))
-            outside, inside = (outside, middle) if middle.growing else (middle, inside)
+            outside, inside = (outside, middle) if middle.grows else (middle, inside)
         middle_fx, half = 0.5 * (outside.fx + inside.fx), 0.5 * abs(inside.fx - outside.fx)
         return Crossing(middle_fx, half, inside.rate.imag, "contact change")
 
@@ -308,7 +308,7 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
         """Whether a mode does not grow yet where the first window so far opens."""
         if mode.fx <= first.fx_onset:
             return False
-        return not follow_mode(mode, self.at(first.fx_onset)).growing
+        return not follow_mode(mode, self.at(first.fx_onset)).grows
 
     def _beside(self, guess: DampedMode, *places: Pencil) -> DampedMode | None:
         """A motion that grows at one of some loads, about the frequency at which one was announced; None if none does.
@@ -338,11 +338,11 @@ class SlicedGrowing(Sliced[Pencil, DampedWindow]):
                 known[middle] = at(middle)
             for _ in range(LOOKS):
                 best = max(known.values(), key=lambda each: each.rate.real)
-                if best.growing:
+                if best.grows:
                     return best
                 fx = parabola_vertex(sorted(known.values(), key=lambda each: abs(each.fx - best.fx))[:3])
                 fx = float(np.clip(fx, here.fx, there.fx))
-                if min(abs(fx - load) for load in known) < SETTLED * (there.fx - here.fx):
+                if min(abs(fx - load) for load in known) < SETTLED_SHIFT * (there.fx - here.fx):
                     return None
                 known[fx] = at(fx)
         except LostPairError as error:  # nothing is lost but what a cluster has announced
@@ -366,15 +366,15 @@ def find_growing(cluster: Cluster) -> Iterator[Candidate]:
     for window in windows:
         if oracle is not None and window.fx_end is not None and cluster.owns(window.frequency):
             modes = oracle.at(0.5 * (window.fx_onset + window.fx_end)).modes
-            if len(modes.growing):
-                nearest = min(modes.growing, key=lambda k: abs(modes.rates[k].imag - window.frequency))
-                yield make_candidate(window.fx_onset, cluster.lifted(modes.mode(int(nearest))))
+            if len(modes.grows):
+                nearest = min(modes.grows, key=lambda k: abs(modes.rates[k].imag - window.frequency))
+                yield make_candidate(window.fx_onset, cluster.lift(modes.mode(int(nearest))))
     begun = {window.frequency: window.fx_onset for window in windows if window.fx_end is None}
     for mode in nearly_growing(cluster, there.modes):
         onset = above
-        if mode.growing:
+        if mode.grows:
             onset = min(begun.items(), key=lambda each: abs(each[0] - mode.rate.imag))[1] if begun else below
-        yield make_candidate(onset, cluster.lifted(mode))
+        yield make_candidate(onset, cluster.lift(mode))
 
 
 def make_candidate(onset: float, mode: DampedMode) -> Candidate:

@@ -35,7 +35,7 @@ from .modes import DampedMode, Pencil, find_growing_near, refine_mode
 KRYLOV = 40
 """Dimension of a Krylov space: 80 cost a fifth more for the same length of the axis, 20 do not reach far enough."""
 
-CONVERGED = 1e-3
+RESIDUAL_LIMIT = 1e-3
 """Residual of an eigenvalue that counts as found, in units of its own: that of single precision is some 1e-4."""
 
 PIVOT = 0.01
@@ -47,7 +47,7 @@ TOUCH = 0.9
 AHEAD = 0.8
 """Distance of a new middle from what is covered, in units of the last disc's radius, as radii change."""
 
-STRAYED = 0.05
+STRAY_LIMIT = 0.05
 """Way that a refined eigenvalue may have gone, in units of its distance from the middle: else it is another one."""
 
 CLOSE = 1e-2
@@ -115,7 +115,7 @@ class Disc:
         order = np.argsort(-np.abs(inverse))
         inverse, vectors = inverse[order], vectors[:, order]
         residuals = small[steps, steps - 1].real * np.abs(vectors[-1]) / np.abs(inverse)
-        unknown = np.flatnonzero(residuals > CONVERGED)
+        unknown = np.flatnonzero(residuals > RESIDUAL_LIMIT)
         count = int(unknown[0]) if len(unknown) else steps
         radius = np.inf
         if len(unknown):
@@ -128,8 +128,8 @@ class Disc:
     def near_axis(self) -> list[int]:
         """Which of the eigenvalues may have a real part that is not negative."""
         distance = np.abs(self.values - self.middle)
-        near = self.values.real > -(CONVERGED + self.residuals) * distance
-        return np.flatnonzero(near & (self.values.imag > -CONVERGED * distance)).tolist()
+        near = self.values.real > -(RESIDUAL_LIMIT + self.residuals) * distance
+        return np.flatnonzero(near & (self.values.imag > -RESIDUAL_LIMIT * distance)).tolist()
 
 
 def growing_modes(pencil: Pencil) -> list[DampedMode]:
@@ -198,13 +198,13 @@ def growing_modes(pencil: Pencil) -> list[DampedMode]:
         if look(0.5 * (low + high)) < 0.5 * abs(size):
             half = 0.5 * size.real if size.real > size.imag else 0.5j * size.imag
             beside += [(low, high - half), (low + half, high)]
-    return drop_duplicates([mode for mode in found if mode.growing and mode.rate.imag >= 0])
+    return drop_duplicates([mode for mode in found if mode.grows and mode.rate.imag >= 0])
 
 
 def _solve(pencil: Pencil, x: Complexes, s: complex, distance: float) -> list[DampedMode]:
     """The mode of an eigenvalue that is nearly known; or those next to it that grow, where it is lost on the way."""
     mode = refine_mode(pencil, x, x.conj(), s)
-    if mode is not None and abs(mode.rate - s) < STRAYED * distance:
+    if mode is not None and abs(mode.rate - s) < STRAY_LIMIT * distance:
         return [mode]
     try:
         return find_growing_near(pencil, s, 1)

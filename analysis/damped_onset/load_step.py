@@ -33,10 +33,10 @@ class GrowthStep:
 
     @classmethod
     def of(cls, here: DampedModes, there: DampedModes) -> "GrowthStep":
-        forward = here.assigned(there)
-        grows = np.isin(np.arange(len(there)), there.growing)
-        ends = [k for k in here.growing if forward[k] >= 0 and not grows[forward[k]]]
-        begins = [k for k in np.flatnonzero(forward >= 0) if grows[forward[k]] and k not in here.growing]
+        forward = here.assign_to(there)
+        grows = np.isin(np.arange(len(there)), there.grows)
+        ends = [k for k in here.grows if forward[k] >= 0 and not grows[forward[k]]]
+        begins = [k for k in np.flatnonzero(forward >= 0) if grows[forward[k]] and k not in here.grows]
         for a in ends:
             for b in begins:
                 # shapes of two modes that nearly coalesce are alike: what goes on growing is then the same mode
@@ -47,16 +47,16 @@ class GrowthStep:
     @property
     def edges(self) -> list[tuple[int, int]]:
         """Modes that grow at one end alone."""
-        before = np.isin(np.arange(len(self.here)), self.here.growing)
+        before = np.isin(np.arange(len(self.here)), self.here.grows)
         known = np.flatnonzero(self.forward >= 0)
-        after = np.isin(self.forward[known], self.there.growing)
+        after = np.isin(self.forward[known], self.there.grows)
         return [(int(k), int(self.forward[k])) for k in known[before[known] != after]]
 
     @property
-    def lost(self) -> bool:
+    def loses_growing_mode(self) -> bool:
         """Whether a growing mode at one end is none of the modes at the other."""
-        unknown = np.setdiff1d(self.there.growing, self.forward)
-        return bool(len(unknown) or np.any(self.forward[self.here.growing] < 0))
+        unknown = np.setdiff1d(self.there.grows, self.forward)
+        return bool(len(unknown) or np.any(self.forward[self.here.grows] < 0))
 
     def suspects(self, narrowest: float) -> list[tuple[int, int]]:
         """Pairs of modes, by their numbers here, of which others may grow in between than at the ends."""

@@ -116,11 +116,11 @@ def in_own_time(pencil: Callable[[float], Pencil], fx: float) -> tuple[Callable[
     """
     unit = 2.0 ** (np.log2(unit_of(pencil(fx).stiffness)) // 2)
 
-    def divided(fx: float) -> Pencil:
+    def over_masses(fx: float) -> Pencil:
         place = pencil(fx)
         return Pencil(place.fx, place.stiffness / unit**2, place.damping / unit, place.balance)
 
-    return divided, float(unit)
+    return over_masses, float(unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ class DampedMode:
         return complex(np.vdot(self.left, 2 * self.rate * self.right + self.pencil.damping @ self.right))
 
     @property
-    def growing(self) -> bool:
+    def grows(self) -> bool:
         """Whether Re s > 0 beyond its uncertainty."""
         return bool(self.rate.real * self.overlap > SAFETY * self.pencil.rounding)
 
@@ -233,7 +233,7 @@ class DampedModes:
         return self.pencil.fx
 
     @property
-    def growing(self) -> Indices:
+    def grows(self) -> Indices:
         """Which of them have Re s > 0 beyond their uncertainty."""
         return np.flatnonzero(self.rates.real > self.uncertainty)
 
@@ -249,7 +249,7 @@ class DampedModes:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(-np.sum(y * force, axis=0) / slant)
 
-    def assigned(self, other: "DampedModes") -> Indices:
+    def assign_to(self, other: "DampedModes") -> Indices:
         """Which mode of a neighbouring load each mode here has become, shape (m,); -1 where there is none.
 
         Shapes decide, |x^H x'| |y^H y'|, and for shapes that two overdamped motions share, the eigenvalues.
@@ -312,7 +312,7 @@ def find_growing_near(pencil: Pencil, point: complex, count: int) -> list[Damped
     for s, x in zip(shift + 1 / values, states[:size].T, strict=True):
         if s.real > -1e-6 * abs(s):  # else it surely loses energy
             mode = refine_mode(pencil, _normalise(x), _normalise(x.conj()), s)
-            if mode is not None and mode.growing and mode.rate.imag >= 0:
+            if mode is not None and mode.grows and mode.rate.imag >= 0:
                 found.append(mode)
     return found
 

@@ -54,7 +54,7 @@ WEAK = 0.3
 MARGIN = 20
 """Modes of a cluster on either side: farther ones mix by less than a hundredth, and are there in first order."""
 
-TAKEN = 0.7
+DISSIPATED_SHARE = 0.7
 """Share of what dashpots take that has to exceed what the motion is fed: a cluster knows both to a few per cent."""
 
 APART = 10
@@ -65,15 +65,15 @@ LARGEST = 100, 1 / 3
 
 
 @dataclass(frozen=True, eq=False)
-class Reduced:
+class ReducedPencil:
     """H and Gamma at one load, 1 / time^2 and 1 / time."""
 
     stiffness: Levels
     damping: Levels
 
-    def mean(self, other: "Reduced") -> "Reduced":
+    def mean(self, other: "ReducedPencil") -> "ReducedPencil":
         """Half-way to another load."""
-        return Reduced(self.stiffness.beyond(other.stiffness, 0.5), self.damping.beyond(other.damping, 0.5))
+        return ReducedPencil(self.stiffness.beyond(other.stiffness, 0.5), self.damping.beyond(other.damping, 0.5))
 
     @cached_property
     def frequencies(self) -> Floats:
@@ -110,7 +110,7 @@ class Reduced:
         if not (softest > 0 and np.any(feed)):
             return 0.0 if softest <= 0 else np.inf
         try:
-            taken = TAKEN * np.sqrt(softest) * (loss + loss.T)
+            taken = DISSIPATED_SHARE * np.sqrt(softest) * (loss + loss.T)
             return 1 / float(eigh(1j * (feed - feed.T), taken, eigvals_only=True)[-1])
         except np.linalg.LinAlgError:
             return 0.0
@@ -145,7 +145,7 @@ class Cluster:
     ends: tuple[tuple[Floats, Floats], tuple[Floats, Floats]]
     right: Floats
     left: Floats
-    owned: tuple[float, float]
+    own_range: tuple[float, float]
 
     def pencil(self, fx: float) -> Pencil:
         """The small pencil at a load."""
@@ -159,7 +159,7 @@ class Cluster:
         softest = min(float(eigvalsh(0.5 * (each + each.T))[0]) for each in (a, b))
         turning = max(float(np.linalg.norm(each - each.T)) for each in (g, h))
         frequency = np.sqrt(max(0.0, softest)) - turning
-        forms = (TAKEN * frequency * (loss + loss.T) + 1j * (force - force.T) for force, loss in self.ends)
+        forms = (DISSIPATED_SHARE * frequency * (loss + loss.T) + 1j * (force - force.T) for force, loss in self.ends)
         try:
             return frequency > 0 and all(np.linalg.cholesky(form).size > 0 for form in forms)
         except np.linalg.LinAlgError:
@@ -167,9 +167,9 @@ class Cluster:
 
     def owns(self, frequency: float) -> bool:
         """Whether a motion of this frequency is its own, and no other cluster's."""
-        return self.owned[0] <= frequency <= self.owned[1]
+        return self.own_range[0] <= frequency <= self.own_range[1]
 
-    def lifted(self, mode: DampedMode) -> DampedMode:
+    def lift(self, mode: DampedMode) -> DampedMode:
         """A mode of the small pencil with its vectors on all coordinates."""
         x, y = self.right @ mode.right, self.left @ mode.left
         return replace(mode, right=x / np.linalg.norm(x), left=y / np.linalg.norm(y))
@@ -181,7 +181,7 @@ class GrowthScreen:
     def __init__(self) -> None:
         self._base: Pencil | None = None
         self._basis: Basis | None = None
-        self._seen: tuple[Pencil, Reduced] | None = None
+        self._seen: tuple[Pencil, ReducedPencil] | None = None
 
     def __call__(self, here: Pencil, there: Pencil) -> list[Cluster] | None:
         """The clusters; None if they are not known."""
@@ -206,17 +206,17 @@ class GrowthScreen:
         return [each for each in group_clusters(basis, (here, before), (there, after), cores) if not each.quiet]
 
 
-def project_pencil(basis: Basis, levels: Levels, pencil: Pencil) -> Reduced:
+def project_pencil(basis: Basis, levels: Levels, pencil: Pencil) -> ReducedPencil:
     """What a pencil is in a basis in which the levels of its stiffness are known."""
     nothing = Levels(np.zeros(len(basis.values)), np.zeros((len(basis.values),) * 2, np.float32))
-    return Reduced(levels, basis.change(nothing, pencil.damping))
+    return ReducedPencil(levels, basis.change(nothing, pencil.damping))
 
 
-def shift_load(basis: Basis, here: Pencil, reduced: Reduced, there: Pencil) -> Reduced:
+def shift_load(basis: Basis, here: Pencil, reduced: ReducedPencil, there: Pencil) -> ReducedPencil:
     """What is reduced at one load, at another."""
     if here is there:
         return reduced
-    return Reduced(
+    return ReducedPencil(
         basis.change(reduced.stiffness, there.stiffness - here.stiffness),
         basis.change(reduced.damping, there.damping - here.damping),
     )
@@ -228,7 +228,7 @@ def find_cores(suspects: Indices) -> list[Indices]:
 
 
 def group_clusters(
-    basis: Basis, here: tuple[Pencil, Reduced], there: tuple[Pencil, Reduced], cores: list[Indices]
+    basis: Basis, here: tuple[Pencil, ReducedPencil], there: tuple[Pencil, ReducedPencil], cores: list[Indices]
 ) -> Iterator[Cluster]:
     """The small pencils about some modes each."""
     if not cores:
@@ -244,16 +244,16 @@ def group_clusters(
         ends = here[1].between(left, right), there[1].between(left, right)
         spread = np.zeros((2, basis.size, len(modes)))
         spread[0, basis.active], spread[1, basis.active] = basis.vectors @ right, basis.vectors @ left
-        owned = _between(ordered, int(core[0])), _between(ordered, int(core[-1]) + 1)
-        yield Cluster((here[0].fx, there[0].fx), ends, spread[0], spread[1], owned)
+        own_range = _between(ordered, int(core[0])), _between(ordered, int(core[-1]) + 1)
+        yield Cluster((here[0].fx, there[0].fx), ends, spread[0], spread[1], own_range)
 
 
-def may_grow(here: Reduced, there: Reduced) -> Indices:
+def may_grow(here: ReducedPencil, there: ReducedPencil) -> Indices:
     """Modes that may grow at two loads or between them, in increasing order; those that hardly oscillate among them.
 
     Parameters
     ----------
-    here, there : Reduced
+    here, there : ReducedPencil
         The pencil at both loads, in one basis.
     """
     points = here, here.mean(there), there
@@ -267,7 +267,7 @@ def may_grow(here: Reduced, there: Reduced) -> Indices:
     return np.flatnonzero(strong | lost | (mixing > CLOSE))
 
 
-def _mixing_and_third_order(here: Reduced, there: Reduced, frequency: Floats) -> tuple[Floats, Floats]:
+def _mixing_and_third_order(here: ReducedPencil, there: ReducedPencil, frequency: Floats) -> tuple[Floats, Floats]:
     """The largest |V/g| of each mode with another, and the scale of the third order of Im sigma, 1 / time^2."""
     frequency = np.nan_to_num(frequency).astype(np.float32)
     h = np.maximum(here.stiffness.largest, there.stiffness.largest)

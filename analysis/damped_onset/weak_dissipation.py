@@ -178,4 +178,4 @@ def _follow_pair(equilibrium: Callable[[float], Packing], window: Window) -> Cal
     family = Family(lambda fx: full_operator(equilibrium(fx)), 0.0)
     onset = family.at(window.fx_onset)
     guess = onset.modes.pair(onset.modes.about(window.eigenvalue))
-    return family.track({onset.fx: family.followed(guess, onset)})
+    return family.track({onset.fx: family.follow_pair(guess, onset)})

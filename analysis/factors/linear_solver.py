@@ -232,7 +232,7 @@ class SparseSolver:
         known[nearby.coordinates] = True
         new = active[~known[active]]
 
-        def preconditioned(residual: Floats) -> Floats:
+        def apply_preconditioner(residual: Floats) -> Floats:
             spread = np.zeros_like(force)
             spread[active] = residual
             step = nearby.solve(spread)
@@ -240,12 +240,14 @@ class SparseSolver:
             return step[active]
 
         # from the right, so that its residual is a force
-        operator = LinearOperator(shape, lambda residual: self._matrix @ preconditioned(residual), dtype=np.float64)
+        operator = LinearOperator(
+            shape, lambda residual: self._matrix @ apply_preconditioner(residual), dtype=np.float64
+        )
         found, failed = gmres(operator, force[active], rtol=ACCURATE, restart=LONGEST, maxiter=1)
         if failed:
             return None
         step = np.zeros_like(force)
-        step[active] = preconditioned(found)
+        step[active] = apply_preconditioner(found)
         return step
 
 

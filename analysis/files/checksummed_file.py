@@ -88,7 +88,7 @@ class SealedFile:
             self._unsaved = True
 
     @property
-    def saved(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether the stored file has everything."""
         return not self._unsaved
 

@@ -46,7 +46,7 @@ from ..packing.contacts import Contacts
 from ..packing.law import MindlinLaw
 from ..packing.packing import Floats, Packing
 from .checksummed_file import SealedFile, new_file, write
-from .runfile_header import CHECKED, COMPACT, LAW_DEFAULTS, parameters_of, write_header
+from .runfile_header import CHECKSUM, COMPACT, LAW_DEFAULTS, parameters_of, write_header
 from .runfile_validation import equilibria
 
 
@@ -306,7 +306,7 @@ class RunFile(SealedFile):
                 if column not in group:
                     shape = array.shape[1:]
                     group.create_dataset(
-                        column, (0, *shape), array.dtype, maxshape=(None, *shape), chunks=True, **CHECKED
+                        column, (0, *shape), array.dtype, maxshape=(None, *shape), chunks=True, **CHECKSUM
                     )
                 group[column].resize(start + rows, axis=0)
                 group[column][start:] = array
@@ -344,7 +344,7 @@ class RunFile(SealedFile):
                 maxshape=(None,) * (value.ndim + 1),
                 chunks=(1, *value.shape) if value.size > 1 else True,
                 fillvalue=np.nan if number is np.float64 else 0,
-                **(COMPACT if value.ndim else CHECKED),
+                **(COMPACT if value.ndim else CHECKSUM),
             )
             for clock in ("step", "time"):
                 group[clock] = self._file[f"particles/disks/position/{clock}"]

@@ -15,13 +15,13 @@ from ..packing.packing import Packing
 
 CREATOR = "faultgouge"
 
-CHECKED = {"fletcher32": True}
+CHECKSUM = {"fletcher32": True}
 """A checksum for every chunk, for readers other than this one."""
 
 LAW_DEFAULTS = {field.name: field.default for field in fields(MindlinLaw) if field.default is not MISSING}
 """Parameters of the law that are in a file only if they are others than these."""
 
-COMPACT = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHECKED}
+COMPACT = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHECKSUM}
 """Filters of what is stored for every disk or contact: half the size, mostly from indices and equal leading bytes, at a
 few milliseconds for a thousand disks. Slower ones gain 3 % more."""
 
@@ -72,8 +72,8 @@ def write_header(file: h5py.File, packing: Packing) -> None:
     periodic = packing.box_length is not None
     box.attrs["boundary"] = np.array(["periodic" if periodic else "none", "none", "none"], dtype="S8")
     position = disks.create_group("position")
-    position.create_dataset("step", (0,), np.int64, maxshape=(None,), **CHECKED)
-    position.create_dataset("time", (0,), np.float64, maxshape=(None,), **CHECKED)
+    position.create_dataset("step", (0,), np.int64, maxshape=(None,), **CHECKSUM)
+    position.create_dataset("time", (0,), np.float64, maxshape=(None,), **CHECKSUM)
     shape = (len(packing), 3)
     position.create_dataset("value", (0, *shape), np.float64, maxshape=(None, *shape), chunks=(1, *shape), **COMPACT)
     # readers of H5MD take positions as float32, and observables as they are: a link, which takes no room

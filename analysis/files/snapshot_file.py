@@ -20,7 +20,7 @@ from ..packing.snapshot import PER_CONTACT, LinearisedContacts, Snapshot
 from .atomic_write import has_checksum
 from .checksummed_file import new_file, open_checksummed, write
 from .plain_file import check_plain
-from .runfile_header import CHECKED, CREATOR, program_version
+from .runfile_header import CHECKSUM, CREATOR, program_version
 from .runfile_validation import check_places, dataset
 
 SCALARS = ("dimension", "fx", "load_error")
@@ -66,7 +66,7 @@ def write_snapshot(path: Path, snapshot: Snapshot, attributes: Mapping[str, str 
         for name in PER_CONTACT:
             values = getattr(snapshot.contacts, name)
             group.create_dataset(
-                f"contacts/{name}", data=values, **(CHECKED if len(values) else {}), chunks=len(values) > 0 or None
+                f"contacts/{name}", data=values, **(CHECKSUM if len(values) else {}), chunks=len(values) > 0 or None
             )
         for name, said in (attributes or {}).items():
             file.attrs[name] = said

@@ -182,7 +182,7 @@ class BlockDiagonal:
         blocks = {int(np.searchsorted(columns, k)): block for k, block in self.blocks.items() if k in columns}
         return BlockDiagonal(self.basis[:, columns], self.inverse[columns], self.values[columns], blocks, self.reach)
 
-    def oscillating(self) -> "BlockDiagonal":
+    def oscillation_modes(self) -> "BlockDiagonal":
         """The modes of the system (z, z')' = ((0, 1), (-A, 0)) (z, z'), which has the rates +-i sqrt(A)."""
         root = 1j * np.sqrt(self.values)
         rate, inverse = np.diag(root), np.diag(1 / root)

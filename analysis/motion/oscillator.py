@@ -60,7 +60,7 @@ class Oscillator:
         if self.dt is not None and not 0 < self.dt < np.inf:
             raise ValueError(f"dt = {self.dt} must be positive and finite.")
 
-    def released(self, eigenvalue: ArrayLike, time: ArrayLike) -> OscillatorMotion:
+    def free_motion(self, eigenvalue: ArrayLike, time: ArrayLike) -> OscillatorMotion:
         """From x = 1 at rest, without forcing.
 
         Parameters
@@ -80,8 +80,8 @@ class Oscillator:
         squared = value if self.dt is None else value * (1 - 0.25 * value * self.dt**2)
         return OscillatorMotion(np.cos(frequency * t), -squared * _sine_over(frequency, t, self.dt))
 
-    def driven(self, eigenvalue: ArrayLike, time: ArrayLike) -> OscillatorMotion:
-        """From rest at x = 0 under the force cos(omega t); parameters as those of `released`."""
+    def forced_motion(self, eigenvalue: ArrayLike, time: ArrayLike) -> OscillatorMotion:
+        """From rest at x = 0 under the force cos(omega t); parameters as those of `free_motion`."""
         value, t = np.asarray(eigenvalue, dtype=np.complex128), np.asarray(time, dtype=np.float64)
         frequency, half = self._frequency(value), None if self.dt is None else 0.5 * self.dt
         fast, slow = frequency + self.omega, frequency - self.omega

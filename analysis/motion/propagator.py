@@ -83,7 +83,7 @@ class Propagator:
     function: Function
     twofold: bool = False
     """Whether each motion is the sum of two mirror images, of half its size."""
-    mirrored: bool = False
+    is_mirrored: bool = False
     """Whether the second half of the modes has the mirror images of the first."""
 
     @classmethod
@@ -93,12 +93,12 @@ class Propagator:
         root, size = system.root_mass, len(system.active)
         if not motion.dissipative and norm == "displacement":
             outward, inward = modes.basis / root[:, None], modes.inverse * root
-            return cls(modes, outward, inward, Oscillator().released)
+            return cls(modes, outward, inward, Oscillator().free_motion)
         if not motion.dissipative:
-            modes = modes.oscillating()
+            modes = modes.oscillation_modes()
             outward = np.concatenate([system.weight @ modes.basis[:size], modes.basis[size:]])
             inward = np.concatenate([modes.inverse[:, :size] @ system.unweight, modes.inverse[:, size:]], axis=1)
-            return cls(modes, outward, inward, released_motion, mirrored=True)
+            return cls(modes, outward, inward, released_motion, is_mirrored=True)
         outward, inward = modes.basis, modes.inverse
         if norm == "displacement":
             outward = (system.unweight / root[:, None]) @ outward[:size]
@@ -111,7 +111,7 @@ class Propagator:
         values = self.modes.values
         return np.abs(np.sqrt(values).real) if self.modes.reach is second_order else np.abs(values.imag)
 
-    def kept(self) -> Indices:
+    def sampled_modes(self) -> Indices:
         """The columns of the modes that are sampled: the most oblique ones, and pairs that are kept together."""
         weight = np.linalg.norm(self.outward, axis=0) * np.linalg.norm(self.inward, axis=1)
         weight *= 2 if self.twofold else 1
@@ -176,10 +176,10 @@ class Propagator:
 
     def at(self, time: Floats) -> Floats:
         """P(t), shape (T, a, b)."""
-        first = np.arange(len(self.modes.values) // (1 + self.mirrored))
+        first = np.arange(len(self.modes.values) // (1 + self.is_mirrored))
         modes, outward, inward = self.modes.some(first), self.outward[:, first], self.inward[first]
         part = modes.between(self.function, time, outward, inward).real
-        return np.ascontiguousarray(2 * part if self.mirrored else part)
+        return np.ascontiguousarray(2 * part if self.is_mirrored else part)
 
     def on(self, left: Floats, right: Floats) -> "Propagator":
         """L^T P(t) R of the columns L and R."""

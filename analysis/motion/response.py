@@ -127,7 +127,7 @@ class LinearMotion:
     ) -> tuple[Floats, Floats]:
         """Displacement and velocity of rows of the mass-weighted coordinates, under a force or from a displacement."""
         if not self.dissipative:
-            second = oscillator.driven if forced else oscillator.released
+            second = oscillator.forced_motion if forced else oscillator.free_motion
             displacement, velocity = self.modes.apply(second, time, vector, observed)
             return displacement.real, velocity.real
         system, rest, size = self.system, np.zeros_like(vector), len(observed)

@@ -9,7 +9,7 @@ peaks at omega,
 and a sweep :math:`s(t) = \sin\phi(t)` has a frequency :math:`\dot\phi` that changes linearly from one value to another.
 
 **Motion of the floor.** In the frame of a rigid floor with the acceleration a(t), the floor is at rest and a force
-:math:`-m a(t)` acts on every disk, exactly. Seismometers record velocities; `differentiated` computes accelerations
+:math:`-m a(t)` acts on every disk, exactly. Seismometers record velocities; `derivative` computes accelerations
 from velocities, by central differences at the samples.
 """
 
@@ -94,11 +94,11 @@ class Signal:
         """Values at any times, of the shape of `time`."""
         return np.interp(np.asarray(time, dtype=np.float64), self.time, self.value, left=0.0, right=0.0)
 
-    def scaled(self, scale: float = 1.0, stretch: float = 1.0) -> Signal:
+    def scale_by(self, scale: float = 1.0, stretch: float = 1.0) -> Signal:
         """The signal with its values times `scale` and its times times `stretch`."""
         return Signal(stretch * self.time, scale * self.value)
 
-    def differentiated(self) -> Signal:
+    def derivative(self) -> Signal:
         """Its time derivative, by central differences at the rows."""
         return Signal(self.time, np.gradient(self.value, self.time))
 

@@ -150,7 +150,7 @@ def _gain(motion: LinearMotion, norm: Norm) -> TransientGain:
     if norm == "energy" and not system.positive:
         raise NoGainError("the symmetric part of K is not positive: displacements have no energy to compare with")
     propagator = Propagator.of(motion, norm)
-    bound, columns = propagator.bound(), propagator.equilibria()
+    bound, columns = propagator.bound(), propagator.sampled_modes()
     if bound < 1 + SYMMETRIC:
         return _zero_gain(packing, norm, 0.0, bound)
     length = min(propagator.window(columns), propagator.end(bound))

@@ -40,10 +40,10 @@ class SliceError(FaultgougeError):
 
 
 Solve = Callable[[Floats], Floats]
-Factored = tuple[Solve, int]
+Factorization = tuple[Solve, int]
 
 
-def factor_shifted(matrix: csc_array, shift: float, mumps: bool = False) -> Factored:
+def factor_shifted(matrix: csc_array, shift: float, mumps: bool = False) -> Factorization:
     """The inverse of S - shift, and how many eigenvalues of S are below the shift: Sylvester's law of inertia.
 
     The factors are made without pivoting, so that the signs of the pivots tell the inertia. What stability that costs
@@ -60,7 +60,7 @@ def slices(
     margin: int,
     modes: tuple[int, int] | None = None,
     limits: Limits = LIMITS,
-    factorise: Callable[[csc_array, float], Factored] | None = None,
+    factorise: Callable[[csc_array, float], Factorization] | None = None,
     ranks: Ranks = ALONE,
     known: SlicePass = NEW_PASS,
 ) -> Iterator[Slice]:
@@ -99,7 +99,7 @@ def slices(
         wanted = [each for each in shifts if each[1] not in found]
         own = wanted[ranks.part(len(wanted))]
         try:
-            with known.taking() as take:
+            with known.lock_slices() as take:
                 for part in _in_turn(pool, ranks.workers, spectrum, own, margin, take):
                     mine.append(part.border)
                     _compare_slices(*mine[-2:])
@@ -143,7 +143,7 @@ class _Spectrum:
     """A symmetric matrix in an order that keeps its factors sparse."""
 
     def __init__(
-        self, matrix: csc_array, limits: Limits, factorise: Callable[[csc_array, float], Factored], ranks: Ranks
+        self, matrix: csc_array, limits: Limits, factorise: Callable[[csc_array, float], Factorization], ranks: Ranks
     ) -> None:
         self.limits, self.factorise, self.ranks = limits, factorise, ranks
         size = matrix.shape[0]
@@ -156,7 +156,7 @@ class _Spectrum:
         """How many eigenvalues are below the shift."""
         return self.factorise(self.matrix, shift)[1]
 
-    def counted(self, pool: ThreadPoolExecutor, shifts: Floats) -> list[int]:
+    def count_below(self, pool: ThreadPoolExecutor, shifts: Floats) -> list[int]:
         """How many eigenvalues are below each of some shifts; all ranks know what each has counted."""
         mine = shifts[self.ranks.part(len(shifts))]
         return [each for one in self.ranks.together(lambda: list(pool.map(self.below, mine))) for each in one]
@@ -169,17 +169,17 @@ class _Spectrum:
         start = np.random.default_rng(0).standard_normal(size)
         top = float(eigsh(self.matrix, k=1, which="LA", tol=1e-3, v0=start, return_eigenvectors=False)[0])
         places, numbers = np.array([-1e-9 * self.bound, 1.01 * top]), np.array([0, size])
-        numbers[0] = self.counted(pool, places[:1])[0]
+        numbers[0] = self.count_below(pool, places[:1])[0]
         while numbers[0] > 0 and places[0] > -self.bound:  # a few negative ones lie next to zero, far from the bound
             places = np.insert(places, 0, 10 * places[0])
-            numbers = np.insert(numbers, 0, self.counted(pool, places[:1])[0] if places[0] > -self.bound else 0)
+            numbers = np.insert(numbers, 0, self.count_below(pool, places[:1])[0] if places[0] > -self.bound else 0)
         while True:
             wanted = (numbers[1:] > first) & (numbers[:-1] < stop)
             wide = np.flatnonzero(wanted & (np.diff(numbers) > self.limits.coarse) & (np.diff(places) > 1e-6 * top))
             if len(wide) == 0:
                 break
             between = places[wide] + 0.5 * (places[wide + 1] - places[wide])
-            numbers = np.insert(numbers, wide + 1, self.counted(pool, between))
+            numbers = np.insert(numbers, wide + 1, self.count_below(pool, between))
             places = np.insert(places, wide + 1, between)
         numbers, last = np.unique(numbers[::-1], return_index=True)
         pieces = max(1, round((stop - first) / self.limits.own))
@@ -291,7 +291,7 @@ class _Krylov:
         firm, fresh = self.firm, self.basis[self.firm : self.used]
         products = fresh @ self.basis[: self.used].T
         strayed, among = products[:, :firm], products[:, firm:] - np.eye(len(fresh))
-        far, limit = np.linalg.norm(strayed, axis=1).max(), self.limits.strayed
+        far, limit = np.linalg.norm(strayed, axis=1).max(), self.limits.stray_limit
         if self.together and (far > limit or np.abs(among).max() > limit**2):
             self.used, self.together = firm, self.together - 1
         else:

@@ -147,7 +147,7 @@ class Basis(Slice):
         blocks = ((symmetric[each.modes, each.modes], self.values[each.modes]) for each in self.clusters)
         return [width_and_mixing(block, values)[1] for block, values in blocks]
 
-    def lifted(self, modes: slice | Indices, vectors: Floats | None = None) -> Floats:
+    def lift(self, modes: slice | Indices, vectors: Floats | None = None) -> Floats:
         """Modes of the basis, or combinations of them in columns, as vectors in the coordinates of the operator."""
         full = np.zeros((self.size, 2))
         full[self.active] = self.vectors[:, modes] if vectors is None else self.vectors[:, modes] @ vectors
@@ -193,14 +193,14 @@ class Bases:
         first, stop = self.range(matrix)
         limits = self.limits
         margins = 2 * (limits.margin + limits.beyond) * max(1, round((stop - first) / limits.own))
-        return (stop - first + margins) * matrix.shape[0] <= limits.equilibria
+        return (stop - first + margins) * matrix.shape[0] <= limits.largest_basis
 
     def at(self, matrix: csr_array, known: SlicePass = NEW_PASS) -> Iterable[tuple[Basis, Levels]]:
         """The bases, those of an earlier load as long as all ranks' serve, and the operator in them.
 
         Where they are not kept, those of the slices that are known are left out.
         """
-        serving = self._serving(matrix)
+        serving = self._usable_bases(matrix)
         if serving is not None:
             return serving
         bases: Iterable[Basis] = self._make_bases(matrix, known)
@@ -209,7 +209,7 @@ class Bases:
             bases = self._kept = list(bases)
         return ((basis, basis.levels(matrix)) for basis in bases)
 
-    def _serving(self, matrix: csr_array) -> list[tuple[Basis, Levels]] | None:
+    def _usable_bases(self, matrix: csr_array) -> list[tuple[Basis, Levels]] | None:
         """The bases that are kept and the operator in them; None if those of all ranks do not serve."""
         covering = all(basis.covers(matrix) for basis in self._kept)
         known = [(basis, basis.levels(matrix)) for basis in self._kept if covering]

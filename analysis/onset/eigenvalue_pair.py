@@ -122,7 +122,7 @@ class Pair:
         # The planes turn in first order, which changes invariants of the block in second order only.
         return float(2 * (b[0, 0] - b[1, 1]) * (db[0, 0] - db[1, 1]) + 4 * (db[0, 1] * b[1, 0] + b[0, 1] * db[1, 0]))
 
-    def extrapolated(self, other: "Pair", fx: float) -> "Pair | None":
+    def extrapolate(self, other: "Pair", fx: float) -> "Pair | None":
         """A guess of the pair at the load fx, force: planes on the line through those at two loads; None beyond FAR."""
         share = (fx - self.fx) / (other.fx - self.fx)
         if abs(share) > FAR:

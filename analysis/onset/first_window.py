@@ -61,7 +61,7 @@ P = TypeVar("P", bound=OperatorAtLoad)
 W = TypeVar("W", bound=GrowthWindow)
 
 
-class Sliced(ABC, Generic[P, W]):
+class SliceSearch(ABC, Generic[P, W]):
     """An oracle; its places are operators, and what it is sure of is a window.
 
     Parameters
@@ -103,7 +103,7 @@ class Sliced(ABC, Generic[P, W]):
         """
 
     @property
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Whether the first window has been found."""
         return self.first is not None
 
@@ -127,15 +127,15 @@ class Sliced(ABC, Generic[P, W]):
         """What the slices of all ranks have, by the order of the spectrum; those of other searches are waited for."""
         first, stop = self.bases.range(places[0].matrices[0])
         while True:
-            known = self._known(places)
-            fresh = self.ranks.together(partial(self._found, places, known))
+            known = self._stored_slices(places)
+            fresh = self.ranks.together(partial(self._search_slices, places, known))
             found = sorted(chain(known.found, *fresh), key=lambda each: each.border.modes)
             if known.folder is None or sum(each.border.size for each in found) == stop - first:
                 return found
             if not any(fresh):
                 time.sleep(self.limits.wait)
 
-    def _known(self, places: Sequence[P]) -> SlicePass:
+    def _stored_slices(self, places: Sequence[P]) -> SlicePass:
         """What other searches have left; nothing if bases are kept, as the increments beyond need these."""
         matrix = places[0].matrices[0]
         if self.folder is None or self.bases.keeps(matrix):
@@ -143,7 +143,7 @@ class Sliced(ABC, Generic[P, W]):
         folder = pass_folder(self.folder, places, self.bases.range(matrix), self.limits)
         return self.ranks.together(lambda: SlicePass.read(folder) if self.ranks.rank == 0 else NEW_PASS)[0]
 
-    def _found(self, places: Sequence[P], known: SlicePass) -> list[SliceResult]:
+    def _search_slices(self, places: Sequence[P], known: SlicePass) -> list[SliceResult]:
         """What this rank's slices have, without those that are known."""
         found: list[SliceResult] = []
         first, stop = self.bases.range(places[0].matrices[0])
@@ -219,7 +219,7 @@ class Sliced(ABC, Generic[P, W]):
         return first, doubt
 
 
-class SlicedPairs(Sliced[LoadPoint, Window]):
+class SlicedPairs(SliceSearch[LoadPoint, Window]):
     """The oracle of complex pairs of a family of matrices."""
 
     def __init__(self, family: Family, modes: tuple[int, int] | None, ranks: Ranks, folder: Path | None) -> None:
@@ -261,7 +261,7 @@ class SlicedPairs(Sliced[LoadPoint, Window]):
             modes = family.at(inside).modes
             pair = modes.pair(modes.about(window.eigenvalue, modes.complex_pairs))
             if cluster.owns(pair.right):
-                right, left = (basis.lifted(cluster.modes, plane) for plane in (pair.right, pair.left))
+                right, left = (basis.lift(cluster.modes, plane) for plane in (pair.right, pair.left))
                 yield Candidate(window.fx_onset, min(inside, there[0]), right, left)
 
     def _narrowest(self, increment: float) -> float:
@@ -285,13 +285,13 @@ class SlicedPairs(Sliced[LoadPoint, Window]):
 
     def _follow(self, pair: Pair, place: LoadPoint) -> Pair:
         """A pair at the same load, or another one."""
-        return pair if pair.fx == place.fx else self.family.followed(pair, place)
+        return pair if pair.fx == place.fx else self.family.follow_pair(pair, place)
 
     def _opens_later(self, inside: Pair, first: Window) -> bool:
         """Whether a pair is still real where the first window so far opens."""
         if inside.fx <= first.fx_onset:
             return False
-        below = self.family.followed(inside, self.family.at(first.fx_onset))
+        below = self.family.follow_pair(inside, self.family.at(first.fx_onset))
         return below.discriminant > 0 and returns_to_start(self.family, below, inside)
 
     def _complex_pair(self, candidate: Candidate, there: LoadPoint) -> Pair | None:
@@ -328,7 +328,7 @@ def first_window(
     return search_along(SlicedPairs(family, modes, ranks, folder), loads)
 
 
-def search_along(oracle: Sliced[P, W], loads: Floats) -> tuple[W | None, Increments]:
+def search_along(oracle: SliceSearch[P, W], loads: Floats) -> tuple[W | None, Increments]:
     """The first window that an oracle finds along a ramp, and the increments before it that are in doubt.
 
     Loads beyond the one above the onset are not asked for, except those of `Limits.ahead` increments; a
@@ -336,7 +336,7 @@ def search_along(oracle: Sliced[P, W], loads: Floats) -> tuple[W | None, Increme
     """
     here = oracle.at(float(loads[0]))
     done = 1
-    while done < len(loads) and not oracle.finished:
+    while done < len(loads) and not oracle.is_finished:
         ahead = 1 if oracle.bases.keeps(here.matrices[0]) else oracle.ahead(done)
         places = [here, *_reach_loads(oracle.at, loads[done : done + ahead])]
         march(oracle, places)

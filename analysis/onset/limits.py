@@ -105,7 +105,7 @@ class Limits:
     """Blocks at the most."""
     together: int = 2
     """Blocks that are made orthogonal to all before them at a time: three stray too far in most slices."""
-    strayed: float = 3e-6
+    stray_limit: float = 3e-6
     """Part of a new vector along the basis, up to which the part is taken away afterwards; some 1e-7 at 29,000
     coordinates. Its square, 1e-11, is what then remains in lengths and angles of the basis."""
     accurate: float = 1e-2
@@ -131,7 +131,7 @@ class Limits:
     """Parts of a doubtful increment: four cost little more than two while a basis passes by."""
     depth: int = 2
     """How often parts are divided again; the finest are a sixteenth."""
-    kept: float = 3e8
+    largest_basis: float = 3e8
     """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision."""
     ahead: int = 2
     """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""

@@ -21,28 +21,28 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import NoEquilibriumError
 
 At = TypeVar("At")  # what an oracle has of a load: the operator, or all of its modes
-Announced = TypeVar("Announced")  # what an oracle announces of an increment
+Announcement = TypeVar("Announcement")  # what an oracle announces of an increment
 Sure = TypeVar("Sure")  # what an oracle is sure of
 
 
-class Oracle(Protocol[At, Announced, Sure]):
+class Oracle(Protocol[At, Announcement, Sure]):
     """Who can tell what happens between two loads."""
 
     @property
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Whether all that is sought has been found."""
 
-    def candidates(self, places: Sequence[At], depth: int) -> Iterable[Announced]:
+    def candidates(self, places: Sequence[At], depth: int) -> Iterable[Announcement]:
         """What may happen on each of the increments between neighbouring places."""
 
-    def confirm(self, candidates: Announced, here: At, there: At, depth: int) -> tuple[Sure | None, Sequence[At]]:
+    def confirm(self, candidates: Announcement, here: At, there: At, depth: int) -> tuple[Sure | None, Sequence[At]]:
         """What does happen on one increment, to be recorded, and where to divide the increment if that is in doubt."""
 
     def record(self, sure: Sure) -> None:
         """Take down what is sure of an increment; increments come in order."""
 
 
-def march(oracle: Oracle[At, Announced, Sure], places: Sequence[At], depth: int = 0) -> None:
+def march(oracle: Oracle[At, Announcement, Sure], places: Sequence[At], depth: int = 0) -> None:
     """Go from the first to the last of two or more places at increasing loads, or to where the oracle is finished.
 
     `depth` is how often the increment has been divided of which these are the parts.
@@ -53,7 +53,7 @@ def march(oracle: Oracle[At, Announced, Sure], places: Sequence[At], depth: int 
             march(oracle, [here, *between, there], depth + 1)
         if sure is not None:
             oracle.record(sure)
-        if oracle.finished:
+        if oracle.is_finished:
             return
 
 

@@ -135,4 +135,4 @@ class PairScreen:
         after = basis.change(before, there - here)
         self._seen = there, after
         pairs = may_meet(before, after, self.limits.slack)
-        return [basis.lifted(pair) for pair in pairs] if len(pairs) <= self.limits.few else None
+        return [basis.lift(pair) for pair in pairs] if len(pairs) <= self.limits.few else None

@@ -73,10 +73,10 @@ class Instability:
     @classmethod
     def of(cls, packing: Packing | Snapshot) -> "Instability":
         """Count what all eigenvalues of a packing show, without contacts whose force is unknown."""
-        return cls.counted(spectrum(force_bearing(packing)))
+        return cls.from_spectrum(spectrum(force_bearing(packing)))
 
     @classmethod
-    def counted(cls, found: Spectrum) -> "Instability":
+    def from_spectrum(cls, found: Spectrum) -> "Instability":
         """The same of a spectrum that is known."""
         return cls(len(found.pairs), len(found.negative), found.growth_rate())
 
@@ -303,7 +303,7 @@ def find_onset(
     windows = tuple(_with_imbalance(window, unbalanced) for window in windows)
     unstable = None
     if windows[0].kind == "start" and (all_modes or takes_all):
-        unstable = Instability.counted(all_modes) if all_modes else Instability.of(start)
+        unstable = Instability.from_spectrum(all_modes) if all_modes else Instability.of(start)
     complete = takes_all and not first
     return Onset(windows, complete, doubtful, modes, unstable, float(ends) if ends < np.inf else None)
 

@@ -40,7 +40,7 @@ Take = Callable[[tuple[int, int]], bool]
 SHIFTS = "shifts.npz"
 """The file of all shifts: to find these, eigenvalues are counted, which takes minutes for 100,000 disks."""
 
-TAKEN = "taken"
+LOCK_FILE = "taken"
 """The file whose bytes are locked, each by the search that has taken the slice which begins at so many modes."""
 
 
@@ -192,7 +192,7 @@ class SlicePass:
         return [each.border for each in self.found]
 
     @contextmanager
-    def taking(self) -> Iterator[Take]:
+    def lock_slices(self) -> Iterator[Take]:
         """What takes a slice if no other search has it; all are given back at the end.
 
         A taken slice is a byte of a file that is locked. The system unlocks what a process leaves that dies. Where
@@ -203,7 +203,7 @@ class SlicePass:
             yield lambda modes: True
             return
         make_folder(folder)
-        with (folder / TAKEN).open("ab") as taken:
+        with (folder / LOCK_FILE).open("ab") as taken:
 
             def take(modes: tuple[int, int]) -> bool:
                 try:

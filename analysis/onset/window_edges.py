@@ -181,13 +181,13 @@ class Family:
         there = self.at(load)
         shortest = self.limits.bending * (load - here.fx)
 
-        def parted(below: LoadPoint, above: LoadPoint) -> list[LoadPoint]:
+        def divide_step(below: LoadPoint, above: LoadPoint) -> list[LoadPoint]:
             if above.fx - below.fx <= shortest or self.states(below.fx) == self.states(above.fx):
                 return [above]
             middle = look_between(self.at, below.fx, 0.5 * (below.fx + above.fx), above.fx)
-            return [*parted(below, middle[0]), *parted(middle[0], above)] if middle else [above]
+            return [*divide_step(below, middle[0]), *divide_step(middle[0], above)] if middle else [above]
 
-        places = [here, *parted(here, there)]
+        places = [here, *divide_step(here, there)]
         states = [self.states(place.fx) for place in places]
         smooth = [before == now == after for before, now, after in zip(states, states[1:], states[2:], strict=False)]
         return [place for place, inside in zip(places[1:], [*smooth, False], strict=True) if not inside]
@@ -197,13 +197,13 @@ class Family:
 
         def follow(nearest: list[Pair], fx: float) -> Pair:
             place = self.at(fx)
-            guess = nearest[0].extrapolated(nearest[1], fx) if len(nearest) > 1 else None
+            guess = nearest[0].extrapolate(nearest[1], fx) if len(nearest) > 1 else None
             image = None if guess is None else continue_pair(guess, fx, place.matrix, self.limits)
-            return image if image and image.same_planes(nearest[0]) else self.followed(nearest[0], place)
+            return image if image and image.same_planes(nearest[0]) else self.follow_pair(nearest[0], place)
 
         return track_pair(known, follow)
 
-    def followed(self, pair: Pair, place: LoadPoint) -> Pair:
+    def follow_pair(self, pair: Pair, place: LoadPoint) -> Pair:
         """A pair at another load: continued, found among all modes, or followed in small steps; else LostPairError."""
         image = continue_pair(pair, place.fx, place.matrix, self.limits)
         if image is None and place.matrix.shape[0] <= self.limits.all_modes:
@@ -251,18 +251,18 @@ def sign_change(value: Callable[[float], float], below: float, above: float, lim
         return SignChange(fx, min(map(abs, ends)) / (abs(ends[1] - ends[0]) / (above - below)), [fx], smooth=True)
     known: dict[float, float] = {}
 
-    def looked(fx: float) -> float:
+    def look_at(fx: float) -> float:
         known[fx] = value(fx)
         return known[fx]
 
-    root = _smooth_root(looked, below, above, limits)
+    root = _smooth_root(look_at, below, above, limits)
     if root is not None:
         return root
     width = _jump_width(below, above, limits)
     left, right = next((a, b) for a, b in pairwise(sorted(known)) if known[a] * known[b] <= 0)
     while right - left > width:
         middle = 0.5 * (left + right)
-        left, right = (middle, right) if looked(middle) * known[left] > 0 else (left, middle)
+        left, right = (middle, right) if look_at(middle) * known[left] > 0 else (left, middle)
     return SignChange(0.5 * (left + right), 0.5 * (right - left), [left, right], smooth=False)
 
 
@@ -316,7 +316,7 @@ def locate_edge(family: Family, here: Pair, there: Pair) -> tuple[Edge, Pair, Pa
         mean, overlap = float(np.mean([point.mean for point in points])), min(point.overlap for point in points)
         return Edge(change.fx, change.error, mean, overlap, "coalescence"), below, above
     # Where the equilibrium does not jump, it is the pair that has become another one on the way.
-    across = family.followed(below, LoadPoint(above.fx, above.matrix))
+    across = family.follow_pair(below, LoadPoint(above.fx, above.matrix))
     if across.discriminant * above.discriminant < 0 or not across.same_planes(above):
         raise LostPairError.of(above, f"at F_x = {above.fx:.10g}")
     return Edge.between(below.fx, above.fx, below, above), below, above
@@ -335,7 +335,7 @@ def edge_from_inside(family: Family, outside: Pair, inside: Pair) -> Edge:
                 return locate_edge(family, *sorted((outside, inside), key=lambda pair: pair.fx))[0]
             except LostPairError:
                 pass
-        middle = family.followed(inside, family.at(0.5 * (outside.fx + inside.fx)))
+        middle = family.follow_pair(inside, family.at(0.5 * (outside.fx + inside.fx)))
         outside, inside = (middle, inside) if middle.discriminant > 0 else (outside, middle)
     return Edge.between(outside.fx, inside.fx, outside, inside)
 

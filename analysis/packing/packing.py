@@ -209,10 +209,10 @@ class Packing:
     @cached_property
     def geometry(self) -> ContactGeometry:
         """Normals, tangents, distances and overlaps of the contacts."""
-        return self._measured[0]
+        return self._exact_geometry[0]
 
     @cached_property
-    def _measured(self) -> tuple[ContactGeometry, Pair, Pair]:
+    def _exact_geometry(self) -> tuple[ContactGeometry, Pair, Pair]:
         """The geometry, and the branch vectors and overlaps with their low parts."""
         return contact_geometry(self.position, self.position_low, self.radius, self.contacts, self.box_length)
 
@@ -265,7 +265,7 @@ class Packing:
         """f_n, f_t and n of the contacts; of a compensated packing in long doubles, which keep what low parts add."""
         if not self.compensated:
             return self.normal_force, self.tangential_force, self.geometry.normal
-        _, branch, overlap = self._measured
+        _, branch, overlap = self._exact_geometry
         delta = np.add(*overlap, dtype=np.longdouble)
         low = self.contacts.slip_low
         slip = np.add(self.contacts.slip, 0.0 if low is None else low, dtype=np.longdouble)

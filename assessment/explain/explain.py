@@ -34,7 +34,7 @@ from ...pywrap.scenes.sections import Ramp
 from ...pywrap.settling.settle import settle
 from .cost_comparison import FEW, SHARE, TURNS, Cost, Part, same_motion
 from .processors import ranks, threads
-from .switches import UNREACHED, Feature, InstanceContents, UndampedRun, features
+from .switches import UNREACHABLE_VELOCITY, Feature, InstanceContents, UndampedRun, features
 
 LARGEST = 400
 """Disks up to which a packing is settled to be explained: half a second. Of a larger one a strip of as many is, of the
@@ -103,11 +103,11 @@ def explain(scene: Scene) -> Explanation:
     run = _run_of(scene, start.packing)
     with temporary_folder() as name:
         folder = Path(name)
-        with run.started(MPI.COMM_SELF, folder / "scene.log") as (engine, _):
+        with run.start(MPI.COMM_SELF, folder / "scene.log") as (engine, _):
             loaded = InstanceContents.of(engine, folder / "scene.log")
         imported = tuple(package for package in HEAVY if package in sys.modules)
         bare = replace(run, motion={})
-        with bare.started(MPI.COMM_SELF) as (_, dynamics):
+        with bare.start(MPI.COMM_SELF) as (_, dynamics):
             steps = _steps(dynamics)
         parts = [_run_feature(feature, loaded, steps, folder) for feature in features(run)]
         parts += [_dumps(scene, start, folder), _contact_output(scene, bare, loaded, steps, folder)]
@@ -129,8 +129,8 @@ def _run_feature(feature: Feature, scene: InstanceContents, steps: int, folder: 
     """Both runs of a feature: what it loads, what it costs, and whether they agree."""
     with ExitStack() as both:
         logs = folder / "without.log", folder / "with.log"
-        without, plain = both.enter_context(feature.without.started(MPI.COMM_SELF, logs[0]))
-        with_it, switched = both.enter_context(feature.with_it.started(MPI.COMM_SELF, logs[1]))
+        without, plain = both.enter_context(feature.without.start(MPI.COMM_SELF, logs[0]))
+        with_it, switched = both.enter_context(feature.with_it.start(MPI.COMM_SELF, logs[1]))
         adds = InstanceContents.of(with_it, logs[1]).beyond(InstanceContents.of(without, logs[0]))
         others = ~np.isin(np.arange(len(feature.with_it.packing)), feature.touched)
         forces = without.net_force, with_it.net_force
@@ -194,7 +194,7 @@ def _trajectory(scene: Scene, start: Equilibrium, run: UndampedRun, steps: int, 
     wanted = scene.output is not None and scene.output.trajectory
     path = folder / "run.h5"
     with ExitStack() as stack:
-        (_, plain), (_, watched) = (stack.enter_context(run.started(MPI.COMM_SELF)) for _ in range(2))
+        (_, plain), (_, watched) = (stack.enter_context(run.start(MPI.COMM_SELF)) for _ in range(2))
         record = stack.enter_context(Record(path, scene, MPI.COMM_SELF))
         record.append(start)
         cost = Cost.of(
@@ -242,7 +242,7 @@ def _run_of(scene: Scene, packing: Packing) -> UndampedRun:
             motion["target"] = tuple(range(len(packing))) if perturb.target == "all" else perturb.target
     if scene.friction:
         law = scene.friction
-        motion["weakening"] = Weakening(B=law.B, w=law.w, mu_ss=law.mu_ss, v0=UNREACHED, v_ss=1.0)
+        motion["weakening"] = Weakening(B=law.B, w=law.w, mu_ss=law.mu_ss, v0=UNREACHABLE_VELOCITY, v_ss=1.0)
     return UndampedRun(packing, motion)
 
 

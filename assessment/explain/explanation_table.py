@@ -21,15 +21,15 @@ def in_words(explanation: Explanation) -> str:
         for part in outside
         if part.cost is not None and part.cost.per == "step" and part.cost.ratio[0] > 1
     }
-    first = f"In: {_listed(inside)}. Out: {_listed([part.name for part in outside])}"
+    first = f"In: {_join_names(inside)}. Out: {_join_names([part.name for part in outside])}"
     if not saves:
         return f"{first}; that saves no time that can be measured."
     dearest = sorted(saves, key=lambda name: -saves[name])
-    each = _listed([f"{saves[name]:.0f} % for {name}" for name in dearest])
+    each = _join_names([f"{saves[name]:.0f} % for {name}" for name in dearest])
     return f"{first}. A step would take longer by {each}, one at a time."
 
 
-def _listed(names: list[str]) -> str:
+def _join_names(names: list[str]) -> str:
     *others, last = names or ["nothing"]
     return f"{', '.join(others)} and {last}" if others else last
 

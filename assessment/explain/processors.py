@@ -49,8 +49,8 @@ def time_ranks(job: str) -> None:
     world = MPI.COMM_WORLD
     run, steps = pickle.loads(Path(job).read_bytes())
     with ExitStack() as both:
-        _, together = both.enter_context(run.started(world))
-        alone = both.enter_context(run.started(MPI.COMM_SELF))[1] if world.rank == 0 else None
+        _, together = both.enter_context(run.start(world))
+        alone = both.enter_context(run.start(MPI.COMM_SELF))[1] if world.rank == 0 else None
 
         def on_one() -> None:
             if alone is not None:

@@ -25,7 +25,7 @@ it is timed. The time that a step takes does not depend on it."""
 OWN_COMPUTES = {"thermo_temp", "thermo_press", "thermo_pe"}
 """Computes that LAMMPS makes in every instance. No deck asks for their values, except relaxations for the energy."""
 
-UNREACHED = 1e6
+UNREACHABLE_VELOCITY = 1e6
 """A threshold v_0 that no layer reaches: friction that could weaken, and does not."""
 
 
@@ -106,7 +106,7 @@ class UndampedRun:
     contacts: Path | None = None
 
     @contextmanager
-    def started(self, communicator: MPI.Comm, log: Path | None = None) -> Iterator[tuple[Engine, Dynamics]]:
+    def start(self, communicator: MPI.Comm, log: Path | None = None) -> Iterator[tuple[Engine, Dynamics]]:
         """LAMMPS, and its dynamics ready for `advance`."""
         # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
         stiffness = self.packing.law.stiffness_scale(10 * self.packing.fy)
@@ -167,7 +167,10 @@ def features(run: UndampedRun) -> Iterator[Feature]:
     yield from _of_contacts(bare, rough)
     weakening, reason = run.motion.get("weakening"), "section [friction]; measured below its threshold"
     if weakening is None:
-        weakening, reason = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=UNREACHED, v_ss=1.0), "no section [friction]"
+        weakening, reason = (
+            Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=UNREACHABLE_VELOCITY, v_ss=1.0),
+            "no section [friction]",
+        )
     weakens = replace(rough, motion={"weakening": weakening})
     yield Feature("dynamic friction", reason, rough, weakens, moves=False)
     yield from _of_damping(bare)

@@ -46,7 +46,7 @@ PATIENT = 200, 0.95
 """Iterations, and the factor of the residual that counts as a gain, where halving leads nowhere. Beside a contact that
 carries next to nothing, or slides nearly, the residual may fall by no more than 0.7 an iteration."""
 
-FREEING = 3
+FREEING_ITERATIONS = 3
 """Iterations in which a disk that is pushed out, and yet was not moved out of the way, gets p times Newton's step:
 its force goes as delta^p, a root of that order, and the factor makes the convergence quadratic again. Later ones take
 Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
@@ -57,11 +57,11 @@ MOVES = 3
 NOISE = 10
 """Rounding floors up to which a residual that no longer falls is one."""
 
-SPARED = 3
+REUSE_ITERATIONS = 3
 """Iterations that are made with the factors of K at hand if these suffice to reach the floor. New ones cost as much as
 two iterations at 100 disks, and one or two more follow."""
 
-SPARING = 300
+REUSE_SIZE = 300
 """Disks beyond which factors of K are used on whatever is left to go: new ones cost ten force evaluations and more."""
 
 REUSE_LIMIT = 0.1
@@ -149,7 +149,7 @@ def iterate_newton(
         step = None if factors is None else factors.solve(trial.force)
         if factors is None or step is None or too_long(step, base):
             return None, evaluations
-        if iteration < FREEING and factors.expelled.any():
+        if iteration < FREEING_ITERATIONS and factors.expelled.any():
             step.reshape(3, -1)[:, factors.expelled] *= base.law.exponent
         if base.compensated and trial.residual < NOISE * _floor_of(displacement, trial):
             base, since, displacement = trial.packing, trial.graph, np.zeros_like(displacement)
@@ -210,9 +210,9 @@ class _Course:
 
     def may_reuse_factors(self, residual: float, disks: int) -> bool:
         """Whether the factors of K at hand do for the next iteration."""
-        if residual * (residual / self._last) ** SPARED < 0.1 * self.floor:
+        if residual * (residual / self._last) ** REUSE_ITERATIONS < 0.1 * self.floor:
             return True
-        return disks > SPARING and residual <= REUSE_LIMIT * self._last
+        return disks > REUSE_SIZE and residual <= REUSE_LIMIT * self._last
 
     def go_on(self, residual: float) -> None:
         """Another iteration is made from here."""
@@ -225,26 +225,26 @@ class _Rattlers:
     def __init__(self, start: Trial, share: float) -> None:
         # no more than an equilibrium may leave
         nothing = max(NOISE * start.floor, share * float(start.derivatives.normal_force.max(initial=0.0)))
-        self._loose = (_carrying(start, nothing) == 0) & ~start.still.top
+        self._loose = (_count_bearing_contacts(start, nothing) == 0) & ~start.still.top
         self._moved = np.zeros(len(self._loose), dtype=np.int64)
 
     def find_hit(self, trial: Trial) -> Indices:
         """Those that a neighbour ran into, and disks with one contact left, which become rattlers; to be moved."""
-        count = _carrying(trial, trial.floor)
+        count = _count_bearing_contacts(trial, trial.floor)
         hit = ((count == 1) & ~trial.still.top) | (self._loose & (count > 0))
         disks = np.flatnonzero(hit & (self._moved < MOVES))
         self._moved[disks] += 1
         return disks
 
 
-def _carrying(trial: Trial, least: float) -> Floats:
+def _count_bearing_contacts(trial: Trial, least: float) -> Floats:
     """Number of contacts of each disk that carry more than a given force, shape (N,)."""
     return trial.graph.count(trial.derivatives.normal_force > least)
 
 
 def _floor_of(displacement: Floats, trial: Trial) -> float:
     """The rounding floor where the displacement is known to its last place only."""
-    return trial.rounded(trial.coordinate_rounding + EPSILON * float(np.abs(displacement).max()))
+    return trial.force_rounding(trial.coordinate_rounding + EPSILON * float(np.abs(displacement).max()))
 
 
 def too_long(step: Floats, packing: Packing) -> bool:

@@ -8,7 +8,7 @@ guess. The ramp of an onset uses the equilibrium before the last. A stored ramp 
 continues bitwise unchanged.
 
 If Newton's method fails, the increment is halved, because friction depends on the path. If this fails, other methods
-are tried (`TRIED`) before the packing is reported to flow.
+are tried (`ATTEMPTS`) before the packing is reported to flow.
 """
 
 from collections.abc import Iterable
@@ -42,7 +42,7 @@ of a branch the packing creeps, the longer the nearer: 800,000 steps of 100 disk
 LOOKS = 8
 """Looks at the layer during dynamics."""
 
-TRIED = (
+ATTEMPTS = (
     "smaller increments, more iterations, increments of other sizes, a larger increment and back, and overdamped "
     "dynamics from the last equilibrium"
 )
@@ -64,7 +64,7 @@ class Equilibrium:
     evaluations : int
         Number of force evaluations since the previous equilibrium.
     way : str or None
-        In words, which of the methods in `TRIED` led here, and from where; None if halving the increment was enough.
+        In words, which of the methods in `ATTEMPTS` led here, and from where; None if halving the increment was enough.
     """
 
     packing: Packing
@@ -122,8 +122,8 @@ def equilibrate(
         Another equilibrium near the last, at another fx, whose displacement gives the initial guess. It changes the
         result only within rounding.
     onward : bool
-        Whether to try the methods in `TRIED` if halving the increment fails. By default the branch of equilibria ends
-        there.
+        Whether to try the methods in `ATTEMPTS` if halving the increment fails. By default the branch of equilibria
+        ends there.
 
     Returns
     -------
@@ -135,12 +135,12 @@ def equilibrate(
         If no permitted method finds an equilibrium.
     """
     guess = _response(engine, last, fx) if beside is None else _in_proportion(last, beside, fx)
-    here = _halving(engine, last, fx, force_tolerance, guess)
+    here = _halve_increments(engine, last, fx, force_tolerance, guess)
     onward = onward and last.fx != fx
     if here.fx != fx and onward:
         here = _otherwise(engine, here, last, fx, force_tolerance)
     if here.fx != fx or here is last:
-        tried = f"; tried were {TRIED}" if onward else ""
+        tried = f"; tried were {ATTEMPTS}" if onward else ""
         raise NoEquilibriumError(
             f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there{tried}"
             f"{'' if here.packing.law.frictional else SMOOTH}",
@@ -149,7 +149,7 @@ def equilibrate(
     return here
 
 
-def _halving(
+def _halve_increments(
     engine: Engine, last: Equilibrium, fx: float, force_tolerance: float | None, guess: Guess | None
 ) -> Equilibrium:
     """The equilibrium at fx, or the furthest one, by Newton's method with increments that are halved where it fails."""
@@ -173,7 +173,7 @@ def _halving(
 def _otherwise(
     engine: Engine, here: Equilibrium, last: Equilibrium, fx: float, force_tolerance: float | None
 ) -> Equilibrium:
-    """The equilibrium at fx by the ways of `TRIED`, in that order; `here` if none leads there."""
+    """The equilibrium at fx by the ways of `ATTEMPTS`, in that order; `here` if none leads there."""
     routes: list[tuple[str, Equilibrium, list[float]]] = [("more iterations", here, [fx])]
     for count in PARTS:
         routes.append((f"{count} increments", last, np.linspace(last.fx, fx, count + 1)[1:].tolist()))

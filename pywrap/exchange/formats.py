@@ -81,8 +81,8 @@ FORMATS = (
 """LAMMPS has no suffixes of its own: data.NAME, dump.NAME and restart.NAME are known as well. YADE and MercuryDPM are
 told by the first line, whatever the name is; MercuryDPM's files have the suffix of LAMMPS's."""
 
-READ = {suffix: each for each in FORMATS if each.reader for suffix in each.suffixes}
-WRITTEN = {each.suffixes[0]: each for each in FORMATS if each.writer and each.alone}
+READERS = {suffix: each for each in FORMATS if each.reader for suffix in each.suffixes}
+WRITERS = {each.suffixes[0]: each for each in FORMATS if each.writer and each.alone}
 FILMS = {each.suffixes[0]: each for each in FORMATS if each.film}
 """Formats by suffix, for reading, for writing, and for writing several frames."""
 
@@ -113,7 +113,7 @@ def format_of(path: Path) -> Format:
     if begun is not None:
         return begun
     suffix = Path(path.stem).suffix if path.suffix.lower() == ".gz" else path.suffix
-    found = READ.get(suffix.lower())
+    found = READERS.get(suffix.lower())
     if found is not None and (suffix == path.suffix or found.text):
         return found
     begin = path.name.split(".")[0].lower()
@@ -203,9 +203,9 @@ def check_writer(path: Path, modes: bool = False) -> None:
     """Refuse a name that no writer takes, or modes in a format that has no room for them."""
     if path.suffix == ".pvd":
         raise BadInputError(f"-o {path}: a .pvd is a list of frames; add --frames all, or export a .vtp.")
-    if path.suffix not in WRITTEN:
-        raise BadInputError(f"-o {path}: exports are {', '.join(WRITTEN)}; give it one of these suffixes.")
-    if modes and not WRITTEN[path.suffix].modes:
+    if path.suffix not in WRITERS:
+        raise BadInputError(f"-o {path}: exports are {', '.join(WRITERS)}; give it one of these suffixes.")
+    if modes and not WRITERS[path.suffix].modes:
         raise BadInputError(f"-o {path}: LAMMPS data has no room for modes; leave --mode out, or export .vtp or .xyz.")
 
 
@@ -229,12 +229,12 @@ def write_packing(path: Path, packing: Packing, modes: Sequence[ModeVectors] = (
     Raises
     ------
     BadInputError
-        If the suffix is not in `WRITTEN`, or the format has no modes.
+        If the suffix is not in `WRITERS`, or the format has no modes.
     OutputError
         If the file cannot be written.
     """
     check_writer(path, bool(modes))
-    return _write(WRITTEN[path.suffix], path, [Frame(packing)], list(modes))
+    return _write(WRITERS[path.suffix], path, [Frame(packing)], list(modes))
 
 
 def _write(format_: Format, path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:

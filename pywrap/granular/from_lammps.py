@@ -244,7 +244,7 @@ class _Contacts:
         if self.commands.style == OWN:
             parts = [self._own_pairs(), *(self._own_floor(name, rows) for name, rows in self.walls.items())]
         else:
-            parts = self._measured()
+            parts = self._linearise_by_measured_laws()
         values = {name: np.concatenate([getattr(part, name) for part in parts]) for name in PER_CONTACT}
         return LinearisedContacts(**values)
 
@@ -272,7 +272,7 @@ class _Contacts:
         normal[np.arange(len(i)), axis] = np.sign(distance)
         return i, normal, self.radius[i] - np.abs(distance), rows[i, 1:4]
 
-    def _measured(self) -> list[LinearisedContacts]:
+    def _linearise_by_measured_laws(self) -> list[LinearisedContacts]:
         i, j, normal, distance, overlap, rows = self._pairs()
         a, b = np.minimum(self.kind[i], self.kind[j]), np.maximum(self.kind[i], self.kind[j])
         kinds = np.unique(np.stack([a, b], axis=1), axis=0)

@@ -64,7 +64,7 @@ class ContactGraph:
         return np.bincount(self._ends[0], minlength=len(self.radius))
 
     @cached_property
-    def held(self) -> Booleans:
+    def has_contact(self) -> Booleans:
         """Disks that have a contact, shape (N,)."""
         return self.degree > 0
 

@@ -123,10 +123,10 @@ class Trial:
     @cached_property
     def derivatives(self) -> Derivatives:
         """Forces and stiffnesses of the contacts; those that the displacement has led to Coulomb's bound slide on."""
-        return self.still.law.derivatives(self.branches.overlap, self.slip, self._parting, sliding=True)
+        return self.still.law.derivatives(self.branches.overlap, self.slip, self._parting_contacts, sliding=True)
 
     @property
-    def _parting(self) -> NDArray[np.bool_] | float:
+    def _parting_contacts(self) -> NDArray[np.bool_] | float:
         """Contacts whose overlap the displacement has reduced, shape (C,), as far as the law cares."""
         if not self.still.law.rescales or self.displacement is None:
             return 0.0
@@ -141,7 +141,7 @@ class Trial:
     def residual(self) -> float:
         """Largest force, with torque over radius, on a disk that has a contact."""
         square = (self.force * self.force).reshape(3, -1).sum(axis=0)
-        return math.sqrt(square[self.graph.held].max(initial=0.0))
+        return math.sqrt(square[self.graph.has_contact].max(initial=0.0))
 
     @cached_property
     def coordinate_rounding(self) -> float:
@@ -153,9 +153,9 @@ class Trial:
     @cached_property
     def floor(self) -> float:
         """As `rounding_floor`, force."""
-        return self.rounded(self.coordinate_rounding)
+        return self.force_rounding(self.coordinate_rounding)
 
-    def rounded(self, unit: float) -> float:
+    def force_rounding(self, unit: float) -> float:
         """As `rounding`, of an error of so much in every overlap."""
         return rounding(self.derivatives.normal_stiffness, self.graph, unit)
 

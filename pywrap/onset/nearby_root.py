@@ -20,7 +20,7 @@ STRAIGHT = 1e-3
 """Distance of a root, in half increments, up to which the slope of what vanishes is the same on all paths: both its
 curvature and the paths' difference change the slope by about this share."""
 
-SETTLED = 0.02
+SECANT_TOLERANCE = 0.02
 """Last secant step, in units of the shift, at which the shift is known: it only has to tell the size of an error."""
 
 
@@ -64,7 +64,7 @@ def _bracket_root(function: Callable[[float], float], fx: float, rounding: float
             if np.sign(function(fx + side * far)) == sign:
                 continue
             low, high = near, far
-            while high - low > max(SETTLED * high, rounding):
+            while high - low > max(SECANT_TOLERANCE * high, rounding):
                 middle = 0.5 * (low + high)
                 low, high = (middle, high) if np.sign(function(fx + side * middle)) == sign else (low, middle)
             return fx + side * high
@@ -87,7 +87,7 @@ def _secant(discriminant: Callable[[float], float], fx: float, rounding: float, 
         a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b
         if not abs(b - fx) < reach:
             return np.nan
-        if abs(b - a) <= max(SETTLED * abs(b - fx), rounding):
+        if abs(b - a) <= max(SECANT_TOLERANCE * abs(b - fx), rounding):
             return b
         at_b = discriminant(b)
     return b if abs(b - a) <= NOISY * rounding else np.nan

@@ -63,7 +63,7 @@ CARRIES = 1e-9
 FAILURES = NoEquilibriumError, OnsetError, ArpackError, LinAlgError
 """What another path may end in: an onset that is known is worth more than the error of its path."""
 
-MOVED = 1 / 3, 2 / 3
+SHIFTS = 1 / 3, 2 / 3
 """Shares of an increment by which the loads of two other paths are moved up where contacts change."""
 
 LONGEST_RUN = 2
@@ -144,7 +144,7 @@ def with_path_error(onset: Onset, path: EquilibriumPath) -> Onset:
     """
     others = OtherPaths(path)
     return replace(
-        onset, windows=tuple(_whole_error(window, meeting(window.eigenvalue), others) for window in onset.windows)
+        onset, windows=tuple(_whole_error(window, squared_gap(window.eigenvalue), others) for window in onset.windows)
     )
 
 
@@ -163,7 +163,7 @@ def with_damped_path_error(
         As in `with_path_error`.
     """
     others = OtherPaths(path)
-    return tuple(_whole_error(window, crossing(window.frequency, dissipation), others) for window in windows)
+    return tuple(_whole_error(window, growth_near(window.frequency, dissipation), others) for window in windows)
 
 
 W = TypeVar("W", bound=GrowthWindow)
@@ -200,7 +200,7 @@ class OtherPaths:
         self._coarser, self._finer, self._moved = (
             [path.equilibria[0]],
             [path.equilibria[0]],
-            [[path.equilibria[0]] for _ in MOVED],
+            [[path.equilibria[0]] for _ in SHIFTS],
         )
 
     def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
@@ -211,7 +211,7 @@ class OtherPaths:
         fx : float
             The onset as found on the path, force.
         vanishes : callable
-            Packing -> what goes through zero at the onset: `meeting` or `crossing`.
+            Packing -> what goes through zero at the onset: `squared_gap` or `growth_near`.
         rounding : float
             Uncertainty of fx from rounding, force.
 
@@ -228,7 +228,7 @@ class OtherPaths:
 
         slope = None
 
-        def shifted(through: Floats, known: list[Equilibrium]) -> float:
+        def shift_path(through: Floats, known: list[Equilibrium]) -> float:
             nonlocal slope
             try:
                 there = self._along(through, known)
@@ -237,12 +237,12 @@ class OtherPaths:
                 return np.nan
             return root - fx
 
-        shift = shifted(other, self._coarser)
+        shift = shift_path(other, self._coarser)
         weight = _cubes(other) / _cubes(ramp) - 1
         if not changed.any():
             return PathError(shift, 0.0, (), weight, False, rounding, increment)
-        finer = 0.0 if few else shifted(_halve_loads(ramp), self._finer)
-        moved = (shifted(_shift_loads(ramp, share), known) for share, known in zip(MOVED, self._moved, strict=True))
+        finer = 0.0 if few else shift_path(_halve_loads(ramp), self._finer)
+        moved = (shift_path(_shift_loads(ramp, share), known) for share, known in zip(SHIFTS, self._moved, strict=True))
         return PathError(shift, finer, tuple(moved), weight, True, rounding, increment)
 
     def changes(self, fx: float) -> NDArray[np.bool_]:
@@ -303,7 +303,7 @@ def _cubes(loads: Floats) -> float:
     return float(np.sum(np.diff(loads) ** 3))
 
 
-def meeting(eigenvalue: float) -> Vanishes:
+def squared_gap(eigenvalue: float) -> Vanishes:
     """(lambda_1 - lambda_2)^2 of the two eigenvalues nearest to one, 1 / time^4, as a function of the packing."""
 
     def discriminant(packing: Packing) -> float:
@@ -316,7 +316,7 @@ def meeting(eigenvalue: float) -> Vanishes:
     return discriminant
 
 
-def crossing(frequency: float, dissipation: Callable[[Packing], Packing]) -> Vanishes:
+def growth_near(frequency: float, dissipation: Callable[[Packing], Packing]) -> Vanishes:
     """Re s of the motion nearest to a frequency, 1 / time, as a function of the packing without its dissipation."""
     known: list[DampedMode] = []
 

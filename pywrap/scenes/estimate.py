@@ -36,13 +36,13 @@ LARGEST_FILE = 1e13
 """10 TB."""
 
 # Work, measured on packings of 30 to 10,000 disks.
-SETTLING = 100.0
+SETTLING_STEPS = 100.0
 """Steps to rest, in units of the time step that F_y's own time has: 26,000 at k_n = 2e5, F_y = 3, as many for 30 disks
 as for 100, and growing with (k_n/F_y)^(1/3) from 26,000 to 665,000."""
 SETTLING_WITH_FRICTION = 25.0
 """The same with packing.settle_friction, in units of the overdamped time step: between 11 and 33 for 30 disks, Hertz
 with k_n = 2e5 and 2e6 and harmonic with 2e4."""
-OVERDAMPED = 16_000
+OVERDAMPED_STEPS = 16_000
 """Steps of the default length in one increment of overdamped dynamics."""
 SECONDS_A_STEP = 2e-6, 1.7e-7
 """Of LAMMPS: of a step, and of a step for each disk."""
@@ -53,7 +53,7 @@ SECONDS_A_SEARCH = 4e-9, 3e-7
 WINDOWS = 14.0, 4.0
 """Windows a and b of a packing up to the load u, in units of F_y/N, as a u^2 / (u + b): 1 to 3 up to 0.7, 5 to 11 up to
 2, 78 up to 4 where they are most, 474 up to 35."""
-DAMPED = 2.5
+DAMPED_SEARCH_COST = 2.5
 """Of the search for growing motion beside that for complex pairs, in units of the latter: 1.3 to 4.5 for 100 disks."""
 DENSE = 300
 """Disks up to which the search takes all eigenvalues, and beyond which it ends at the first window."""
@@ -68,7 +68,7 @@ DASHPOTS = 0.013, 1.5e-3
 to 171; and the c/(k m)^(1/2), at a contact that carries F_y, from which on dashpots are strong."""
 DRAG = 3.5
 """Load of the first window with drag, in units of F_y/N, for any tau."""
-CROWDED = 0.02
+CROWDING_DASHPOT = 0.02
 """The c/(k m)^(1/2) from which on dashpots couple more modes than a cluster has: cn = 50 and 171 do."""
 SECONDS_OF_LOOKS = 3e-5
 """Of the three looks at all motions that grow, with such dashpots, for each disk squared."""
@@ -92,11 +92,11 @@ BYTES_AT_ALL = 4000
 # Refusals, each where nothing else could be meant.
 STEPS_TO_REST = 10_000_000
 """Steps after which the decks give up on a packing of up to 300 disks: 10,000 looks of 1000 steps."""
-SINKING = 400_000
+SINKING_STEPS = 400_000
 """Steps after which they give up on a stage of a larger one."""
 LEAST_SHARE = 0.4
-"""Of `SETTLING`, what a larger packing takes at the least in its first stage; and of `SETTLING_WITH_FRICTION`."""
-LOST = 5e-5
+"""Of `SETTLING_STEPS`, what a larger packing takes at the least in its first stage; and of `SETTLING_WITH_FRICTION`."""
+ROUNDING_LIMIT = 5e-5
 """Rounding of a force, in units of F_y, beyond which a bed never comes to the 1e-3 F_y that the first stage asks."""
 WORTH_SAYING = 10.0
 """Seconds from which on somebody wonders whether anything is happening."""
@@ -232,7 +232,7 @@ def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
             f"where the contact law does not hold: lower it, or raise law.kn = {law.kn:g}"
         )
     rounding = EPSILON * packing.width * _stiffness(scene, fy) / fy
-    if not rounding < LOST:
+    if not rounding < ROUNDING_LIMIT:
         return "law.kn", (
             f"= {law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of F_y, "
             "and no packing comes to rest: lower it, or raise load.fy"
@@ -241,7 +241,7 @@ def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
     if packing.settle_friction:
         ends = LEAST_SHARE * steps < STEPS_TO_REST
     else:
-        ends = steps < STEPS_TO_REST if packing.disks <= DENSE else LEAST_SHARE * steps < SINKING
+        ends = steps < STEPS_TO_REST if packing.disks <= DENSE else LEAST_SHARE * steps < SINKING_STEPS
     if not ends:
         return "law.kn", (
             f"= {law.kn:g} is too stiff for load.fy = {fy:g}: settling takes about {_count(steps)} time steps, more "
@@ -266,10 +266,10 @@ def _search_seconds(scene: SceneKeys, increments: float, damped: bool) -> float:
         load = increments * step / unit
         windows = WINDOWS[0] * load**2 / (load + WINDOWS[1])
         search = disks**3 * (SECONDS_A_SEARCH[0] * increments + SECONDS_A_SEARCH[1] * windows)
-        return search * (1 + DAMPED if damped else 1)
+        return search * (1 + DAMPED_SEARCH_COST if damped else 1)
     one = disks * (SECONDS_A_PASS[0] + SECONDS_A_PASS[1] * disks)
     kept, seconds = BYTES_OF_BASES[0] * disks**2 < BYTES_OF_BASES[1], 0.0
-    if damped and _dashpot_share(scene) > CROWDED:
+    if damped and _dashpot_share(scene) > CROWDING_DASHPOT:
         seconds += SECONDS_OF_LOOKS * disks**2
     for first, share in [(FIRST, 1.0), (_first_load(scene), DAMPED_PASS)][: 1 + damped]:
         searched = min(increments, first * unit / step) if step else 0.0
@@ -318,7 +318,7 @@ def _settling_steps(scene: SceneKeys) -> float:
     stiff = _stiffness(scene, FORCE_CHAINS * scene.load.fy) * 2 * min(scene.packing.radii) / scene.load.fy
     if scene.packing.settle_friction:
         return SETTLING_WITH_FRICTION * 4 * stiff  # overdamped
-    return SETTLING * math.sqrt(8 * stiff) / 0.8
+    return SETTLING_STEPS * math.sqrt(8 * stiff) / 0.8
 
 
 def _overdamped_step(scene: SceneKeys) -> float:
@@ -327,7 +327,7 @@ def _overdamped_step(scene: SceneKeys) -> float:
 
 def _overdamped_steps(scene: SceneKeys) -> float:
     step = scene.relax.time_step
-    return OVERDAMPED if step is None else OVERDAMPED * _overdamped_step(scene) / step
+    return OVERDAMPED_STEPS if step is None else OVERDAMPED_STEPS * _overdamped_step(scene) / step
 
 
 def _undamped_step(scene: SceneKeys) -> float:

@@ -122,7 +122,7 @@ class StoredPacking(Section):
 
     @field_validator("file")
     @classmethod
-    def _known(cls, file: Path, info: ValidationInfo) -> Path:
+    def _check_file(cls, file: Path, info: ValidationInfo) -> Path:
         folder: Path = (info.context or {}).get("folder", Path())
         path = Path(os.path.realpath(folder / file))  # Path.resolve fails on a loop of links
         try:

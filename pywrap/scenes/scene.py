@@ -95,7 +95,7 @@ class Scene(SceneKeys):
         path = Path(path)
         mapping = read_toml(path, "scene")
         whole = mapping if packing is None else mapping | {"packing": packing}
-        return cls._checked(whole, path.parent, str(path), command)
+        return cls._check(whole, path.parent, str(path), command)
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any], folder: str | Path = ".", command: str | None = None) -> "Scene":
@@ -119,10 +119,10 @@ class Scene(SceneKeys):
         SceneError
             If the mapping does not describe a scene that can be run.
         """
-        return cls._checked(mapping, Path(folder), "scene", command)
+        return cls._check(mapping, Path(folder), "scene", command)
 
     @classmethod
-    def _checked(cls, mapping: Mapping[str, Any], folder: Path, name: str, command: str | None) -> "Scene":
+    def _check(cls, mapping: Mapping[str, Any], folder: Path, name: str, command: str | None) -> "Scene":
         wanted = COMMANDS.get(command or "", ALL)
         context: dict[str, Any] = {"folder": folder}
         try:

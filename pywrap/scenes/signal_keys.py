@@ -65,7 +65,7 @@ class SignalKeys(Section):
 
     @model_validator(mode="after")
     def _forcing(self) -> SignalKeys:
-        wrong = self._unfit() or self._missing()
+        wrong = self._unfit() or self._missing_key()
         if wrong:
             raise refusal_sentence(*wrong)
         try:
@@ -94,7 +94,7 @@ class SignalKeys(Section):
                 return key, 'stands without signal: give signal = "pulse", "sweep" or a file'
         return None
 
-    def _missing(self) -> tuple[str, str] | None:
+    def _missing_key(self) -> tuple[str, str] | None:
         """The first key that is not there and should be, and why."""
         if self.amplitude > 0 and self.omega is None:
             return "omega", "is missing: an amplitude needs the frequency of its forcing"
@@ -116,13 +116,13 @@ class SignalKeys(Section):
         if self.signal in KINDS:
             assert self.omega is not None
             wave = pulse(self.omega) if self.signal == "pulse" else sweep(self.omega, self.omega_end or 0.0, self.time)
-            signal = wave.scaled(self.amplitude)
+            signal = wave.scale_by(self.amplitude)
         else:
-            signal = read_signal(self.signal, self.channel).scaled(
+            signal = read_signal(self.signal, self.channel).scale_by(
                 1.0 if self.scale is None else self.scale, self.stretch or 1.0
             )
         for _ in range(DERIVATIVES[self.quantity or "velocity"] if self.on == "floor" else 0):
-            signal = signal.differentiated()
+            signal = signal.derivative()
         return signal
 
     def check_samples(self, dt: float) -> None:

@@ -213,12 +213,12 @@ def restitution(kn: float, cn: float, mass: float, velocity: float) -> float:
         overlap = max(state[0], 0.0)
         return [state[1], -2 * (overlap**1.5 + damping * np.sqrt(overlap) * state[1])]
 
-    def parted(_: float, state: np.ndarray) -> float:
+    def disks_part(_: float, state: np.ndarray) -> float:
         # they part where the force would pull, which is before the overlap is gone
         return state[0] + damping * state[1] if state[1] < 0 else 1.0
 
-    parted.terminal = True  # type: ignore[attr-defined]  # what solve_ivp looks for
-    path = solve_ivp(course, (0.0, 100.0), [0.0, 1.0], events=parted, rtol=1e-10, atol=1e-12, max_step=0.05)
+    disks_part.terminal = True  # type: ignore[attr-defined]  # what solve_ivp looks for
+    path = solve_ivp(course, (0.0, 100.0), [0.0, 1.0], events=disks_part, rtol=1e-10, atol=1e-12, max_step=0.05)
     return float(max(0.0, -path.y[1, -1]))
 
 

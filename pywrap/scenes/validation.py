@@ -49,7 +49,7 @@ KEYS = {
 """What a section needs at least."""
 
 
-MISSING = {"friction.v_ss": ', and the paper gives no value: give a velocity, or a multiple such as "10 v0"'}
+MISSING_KEY_ADVICE = {"friction.v_ss": ', and the paper gives no value: give a velocity, or a multiple such as "10 v0"'}
 """What is said of a key that is missing, where it is more than to add the key."""
 
 
@@ -108,7 +108,7 @@ def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ..
         return f"{place} {context['says']}"
     if kind == "missing":
         what = f"{path[1]} to [{path[0]}]" if len(path) > 1 else f"the section [{place}]"
-        return f"{place} is missing{MISSING.get(place, f': add {what}')}"
+        return f"{place} is missing{MISSING_KEY_ADVICE.get(place, f': add {what}')}"
     if not path:
         return "a scene maps the names of sections to their keys, and this one is no mapping: give a dict"
     if kind in ("model_type", "model_attributes_type", "dict_type"):

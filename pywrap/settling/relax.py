@@ -18,7 +18,7 @@ from ..equilibria.rattlers import clear_rattlers
 from ..lammps.engine import Engine
 from .minimize_energy import ABOVE_ROUNDING, TOLERANCES, contact_rounding, largest_force, settle_loose
 
-SEEN = 0.01
+MOTION_LIMIT = 0.01
 """Displacement, in radii of the disk, from which a disk counts as moved."""
 
 
@@ -69,11 +69,11 @@ def _what_moved(before: Packing, found: Equilibrium) -> str:
     """What coming to rest has done to a packing, in words."""
     after = found.packing
     moved = np.hypot(*nearest_image(after.position - before.position, after.box_length).T)
-    far = int(np.sum(moved > SEEN * after.radius))
+    far = int(np.sum(moved > MOTION_LIMIT * after.radius))
     old, new = (set(zip(p.contacts.i.tolist(), p.contacts.j.tolist(), strict=True)) for p in (before, after))
     return (
         f"brought to rest: the largest force on a disk was {largest_force(before):.3g} and is {found.residual:.2g}; "
-        f"{far} of {len(after)} disks moved by more than {SEEN:.0%} of their radius, the farthest by "
+        f"{far} of {len(after)} disks moved by more than {MOTION_LIMIT:.0%} of their radius, the farthest by "
         f"{moved.max():.3g}, all by {np.sqrt(np.mean(moved**2)):.3g} (rms); {len(new - old)} contacts closed and "
         f"{len(old - new)} opened"
     )

@@ -28,7 +28,7 @@ def onsets_figure(onsets: Table, predicted: Floats) -> Figure:
     figure = Figure(figsize=(6.8, 3.1), layout="constrained")
     left, right = figure.subplots(1, 2)
     for number, mu in enumerate(FRICTION):
-        part = onsets.where(law_mu=mu).settled
+        part = onsets.where(law_mu=mu).at_rest
         _survival(left, part.reach, part.found, rf"$\mu = {mu:g}$", f"C{number}")
     if len(predicted):
         fx = np.linspace(0, 0.03, 100)
@@ -38,7 +38,7 @@ def onsets_figure(onsets: Table, predicted: Floats) -> Figure:
     if left.lines:
         left.legend(fontsize=7)
     strong, weak = STEPS[0]
-    pairs = onsets.where(law_mu=strong).settled.beside(onsets.where(law_mu=weak).settled, "packing.seed")
+    pairs = onsets.where(law_mu=strong).at_rest.beside(onsets.where(law_mu=weak).at_rest, "packing.seed")
     draw_pairs(right, [(a, b, bool(b["ancestors"]) and a["ancestors"] == b["ancestors"]) for a, b in pairs], ms=3.5)
     for marker, face, label in (
         ("o", "C0", "the same two modes"),
@@ -57,7 +57,7 @@ def modes_figure(onsets: Table) -> Figure:
     """Which modes meet: participation over place in the spectrum, coloured by the share of rotation (mu = 1)."""
     figure = Figure(figsize=(3.4, 2.6), layout="constrained")
     axes = figure.add_subplot()
-    found = onsets.where(law_mu=1.0).having("rank")
+    found = onsets.where(law_mu=1.0).where_known("rank")
     drawn = axes.scatter(
         found.numbers("rank") / found.numbers("modes"),
         found.numbers("participation"),

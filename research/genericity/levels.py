@@ -52,7 +52,7 @@ from faultgouge.pywrap.runs.equilibrium_path import loads
 from faultgouge.pywrap.scenes.validation import require_section
 from faultgouge.studies.packing_tools import path_from
 
-AVERAGED = 21
+AVERAGED_OVER = 21
 """Levels over which local densities and couplings are averaged: some 5 % of the level's statistics in error, and few
 enough that the density does not change over them."""
 
@@ -154,7 +154,7 @@ def local_mean(values: Floats) -> Floats:
     """The mean over neighbouring levels."""
     from scipy.ndimage import uniform_filter1d  # slow to import
 
-    return uniform_filter1d(values, AVERAGED, mode="reflect")
+    return uniform_filter1d(values, AVERAGED_OVER, mode="reflect")
 
 
 def growth(scene: Scene, rest: Equilibrium) -> dict[str, Any]:

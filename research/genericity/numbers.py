@@ -40,7 +40,7 @@ def numbers(tables: dict[str, Table]) -> dict[str, Any]:
         "lowered": [compare_friction(onsets, *pair) | {"from": pair[0], "to": pair[1]} for pair in STEPS],
         "kinds": [kinds(onsets.where(law_mu=mu)) | {"mu": mu} for mu in FRICTION],
         "modes": [modes(onsets.where(law_mu=mu)) | {"mu": mu} for mu in FRICTION],
-        "shape": shape(reference.settled.reach, reference.settled.found),
+        "shape": shape(reference.at_rest.reach, reference.at_rest.found),
         "settled": settled_with_friction(tables.get("settled with friction", empty)),
         "halved": compare_halved(onsets, tables.get("halved increments", empty)),
         "harmonic": harmonic(onsets, tables.get("harmonic", empty)),
@@ -53,7 +53,7 @@ def numbers(tables: dict[str, Table]) -> dict[str, Any]:
 
 def of_friction(table: Table) -> dict[str, Any]:
     """How the ramps of one friction coefficient end."""
-    good = table.settled
+    good = table.at_rest
     reach, found = good.reach, good.found
     ends = good.column("ends")
     below = []
@@ -62,7 +62,7 @@ def of_friction(table: Table) -> dict[str, Any]:
         below.append({"load": load} | share(int(np.sum(found & (reach <= load))), int(np.sum(known))))
     return {
         "packings": len(table),
-        "failed": len(table.having("says")),
+        "failed": len(table.where_known("says")),
         "until": ends.count("until"),
         "flows": ends.count("flows"),
         "found": share(int(found.sum()), len(good)),
@@ -74,7 +74,7 @@ def of_friction(table: Table) -> dict[str, Any]:
 
 def compare_friction(onsets: Table, strong: float, weak: float) -> dict[str, Any]:
     """Whether a smaller friction coefficient lowers the onset, and what is different where it does not."""
-    first, second = (onsets.where(law_mu=mu).settled for mu in (strong, weak))
+    first, second = (onsets.where(law_mu=mu).at_rest for mu in (strong, weak))
     both = first.beside(second, "packing.seed")
     decided = [(lower, a, b) for a, b in both if (lower := sign_test(a, b)) is not None]
     pairs = [each for each in decided if each[1]["ends"] == each[2]["ends"]]
@@ -95,7 +95,7 @@ def compare_friction(onsets: Table, strong: float, weak: float) -> dict[str, Any
 
 def kinds(onsets: Table) -> dict[str, Any]:
     """What begins the first window, of packings with one friction coefficient."""
-    words = onsets.having("kind").column("kind")
+    words = onsets.where_known("kind").column("kind")
     counts = {"sliding": onsets.numbers("sliding"), "changed": onsets.numbers("opened") + onsets.numbers("closed")}
     return {"coalescence": share(words.count("coalescence"), len(words))} | {
         name: share(int(np.sum(each > 0)), int(np.isfinite(each).sum())) for name, each in counts.items()
@@ -104,7 +104,7 @@ def kinds(onsets: Table) -> dict[str, Any]:
 
 def modes(onsets: Table) -> dict[str, Any]:
     """Which modes meet, in packings with one friction coefficient."""
-    found = onsets.having("rank")
+    found = onsets.where_known("rank")
     place = found.numbers("rank") / found.numbers("modes")
     neighbours = [second - first == 1 for first, second in found.column("ancestors")]
     columns = {"place": place, "frequency": np.sqrt(found.numbers("lambda") / found.numbers("largest"))}
@@ -124,7 +124,7 @@ def _median_and_quartiles(values: Floats) -> dict[str, Any]:
 
 def settled_with_friction(table: Table) -> dict[str, Any]:
     """Packings that have settled with friction: complex pairs at rest."""
-    good = table.settled
+    good = table.at_rest
     return {
         "packings": len(set(table.column("packing.seed"))),
         "rows": len(good),
@@ -134,7 +134,7 @@ def settled_with_friction(table: Table) -> dict[str, Any]:
 
 def compare_halved(onsets: Table, finer: Table) -> dict[str, Any]:
     """Onsets with increments half as large."""
-    both = onsets.settled.beside(finer.settled, "packing.seed", "law.mu")
+    both = onsets.at_rest.beside(finer.at_rest, "packing.seed", "law.mu")
     off = np.array([abs(b["reach"] / a["reach"] - 1) for a, b in both if a["ends"] == b["ends"] == "onset"])
     return {
         "rows": len(both),
@@ -149,16 +149,16 @@ def harmonic(onsets: Table, table: Table) -> list[dict[str, Any]]:
     """The onsets of the law with exponent 1 beside those of the same packings' seeds with 3/2."""
     result = []
     for mu in sorted(set(table.column("law.mu"))):
-        own, other = table.where(law_mu=mu).settled, onsets.where(law_mu=mu).settled
+        own, other = table.where(law_mu=mu).at_rest, onsets.where(law_mu=mu).at_rest
         result.append({"mu": mu, "harmonic": of_friction(table.where(law_mu=mu)), "p": _logrank(own, other)})
     return result
 
 
 def sizes(table: Table, reference: Table) -> dict[str, Any]:
     """The onset over the number of disks, in units of F_y; the packings of 100 disks are those of the first set."""
-    parts = {disks: table.where(packing_disks=disks).settled for disks in set(table.column("packing.disks"))}
+    parts = {disks: table.where(packing_disks=disks).at_rest for disks in set(table.column("packing.disks"))}
     rows, disks, reach, found = [], [], [], []
-    for number, part in sorted([*parts.items(), (100, reference.settled)]):
+    for number, part in sorted([*parts.items(), (100, reference.at_rest)]):
         load = np.full(len(part), 3.0) if number == 100 else part.numbers("load.fy")
         scaled = part.reach / load
         row: dict[str, Any] = {"disks": number, "packings": len(part), "onsets": int(part.found.sum())}
@@ -173,7 +173,7 @@ def sizes(table: Table, reference: Table) -> dict[str, Any]:
 
 def levels(table: Table) -> dict[str, Any]:
     """Levels, couplings and the predicted scale over the number of disks, in units of F_y, and their exponents."""
-    good = table.settled
+    good = table.at_rest
     disks = good.numbers("packing.disks")
     load = good.numbers("load.fy")
     columns = {name: good.numbers(name) for name in ("spacing", "ratio", "coupling", "speed", "participation")}
@@ -217,7 +217,7 @@ def growth(table: Table) -> list[dict[str, Any]]:
     """Largest growth rate over the load, by number of disks: medians over packings at common loads."""
     result = []
     for number in sorted(set(table.column("packing.disks"))):
-        part = table.where(packing_disks=number).having("fx").rows
+        part = table.where(packing_disks=number).where_known("fx").rows
         points = []
         for k in range(max((len(row["fx"]) for row in part), default=0)):
             long = [row for row in part if len(row["fx"]) > k]
@@ -231,13 +231,13 @@ def growth(table: Table) -> list[dict[str, Any]]:
 def surrogates(table: Table, reference: Table) -> dict[str, Any]:
     """Onsets of the surrogates beside those of the packings of the same seeds."""
     seeds = set(table.column("packing.seed"))
-    own = Table(tuple(row for row in reference.rows if row["packing.seed"] in seeds)).settled
+    own = Table(tuple(row for row in reference.rows if row["packing.seed"] in seeds)).at_rest
     result: dict[str, Any] = {"packings": len(seeds), "own": _ends(own)}
     for name in ("linear", "random", "shuffled"):
         part = Table(
             tuple(
                 {"packing.seed": row["packing.seed"], "ends": row[f"{name}.ends"], "reach": row[f"{name}.reach"]}
-                for row in table.having(f"{name}.ends").rows
+                for row in table.where_known(f"{name}.ends").rows
             )
         )
         result[name] = _ends(part) | signs(own.beside(part, "packing.seed"))

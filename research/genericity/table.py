@@ -41,7 +41,7 @@ class Table:
         wanted = {name.replace("_", ".", 1): value for name, value in values.items()}
         return Table(tuple(row for row in self.rows if all(row[name] == value for name, value in wanted.items())))
 
-    def having(self, name: str) -> Table:
+    def where_known(self, name: str) -> Table:
         """The rows with something in a column."""
         return Table(tuple(row for row in self.rows if row.get(name) is not None))
 
@@ -60,9 +60,9 @@ class Table:
         return np.array(self.column(name), dtype=np.float64)
 
     @cached_property
-    def settled(self) -> Table:
+    def at_rest(self) -> Table:
         """The rows that have a result."""
-        return self.having("ends" if self.rows and "ends" in self.rows[0] else "modes")
+        return self.where_known("ends" if self.rows and "ends" in self.rows[0] else "modes")
 
     @property
     def reach(self) -> Floats:

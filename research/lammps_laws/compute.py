@@ -207,7 +207,7 @@ def damping_needed(found: Snapshot) -> dict[str, float] | None:
     }
 
 
-PUSHED = ("gran/hertz/history", 3, 50, 0.1)
+PUSH_SIZE = ("gran/hertz/history", 3, 50, 0.1)
 """Law, dimension, particles and tilt of the packings that are let go without loss, those of the seeds 1 to `LET_GO`."""
 
 LET_GO, PUSH = 12, 1e-11
@@ -227,7 +227,7 @@ def let_go(seed: int) -> dict[str, Any]:
     "linear" is the growth of the linearised packing after the same push in the same time, "predicted" the rate of its
     fastest pair alone.
     """
-    law, d, count, tilt = PUSHED
+    law, d, count, tilt = PUSH_SIZE
     begin = time.process_time()
     row: dict[str, Any] = {"law": law, "d": d, "count": count, "mu": MU, "seed": seed, "tilt": tilt, "rests": False}
     with TemporaryDirectory() as folder:

@@ -34,7 +34,7 @@ AGREES = 1e-6
 bit on one machine, and its rounding ends at the balance of forces, 1e-8."""
 
 
-GROWN = TO / 10
+GROWTH_BOUND = TO / 10
 """D beyond which a packing that has been let go has grown: a decade below the end of a run, twelve above the push."""
 
 
@@ -125,7 +125,7 @@ def growth(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "packings": len(good),
         "restless": len(rows) - len(good),
         "pairs": sum(row["pairs"] > 0 for row in good),
-        "grown": sum(row["last"] > GROWN for row in good),
+        "grown": sum(row["last"] > GROWTH_BOUND for row in good),
         "rows": good,
         "free": len(free),
         "ratio": _middle(row["rate"] / row["linear"] for row in free),
@@ -165,24 +165,24 @@ def wall_alone() -> dict[str, Any]:
     }
 
 
-def ranged(value: list[float] | None, digits: str = ".2g") -> str:
+def format_range(value: list[float] | None, digits: str = ".2g") -> str:
     """A median with its interval."""
     return "-" if value is None else "{} ({} to {})".format(*(format(each, digits) for each in value))
 
 
 def three(value: list[float]) -> str:
     """A median with its range, to hundredths."""
-    return ranged(value, ".2f")
+    return format_range(value, ".2f")
 
 
-def signed(value: float) -> str:
+def format_signed(value: float) -> str:
     """A number with its sign; what is zero to eight digits has none."""
     return "0" if abs(value) < 1e-8 else f"{value:+.4g}"
 
 
 def write_page(folder: Path = HERE, tables: Path = TABLES) -> Path:
     """Write README.md of a folder from the tables."""
-    formats = {"ranged": ranged, "three": three, "signed": signed}
+    formats = {"ranged": format_range, "three": three, "signed": format_signed}
     text = render("research.lammps_laws", "README.md.j2", **numbers(tables), **formats)
     write_text(folder / "README.md", text)
     return folder / "README.md"

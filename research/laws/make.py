@@ -22,7 +22,7 @@ from research.modes.packing_rows import condense, read_known, table_of
 HERE = Path(__file__).parent
 TABLES = HERE / "tables"
 
-ALLOWED = {"draws": 1e-2, "error": 0.5, "overlap": 0.5}
+TOLERANCES = {"draws": 1e-2, "error": 0.5, "overlap": 0.5}
 """Relative difference of numbers whose name has one of these words. What a run measures: a coordinate is rounded by
 2e-15, which is 2e-4 of the push, and D is a square that beats; 2e-3 of D and 1e-5 of rates were seen. And stated errors
 and the overlap y^H x at an onset, which say where rounding ends the search for a root; F_x^c agrees within it."""
@@ -50,7 +50,7 @@ def check(folder: Path, names: list[str]) -> None:
         for seed, row in read_known(folder / "tables", path.stem).items():
             compared += 1
             one, other = ({key: each[key] for key in each if key != "cpu_seconds"} for each in (row, before[seed]))
-            wrong += [f"{path.stem}, seed {seed}: {key}" for key in different(one, other, allowed=ALLOWED)]
+            wrong += [f"{path.stem}, seed {seed}: {key}" for key in different(one, other, allowed=TOLERANCES)]
     said = "the same" if not wrong else f"{len(wrong)} numbers differ"
     print("\n".join([f"{compared} packings compared: {said}", *wrong]))
     sys.exit(len(wrong) > 0)

@@ -53,7 +53,7 @@ def write_page(tables: Path, folder: Path) -> Path:
     found["yielding"]["smoothed"] = yields(smoothed)
     write_json(folder / "laws.json", finite(found))
     formats = {"middle": interval, "quality": partial(interval, digits=".3g"), "part": part, "across": across}
-    formats |= {"restitutions": RESTITUTIONS, "words": WORDS, "stock_words": STOCK, "asked": asked()}
+    formats |= {"restitutions": RESTITUTIONS, "words": WORDS, "stock_words": STOCK, "asked": packings_by_set()}
     write_text(folder / "README.md", render("research.laws", "README.md.j2", **found, **formats))
     return folder / "README.md"
 
@@ -84,28 +84,28 @@ def by_load(rows: Sequence[Row]) -> dict[float, dict[str, Any]]:
     for fx in loads:
         at = [load for row in rows for load in row["loads"] if load["fx_over_fy"] == fx]
         seen = {name: [load[name] for load in at if name in load] for name in STATES}
-        found[fx] = {name: described(each) for name, each in seen.items()} | {
+        found[fx] = {name: describe_states(each) for name, each in seen.items()} | {
             "branches": {branch: median([each[branch] for each in seen["same"]]) for branch in BRANCHES}
         }
     return found
 
 
-def described(states: Sequence[Row]) -> dict[str, Any]:
+def describe_states(states: Sequence[Row]) -> dict[str, Any]:
     """Counts and medians of one state at one load."""
-    found: dict[str, Any] = {"packings": len(states), "with_pairs": counted(each["pairs"] > 0 for each in states)}
+    found: dict[str, Any] = {"packings": len(states), "with_pairs": count_true(each["pairs"] > 0 for each in states)}
     found["moved"] = sum(each["moved"] > 0 for each in states)
     found |= {name: median([np.inf if each[name] is None else each[name] for each in states]) for name in MEDIANS}
     found["lowest_q"] = min((each["least_q"] for each in states if each["least_q"] is not None), default=None)
     damped = [dict(map(tuple, each["damped"])) for each in states]
-    found["grows"] = {e: counted(each[e] > GROWS for each in damped if e in each) for e in RESTITUTIONS}
+    found["grows"] = {e: count_true(each[e] > GROWS for each in damped if e in each) for e in RESTITUTIONS}
     found["beyond_drag"] = sum(each["drag_rate"] > DRAG for each in states)
     alone = [each["normal_dashpots"] for each in states if "normal_dashpots" in each]
     found["fastest_normal_alone"] = 2 * max(alone, default=0.0)
-    found["normal_alone"] = counted(each > GROWS for each in alone)
+    found["normal_alone"] = count_true(each > GROWS for each in alone)
     return found
 
 
-def counted(which: Iterable[bool]) -> dict[str, Any]:
+def count_true(which: Iterable[bool]) -> dict[str, Any]:
     """How many, with Wilson's interval of the share."""
     told = list(which)
     return share(sum(told), len(told))
@@ -123,10 +123,10 @@ def runs(rows: Sequence[Row]) -> dict[str, dict[float, dict[str, Any]]]:
                 draw["rate"] / run["predicted"] for run in chosen for draw in run["draws"] if draw["rate"] is not None
             ]
             found.setdefault(name, {})[e] = {
-                "predicted": counted(run["predicted"] > 2 * GROWS for run in chosen),
-                "fast": counted(run["predicted"] > FAST for run in chosen),
-                "always": counted(map(all, rates)),
-                "ever": counted(map(any, rates)),
+                "predicted": count_true(run["predicted"] > 2 * GROWS for run in chosen),
+                "fast": count_true(run["predicted"] > FAST for run in chosen),
+                "always": count_true(map(all, rates)),
+                "ever": count_true(map(any, rates)),
                 "ratio": [float(np.median(ratios)), min(ratios), max(ratios)] if ratios else None,
                 "most": max(draw["last_over_first"] for run in chosen for draw in run["draws"] if draw["rate"] is None)
                 if not all(map(all, rates))
@@ -138,7 +138,7 @@ def runs(rows: Sequence[Row]) -> dict[str, dict[float, dict[str, Any]]]:
 def first_windows(rows: Sequence[Row]) -> dict[str, Any]:
     """How many packings have a first window up to the end of the ramp, and the median of F_x^c."""
     reach, found = [row["reach"] for row in rows], [row["ends"] == "onset" for row in rows]
-    return {"windows": counted(found), "median": median_interval(reach, found)}
+    return {"windows": count_true(found), "median": median_interval(reach, found)}
 
 
 def stock(rows: Sequence[Row]) -> dict[str, dict[str, Any]]:
@@ -152,9 +152,9 @@ def stock(rows: Sequence[Row]) -> dict[str, dict[str, Any]]:
         found[law] = {
             "packings": len(each),
             "undamped": median([row["undamped"] for row in each]),
-            "predicted": counted(row["predicted"] > 2 * GROWS for row in each),
-            "always": counted(map(all, grown)),
-            "ever": counted(map(any, grown)),
+            "predicted": count_true(row["predicted"] > 2 * GROWS for row in each),
+            "always": count_true(map(all, grown)),
+            "ever": count_true(map(any, grown)),
             "ratio": [float(np.median(ratios)), ratios[0], ratios[-1]] if ratios else None,
             "most": max((draw["last_over_first"] for _, draw in draws if draw["rate"] is None), default=None),
             "unseen": max(
@@ -171,11 +171,11 @@ def yields(rows: Sequence[Row]) -> dict[str, Any]:
     found: dict[str, Any] = {"packings": len(rows), "static": median([row["static"] for row in rows])}
     for name, loss in (("undamped", 1.0), ("lossy", LOSS)):
         runs = [[run for run in row["dynamic"] if run["restitution"] == loss] for row in rows]
-        found[name] = {kind: counted(any(run["ends"] == kind for run in each) for each in runs) for kind in UNREST}
-        found[name]["grows"] = counted(any(run["rate"] > 2 * GROWS for run in each) for each in runs)
+        found[name] = {kind: count_true(any(run["ends"] == kind for run in each) for each in runs) for kind in UNREST}
+        found[name]["grows"] = count_true(any(run["rate"] > 2 * GROWS for run in each) for each in runs)
     return found
 
 
-def asked() -> dict[str, int]:
+def packings_by_set() -> dict[str, int]:
     """How many packings of each set were asked for."""
     return {name: len(sweep.points) for name, sweep in all_sets().items()}

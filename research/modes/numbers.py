@@ -25,7 +25,7 @@ LEVELS = (0.1, 0.3)
 NOT_COMPARED = ("random", "loss", "runs", "quartz", "thick")
 """Sets of other tasks than "modes"."""
 
-COMPARED = (0.03, 0.1, 0.2)
+COMPARISONS = (0.03, 0.1, 0.2)
 """F_x/F_y at which kinds of packings, checks and switches of b are compared."""
 
 LAYERS = ("thick 50", "quartz 10 MPa", "thick 200", "thick 400")
@@ -43,7 +43,7 @@ def numbers(tables: Mapping[str, Table]) -> dict[str, Any]:
         thickness_powers : of `LAYERS`; random : shares of random matrices beside those of the packings; loss : what
         stops the pairs, by number of disks; structural : share of packings that grow, for each quality factor;
         quartz : as loss, of the shipped scenes; runs : growth with dashpots in LAMMPS beside the pencil's; sets :
-        medians at `COMPARED` of every set; switches : the same with b of some contacts; histories : with total slips
+        medians at `COMPARISONS` of every set; switches : the same with b of some contacts; histories : with total slips
         and with rescaled ones.
     """
     by_size, randoms, lossy, runs = (_of_sizes(tables, kind) for kind in ("force", "random", "loss", "runs"))
@@ -131,7 +131,7 @@ def ends(table: Table) -> Floats:
     return np.array([row["reach"] / fy[0] if row["ends"] != "until" else np.inf for row in table.rows])
 
 
-def crossing(row: Mapping[str, Any], level: float) -> float:
+def load_of_crossing(row: Mapping[str, Any], level: float) -> float:
     """F_x/F_y at which the share of complex modes of a packing first exceeds a level; nan if it does not.
 
     Interpolated over the logarithm of the load.
@@ -151,7 +151,7 @@ def powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
     """How loads of a share, growth rates and least Q go with the number of disks."""
     found: dict[str, Any] = {}
     for level in LEVELS:
-        samples = {n: np.array([crossing(row, level) for row in table.rows]) for n, table in by_size.items()}
+        samples = {n: np.array([load_of_crossing(row, level) for row in table.rows]) for n, table in by_size.items()}
         samples = {n: each[np.isfinite(each)] for n, each in samples.items()}
         known = {n: each for n, each in samples.items() if len(each) >= max(2, len(by_size[n].rows) // 2)}
         medians = {n: median(each) for n, each in known.items()}
@@ -169,7 +169,7 @@ def _power(samples: Mapping[int, Floats]) -> list[float] | None:
 def growth_powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
     """How growth rates and least Q go with the number of disks."""
     found: dict[str, Any] = {}
-    for load in COMPARED:
+    for load in COMPARISONS:
         for name in ("growth_rate", "least_q"):
             samples = {n: table.at(load, name) for n, table in by_size.items()}
             # a median needs more than half of the packings, and a pair in more than half of these
@@ -186,7 +186,7 @@ def growth_powers(by_size: Mapping[int, Table]) -> dict[str, Any]:
 def compare_kinds(table: Table) -> dict[str, Any]:
     """Medians with intervals at a few loads."""
     found: dict[str, Any] = {"packings": len(table.rows), "end": median(ends(table)) if table.rows else None}
-    for load in COMPARED:
+    for load in COMPARISONS:
         found[f"{load:g}"] = {name: median(table.at(load, name)) for name in QUANTITIES}
         found[f"{load:g}"]["count"] = len(table.at(load, "share"))
     return found

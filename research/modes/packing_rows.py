@@ -11,7 +11,7 @@ from faultgouge.studies.modes.table import Table
 from faultgouge.studies.result_rows import read_rows
 from faultgouge.studies.sweep.run_sweep import LINES, read_results
 
-ENDING = ".jsonl"
+TABLE_SUFFIX = ".jsonl"
 
 DIGITS = 7
 """Of the numbers in a table."""
@@ -40,7 +40,7 @@ def condense(results: Path, tables: Path) -> None:
 
 def table_of(tables: Path, name: str) -> Path:
     """The file of a set's table."""
-    return tables / f"{name.replace(' ', '_')}{ENDING}"
+    return tables / f"{name.replace(' ', '_')}{TABLE_SUFFIX}"
 
 
 def read_known(tables: Path, name: str) -> dict[int, dict[str, Any]]:
@@ -68,7 +68,7 @@ def _round_numbers(value: Any) -> Any:
 def read_tables(folder: Path) -> dict[str, Table]:
     """The tables of a folder by name; packings that failed are left out, and counted by `failures`."""
     found = {}
-    for path in sorted(folder.glob(f"*{ENDING}")):
+    for path in sorted(folder.glob(f"*{TABLE_SUFFIX}")):
         name = path.stem.replace("_", " ")
         found[name] = Table(name, tuple(row for row in read_rows(path) if row["says"] is None))
     return found

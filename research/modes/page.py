@@ -16,7 +16,7 @@ from faultgouge.studies.statistics import interval
 from faultgouge.studies.study import draw_all, save_png
 from research.modes.draw import collapse
 from research.modes.loss import EVERY, RESTITUTIONS
-from research.modes.numbers import COMPARED, QUALITIES, numbers
+from research.modes.numbers import COMPARISONS, QUALITIES, numbers
 from research.modes.packing_rows import read_tables
 from research.modes.sets import SIZES
 
@@ -53,7 +53,7 @@ def write_page(tables: Path, folder: Path) -> Path:
     names = {
         "ratio": [ratio["low"], ratio["high"]],
         "planned": SIZES,
-        "compared": COMPARED,
+        "compared": COMPARISONS,
         "qualities": QUALITIES,
         **describe_loss(found),
     }

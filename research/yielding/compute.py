@@ -54,10 +54,18 @@ LOOKS = 50
 LOADING_LOOKS = 200
 """Looks at the disks while the load rises."""
 
-CONTROLLED = 0.01
+CONTROLLED_RATE = 0.01
 """Rate of loading, F_y per unit of time, at which layers with more loss are looked at, too."""
 
-LOADINGS = ((10.0, 0.9), (1.0, 0.9), (0.1, 0.9), (CONTROLLED, 0.9), (CONTROLLED, 0.5), (CONTROLLED, 0.1), (0.001, 0.9))
+LOADINGS = (
+    (10.0, 0.9),
+    (1.0, 0.9),
+    (0.1, 0.9),
+    (CONTROLLED_RATE, 0.9),
+    (CONTROLLED_RATE, 0.5),
+    (CONTROLLED_RATE, 0.1),
+    (0.001, 0.9),
+)
 """Rates of loading with the restitution."""
 
 INCREMENTS = (0.005, 0.02)

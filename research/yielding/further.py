@@ -37,9 +37,9 @@ STANDARD_LOSSES = (1.0, 0.9)
 """Restitutions of the runs with the standard law."""
 
 FRICTION, RESTITUTIONS = (1.0, 1.01), (0.9, 0.7)
-"""Friction over that of the law, and restitutions, of the runs of `sliding`."""
+"""Friction over that of the law, and restitutions, of the runs of `growth_at_bound`."""
 
-GROWN = 1e-15
+GROWTH_BOUND = 1e-15
 """D in a run beyond which noise has grown. Contacts that shake down creep to 1e-18, and noise has 1e-24."""
 
 LARGE = {"disks": 400, "width": 23.8, "top": 20}
@@ -60,7 +60,7 @@ def with_history(start: Equilibrium, history: str) -> Equilibrium:
     return replace(start, packing=replace(start.packing, law=law))
 
 
-def lasting(seed: int) -> Iterator[dict[str, Any]]:
+def lasting_motion(seed: int) -> Iterator[dict[str, Any]]:
     """Runs from the equilibria of total slips at 0.97 and 0.9 of the static yield with noise, with either history."""
     given = scene(seed)
     path = branch(settle(given))
@@ -122,7 +122,7 @@ def standard(seed: int) -> Iterator[dict[str, Any]]:
     yield known | {"dynamic": list(dynamic_runs(given, path, STANDARD_LOSSES, DRAWS))}
 
 
-def bound(seed: int) -> Iterator[dict[str, Any]]:
+def all_lossy_runs(seed: int) -> Iterator[dict[str, Any]]:
     """Runs of lossy layers that the standard law has loaded, whatever the spectrum says.
 
     A contact at Coulomb's bound sticks in the spectrum. It slides on while a growing motion exceeds its last peak.
@@ -132,7 +132,7 @@ def bound(seed: int) -> Iterator[dict[str, Any]]:
     yield known | {"dynamic": list(dynamic_runs(given, path, (0.9,), DRAWS, all_layers=True))}
 
 
-def sliding(seed: int) -> Iterator[dict[str, Any]]:
+def growth_at_bound(seed: int) -> Iterator[dict[str, Any]]:
     """The largest D of these runs with the friction that no contact reaches, and with more loss.
 
     A little more friction changes no force of an equilibrium: it takes the contacts off the bound.
@@ -168,12 +168,12 @@ def large(seed: int) -> Iterator[dict[str, Any]]:
 if __name__ == "__main__":
     kind, folder, *seeds = sys.argv[1:]
     compute, name = {
-        "rest": (lasting, "lasting"),
+        "rest": (lasting_motion, "lasting"),
         "draws": (draws, "draws"),
         "large": (large, "quartz_400"),
         "standard": (standard, "standard_100"),
-        "bound": (bound, "bound_100"),
-        "sliding": (sliding, "sliding_100"),
+        "bound": (all_lossy_runs, "bound_100"),
+        "sliding": (growth_at_bound, "sliding_100"),
     }[kind]
     for seed in map(int, seeds or range(1, 21)):
         for row in compute(seed):

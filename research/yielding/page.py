@@ -18,7 +18,7 @@ from faultgouge.figures.pages import render
 from faultgouge.figures.style import INK, save, styled
 from faultgouge.studies.result_rows import read_rows, row_columns
 from faultgouge.studies.statistics import interval, median, share
-from research.yielding.compute import CONTROLLED, LOADINGS, LOSSES, SHARES, TIME
+from research.yielding.compute import CONTROLLED_RATE, LOADINGS, LOSSES, SHARES, TIME
 
 UNREST = ("flows", "bursts", "fails at rest")
 """How a run ends after which the layer does not rest: it flows in the run; it throws a disk out of the box; or it finds
@@ -52,7 +52,7 @@ def numbers(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "yields": [yields(rows, loss) for loss in LOSSES],
         "worst": worst_ends(rows, 1.0),
         "spread": median([np.ptp([row["static"], *(each[1] for each in row["static_by_increment"])]) for row in rows]),
-        "loading": [_rising(rows, *each) for each in LOADINGS],
+        "loading": [_rising_loads(rows, *each) for each in LOADINGS],
     }
 
 
@@ -114,7 +114,7 @@ def of_runs(rows: list[dict[str, Any]], load: float, loss: float) -> dict[str, A
     }
 
 
-def _rising(rows: list[dict[str, Any]], rate: float, loss: float) -> dict[str, Any]:
+def _rising_loads(rows: list[dict[str, Any]], rate: float, loss: float) -> dict[str, Any]:
     """Packings whose load rose at a rate: where they left the path, and where those flowed that did.
 
     "flows" are their loads over the static yield, in the order of the packings; "branch" is how many of them flow
@@ -140,7 +140,7 @@ def text(found: dict[str, Any], packings: int, failed: int, loaded: list[dict[st
     unrest = [share(each["unrest"], packings) for each in found["yields"]]
     names = {"packings": packings, "failed": failed, "unrest": unrest, "interval": interval, "percent": percent}
     names["standard"] = standard(loaded)
-    names["slow"] = [row for row in found["loading"] if row["rate"] == CONTROLLED]
+    names["slow"] = [row for row in found["loading"] if row["rate"] == CONTROLLED_RATE]
     return render("research.yielding", "README.md.j2", **found, **names)
 
 
@@ -268,7 +268,7 @@ def write_lasting(folder: Path) -> Path:
         lossy=lossy,
         again=drawn_again(rows, read_rows(further) if further.exists() else []),
         standard=standard(read_rows(tables / "standard_100.jsonl")),
-        **_lasting(lossy),
+        **_count_lasting(lossy),
         free=_without_loss(rows, tables / "quartz_100.jsonl"),
         large=[of_runs(large, load, loss) for load in SHARES for loss in LOSSES],
         large_unrest=[_restless(large, loss) for loss in LOSSES],
@@ -284,7 +284,7 @@ def lasts(row: dict[str, Any]) -> bool:
     return bool(row["late"] > LASTS * row["early"] and row["late"] > QUIET)
 
 
-def _lasting(lossy: list[dict[str, Any]]) -> dict[str, Any]:
+def _count_lasting(lossy: list[dict[str, Any]]) -> dict[str, Any]:
     """Who vibrates with either history, and the test of signs of the packings in which the histories differ."""
     most = {
         history: {row["seed"]: lasts(row) for row in lossy if (row["history"], row["restitution"]) == (history, 0.9)}

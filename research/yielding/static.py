@@ -72,7 +72,7 @@ class Branch:
         """The equilibrium at a load, from the equilibrium below it; None if the packing fails between two of these."""
         below = next(each for each in reversed(self.equilibria) if each.fx <= fx)
         try:
-            return below if below.fx == fx else following(below, fx)[0]
+            return below if below.fx == fx else next_equilibrium(below, fx)[0]
         except FailedError:
             return None
 
@@ -86,7 +86,7 @@ def branch(start: Equilibrium, increment: float = STEP) -> Branch:
     while True:
         last = equilibria[-1]
         try:
-            found, moved = following(last, len(equilibria) * step)
+            found, moved = next_equilibrium(last, len(equilibria) * step)
         except FailedError:
             return Branch(equilibria, last.fx if newton is None else newton, jumps)
         if moved is not None:
@@ -95,7 +95,7 @@ def branch(start: Equilibrium, increment: float = STEP) -> Branch:
         equilibria.append(found)
 
 
-def following(last: Equilibrium, fx: float) -> tuple[Equilibrium, float | None]:
+def next_equilibrium(last: Equilibrium, fx: float) -> tuple[Equilibrium, float | None]:
     """The equilibrium at fx by Newton's method, or by dynamics: then with the distance that the layer has moved.
 
     Raises
@@ -105,7 +105,7 @@ def following(last: Equilibrium, fx: float) -> tuple[Equilibrium, float | None]:
     """
     with Engine(last.packing) as engine:
         try:
-            return _resting(equilibrate(engine, last, fx)), None
+            return _check_rest(equilibrate(engine, last, fx)), None
         except NoEquilibriumError:
             engine.restore(last.packing)
             engine.set_fx(fx)
@@ -132,7 +132,7 @@ def rest(engine: Engine) -> tuple[Equilibrium, float]:
             raise FailedError(f"at F_x = {fx:.6g} the layer has moved by {moved:.3g}")
         if np.abs(motion.velocity).max() < SLOW:
             try:
-                found = _resting(equilibrate(engine, Equilibrium.of(now), fx))
+                found = _check_rest(equilibrate(engine, Equilibrium.of(now), fx))
             except NoEquilibriumError:
                 engine.restore(now)
                 engine.set_fx(fx)
@@ -141,7 +141,7 @@ def rest(engine: Engine) -> tuple[Equilibrium, float]:
     raise FailedError(f"at F_x = {fx:.6g} the disks still move after {LONGEST:g}")
 
 
-def _resting(found: Equilibrium) -> Equilibrium:
+def _check_rest(found: Equilibrium) -> Equilibrium:
     """The equilibrium, unless it buckles."""
     if len(negative_eigenvalues(found.packing)):
         raise NoEquilibriumError(f"at F_x = {found.fx:.6g} the equilibrium lies beyond a turning point")

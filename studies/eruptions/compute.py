@@ -129,7 +129,7 @@ def erupt(start: Start) -> dict[str, Any]:
         **{name: float(columns[name].max()) for name in ("msd", "kinetic_energy")},
         "slip": float(np.abs(columns["slip"]).max()),
         **{name: int(columns[name].max()) for name in ("lost", "gained", "sliding")},
-        **_ending(start, looks, columns, rate, unit),
+        **_end_of_growth(start, looks, columns, rate, unit),
         "noise": _noise(columns, unit),
         "balance": balance,
         "series": {name: column.tolist() for name, column in columns.items()},
@@ -178,7 +178,7 @@ class _Watch:
         self._moved = np.zeros_like(start.packing.position)
         carrying = start.packing.loaded(start.residual)
         self._contacts = contact_pairs(carrying)
-        self._slid = _sliding(carrying)
+        self._slid = _sliding_pairs(carrying)
 
     def look(self, time: float, motion: Motion, now: Packing) -> Look:
         """The packing at one time.
@@ -203,11 +203,11 @@ class _Watch:
             "kinetic_energy": motion.kinetic_energy(first),
             "lost": len(self._contacts - there),
             "gained": len(there - contact_pairs(first)),
-            "sliding": len((_sliding(now) - self._slid) & self._contacts),
+            "sliding": len((_sliding_pairs(now) - self._slid) & self._contacts),
         }
 
 
-def _sliding(packing: Packing) -> set[tuple[int, int]]:
+def _sliding_pairs(packing: Packing) -> set[tuple[int, int]]:
     return contact_pairs(packing, packing.sliding)
 
 
@@ -224,7 +224,9 @@ def _noise(columns: dict[str, Floats], unit: float) -> float:
     return float(columns["msd"][columns["time"] <= unit].max(initial=float(columns["msd"][0])))
 
 
-def _ending(start: Start, looks: list[Look], columns: dict[str, Floats], rate: float, unit: float) -> dict[str, Any]:
+def _end_of_growth(
+    start: Start, looks: list[Look], columns: dict[str, Floats], rate: float, unit: float
+) -> dict[str, Any]:
     """When and by what the growth ended, see the module."""
     ended: float | None = None
     drift = WALK * start.packing.coordinate_rounding**2 * columns["time"][-1] / time_step(start.packing)

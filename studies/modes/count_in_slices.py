@@ -39,7 +39,7 @@ STEPS = 2
 """Iterations: with them, counts of 400 disks were off by none, with one less by one of 250."""
 
 
-PIVOTING = 1e-4
+PIVOT_THRESHOLD = 1e-4
 """Share of a column's largest entry that suffices for a pivot on the diagonal. Pivots of 1, the default of SuperLU,
 leave the symmetric pattern: of 10,000 disks the factors then take 1,000 times as long, and a solution 50 times."""
 
@@ -121,7 +121,7 @@ def _part(blocks: list[_Block], which: int) -> _SlicePart:
 def _projections(matrix: csr_array, part: _SlicePart) -> Iterator[Floats]:
     """The operator in the space of a part, after each iteration."""
     shifted = csc_array(matrix - part.shift * eye_array(matrix.shape[0]))
-    factors = symmetric_lu(shifted, pivoting=PIVOTING, mumps=False)
+    factors = symmetric_lu(shifted, pivoting=PIVOT_THRESHOLD, mumps=False)
     right = left = part.vectors
     yield right.T @ (matrix @ right)
     for _ in range(STEPS):

@@ -176,7 +176,7 @@ def count_with_part_of_b(packing: Packing) -> dict[str, dict[str, Any]]:
     }
 
 
-def parting(packing: Packing) -> dict[str, dict[str, Any]]:
+def pairs_by_branch(packing: Packing) -> dict[str, dict[str, Any]]:
     """The complex pairs of a law with rescaled slips while all contacts close, and while all part."""
     return {
         name: PairCounts.of(_values(packing, parting=share)).as_dict()
@@ -263,6 +263,6 @@ def _load(packing: Packing) -> dict[str, Any]:
     if len(packing) <= SMALL:
         row["b_of"] = count_with_part_of_b(packing)
         if packing.law.rescales:
-            row["while"] = parting(packing)
+            row["while"] = pairs_by_branch(packing)
     digits = [[float(f"{w.real:.{DIGITS}g}"), float(f"{w.imag:.{DIGITS}g}")] for w in found.omega.tolist()]
     return row | {"frequencies": digits}

@@ -59,7 +59,7 @@ class SweepPoint:
     key: str
 
     @cached_property
-    def settling(self) -> str:
+    def settling_key(self) -> str:
         """What decides how the packing settles; points of one settling share the settled packing."""
         if self.scene is None:
             return self.key
@@ -190,8 +190,8 @@ def shard(points: tuple[SweepPoint, ...], part: tuple[int, int]) -> tuple[SweepP
     mine, of = part
     order: dict[str, int] = {}
     for point in points:
-        order.setdefault(point.settling, len(order))
-    return tuple(point for point in points if order[point.settling] % of == mine - 1)
+        order.setdefault(point.settling_key, len(order))
+    return tuple(point for point in points if order[point.settling_key] % of == mine - 1)
 
 
 def digest(value: Any) -> str:

@@ -53,7 +53,7 @@ def _onset(scene: Scene) -> float:
     return 0.03 * _increments(scene) * _disks(scene) ** 1.6
 
 
-def _triggering(scene: Scene) -> float:
+def _estimate_triggering(scene: Scene) -> float:
     """The onsets for all friction coefficients, and four undamped runs of 8 s for 100 disks and t = 200."""
     runs = 0.0 if scene.perturb is None else 8.0 * scene.perturb.time / 200 * _disks(scene)
     return (len(scene.law.mus) + 1) * _onset(scene) + 4 * runs
@@ -82,7 +82,7 @@ def _modes(scene: Scene) -> float:
 
 TASKS: Mapping[str, Task] = {
     "onset": Task(onset, _onset),
-    "triggering": Task(triggering, _triggering),
+    "triggering": Task(triggering, _estimate_triggering),
     "trigger": Task(trigger, _trigger),
     "eruptions": Task(eruptions_of, _eruptions),
     "modes": Task(modes, _modes),
@@ -100,7 +100,7 @@ def estimate(task: str, points: Sequence[SweepPoint], known: Iterable[Row] = ())
     Of a function of the user's, the known rows tell it.
     """
     scenes = [point.scene for point in points if point.scene is not None]
-    settlings = {point.settling: point.scene for point in points if point.scene is not None}
+    settlings = {point.settling_key: point.scene for point in points if point.scene is not None}
     refused = len(points) - len(scenes)
     return [
         f"{len(scenes)} scenes to compute, {len(settlings)} packings to settle",

@@ -45,7 +45,7 @@ def compute_points(pool: Executor | None, task: str, points: Sequence[SweepPoint
     """The rows of points as they end; closing the generator takes back those that no worker has begun."""
     groups: dict[str, deque[SweepPoint]] = defaultdict(deque)
     for point in points:
-        groups[point.settling].append(point)
+        groups[point.settling_key].append(point)
     if pool is not None and len(points) > 1:
         yield from _Shared(pool, task).rows(groups.values())
         return

@@ -124,10 +124,10 @@ def _bisect_map(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
     """The bisections, those that are in the file already and those that are not."""
     wanted = spread_over_map(predicted, settings(scene).runs)
 
-    def known(each: Row) -> Row | None:
+    def row_of(each: Row) -> Row | None:
         return work.rows.find(kind="measured", fx=each["fx"], omega=each["omega"])
 
-    missing = [each for each in wanted if known(each) is None]
+    missing = [each for each in wanted if row_of(each) is None]
     if len(missing) < len(wanted):
         work.say(f"{len(wanted) - len(missing)} of {len(wanted)} bisections are in {work.rows.path} already")
     if missing:
@@ -137,7 +137,7 @@ def _bisect_map(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
             work.rows.append(kind="measured", **found)
             at = f"omega = {found['omega']:.4g} at {found['distance']:g}"
             work.say(f"{at}: triggers from {middle(found['below'], found['above']):.4g} on in LAMMPS")
-    return [row for each in wanted if (row := known(each)) is not None]
+    return [row for each in wanted if (row := row_of(each)) is not None]
 
 
 def trigger(scene: Scene, start: Start) -> Row:

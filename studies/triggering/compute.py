@@ -180,7 +180,7 @@ def calibrate_weakening(friction: Friction, unperturbed: Series) -> Weakening:
     return weakening_of(friction, float(v0))
 
 
-def crossing(run: Series, v0: float) -> float | None:
+def time_of_crossing(run: Series, v0: float) -> float | None:
     """The time at which the layer of a run first exceeds v_0, or None."""
     faster = np.abs(run["layer_velocity"]) > v0
     return float(run["time"][np.argmax(faster)]) if faster.any() else None
@@ -228,7 +228,7 @@ def judge(run: Series, v0: float, foreseen: Forecast) -> TriggeringOutcome:
     foreseen : Forecast
         Of linear theory with the weakened friction.
     """
-    when = crossing(run, v0)
+    when = time_of_crossing(run, v0)
     if when is None:
         return TriggeringOutcome("does not weaken")
     time, msd = run["time"], run["msd"]
@@ -254,7 +254,7 @@ def judge(run: Series, v0: float, foreseen: Forecast) -> TriggeringOutcome:
 def foresee(start: Equilibrium, mu: float, run: Series, v0: float) -> Forecast:
     """The forecast for what is left of a run once the layer has exceeded v_0; of the whole run if it never does."""
     length = float(run["time"][-1])
-    left = length - (crossing(run, v0) or 0.0)
+    left = length - (time_of_crossing(run, v0) or 0.0)
     return forecast(start, mu, max(left, JUMP_SHARE * length), JUMP_SHARE * length)
 
 

@@ -35,7 +35,7 @@ Course = tuple[Floats, Floats]
 
 UNPERTURBED, PERTURBED, WEAKENING, CONTROL = "C1", "C2", "C0", "C3"
 
-DAMPING = np.geomspace(1e-2, 1e2, 33)
+DAMPING_TIMES = np.geomspace(1e-2, 1e2, 33)
 """Damping times of a curve, in units of tau_d."""
 
 
@@ -214,9 +214,9 @@ def damping_figure(pairs: Sequence[PairForm]) -> Figure:
     figure = Figure(figsize=(3.4, 2.7), layout="constrained")
     axes = figure.add_subplot(xscale="log", yscale="log", ylabel="largest response / start")
     axes.set_xlabel(r"damping time $\tau$")
-    last = max(pair.tau_d * DAMPING[-1] for pair in pairs)
+    last = max(pair.tau_d * DAMPING_TIMES[-1] for pair in pairs)
     for number, pair in enumerate(pairs):
-        colour, damping, undamped = f"C{number}", pair.tau_d * DAMPING, pair.amplitude()
+        colour, damping, undamped = f"C{number}", pair.tau_d * DAMPING_TIMES, pair.amplitude()
         amplitude = np.array([pair.amplitude(tau) for tau in damping])
         axes.plot(damping, amplitude, color=colour, linewidth=0.9)
         axes.plot([pair.tau_d, last], [undamped] * 2, color=colour, linewidth=0.6, linestyle=":")
@@ -225,7 +225,7 @@ def damping_figure(pairs: Sequence[PairForm]) -> Figure:
         axes.plot([pair.half_gain_time()], [0.5 * undamped], "o", color=colour, fillstyle="none", label="half")
         words = rf"$\varepsilon = {scientific(pair.form.epsilon)}$"
         _note(axes, words, (last, undamped), (-2, 2), ha="right", va="bottom", color=colour)
-    axes.set_xlim(min(pair.tau_d * DAMPING[0] for pair in pairs), last)
+    axes.set_xlim(min(pair.tau_d * DAMPING_TIMES[0] for pair in pairs), last)
     axes.set_ylim(top=3 * max(pair.amplitude() for pair in pairs))
     few_decades(axes)
     handles = axes.get_legend_handles_labels()[0][:2]

@@ -62,7 +62,7 @@ def motion_of(matrix, force, start, time, tau=None, dt=None):
     time, size = np.asarray(time, dtype=float), len(matrix)
     if tau is None:
         modes, oscillator = BlockDiagonal.of(matrix), Oscillator(OMEGA, dt)
-        pairs = ((oscillator.driven, force), (oscillator.released, start))
+        pairs = ((oscillator.forced_motion, force), (oscillator.released, start))
         return np.sum([modes.apply(function, time, vector) for function, vector in pairs], axis=0)
     system = StateSpace.of_matrices(csr_array(matrix), csr_array(np.eye(size) / tau), np.ones(size))
     rows, rest = block_diag(system.unweight, np.eye(size)), np.zeros(size)
@@ -130,8 +130,8 @@ def test_time_step_is_that_of_velocity_verlet(epsilon, dt):
 def test_motion_at_no_frequency():
     """Nor is resonance to the bit a special case."""
     time = np.linspace(0, 50, 101)
-    np.testing.assert_allclose(Oscillator(0.0).driven(0.0, time).displacement, time**2 / 2)
-    assert np.isfinite(Oscillator(2.0).driven(4.0, time)).all()
+    np.testing.assert_allclose(Oscillator(0.0).forced_motion(0.0, time).displacement, time**2 / 2)
+    assert np.isfinite(Oscillator(2.0).forced_motion(4.0, time)).all()
 
 
 @pytest.mark.parametrize(

@@ -26,9 +26,9 @@ def test_record_moves_the_packing_as_linear_response_says(packing, on, scale):
     """The example record of ObsPy, its 30 s in 6 time units, scaled so that the layer moves by 1e-9: in the linear
     regime, and far above the noise of doubles. One percent is asked for; the time step leaves less."""
     obspy = pytest.importorskip("obspy", reason="the extra `seismic` is not installed")
-    signal = of_trace(obspy.read()[0]).scaled(scale, 6.0 / 30)
+    signal = of_trace(obspy.read()[0]).scale_by(scale, 6.0 / 30)
     assert len(signal) == 3000
-    acting = signal if on == "layer" else signal.differentiated()
+    acting = signal if on == "layer" else signal.derivative()
     dt, every = time_step(packing), 20
     rows = []
     with Engine(packing) as engine, engine.undamped(dt, signal=acting, on=on) as dynamics:

@@ -131,7 +131,7 @@ def run():
 def test_a_wrong_claim_is_found_out(run, tmp_path):
     """A push that is said to touch nobody, and one that is said to leave the motion."""
     pushed = replace(run, motion={"amplitude": 1.0, "omega": 1.0})
-    with run.started(MPI.COMM_SELF, tmp_path / "log") as (engine, _):
+    with run.start(MPI.COMM_SELF, tmp_path / "log") as (engine, _):
         loaded = InstanceContents.of(engine, tmp_path / "log")
     top = np.flatnonzero(run.packing.top)
     for touched, moves in (((), True), (top, False)):

@@ -45,12 +45,12 @@ def test_all_ways_lead_to_one_equilibrium_and_a_relaxations_time_step_is_its_own
             (lambda: increment.verlet(step, 10.0, 1000), 1e-12),
             (lambda: increment.fire(step, 1e-6), 1e-7),
             (lambda: increment.newton(None), 1e-12),
-            (lambda: increment.overdamped(None, 1e-8), 1e-9),
+            (lambda: increment.relax_overdamped(None, 1e-8), 1e-9),
         ):
             packing, evaluations = way()
             assert increment.distance(packing) < least < increment.distance(start.packing)
             assert evaluations > 0
-        steps = [increment.overdamped(time_step, 1e-4)[1] for time_step in (None, 4e-5, None)]
+        steps = [increment.relax_overdamped(time_step, 1e-4)[1] for time_step in (None, 4e-5, None)]
     assert steps[0] == steps[2] > steps[1]
 
 

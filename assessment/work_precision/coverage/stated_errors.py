@@ -46,7 +46,7 @@ SCENES = 60
 AT_ONCE = 3
 """Increments that are searched at once: an onset far below the ramp's end costs no more than it has to."""
 
-NAMED = {
+FIRST_SCENES = {
     "packing": {"file": str(files("faultgouge") / "scenes" / "packing7.json")},
     "law": {"kn": 2e5, "mu": 1.0},
     "load": {"fy": 3.0},
@@ -124,7 +124,7 @@ class CoverageCase:
 def draw_scene(number: int) -> Scene:
     """The scene of a draw, with dashpots; without them it is that of the undamped onset."""
     if number == 0:
-        return Scene.from_mapping(NAMED)
+        return Scene.from_mapping(FIRST_SCENES)
     chance = np.random.default_rng(number)
     stiffness = float(chance.choice([2e3, 2e4, 2e5]))
     cn = float(chance.choice([0.5, 2.0, 10.0])) * float(np.sqrt(stiffness / 2e5))
@@ -163,7 +163,7 @@ class FirstOnset:
         self._scene = scene.model_copy(update={"damping": None})
         self._wanted = loads(require_section(scene.ramp, "ramp"))
 
-    def found(self, finer: int = 1, beyond: float = 0.0) -> tuple[EquilibriumPath, Window | DampedWindow] | None:
+    def first_window(self, finer: int = 1, beyond: float = 0.0) -> tuple[EquilibriumPath, Window | DampedWindow] | None:
         """The ramp with increments so many times smaller, and the first window on it, without the error of the path.
 
         None where there is none before the ramp's end or that of the equilibria, or none beyond a load.
@@ -190,10 +190,12 @@ class FirstOnset:
             undamped = ()
         if self._damping is None:
             return undamped[0] if undamped else None
-        windows = damped_windows(lambda fx: self._damped(path(fx)), part, look=loads_inside(undamped), first=True)
+        windows = damped_windows(
+            lambda fx: self._with_dashpots(path(fx)), part, look=loads_inside(undamped), first=True
+        )
         return windows[0] if windows else None
 
-    def _damped(self, packing: Packing) -> Packing:
+    def _with_dashpots(self, packing: Packing) -> Packing:
         assert self._damping is not None
         return with_dissipation(packing, self._damping.cn, self._damping.ct, self._damping.tau)
 
@@ -206,7 +208,7 @@ class FirstOnset:
         if isinstance(window, Window):
             first, *_ = with_path_error(Onset((window,), complete=False), path).windows
             return first.fx_onset, first.error
-        damped, *_ = with_damped_path_error([window], self._damped, path)
+        damped, *_ = with_damped_path_error([window], self._with_dashpots, path)
         return damped.fx_onset, damped.error
 
 
@@ -234,14 +236,14 @@ def compute_cases(number: int) -> list[CoverageCase]:
 
 def _compare_case(onset: FirstOnset, case: CoverageCase) -> CoverageCase:
     """The case with what its onset states and the limit of small increments, if contacts change before the onset."""
-    found = onset.found()
+    found = onset.first_window()
     changes = 0 if found is None else onset.changes(found[0], found[1].fx_onset)
     if found is None or not changes:
         return case
     fx_c, stated = onset.whole(*found)
     case = replace(case, changes=changes, fx_c=fx_c, stated=stated)
     before = found[1].fx_onset - AT_ONCE * case.increment
-    coarser, finest = (onset.found(finer, before) for finer in (FINER // 2, FINER))
+    coarser, finest = (onset.first_window(finer, before) for finer in (FINER // 2, FINER))
     if coarser is None or finest is None:
         return case
     limit = finest[1].fx_onset
@@ -260,7 +262,7 @@ def restate_case(case: CoverageCase) -> CoverageCase:
     start = settle(scene.model_copy(update={"damping": None}))
     with Engine(start.packing) as engine:
         onset = FirstOnset(scene, engine, start)
-        found = onset.found(beyond=case.fx_c - AT_ONCE * case.increment)
+        found = onset.first_window(beyond=case.fx_c - AT_ONCE * case.increment)
         assert found is not None  # it was there when the limit was computed
         fx_c, stated = onset.whole(*found)
         return replace(case, changes=onset.changes(found[0], found[1].fx_onset), fx_c=fx_c, stated=stated)

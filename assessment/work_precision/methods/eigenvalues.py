@@ -105,7 +105,7 @@ class Target:
         found = eigenpairs(self.packing, self.shift, COUNT, tolerance=tolerance)
         return found.values, found.solves
 
-    def refined(self) -> tuple[Complexes, int | None]:
+    def refine(self) -> tuple[Complexes, int | None]:
         """The same from LAPACK and Newton's method in extended precision, and the number of steps."""
         found, *_ = refined_near(self.packing, self.shift, COUNT)
         return np.array([complex(each.value) for each in found]), sum(each.steps for each in found)
@@ -140,7 +140,7 @@ def _study(name: str, settings: Settings, packing: Packing, pair: float) -> Stud
     runs: list[Run[Complexes]] = [
         (DENSE, None, target.dense),
         *((ARPACK, tolerance, partial(target.shift_invert, tolerance)) for tolerance in tolerances),
-        (REFINED, None, target.refined),
+        (REFINED, None, target.refine),
     ]
     points = timed_points(runs, settings, target.off)
     last = {point.method: point for point in points}  # shift-invert's with the smallest tolerance

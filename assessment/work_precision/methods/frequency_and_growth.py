@@ -108,7 +108,7 @@ class FastestMode:
         found = spectrum(self.packing)
         return found.growth_rate() if self.growing else found.omega_max
 
-    def measured(self, engine: Engine, dt: float, time: float) -> complex:
+    def measure_frequency(self, engine: Engine, dt: float, time: float) -> complex:
         """Omega from an undamped run in LAMMPS that starts displaced along the mode, radian / time."""
         every = max(1, round(0.25 * np.pi / np.sqrt(self.eigenvalue).real / dt))  # an eighth of a period
         mass, inertia = self.packing.mass, self.packing.inertia_factor
@@ -188,7 +188,7 @@ def _points(
     with Engine(mode.packing) as engine, Engine(fine_mode.packing) as fine_engine:
         runs = [(RUN, mode, engine, dt) for dt in steps.tolist()]
         runs += [(RUN + CAREFUL, fine_mode, fine_engine, dt) for dt in steps.tolist()]
-        jobs: list[Callable[[], complex]] = [partial(one.measured, on, dt, time) for _, one, on, dt in runs]
+        jobs: list[Callable[[], complex]] = [partial(one.measure_frequency, on, dt, time) for _, one, on, dt in runs]
         (*found, alone), seconds = time_jobs([*jobs, mode.from_spectrum], settings)
     plain, out = [], []
     for (method, one, _, dt), value, spent in zip(runs, found, seconds[:-1], strict=True):

@@ -74,10 +74,10 @@ class OnsetMethods:
     def root(self, increment: float, beyond: float) -> tuple[float, int]:
         """The onset by the root of the discriminant on a ramp to the first increment beyond a force, and the number of
         equilibria."""
-        found, _, computed = self.solved(increment, beyond)
+        found, _, computed = self.solve(increment, beyond)
         return found.fx_c, computed
 
-    def solved(self, increment: float, beyond: float) -> tuple[Onset, EquilibriumPath, int]:
+    def solve(self, increment: float, beyond: float) -> tuple[Onset, EquilibriumPath, int]:
         """The same with the error that it states, and the path."""
         path, asked = self._path("newton"), list[float]()
 
@@ -90,7 +90,7 @@ class OnsetMethods:
 
     def whole(self, increment: float, beyond: float) -> Onset:
         """The same with the error of the path in it."""
-        found, path, _ = self.solved(increment, beyond)
+        found, path, _ = self.solve(increment, beyond)
         return with_path_error(found, path)
 
     def beyond(self, onset: float) -> tuple[float, float]:
@@ -126,7 +126,7 @@ def _study(settings: Settings, ways: OnsetMethods, reference: OnsetMethods) -> S
     quick = settings.quick
     check, finest = (2e-3, 1e-3) if quick else (5e-4, 2.5e-4)
     guess = ways.scan(1e-3)[0] + 0.5e-3
-    found, *_ = reference.solved(finest, guess)
+    found, *_ = reference.solve(finest, guess)
     exact = found.fx_c
     reference_error = found.error + abs(reference.root(check, guess)[0] - exact)
     runs = _runs(ways, quick, exact)

@@ -30,7 +30,7 @@ FROM, TO = 0.010, 0.011
 
 DECKS, OVERDAMPED, FIRE = "overdamped, step of the decks", "overdamped", "FIRE"
 VERLET, NEWTON = "Verlet with drag", "Newton"
-COMPENSATED = ", compensated"
+COMPENSATED_SUFFIX = ", compensated"
 """Ends the name of a method in compensated arithmetic."""
 
 CHUNK = 200
@@ -64,7 +64,7 @@ class Increment:
         turned = packing.scaled_angle - self.end.scaled_angle
         return float(np.abs(np.delete(np.column_stack([apart, turned]), self.end.rattlers, axis=0)).max())
 
-    def overdamped(self, time_step: float | None, tolerance: float) -> tuple[Packing, int]:
+    def relax_overdamped(self, time_step: float | None, tolerance: float) -> tuple[Packing, int]:
         """The paper's dynamics until no disk feels more than a force."""
         self.engine.restore(self.start.packing)
         self.engine.set_fx(TO)
@@ -182,15 +182,18 @@ def _runs(
         # FIRE's evaluations are slow, and its convergence steady
         *((FIRE, force, partial(plain.fire, verlet_step, force)) for force in forces if force > 1e-6),
         *((NEWTON, force, partial(plain.newton, force or None)) for force in most),
-        *((NEWTON + COMPENSATED, force, partial(careful.newton, force or None)) for force in (*most[:3], 1e-12, 0.0)),
-        *((VERLET, steps, partial(plain.verlet, verlet_step, drag, steps)) for steps in counts),
-        *((VERLET + COMPENSATED, steps, partial(careful.verlet, verlet_step, drag, steps)) for steps in counts),
-        *((OVERDAMPED, force, partial(plain.overdamped, relax_step, force)) for force in forces),
         *(
-            (OVERDAMPED + COMPENSATED, force, partial(careful.overdamped, relax_step, force))
+            (NEWTON + COMPENSATED_SUFFIX, force, partial(careful.newton, force or None))
+            for force in (*most[:3], 1e-12, 0.0)
+        ),
+        *((VERLET, steps, partial(plain.verlet, verlet_step, drag, steps)) for steps in counts),
+        *((VERLET + COMPENSATED_SUFFIX, steps, partial(careful.verlet, verlet_step, drag, steps)) for steps in counts),
+        *((OVERDAMPED, force, partial(plain.relax_overdamped, relax_step, force)) for force in forces),
+        *(
+            (OVERDAMPED + COMPENSATED_SUFFIX, force, partial(careful.relax_overdamped, relax_step, force))
             for force in (1e-5, 1e-9, 1e-13)
         ),
-        *((DECKS, force, partial(plain.overdamped, None, force)) for force in forces),
+        *((DECKS, force, partial(plain.relax_overdamped, None, force)) for force in forces),
     ]
 
 

@@ -329,7 +329,7 @@ def _damped_onset(
     from faultgouge.analysis.uncertain_digits import with_uncertainty
     from faultgouge.pywrap.onset.damped import damped_onset_run
 
-    def known(so_far: DampedOnset, fx: float) -> None:
+    def report_windows(so_far: DampedOnset, fx: float) -> None:
         if output is not None:
             _write_result(output, [*before, {"mu": mu, "searched_to": fx} | so_far.as_dict()])
             keeps(
@@ -339,7 +339,7 @@ def _damped_onset(
 
     with status(f"mu = {mu:g}") as show:
         watch = partial(_under_way, show, f"mu = {mu:g}", folder=folder, tells=output is None)
-        run = damped_onset_run(scene, mu, watch, known, folder, first, bed)
+        run = damped_onset_run(scene, mu, watch, report_windows, folder, first, bed)
     opening = run.windows[0]
     if opening.kind == "start":
         tell(

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 from test_found import PASSING, cut_off
 from test_slicing import FEW, on_ranks
 
-from faultgouge.analysis.damped_onset.first_window import SlicedGrowing, first_growing
+from faultgouge.analysis.damped_onset.first_window import SlicedGrowthSearch, first_growing
 from faultgouge.analysis.damped_onset.imaginary_axis import growing_modes
 from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, find_growing_near, nearest_mode
 from faultgouge.analysis.damped_onset.window_edges import DampedWindow
@@ -197,7 +197,7 @@ def test_all_announced_modes_are_looked_at_also_beside_one_that_grew_before():
     hopf = partial(DampedWindow, fx_end=None, frequency=1.0, error=0.0, kind="hopf")
     begun = {0.5: hopf(fx_onset=-1.0), 0.9: hopf(fx_onset=-2.0)}
 
-    class Told(SlicedGrowing):
+    class Told(SlicedGrowthSearch):
         def _confirm_window(self, candidate, there, first):
             return begun[candidate.onset]
 
