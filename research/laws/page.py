@@ -17,7 +17,7 @@ from research.laws.both_laws import BRANCHES, RESTITUTIONS
 from research.laws.sets import sets as all_sets
 from research.modes.loss import GROWS
 from research.modes.page import finite, part
-from research.yielding.page import UNREST, rows_of
+from research.yielding.page import UNREST, read_standard, rows_of
 
 Row = dict[str, Any]
 
@@ -48,7 +48,7 @@ def write_page(tables: Path, folder: Path) -> Path:
         {path.stem: [row for row in read_rows(path) if row["says"] is None] for path in tables.glob("*.jsonl")}
     )
     found["stock"] = stock(read_rows(HERE / "stock_lammps.jsonl"))
-    found["yielding"] = yields(read_rows(YIELDING / "standard_100.jsonl"))
+    found["yielding"] = yields(read_standard(YIELDING))
     smoothed, _ = rows_of(YIELDING / "quartz_100.jsonl")
     found["yielding"]["smoothed"] = yields(smoothed)
     write_json(folder / "laws.json", finite(found))

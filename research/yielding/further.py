@@ -39,9 +39,6 @@ STANDARD_LOSSES = (1.0, 0.9)
 FRICTION, RESTITUTIONS = (1.0, 1.01), (0.9, 0.7)
 """Friction over that of the law, and restitutions, of the runs of `growth_at_bound`."""
 
-GROWTH_BOUND = 1e-15
-"""D in a run beyond which noise has grown. Contacts that shake down creep to 1e-18, and noise has 1e-24."""
-
 LARGE = {"disks": 400, "width": 23.8, "top": 20}
 
 

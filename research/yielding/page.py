@@ -18,6 +18,7 @@ from faultgouge.figures.pages import render
 from faultgouge.figures.style import INK, save, styled
 from faultgouge.studies.result_rows import read_rows, row_columns
 from faultgouge.studies.statistics import interval, median, share
+from research.modes.loss import GROWS
 from research.yielding.compute import CONTROLLED_RATE, LOADINGS, LOSSES, SHARES, TIME
 
 UNREST = ("flows", "bursts", "fails at rest")
@@ -30,6 +31,12 @@ ELSEWHERE = 1e-8
 
 QUIET = 1e-18
 """Kinetic energy at the end, force length, below which nothing moves: noise of 1e-12 begins with some 1e-20."""
+
+SEEN_GROWTH = 1e-15
+"""D in a run beyond which noise has grown. Contacts at the bound that yield to noise move by 1e-18 and less in all."""
+
+ROUNDED_RATE = 2 * GROWS
+"""Rate of D, 1 / time, below which the spectrum has no growth but a rounded eigenvalue of zero: a disk that rolls."""
 
 LASTS = 0.5
 """Share of its early kinetic energy from which on a layer vibrates without slowing down; the others lose 57 % and more
@@ -135,11 +142,16 @@ def _rising_loads(rows: list[dict[str, Any]], rate: float, loss: float) -> dict[
     }
 
 
-def text(found: dict[str, Any], packings: int, failed: int, loaded: list[dict[str, Any]]) -> str:
-    """The page; `loaded` are the rows of layers that the standard law has loaded."""
+def text(
+    found: dict[str, Any], packings: int, failed: int, loaded: list[dict[str, Any]], at_bound: list[dict[str, Any]]
+) -> str:
+    """The page; `loaded` are the rows of layers that the standard law has loaded, `at_bound` runs of those that grow."""
     unrest = [share(each["unrest"], packings) for each in found["yields"]]
     names = {"packings": packings, "failed": failed, "unrest": unrest, "interval": interval, "percent": percent}
     names["standard"] = standard(loaded)
+    grows = {(row["seed"], row["share"]) for row in at_bound if row["largest_D"] > SEEN_GROWTH}
+    names["sliding"] = [row for row in at_bound if (row["seed"], row["share"]) in grows]
+    names["bound_slips"] = [abs(row["slip"]) for row in at_bound if row["largest_D"] > SEEN_GROWTH]
     names["slow"] = [row for row in found["loading"] if row["rate"] == CONTROLLED_RATE]
     return render("research.yielding", "README.md.j2", **found, **names)
 
@@ -191,16 +203,26 @@ def write_page(folder: Path) -> Path:
     (folder / "pictures").mkdir(exist_ok=True)
     save(figure(found), folder / "pictures" / "yield")
     page = folder / "README.md"
-    page.write_text(text(found, len(rows), failed, read_rows(folder / "tables" / "standard_100.jsonl")))
+    tables = folder / "tables"
+    page.write_text(text(found, len(rows), failed, read_standard(tables), read_rows(tables / "sliding_100.jsonl")))
     return page
+
+
+def read_standard(tables: Path) -> list[dict[str, Any]]:
+    """Rows of layers of the standard law; all lossy layers have runs, whatever their spectrum says."""
+    runs = {row["seed"]: row["dynamic"] for row in read_rows(tables / "bound_100.jsonl")}
+    rows = read_rows(tables / "standard_100.jsonl")
+    undamped = ([run for run in row["dynamic"] if run["restitution"] == 1] for row in rows)
+    return [row | {"dynamic": each + runs[row["seed"]]} for row, each in zip(rows, undamped, strict=True)]
 
 
 def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Layers that the standard law has loaded, each with several draws of noise where a run decides.
 
-    "runs" are by share of the static yield and restitution: packings; those whose spectrum has growth; those that end
-    in each way of `UNREST`, and those that rest elsewhere, in all draws and in any. "flows" are packings that flow in
-    any run, by restitution.
+    "runs" are by share of the static yield and restitution: packings; those whose spectrum has growth; those in whose
+    runs noise grows, those that end in each way of `UNREST`, and those that rest elsewhere, in all draws and in any.
+    "flows" are packings that flow in any run, by restitution. "at_bound" are seed and share of the lossy layers in
+    which noise grows and the spectrum has no growth.
     """
     losses = sorted({run["restitution"] for row in rows for run in row["dynamic"]}, reverse=True)
     runs = []
@@ -211,7 +233,9 @@ def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
             ]
             each = [draws for draws in each if draws]
             cell: dict[str, Any] = {"share": load, "restitution": loss, "packings": len(each)}
-            cell["grows"] = sum(draws[0]["rate"] > 0 for draws in each)
+            cell["grows"] = sum(draws[0]["rate"] > ROUNDED_RATE for draws in each)
+            which = [[run["largest_D"] > SEEN_GROWTH for run in draws] for draws in each]
+            cell["grown"] = [sum(map(all, which)), sum(map(any, which))]
             for kind in UNREST:
                 which = [[run["ends"] == kind for run in draws] for draws in each]
                 cell[kind] = [sum(map(all, which)), sum(map(any, which))]
@@ -231,7 +255,14 @@ def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
         )
         for loss in losses
     }
-    return {"static": median([row["static"] for row in rows]), "of": len(rows), "runs": runs, "flows": flows}
+    at_bound = {
+        (row["seed"], run["share"])
+        for row in rows
+        for run in row["dynamic"]
+        if run["restitution"] < 1 and run["rate"] < ROUNDED_RATE and run["largest_D"] > SEEN_GROWTH
+    }
+    found = {"static": median([row["static"] for row in rows]), "of": len(rows), "runs": runs, "flows": flows}
+    return found | {"at_bound": sorted(at_bound)}
 
 
 def drawn_again(lasting: list[dict[str, Any]], further: list[dict[str, Any]]) -> dict[str, Any] | None:
@@ -267,7 +298,7 @@ def write_lasting(folder: Path) -> Path:
         percent=percent,
         lossy=lossy,
         again=drawn_again(rows, read_rows(further) if further.exists() else []),
-        standard=standard(read_rows(tables / "standard_100.jsonl")),
+        standard=standard(read_standard(tables)),
         **_count_lasting(lossy),
         free=_without_loss(rows, tables / "quartz_100.jsonl"),
         large=[of_runs(large, load, loss) for load in SHARES for loss in LOSSES],

@@ -62,7 +62,7 @@ def motion_of(matrix, force, start, time, tau=None, dt=None):
     time, size = np.asarray(time, dtype=float), len(matrix)
     if tau is None:
         modes, oscillator = BlockDiagonal.of(matrix), Oscillator(OMEGA, dt)
-        pairs = ((oscillator.forced_motion, force), (oscillator.released, start))
+        pairs = ((oscillator.forced_motion, force), (oscillator.free_motion, start))
         return np.sum([modes.apply(function, time, vector) for function, vector in pairs], axis=0)
     system = StateSpace.of_matrices(csr_array(matrix), csr_array(np.eye(size) / tau), np.ones(size))
     rows, rest = block_diag(system.unweight, np.eye(size)), np.zeros(size)

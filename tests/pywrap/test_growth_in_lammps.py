@@ -118,7 +118,7 @@ def test_growth_with_dashpots_is_that_of_the_eigenvalue(path, fx, cn, unstable):
     packing = without_dissipation(path, cn=cn)(fx)
     assert len(spectrum(packing).pairs) == unstable
     modes = DampedModes.of(Pencil.of(packing))
-    (index,) = modes.growing
+    (index,) = modes.grows
     # 0.15 of the limit: damped runs are of second order in the step, and 3e-4 off there
     mode, dt = modes.mode(int(index)), 3 * time_step(packing)
     rate = 2 * mode.rate.real

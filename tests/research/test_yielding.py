@@ -4,16 +4,28 @@ import shutil
 from pathlib import Path
 
 from faultgouge.studies.result_rows import read_rows
-from research.yielding.compute import CONTROLLED
-from research.yielding.page import UNREST, drawn_again, numbers, rows_of, standard, text, worst_ends, write_lasting
+from research.yielding.compute import CONTROLLED_RATE
+from research.yielding.page import (
+    SEEN_GROWTH,
+    UNREST,
+    drawn_again,
+    numbers,
+    read_standard,
+    rows_of,
+    standard,
+    text,
+    worst_ends,
+    write_lasting,
+)
 
 YIELDING = Path(__file__).parents[2] / "research" / "yielding"
 ROWS, FAILED = rows_of(YIELDING / "tables" / "quartz_100.jsonl")
-STANDARD = read_rows(YIELDING / "tables" / "standard_100.jsonl")
+STANDARD = read_standard(YIELDING / "tables")
+AT_BOUND = read_rows(YIELDING / "tables" / "sliding_100.jsonl")
 
 
 def test_the_page_of_yield_is_that_of_its_table():
-    assert (YIELDING / "README.md").read_text() == text(numbers(ROWS), len(ROWS), FAILED, STANDARD)
+    assert (YIELDING / "README.md").read_text() == text(numbers(ROWS), len(ROWS), FAILED, STANDARD, AT_BOUND)
 
 
 def test_flow_is_told_from_a_layer_that_finds_no_rest_under_drag():
@@ -35,6 +47,18 @@ def test_the_standard_law_loads_the_same_packings_and_lossy_layers_rest():
         for share, loss in {(run["share"], run["restitution"]) for run in row["dynamic"]}:
             runs = [run for run in row["dynamic"] if (run["share"], run["restitution"]) == (share, loss)]
             assert len(runs) == (1 if runs[0]["ends"] == "stable" else 3)
+
+
+def test_growth_at_the_bound_needs_contacts_there():
+    """A lossy layer whose spectrum is stable grows while contacts slide on, and not with a little more friction."""
+    found = standard(STANDARD)["at_bound"]
+    assert found
+    assert {seed for seed, _ in found} == {row["seed"] for row in AT_BOUND}
+    for seed, share in found:
+        chosen = [row for row in AT_BOUND if (row["seed"], row["share"]) == (seed, share)]
+        runs = {(row["friction"], row["restitution"]): row for row in chosen}
+        assert runs[1.0, 0.9]["at_bound"] > 0 == runs[1.01, 0.9]["at_bound"]
+        assert runs[1.0, 0.9]["largest_D"] > SEEN_GROWTH > 100 * runs[1.01, 0.9]["largest_D"]
 
 
 def test_draws_are_counted_by_layer():
@@ -64,7 +88,7 @@ def test_layers_without_loss_do_not_rest_below_their_static_yield_and_lossy_ones
     for k, row in enumerate(ROWS):
         for run in row["loading"]:
             assert run["flows"] is None or row["newton"] < run["flows"] < row["static"]
-            if run["rate"] == CONTROLLED and run["flows"] is not None and run["restitution"] in flowing:
+            if run["rate"] == CONTROLLED_RATE and run["flows"] is not None and run["restitution"] in flowing:
                 flowing[run["restitution"]].append(k)
     assert flowing[0.9] == flowing[0.5] == flowing[0.1] != []
 

@@ -13,7 +13,7 @@ from faultgouge.figures.series import draw_growth
 from faultgouge.pywrap.lammps.dynamics import Weakening
 from faultgouge.studies.triggering.compute import Sensitivity
 from faultgouge.studies.triggering.draw import (
-    DAMPING,
+    DAMPING_TIMES,
     amplitude_figure,
     damping_figure,
     eruption_figure,
@@ -84,7 +84,7 @@ def test_damping_marks_its_crossover():
     lines = damping_figure(pairs).axes[0].lines
     for number, pair in enumerate(pairs):
         line, plateau, dot, ring = lines[4 * number : 4 * number + 4]
-        np.testing.assert_array_equal(line.get_xdata(), pair.tau_d * DAMPING)
+        np.testing.assert_array_equal(line.get_xdata(), pair.tau_d * DAMPING_TIMES)
         np.testing.assert_array_equal(line.get_ydata(), [pair.form.amplitude(tau) for tau in line.get_xdata()])
         assert set(plateau.get_ydata()) == {pair.form.amplitude()}
         # between two points the curve bends by a few per cent

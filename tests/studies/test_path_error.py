@@ -13,7 +13,7 @@ from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
 from faultgouge.assessment.work_precision.coverage.stated_errors import FINER, draw_scene, read, restate_case
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.onset.damped import damped_onset_run
-from faultgouge.pywrap.onset.path_error import OtherPaths, PathError, meeting, with_path_error
+from faultgouge.pywrap.onset.path_error import OtherPaths, PathError, squared_gap, with_path_error
 from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
 from faultgouge.studies.sweep.onset import onset
@@ -81,7 +81,7 @@ def test_a_contact_that_slides_before_the_onset_is_covered():
         scene = scene_of(sections, precision, increment, 3e-3)
         with path_of(scene) as path:
             window, *_ = find_onset(path, increment * np.arange(round(3e-3 / increment) + 1)).windows
-            part = OtherPaths(path).error(window.fx_onset, meeting(window.eigenvalue), window.error)
+            part = OtherPaths(path).error(window.fx_onset, squared_gap(window.eigenvalue), window.error)
         assert part.changes
         assert part.correction == 0
         found[precision, increment] = window.fx_onset, window.error + part.error
@@ -130,7 +130,7 @@ def test_an_onset_that_is_not_found_again_is_uncertain_by_the_increment():
     scene = scene_of(HUNDRED, "double", 1e-3, 0.02)
     with path_of(scene) as path:
         path(1e-3)
-        part = OtherPaths(path).error(0.0005, meeting(30.0), 1e-11)  # no pair coalesces there
+        part = OtherPaths(path).error(0.0005, squared_gap(30.0), 1e-11)  # no pair coalesces there
     assert np.isnan(part.shift)
     assert part.correction == 0
     assert part.error == pytest.approx(5e-4)

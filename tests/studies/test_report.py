@@ -59,7 +59,7 @@ def test_runs_show_velocity_verlets_frequency(settings, fx, growing, least):
     mode = FastestMode.of(compensate(settings.at(fx)).packing, growing)
     dt = 0.4 * mode.limit
     with Engine(mode.packing) as engine:
-        found = mode.measured(engine, dt, 3.0)
+        found = mode.measure_frequency(engine, dt, 3.0)
     predicted = mode.quantity(complex(discrete_frequency(mode.eigenvalue, dt)))
     assert mode.quantity(found) == pytest.approx(predicted, rel=least)
     assert abs(mode.quantity(found) / mode.exact - 1) > 10 * least

@@ -65,7 +65,7 @@ def test_a_key_belongs_to_the_scene_and_not_to_the_sweep():
 )
 def test_what_settles_alike(axes, changes, shared):
     first, second = sweep_of(axes, **changes).points
-    assert (first.settling == second.settling) is shared
+    assert (first.settling_key == second.settling_key) is shared
 
 
 @pytest.mark.parametrize(

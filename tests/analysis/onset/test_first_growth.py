@@ -153,13 +153,13 @@ def test_modes_near_a_frequency_are_those_of_all(path):
     for rate in modes.rates[[3, 100, 200]]:
         found = nearest_mode(modes.pencil, float(rate.imag) * (1 + 1e-6))
         assert found.rate == pytest.approx(rate, rel=1e-9)
-    assert len(modes.growing)
-    for rate in modes.rates[modes.growing]:
+    assert len(modes.grows)
+    for rate in modes.rates[modes.grows]:
         found = [mode.rate for mode in find_growing_near(modes.pencil, 1.001j * rate.imag, 12)]
         assert min(abs(each - rate) for each in found) < 1e-9 * abs(rate)
         assert find_growing_near(Pencil.of(damped(0.02)), 1j * rate.imag, 12) == []
     found = sorted((mode.rate for mode in growing_modes(modes.pencil)), key=lambda s: s.imag)
-    assert found == pytest.approx(modes.rates[modes.growing], rel=1e-9)
+    assert found == pytest.approx(modes.rates[modes.grows], rel=1e-9)
     assert growing_modes(Pencil.of(damped(0.02))) == []
 
 

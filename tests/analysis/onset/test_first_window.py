@@ -78,7 +78,7 @@ def test_load_without_equilibrium_ends_the_search_for_the_first_window(ahead):
 
         return until
 
-    limits = Limits(kept=0, ahead=ahead)
+    limits = Limits(largest_basis=0, ahead=ahead)
     with pytest.raises(NoEquilibriumError, match="no equilibrium"):
         complex_windows(ending(crossing(0.37, 1e-3)), [0.0, 1.0, 2.0])
     with pytest.raises(NoEquilibriumError, match="no equilibrium"):
@@ -95,7 +95,7 @@ def test_the_search_ends_with_the_first_window():
         asked.append(f)
         return crossing(0.0, -0.04)(np.cos(np.pi * f))
 
-    window, _ = searched(operator, [0.0, 1.0, 2.0, 3.0], Limits(kept=0, ahead=3))
+    window, _ = searched(operator, [0.0, 1.0, 2.0, 3.0], Limits(largest_basis=0, ahead=3))
     assert window.fx_end == pytest.approx(np.arccos(-0.2) / np.pi, abs=DIGITS)
     assert {f for f in asked if f > 1.0} == {2.0, 3.0}
 

@@ -19,7 +19,7 @@ from faultgouge.analysis.onset.first_window import first_window
 from faultgouge.analysis.onset.slice_store import Border, Candidate, DamagedSliceError, SlicePass, SliceResult
 from faultgouge.analysis.progress import show_progress
 
-PASSING = replace(FEW, kept=0, wait=0.1)
+PASSING = replace(FEW, largest_basis=0, wait=0.1)
 """Slices of 24 modes, in bases that are not kept in memory."""
 
 
