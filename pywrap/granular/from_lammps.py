@@ -60,7 +60,8 @@ def from_lammps(
 ) -> Snapshot:
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
-    The instance does not change: its next run is the same to the bit as without the look, on any number of ranks.
+    The instance does not change: its next run is the same to the bit as without the look, on any number of ranks, and
+    with the threads of `package omp`.
 
     Parameters
     ----------
