@@ -108,9 +108,11 @@ def _first(packings: Sequence[Packing | Snapshot], values: Sequence[Complexes]) 
 
 def _closest(packing: Packing | Snapshot, modes: Modes) -> Pair:
     """The two real modes that are closest to meeting."""
-    if len(modes.values) < 2:
-        raise ModeError(f"the packing at F_x = {packing.fx:g} has fewer than two modes, so that no two can meet")
-    first, second, _ = closest_to_meeting(Eigenpairs(modes.values, modes.right, modes.left, 0))
+    try:
+        first, second, _ = closest_to_meeting(Eigenpairs(modes.values, modes.right, modes.left, 0))
+    except ValueError as error:
+        words = f"the packing at F_x = {packing.fx:g} has fewer than two modes, so that no two can meet"
+        raise ModeError(words) from error
     return modes.pair((first, second))
 
 

@@ -5,8 +5,10 @@ pytest reads this file before it starts its workers: what takes long to import i
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import gc
+import io
 import json
 import os
 import shlex
@@ -114,29 +116,34 @@ def faultgouge(faultgouge_in, tmp_path: Path) -> Callable[..., subprocess.Comple
     return partial(faultgouge_in, tmp_path)
 
 
-@pytest.fixture
-def faultgouge_here(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., subprocess.CompletedProcess]:
-    """Runs the command in tmp_path within this process, which saves the second that a process takes to start."""
+@pytest.fixture(scope="session")
+def faultgouge_here_in() -> Callable[..., subprocess.CompletedProcess]:
+    """Runs the command in a folder within this process, which saves the second that a process takes to start."""
 
-    def run(*words: object, code: int = 0) -> subprocess.CompletedProcess:
+    def run(folder: Path, *words: object, code: int | None = 0) -> subprocess.CompletedProcess:
         from faultgouge.commands import program
         from faultgouge.exit_status import fail
 
-        monkeypatch.chdir(tmp_path)
-        capsys.readouterr()
-        exit_code: object = 0
-        try:
-            program()([str(word) for word in words], standalone_mode=False)
-        except Exception as error:
-            with pytest.raises(SystemExit) as ended:
-                fail(error)
-            exit_code = ended.value.code
-        said = capsys.readouterr()
-        return _ended(subprocess.CompletedProcess(words, int(str(exit_code)), said.out, said.err), code)
+        out, err, exit_code, before = io.StringIO(), io.StringIO(), 0, Path.cwd()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            os.chdir(folder)
+            try:
+                program()([str(word) for word in words], standalone_mode=False)
+            except Exception as error:
+                with pytest.raises(SystemExit) as ended:
+                    fail(error)
+                exit_code = int(str(ended.value.code))
+            finally:
+                os.chdir(before)
+        return _ended(subprocess.CompletedProcess(words, exit_code, out.getvalue(), err.getvalue()), code)
 
     return run
+
+
+@pytest.fixture
+def faultgouge_here(faultgouge_here_in, tmp_path: Path) -> Callable[..., subprocess.CompletedProcess]:
+    """Runs the command in tmp_path within this process."""
+    return partial(faultgouge_here_in, tmp_path)
 
 
 @pytest.fixture

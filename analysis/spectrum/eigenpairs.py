@@ -13,7 +13,16 @@ from ..factors.sparse_lu import general_lu
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Packing
 from ..packing.snapshot import Snapshot
-from .spectrum import Complexes, all_modes, dynamical_matrix, mass_weighted, participation_ratio, rotation_share
+from .spectrum import (
+    SAFETY,
+    Complexes,
+    all_modes,
+    dynamical_matrix,
+    mass_weighted,
+    participation_ratio,
+    rotation_share,
+    unit_rounding,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +85,9 @@ def closest_to_meeting(modes: Eigenpairs) -> tuple[int, int, float]:
 
     At a coalescence of two real eigenvalues the vectors become one. In the normal form of two modes the cosine between
     the right vectors is :math:`\eta/\delta = 1 - \epsilon`, and :math:`\epsilon` is the distance from the coalescence.
-    The two modes are therefore the real modes whose mass-weighted right vectors are most nearly parallel.
+    The two modes are therefore the real modes whose mass-weighted right vectors are most nearly parallel. Motions
+    that no force opposes, whose eigenvalue is zero within rounding, do not count: LAPACK's vectors of several of them
+    may be parallel by rounding alone.
 
     Parameters
     ----------
@@ -92,11 +103,12 @@ def closest_to_meeting(modes: Eigenpairs) -> tuple[int, int, float]:
     Raises
     ------
     ValueError
-        If there are fewer than two real modes.
+        If there are fewer than two such modes.
     """
-    real = np.flatnonzero(modes.values.imag == 0)
+    zero = np.abs(modes.values) <= SAFETY * unit_rounding(modes.values)
+    real = np.flatnonzero((modes.values.imag == 0) & ~zero)
     if len(real) < 2:
-        raise ValueError(f"There are {len(real)} real modes; two are needed to meet.")
+        raise ValueError(f"There are {len(real)} real modes that a force opposes; two are needed to meet.")
     cosine = np.abs(modes.right[:, real].real.T @ modes.right[:, real].real)
     np.fill_diagonal(cosine, 0.0)
     first, second = sorted(np.unravel_index(np.argmax(cosine), cosine.shape))

@@ -401,7 +401,7 @@ def largest_frequency(packing: Packing | Snapshot) -> float:
     return float(np.sqrt(np.abs(largest).max()))
 
 
-def unit_rounding(matrix: Floats) -> float:
+def unit_rounding(matrix: Floats | Complexes) -> float:
     """u |A|_F with the unit roundoff u = 2^-53: the backward error scale of an eigenvalue solver."""
     return float(0.5 * np.finfo(np.float64).eps * np.linalg.norm(matrix))
 

@@ -38,8 +38,8 @@ from ...analysis import Snapshot, damping_matrix, stiffness_matrix
 from ...analysis.operators.linearised_contacts import rescaling_operators
 from ...analysis.packing.arrays import Floats, Indices
 from ...analysis.spectrum.spectrum import active_coordinates, mass_weighted
-from . import forked_look
 from .granular_commands import SnapshotError
+from .look_in_a_copy import can_copy, in_a_copy, quieten
 
 ACCURACY = 1e-10
 """Of the motion with two derivatives, as a share of the largest velocity."""
@@ -102,7 +102,7 @@ def compare_motion(
     SnapshotError
         If the instance has several ranks or threads, or other particles than the snapshot.
     """
-    if not forked_look.can_copy(lmp):
+    if not can_copy(lmp):
         raise SnapshotError("compare_motion runs LAMMPS in copies of the process: use one rank and one thread.")
     step = float(lmp.extract_global("dt")) if timestep is None else float(timestep)
     steps = max(1, round(time / step))
@@ -111,7 +111,7 @@ def compare_motion(
     root = np.sqrt(snapshot.coordinate_mass)
     start = np.zeros(snapshot.coordinates)
     start[active] = amplitude * np.random.Generator(np.random.PCG64(seed)).standard_normal(len(active))
-    there, back = (forked_look.in_a_copy(partial(_run, lmp, snapshot, sign * start, step, steps)) for sign in (1, -1))
+    there, back = (in_a_copy(partial(_run, lmp, snapshot, sign * start, step, steps)) for sign in (1, -1))
     measured = (0.5 * (there - back) * root)[active]
     predicted = _velocity(snapshot, stiffness, active, (start * root)[active], step * steps)
     difference = float(np.linalg.norm(measured - predicted) / np.linalg.norm(predicted))
@@ -149,7 +149,7 @@ def _velocity(snapshot: Snapshot, stiffness: csr_array, active: Indices, start: 
 def _run(lmp: Any, snapshot: Snapshot, velocity: Floats, step: float, steps: int) -> Floats:
     """Velocities of the coordinates after some steps of LAMMPS."""
     lmp.command("log none")
-    forked_look.quieten(lmp, drag=True)
+    quieten(lmp, drag=True)
     d, parts = snapshot.dimension, velocity.reshape(snapshot.axes, -1)
     spin = parts[d:] / snapshot.radius
 

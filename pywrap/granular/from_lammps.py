@@ -1,8 +1,8 @@
 r"""A Snapshot of a live LAMMPS with its own granular styles, or ours: any packing, as it stands.
 
 What LAMMPS says of each contact (compute pair/local, fix wall/gran ... contacts) is its normal, its overlap and both
-forces, without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.forked_look`). The laws are
-measured (:mod:`~faultgouge.pywrap.granular.contact_law_measurement`), with which
+forces, without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.lammps_arrays`). The laws
+are measured (:mod:`~faultgouge.pywrap.granular.contact_law_measurement`), with which
 
 .. math::
 
@@ -33,9 +33,12 @@ import numpy as np
 from ...analysis import LinearisedContacts, MindlinLaw, Snapshot
 from ...analysis.packing.arrays import Floats, Indices
 from ...analysis.packing.snapshot import PER_CONTACT, WALL, linearise_contacts
-from . import forked_look
 from .contact_law_measurement import MeasuredLaw, State, measure_laws
 from .granular_commands import OWN, Commands, SnapshotError, check_fixes, check_pair, read_commands, without_suffix
+from .instance_queries import communicator, log_of, only_log, styles_of
+from .lammps_arrays import Arrays, arrays_at_rest
+from .look_in_a_copy import can_copy, in_a_copy, quieten
+from .look_in_place import in_place
 
 BALANCE = 1e-4
 """Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
@@ -57,7 +60,8 @@ def from_lammps(
 ) -> Snapshot:
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
-    The instance does not change: its next run is the same to the bit as without the look, on any number of ranks.
+    The instance does not change: its next run is the same to the bit as without the look, on any number of ranks, and
+    with the threads of `package omp`.
 
     Parameters
     ----------
@@ -83,8 +87,8 @@ def from_lammps(
         without contacts, moving or curved walls, or bodies; or the commands are not those of the instance.
     """
     given = None if commands is None else read_commands(commands)
-    if forked_look.can_copy(lmp):
-        styles, read, found = forked_look.in_a_copy(lambda: _look(lmp, given, copied=True))
+    if can_copy(lmp):
+        styles, read, found = in_a_copy(lambda: _look(lmp, given, copied=True))
     else:
         styles, read, found = _look(lmp, given, copied=False)
     snapshot = _snapshot(lmp, styles, read, found)
@@ -100,15 +104,11 @@ def from_lammps(
 Styles = tuple[str, dict[str, str], str, str]
 
 
-def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Styles, Commands, forked_look.Arrays]:
+def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Styles, Commands, Arrays]:
     """Styles, commands, and the arrays of all ranks."""
-    world = forked_look.communicator(lmp)
+    world = communicator(lmp)
     if given is None:
-        lines = (
-            forked_look.log_of(lmp)
-            if copied
-            else world.bcast(forked_look.only_log() if world.rank == 0 else None, root=0)
-        )
+        lines = log_of(lmp) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
         if lines is None:
             raise SnapshotError(
                 "This LAMMPS has no log to read its commands from: give the lines pair_style, pair_coeff, fix "
@@ -117,10 +117,10 @@ def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Styles, Co
         given = read_commands(lines, log=True)
     elif copied:
         lmp.command("log none")
-    styles = forked_look.styles_of(lmp)
+    styles = styles_of(lmp)
     _check(lmp, styles, given)
     if copied:
-        forked_look.quieten(lmp)
+        quieten(lmp)
     groups = _groups(styles[1], given)
     walls = tuple(
         name for name, style in styles[1].items() if without_suffix(style) in ("wall/gran", "wall/mindlin/smooth")
@@ -128,10 +128,10 @@ def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Styles, Co
     own = given.style == OWN
     columns = "dx dy dz force p1 p2 p3" if not own else "dx dy dz force p1 p3"
 
-    def work() -> forked_look.Arrays:
-        return forked_look.at_rest(lmp, groups, walls, columns)
+    def work() -> Arrays:
+        return arrays_at_rest(lmp, groups, walls, columns)
 
-    mine = work() if copied else forked_look.in_place(lmp, work, groups)
+    mine = work() if copied else in_place(lmp, work, groups)
     every = world.allgather(mine)
     return styles, given, {name: _join_ranks([each[name] for each in every]) for name in mine}
 
@@ -178,7 +178,7 @@ def _groups(fixes: dict[str, str], commands: Commands) -> dict[str, str]:
     return found
 
 
-def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: forked_look.Arrays) -> Snapshot:
+def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: Arrays) -> Snapshot:
     order = np.argsort(found["id"], kind="stable")
     per_atom = [name for name in found if name not in ("contacts", "partners")]
     found = found | {name: found[name][order] for name in per_atom}
@@ -231,9 +231,7 @@ def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: forked_look.A
 class _Contacts:
     """The contacts of a look, with the laws that LAMMPS has for them."""
 
-    def __init__(
-        self, found: forked_look.Arrays, commands: Commands, styles: Styles, types: int, frozen: Indices
-    ) -> None:
+    def __init__(self, found: Arrays, commands: Commands, styles: Styles, types: int, frozen: Indices) -> None:
         self.found, self.commands, self.types, self.units = found, commands, types, styles[2]
         self.radius, self.mass = found["radius"], np.where(frozen, np.inf, found["rmass"])
         self.kind = found["type"].astype(np.int64)

@@ -40,9 +40,10 @@ from ...analysis import NoEquilibriumError, Snapshot, negative_eigenvalues, stif
 from ...analysis.errors import FaultgougeError
 from ...analysis.factors.sparse_lu import general_lu
 from ...analysis.packing.arrays import Floats, derive_frozen
-from . import forked_look
 from .from_lammps import INTEGRATORS, from_lammps
 from .granular_commands import SnapshotError, read_commands, without_suffix
+from .instance_queries import explain_error, log_of, log_path
+from .look_in_a_copy import can_copy, in_a_copy, quieten
 
 REST = 1e-8
 """Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
@@ -102,7 +103,7 @@ def lammps_path(
         By ``path(value)``, where the packing flows: its particles have moved by their diameter in the mean, or do not
         come to rest.
     """
-    if not forked_look.can_copy(lmp):
+    if not can_copy(lmp):
         raise SnapshotError("lammps_path keeps copies of the process: use one rank and one thread.")
     given = None if commands is None else list(commands)
     return LammpsPath(_Relaxation(lmp, apply, given, slides, balance, steps))
@@ -180,7 +181,7 @@ def _be_start(relaxation: "_Relaxation", folder: Path) -> NoReturn:
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
         _own_log(relaxation.lmp, folder)
-        forked_look.quieten(relaxation.lmp)
+        quieten(relaxation.lmp)
         there = Client(str(folder / "path"), "AF_UNIX")
         while (value := there.recv()) is not None:
             source, sink = os.pipe()
@@ -206,7 +207,7 @@ def _be_start(relaxation: "_Relaxation", folder: Path) -> NoReturn:
 
 def _own_log(lmp: Any, folder: Path) -> None:
     """Go on in a copy of the log, where there is one: copies of a process must not write to the same file."""
-    before = forked_look.log_path(lmp)
+    before = log_path(lmp)
     if before is not None:
         own = folder / f"log.{os.getpid()}"
         shutil.copyfile(before, own)
@@ -236,7 +237,7 @@ class _Relaxation:
             self.set(value)
             found = self.displace_to_balance() or self.relax(value)
             self.found = found
-            change = forked_look.in_a_copy(lambda: self.force_change(value))
+            change = in_a_copy(lambda: self.force_change(value))
             if change == 0.0:
                 return SnapshotError(
                     f"No force changes with the load at {value:g}: does apply set it, or a fix read the variable?"
@@ -245,7 +246,7 @@ class _Relaxation:
         except FaultgougeError as error:
             return error
         except Exception as error:  # LAMMPS, and a user's function, raise what they choose
-            return SnapshotError(f"At {value:g}: {forked_look.explain_error(error)}")
+            return SnapshotError(f"At {value:g}: {explain_error(error)}")
 
     def set(self, value: float) -> None:
         """Set the load."""
@@ -280,7 +281,7 @@ class _Relaxation:
         if start.contacts.at_bound.any():
             return None
         try:
-            moves, found = forked_look.in_a_copy(lambda: self._try_newton(start))
+            moves, found = in_a_copy(lambda: self._try_newton(start))
             if found is None:
                 return None
         except SnapshotError:  # particles that nothing holds fly off: the relaxation has its own words for it
@@ -358,7 +359,7 @@ class _Relaxation:
 
     def _integrators(self) -> list[tuple[str, str]]:
         """IDs and lines of the fixes that move particles."""
-        given = self.commands or forked_look.in_a_copy(lambda: forked_look.log_of(self.lmp)) or []
+        given = self.commands or in_a_copy(lambda: log_of(self.lmp)) or []
         fixes = read_commands(given, log=self.commands is None).fixes
         return [(name, line) for name, line in fixes.items() if without_suffix(line.split()[3]) in INTEGRATORS]
 

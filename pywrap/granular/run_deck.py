@@ -8,9 +8,9 @@ from mpi4py import MPI
 
 from ...analysis import BadInputError, Snapshot
 from ..lammps.instance import lammps_instance
-from . import forked_look
 from .from_lammps import BALANCE, from_lammps
 from .granular_commands import SnapshotError, check_fixes, check_pair, read_commands
+from .instance_queries import explain_error
 
 
 def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE) -> Snapshot:
@@ -42,7 +42,7 @@ def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE) -> S
             os.chdir(path.parent.resolve())
             lmp.file(path.name)
         except Exception as error:  # LAMMPS raises what its bindings choose
-            raise SnapshotError(f"{path}: {forked_look.explain_error(error)}") from error
+            raise SnapshotError(f"{path}: {explain_error(error)}") from error
         finally:
             os.chdir(here)
         found = from_lammps(lmp, slides=slides, balance=balance)

@@ -16,7 +16,7 @@ from faultgouge.analysis import Snapshot, damping_matrix, spectrum, stiffness_ma
 from faultgouge.analysis.packing.arrays import Floats
 from faultgouge.analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from faultgouge.pywrap import compare_motion, from_lammps
-from faultgouge.pywrap.granular.forked_look import in_a_copy
+from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
 
 KN, KT, GAMMA = 1e5, 2e5 / 7, 40.0
 MU = 0.5

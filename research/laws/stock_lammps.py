@@ -40,7 +40,7 @@ from faultgouge.analysis import Packing, Snapshot, damping_matrix, spectrum, sti
 from faultgouge.analysis.packing.arrays import Floats, Indices
 from faultgouge.analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from faultgouge.pywrap import Scene, from_lammps, ramp, settle
-from faultgouge.pywrap.granular.forked_look import in_a_copy
+from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
 from faultgouge.pywrap.lammps.data_file import box_lines
 from faultgouge.pywrap.lammps.instance import lammps_instance
 from faultgouge.pywrap.scenes.units import dashpot

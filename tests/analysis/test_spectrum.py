@@ -11,6 +11,7 @@ from tiling import tiled
 
 from faultgouge.analysis import (
     Contacts,
+    Eigenpairs,
     MindlinLaw,
     Packing,
     closest_to_meeting,
@@ -206,6 +207,15 @@ def test_imaginary_part_grows_as_the_root_of_the_distance(path):
     near, nearer = (spectrum(path(onset + distance)).pairs[0].eigenvalue.imag for distance in (1e-5, 1e-7))
     # The next order is the distance over the width of the window, 1e-2.
     assert near / nearer == pytest.approx(10, rel=1e-2)
+
+
+def test_motions_that_no_force_opposes_do_not_meet():
+    """Two zeros of rounding with one vector, as LAPACK has them of three disks that roll on a floor, and two modes."""
+    right = np.array([[1.0, 1.0, 0, 0], [0, 0, 1.0, 0.6], [0, 0, 0, 0.8]], dtype=complex)
+    modes = Eigenpairs(np.array([-1e-15, 2e-15, 1.0, 2.0], dtype=complex), right, right, 0)
+    assert closest_to_meeting(modes) == (2, 3, pytest.approx(0.6, abs=1e-15))
+    with pytest.raises(ValueError, match="There are 1 real modes that a force opposes"):
+        closest_to_meeting(Eigenpairs(modes.values[:3], right[:, :3], right[:, :3], 0))
 
 
 def test_modes_of_a_symmetric_operator_are_not_close_to_meeting(path):

@@ -12,10 +12,10 @@ BEYOND_ITS_ONSET = {
 
 
 @pytest.fixture(scope="session")
-def beyond(tmp_path_factory, faultgouge_in):
+def beyond(tmp_path_factory, faultgouge_here_in):
     """A folder with ramp.h5 beyond the onset and its dumps, and perturb.h5, the undamped run with its trajectory."""
     made = tmp_path_factory.mktemp("beyond")
     (made / "scene.toml").write_text(LAYER + toml(BEYOND_ITS_ONSET))
     for command in ("ramp", "perturb"):
-        faultgouge_in(made, command, "scene.toml", "-o", f"{command}.h5")
+        faultgouge_here_in(made, command, "scene.toml", "-o", f"{command}.h5")
     return made

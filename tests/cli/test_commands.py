@@ -42,11 +42,11 @@ def _scene(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory, faultgouge_in):
+def whole(tmp_path_factory, faultgouge_here_in):
     """A folder with run.h5, the whole ramp of the scene, and what the command printed."""
     folder = tmp_path_factory.mktemp("whole")
     (folder / "scene.toml").write_text(SCENE)
-    return folder, json.loads(faultgouge_in(folder, "ramp", "scene.toml", "--json").stdout)
+    return folder, json.loads(faultgouge_here_in(folder, "ramp", "scene.toml", "--json").stdout)
 
 
 @pytest.mark.slow
@@ -89,21 +89,21 @@ def test_a_ramp_that_was_cut_off_goes_on_and_two_ranks_write_the_same(faultgouge
 
 @pytest.mark.slow
 @pytest.mark.parametrize("loads", [(0.0,), (0.0, 1e-3)], ids=["settled", "with a ramp"])
-def test_settle_finishes_a_settling_and_no_ramp(faultgouge, tmp_path, loads):
+def test_settle_finishes_a_settling_and_no_ramp(faultgouge_here, tmp_path, loads):
     scene = Scene.from_toml(tmp_path / "scene.toml", command="settle")
     settled = settle(scene)
     with Record(tmp_path / "run.h5", scene) as record:  # as a kill between the packing and the end leaves it
         for fx in loads:
             record.append(replace(settled, packing=replace(settled.packing, fx=fx)))
-    faultgouge("settle", "scene.toml")
+    faultgouge_here("settle", "scene.toml")
     with RunFile(tmp_path / "run.h5") as file:
         assert len(file) == len(loads)
         assert file.complete == (loads == (0.0,))
 
 
 @pytest.mark.slow
-def test_perturb_writes_the_series_and_the_trajectory_that_is_asked_for(faultgouge, tmp_path):
-    done = faultgouge("perturb", "scene.toml", "--json")
+def test_perturb_writes_the_series_and_the_trajectory_that_is_asked_for(faultgouge_here, tmp_path):
+    done = faultgouge_here("perturb", "scene.toml", "--json")
     series = json.loads(done.stdout)
     assert done.stderr.endswith("written to perturb.h5\n")
     assert (series["growth"], series["predicted_rate"], series["time_needed"]) == (None, 0, None)
@@ -136,8 +136,10 @@ def test_dumps_that_are_asked_for_hold_the_equilibria(faultgouge_here, beyond):
 
 
 @pytest.mark.slow
-def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves(faultgouge_here, whole):
-    run = whole[0] / "run.h5"
+def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves(faultgouge_here, tmp_path):
+    (tmp_path / "scene.toml").write_text(toml(SMALL | {"ramp": {"step": 5e-3, "until": 1e-2}}))
+    faultgouge_here("ramp", "scene.toml")
+    run = tmp_path / "run.h5"
     with RunFile(run) as file:
         packing = file.packing()
     printed, fast = (
@@ -200,16 +202,18 @@ def test_onset_as_json_and_among_some_modes(faultgouge_here, tmp_path):
 
 
 @pytest.mark.slow
-def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge, tmp_path, monkeypatch):
+def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge, faultgouge_here, tmp_path):
     """As two pipes of a shell see them; the onset of the reference packing is the first of its windows."""
     scene = LAYER + toml({"ramp": {"step": 5.5e-3, "until": 0.022}, "perturb": {"fx": 0.022, "time": 0.1}})
     (tmp_path / "scene.toml").write_text(scene)
     first = faultgouge("onset", "scene.toml")
-    found, every = (json.loads(faultgouge("onset", "scene.toml", *more, "--json").stdout) for more in ((), ("--all",)))
+    found, every = (
+        json.loads(faultgouge_here("onset", "scene.toml", *more, "--json").stdout) for more in ((), ("--all",))
+    )
     assert first.stdout.startswith("mu = 1: F_x^c = 0.02183305")
     assert "two eigenvalues merge there" in first.stdout
     assert first.stderr == ""
-    table = faultgouge("onset", "scene.toml", "--all").stdout.splitlines()
+    table = faultgouge_here("onset", "scene.toml", "--all").stdout.splitlines()
     assert [line.split()[:2] for line in table[:2]] == [["mu", "="], ["from", "F_x"]]
     assert len(table) == 2 + len(every["windows"])
     assert (len(found["windows"]), found["fx_c"]) == (1, every["fx_c"])
@@ -292,10 +296,10 @@ def ramps_that_end(beds):
 
 
 @pytest.mark.slow
-def test_onset_with_dissipation_as_json(faultgouge, tmp_path):
+def test_onset_with_dissipation_as_json(faultgouge_here, tmp_path):
     """All modes at four loads; no contact changes on the way, and the onset hangs on the increment by 2e-11."""
     (tmp_path / "scene.toml").write_text(LAYER + toml({"ramp": {"step": 5.5e-3, "until": 0.022}, "damping": {"cn": 1}}))
-    done = faultgouge("onset", "scene.toml", "-o", "onset.json", "--json")
+    done = faultgouge_here("onset", "scene.toml", "-o", "onset.json", "--json")
     result = json.loads(done.stdout)
     assert json.loads((tmp_path / "onset.json").read_text()) == result
     assert "searched_to" not in result

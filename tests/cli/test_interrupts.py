@@ -269,11 +269,11 @@ if MPI.COMM_WORLD.rank == 0:
 
 
 @pytest.fixture(scope="module")
-def settled(faultgouge_in, tmp_path_factory):
+def settled(faultgouge_here_in, tmp_path_factory):
     """A folder with the scene of the packing that is settled already."""
     folder = tmp_path_factory.mktemp("settled")
     (folder / "scene.toml").write_text(toml(FAILS))
-    faultgouge_in(folder, "settle", "scene.toml", "-o", "settled.h5")
+    faultgouge_here_in(folder, "settle", "scene.toml", "-o", "settled.h5")
     (folder / "scene.toml").write_text(toml(FAILS | {"packing": {"file": "settled.h5"}}))
     return folder
 

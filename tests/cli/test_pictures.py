@@ -29,24 +29,24 @@ MODE = r"mode \d+: lambda = [\d.]+, participation ratio 0\.\d+, rotation"
     ],
 )
 @pytest.mark.slow
-def test_a_packing_and_modes(beyond, faultgouge_in, options, name, says, times):
-    done = faultgouge_in(beyond, "draw", "ramp.h5", *options.split(), "-o", name)
+def test_a_packing_and_modes(beyond, faultgouge_here_in, options, name, says, times):
+    done = faultgouge_here_in(beyond, "draw", "ramp.h5", *options.split(), "-o", name)
     assert len(re.findall(says, done.stdout)) == times
     assert (beyond / name).stat().st_size > 10_000
 
 
 @pytest.mark.long
-def test_films_of_a_run_a_ramp_and_a_mode(beyond, faultgouge_in):
+def test_films_of_a_run_a_ramp_and_a_mode(beyond, faultgouge_here_in):
     for name, more in (("perturb", ()), ("ramp", ()), ("ramp", ("--mode", "pair"))):
         command = ("movie", f"{name}.h5", *more, "--seconds", "1", "--rate", "5", "--dots", "50", "-o", "film.gif")
-        faultgouge_in(beyond, *command)
+        faultgouge_here_in(beyond, *command)
         with Image.open(beyond / "film.gif") as gif:
             assert gif.n_frames == 5
 
 
 @pytest.mark.slow
-def test_init_writes_a_scene_that_holds_every_key(faultgouge, tmp_path):
-    faultgouge("init")
+def test_init_writes_a_scene_that_holds_every_key(faultgouge_here, tmp_path):
+    faultgouge_here("init")
     path = tmp_path / "scene.toml"
     assert Scene.from_toml(path).law.kn == 2e5
     # without the signs of comments every key is there, and the scene is still one
@@ -79,10 +79,10 @@ def test_few_eigenvalues_show_the_pair_that_all_show(beyond):
 
 
 @pytest.fixture(scope="module")
-def pages(beyond, faultgouge_in):
+def pages(beyond, faultgouge_here_in):
     """The folder, with a page of either file."""
     for name in ("ramp", "perturb"):
-        faultgouge_in(beyond, "view", f"{name}.h5", "-o", f"{name}.html")
+        faultgouge_here_in(beyond, "view", f"{name}.h5", "-o", f"{name}.html")
     return beyond
 
 

@@ -32,7 +32,7 @@ from faultgouge.pywrap.exchange import (
 FILMS = pytest.mark.parametrize("suffix", [".xyz", ".gsd"], indirect=True)
 READERS = "needs a large library that is no dependency: make readers"
 
-PUSHED = {"fx": 1e-3, "time": 0.3, "amplitude": 1.0, "omega": 5.0}
+PUSHED = {"fx": 1e-3, "time": 0.1, "amplitude": 1.0, "omega": 5.0}
 SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 2e-3}, "perturb": PUSHED, "output": {"trajectory": True}})
 
 
@@ -226,11 +226,11 @@ def test_lines_of_a_vtp_go_from_disk_to_disk_and_to_the_floor(tmp_path, sheared)
 
 
 @pytest.fixture(scope="module", params=["double", pytest.param("compensated", marks=pytest.mark.long)])
-def run(tmp_path_factory, faultgouge_in, request):
+def run(tmp_path_factory, faultgouge_here_in, request):
     """perturb.h5 of a strong push, with displacements that float32 still tells; its start, and all places of disks."""
     folder = tmp_path_factory.mktemp("run")
     (folder / "scene.toml").write_text(f'precision = "{request.param}"\n' + SCENE)
-    faultgouge_in(folder, "perturb", "scene.toml")
+    faultgouge_here_in(folder, "perturb", "scene.toml")
     with RunFile(folder / "perturb.h5") as file:
         start, moved = file.packing(), file.series("trajectory")["position"]
     return folder / "perturb.h5", start, np.insert(moved, 0, start.position, axis=0)

@@ -5,6 +5,7 @@ import json
 import re
 import subprocess
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -181,7 +182,7 @@ def test_what_mdanalysis_reads_with_radii(tmp_path, sheared):
 @pytest.mark.ranks
 @pytest.mark.parametrize("slips", [False, pytest.param(True, marks=pytest.mark.long)])
 @pytest.mark.slow
-def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packing, sheared, slips):
+def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, faultgouge_here, reference_packing, sheared, slips):
     """Without friction, or with slips, and then with friction; on any number of ranks."""
     packing, digits = (sheared, 6) if slips else (reference_packing(1.0), 3)
     # with 3 digits, a hundredth of an overlap, forces of the order of the load; with 6, forces of 1e-2
@@ -192,12 +193,12 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, reference_packi
         table_of_slips = np.column_stack([c.i + 1, c.j + 1, c.slip])
         np.savetxt(tmp_path / "slips.csv", table_of_slips, "%.17g", ",", header="id1,id2,slip", comments="")
         words += ["--contacts", "slips.csv"]
-    refused = faultgouge(*words, "-o", "one.h5", code=2)
+    refused = faultgouge_here(*words, "-o", "one.h5", code=2)
     assert re.search("not in balance under .*fy = 3.*--relax", refused.stderr)
     assert not (tmp_path / "one.h5").exists()
     found = []
-    for name, ranks in (("one.h5", None), ("two.h5", 2)):
-        assert "brought to rest" in faultgouge(*words, "--relax", "-o", name, ranks=ranks).stdout
+    for name, run in (("one.h5", faultgouge_here), ("two.h5", partial(faultgouge, ranks=2))):
+        assert "brought to rest" in run(*words, "--relax", "-o", name).stdout
         with RunFile(tmp_path / name) as file:
             found.append(file.packing())
     rest = found[0]

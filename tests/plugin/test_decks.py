@@ -16,9 +16,9 @@ from faultgouge.pywrap.lammps.instance import lammps_instance
 
 SHORT = {
     "settle": {},
-    "ramp": {"until": 2e-3},
-    "perturb": {"time": 0.5},
-    "perturb, damped": {"fx": 0.01, "time": 2.0, "amplitude": 1e-6, "v_ss": 2e-9, "cn": 2.0, "ct": 1.0, "tau": 20.0},
+    "ramp": {"until": 1e-3},
+    "perturb": {"time": 0.2},
+    "perturb, damped": {"fx": 0.01, "time": 0.5, "amplitude": 1e-6, "v_ss": 2e-9, "cn": 2.0, "ct": 1.0, "tau": 20.0},
     "perturb, signal": {"time": 0.2, "signal": "record.txt", "scale": 1e-6, "on": "floor"},
 }
 

@@ -1,5 +1,6 @@
 """Scenes that are refused, and the reference packing under load."""
 
+import sys
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
@@ -7,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from faultgouge.analysis import Packing
+
+sys.path.insert(0, str(Path(__file__).parent))  # granular_packings
 
 
 @pytest.fixture(scope="session")

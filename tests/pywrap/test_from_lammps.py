@@ -1,110 +1,10 @@
-"""Snapshots of LAMMPS's own packings: LAMMPS's motion beside exp(t G), b of two spheres, refusals, what changes."""
+"""Snapshots of LAMMPS's own packings: LAMMPS's motion beside exp(t G), b of two spheres, and refusals."""
 
 import numpy as np
 import pytest
+from granular_packings import ALMOST_NONE, LAWS, RESCALED, command, instance, start, with_law
 
 from faultgouge.analysis import damping_matrix, spectrum, stiffness_matrix
-
-LAWS = {
-    "gran/hooke/history": ("gran/hooke/history 5e2 2e2 {g} {g} 3.0 1", ["* *"], "hooke/history 5e2 2e2 {w} {w} 3.0 1"),
-    "gran/hertz/history": ("gran/hertz/history 3e3 NULL {g} {g} 3.0 1", ["* *"], "hertz/history 3e3 9e2 {w} {w} 3.0 1"),
-    "linear_history": (
-        "granular", ["* * hooke 5e2 {g} tangential linear_history 2e2 1.0 3.0 damping mass_velocity"],
-        "granular hooke 5e2 {w} tangential linear_history 2e2 1.0 3.0 damping velocity",
-    ),
-    "mindlin": (
-        "granular",
-        ["1 1 hertz 3e3 {g} tangential mindlin 9e2 1.0 3.0", "2 2 hertz 5e3 {g} tangential mindlin 2e3 1.0 3.0"],
-        "granular hertz 3e3 {w} tangential mindlin 9e2 1.0 3.0",
-    ),
-    "mindlin/force": (
-        "granular", ["* * hertz/material 3e3 {g} 0.3 tangential mindlin/force NULL 1.0 3.0 damping viscoelastic"],
-        "granular hertz/material 5e3 {w} 0.2 tangential mindlin/force NULL 1.0 3.0",
-    ),
-    "mindlin_rescale": (
-        "granular", ["* * hertz 3e3 {g} tangential mindlin_rescale 9e2 1.0 3.0"],
-        "granular hertz 3e3 {w} tangential mindlin_rescale 9e2 1.0 3.0",
-    ),
-    "mindlin_rescale/force": (
-        "granular", ["* * hertz 3e3 {g} tangential mindlin_rescale/force 9e2 1.0 3.0"],
-        "granular hertz 3e3 {w} tangential mindlin_rescale/force 9e2 1.0 3.0",
-    ),
-    "tsuji": (
-        "granular", ["* * hertz 3e3 {e} tangential mindlin/force 9e2 1.0 3.0 damping tsuji"],
-        "granular hertz/material 3e3 {e} 0.3 tangential mindlin/force 9e2 0.5 3.0 damping coeff_restitution",
-    ),
-}  # fmt: skip
-"""Pair style, coefficients and wall, with dashpots g and w, or a restitution e.
-
-The coefficient of friction is 3, so that no contact comes to rest at Coulomb's bound. They are soft: overlaps are a
-hundredth of a radius, so that velocities of 1e-5 are small beside them and large beside rounding."""
-
-RESCALED = ("mindlin_rescale", "mindlin_rescale/force")
-SMOOTH = {kind: f"3e3 9e2 0.5{{}} history {kind} damping 40 40" for kind in ("total", "rescaled", "coulomb")}
-"""What follows the name of mindlin/smooth, for pairs and, with a floor, for the fix."""
-ALMOST_NONE = "1e-12"
-"""A dashpot: LAMMPS's walls have forces that are no numbers with one of 0."""
-
-
-def instance(*arguments: str):
-    """LAMMPS on the ranks of this process, with the plugin."""
-    from faultgouge.pywrap import Engine  # loads what is needed, in order
-
-    assert Engine
-    from mpi4py import MPI
-
-    from faultgouge.pywrap.lammps.instance import lammps_instance
-
-    return lammps_instance(MPI.COMM_WORLD, *arguments or (None,))
-
-
-def command(lmp, lines: str) -> None:
-    for line in lines.strip().splitlines():
-        lmp.command(line)
-
-
-def start(lmp, d: int, count: int) -> None:
-    """Particles of two sizes above a floor, in a sheared box of spheres, or one of disks."""
-    rng = np.random.default_rng(5)
-    width = 3.0 if d == 3 else 4.4
-    box = "prism 0 3 0 3 0 40 0.5 0 0" if d == 3 else "block 0 4.4 0 40 -0.5 0.5"
-    command(lmp, f"""
-units lj
-dimension {d}
-atom_style sphere
-atom_modify map array
-boundary {"p p f" if d == 3 else "p f p"}
-newton off
-comm_modify vel yes
-processors {"* * 1" if d == 3 else "* 1 *"}
-region box {box} units box
-create_box 2 box
-neighbor 0.2 bin
-neigh_modify every 1 delay 0 check yes
-""")  # fmt: skip
-    across = int(width // 1.05)
-    layer = across ** (d - 1)
-    for k in range(count):
-        a, b = k % layer % across, k % layer // across
-        x, y = (np.array([a, b]) + 0.5) * width / across + rng.uniform(-0.1, 0.1, 2)
-        height = 0.55 + 1.02 * (k // layer)
-        place = (x, y, height) if d == 3 else (x, height, 0.0)
-        lmp.command(f"create_atoms {1 + k % 2} single {' '.join(f'{p:.17g}' for p in place)} units box")
-    command(lmp, "set type 1 diameter 0.8\nset type 2 diameter 1.0\nset group all density 1.5")
-
-
-def with_law(lmp, law: str, d: int, g: str, w: str, e: tuple[str, str], mu: str = "3.0") -> None:
-    own = {name: (f"mindlin/smooth {words.format('')}", ["* *"], "") for name, words in SMOOTH.items()}
-    style, coefficients, wall = (LAWS | own)[law]
-    style, wall, *coefficients = (each.replace(" 3.0", f" {mu}") for each in (style, wall, *coefficients))
-    lmp.command(f"pair_style {style.format(g=g)}")
-    for each in coefficients:
-        lmp.command(f"pair_coeff {each.format(g=g, e=e[0])}")
-    plane = "zplane" if d == 3 else "yplane"
-    if law in SMOOTH:
-        lmp.command(f"fix floor all wall/mindlin/smooth {SMOOTH[law].format(' ylo 0')}")
-    elif w:
-        lmp.command(f"fix floor all wall/gran {wall.format(w=w, e=e[1])} {plane} 0 NULL contacts")
 
 
 @pytest.fixture(scope="module")
@@ -140,18 +40,6 @@ thermo 100000
         return made[law, d, damped]
 
     return make
-
-
-def state(lmp, world=None) -> np.ndarray:
-    """All that moves, in the order of the IDs, of one rank or of all."""
-    count = lmp.extract_setting("nlocal")
-    names = ("x", "v", "omega", "f", "torque")
-    rows = np.zeros((0, 16))
-    if count:
-        ids = np.array(lmp.numpy.extract_atom("id")[:count], dtype=float)[:, None]
-        rows = np.hstack([ids, *(lmp.numpy.extract_atom(name)[:count] for name in names)])
-    every = rows if world is None else np.concatenate(world.allgather(rows))
-    return every[np.argsort(every[:, 0])]
 
 
 CASES = [
@@ -197,38 +85,6 @@ def test_motion_of_lammps(beds, law, damped, d):
     first, second, third = linear[1:]
     rest = (8 * third - 6 * second + first) / 3 if damped else (64 * third - 20 * second + first) / 45
     assert np.linalg.norm(rest - predicted) < 1e-6 * size
-
-
-def test_a_look_changes_nothing(beds, tmp_path):
-    """The run that follows is the same to the bit, while particles still collide and slide."""
-    from faultgouge.pywrap import from_lammps
-
-    ends = []
-    for looks in (0, 2):
-        lmp = instance(tmp_path / f"log{looks}")
-        start(lmp, 3, 12)
-        with_law(lmp, "mindlin_rescale/force", 3, "100", "100", ("", ""))
-        command(lmp, f"""
-fix load all gravity 1.0 vector 0.8 0 -1
-fix move all nve/sphere
-timestep 0.004
-dump 1 all custom 100 {tmp_path}/dump{looks} id x
-fix mean all ave/time 10 1 10 c_thermo_temp file {tmp_path}/mean{looks}
-run 1950
-""")  # fmt: skip
-        before = state(lmp)
-        for _ in range(looks):
-            found = from_lammps(lmp, balance=np.inf)
-            assert found.contacts.at_bound.any()
-        assert np.array_equal(state(lmp), before)
-        lmp.command("run 500")
-        ends.append(state(lmp))
-        lmp.close()
-    assert np.array_equal(*ends)
-    for name in ("dump", "mean"):
-        assert (tmp_path / f"{name}0").read_bytes() == (tmp_path / f"{name}2").read_bytes()
-    one, other = ((tmp_path / f"log{looks}").read_text().count("run ") for looks in (0, 2))
-    assert one == other
 
 
 @pytest.mark.parametrize(
@@ -435,83 +291,6 @@ def test_pairs_at_rest_on_a_slope(beds):
     found = from_lammps(beds("mindlin/force", 3, True))
     if not found.contacts.at_bound.any():
         assert len(spectrum(found).pairs) == 0
-
-
-RANKS = """
-import sys
-from dataclasses import fields
-from pathlib import Path
-import numpy as np
-from mpi4py import MPI
-sys.path[:0] = sys.argv[1:]
-from test_from_lammps import SMOOTH, command, instance, start, state, with_law
-from faultgouge.pywrap import from_lammps
-world = MPI.COMM_WORLD
-def owned(lmp):
-    return set(lmp.numpy.extract_atom("id")[: lmp.extract_setting("nlocal")])
-def run(law, steps, looks, drag=0.0):
-    d = 2 if law in SMOOTH else 3
-    lmp = instance(Path("log"))
-    start(lmp, d, 18)
-    with_law(lmp, law, d, "100", "100", ("", ""), "3.0" if drag else "0.3")
-    slope = f"{0.1 if drag else 0.8} 0 -1" if d == 3 else "0.8 -1 0"
-    command(lmp, f"fix load all gravity 1.0 vector {slope}\\nfix move all nve/sphere\\nfix drag all viscous {drag}\\n"
-                 f"timestep 0.002\\nthermo 10000\\nneighbor 0.45 bin\\nrun {steps}")
-    found, states, moved = [], [], 0
-    for _ in range(12):
-        before, there = state(lmp, world), owned(lmp)
-        found += [from_lammps(lmp, balance=np.inf) for _ in range(looks)]
-        moved += world.allreduce(len(there - owned(lmp)))
-        assert np.array_equal(state(lmp, world), before)
-        lmp.command("run 53")
-        states.append(state(lmp, world))
-    last = from_lammps(lmp, balance=np.inf)
-    lmp.close()
-    return np.array(states), found, moved, last
-def equal(one, other):
-    return all(np.array_equal(getattr(one, each.name), getattr(other, each.name)) for each in fields(one))
-law = sys.argv.pop()
-# particles that collide and slide, and some of which change their rank in a look
-(there, found, moved, last), (other, _, _, end) = (run(law, 1950, looks) for looks in (1, 0))
-assert sum(each.contacts.at_bound.any() for each in found) > 1
-assert moved > 0
-assert np.array_equal(there, other)
-assert equal(last.contacts, end.contacts)
-if law not in SMOOTH:
-    # particles that do not slide: in a sheared box zero steps round coordinates, which are given back
-    (there, found, *_), (other, *_) = (run(law, 3000, looks, drag=1.5) for looks in (2, 0))
-    assert len(found[0].contacts) > 5 and found[0].contacts.wall.any()
-    one, two = (np.sort(each.contacts.overlap) for each in found[:2])
-    assert np.abs(one - two).max() < 1e-14  # LAMMPS may list them in another order, and round images otherwise
-    assert np.array_equal(there, other)
-    # what is left of the forces without those of all contacts is the weight
-    slope = np.array([0.1, 0, -1]) / np.hypot(0.1, 1)
-    assert np.abs(found[0].load[:, 0] - found[0].mass[:, None] * slope).max() < 1e-9
-    assert np.abs(found[0].load[:, 1]).max() < 1e-9
-"""
-
-
-@pytest.mark.ranks
-@pytest.mark.parametrize(
-    "law",
-    [
-        pytest.param(law, marks=pytest.mark.slow if law in ("gran/hertz/history", "coulomb") else pytest.mark.long)
-        for law in ("gran/hertz/history", "mindlin_rescale/force", *SMOOTH)
-    ],
-)
-def test_on_two_ranks(tmp_path, law):
-    """All contacts are in the snapshot, whichever rank has them, and the next run is the same to the bit."""
-    import subprocess
-    import sys
-    from pathlib import Path
-
-    from reference_layer import BIN
-
-    (tmp_path / "look.py").write_text(RANKS)
-    paths = [Path(__file__).parent, Path(__file__).parents[1]]
-    words = [BIN / "mpiexec", "-n", "2", sys.executable, "look.py", *paths, law]
-    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.long

@@ -74,13 +74,13 @@ def test_turning_points_turn(until, says, refused_scene):
 
 
 @pytest.mark.slow
-def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_in):
+def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_here):
     (tmp_path / "scene.toml").write_text(SCENE.format(mu=0.3, until=[0.5, -0.5, 0.5]))
-    done = faultgouge_in(tmp_path, "ramp", "scene.toml", "-o", "cycle.h5", "--json")
+    done = faultgouge_here("ramp", "scene.toml", "-o", "cycle.h5", "--json")
     left = json.loads(done.stdout)["hysteresis"]
     (tmp_path / "short.toml").write_text(SCENE.format(mu=0.3, until=[0.5, -0.2]))
-    faultgouge_in(tmp_path, "ramp", "short.toml", "-o", "parts.h5")
-    said = faultgouge_in(tmp_path, "ramp", "scene.toml", "-o", "parts.h5").stdout
+    faultgouge_here("ramp", "short.toml", "-o", "parts.h5")
+    said = faultgouge_here("ramp", "scene.toml", "-o", "parts.h5").stdout
     assert "F_x is back at 0.5" in said
     with RunFile(tmp_path / "cycle.h5") as one, RunFile(tmp_path / "parts.h5") as other:
         packings = [one.packing(k) for k in range(len(one))]
@@ -99,7 +99,7 @@ def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_in)
     assert found.work > 0  # friction takes energy
     moved = layer_displacement(packings)[:, 0]
     assert found.remaining == moved[-1] - moved[5]
-    drawn = faultgouge_in(tmp_path, "draw", "cycle.h5", "-o", "cycle.svg").stdout
+    drawn = faultgouge_here("draw", "cycle.h5", "-o", "cycle.svg").stdout
     assert "rattlers" not in drawn  # said of a packing
     # a view of three loads has both turning points, too; all turning points and frames of either direction are there
     for command, says in (
@@ -107,7 +107,7 @@ def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_in)
         ("movie cycle.h5 --seconds 0.5 --dots 40 -o cycle.gif", "5 frames"),
         ("export cycle.h5 --frames all -o cycle.xyz", "26 frames of equilibria"),
     ):
-        assert faultgouge_in(tmp_path, *command.split()).stdout.startswith(says)
+        assert faultgouge_here(*command.split()).stdout.startswith(says)
     assert "displacement of the upper layer" in (tmp_path / "cycle.html").read_text()
     heads = (tmp_path / "cycle.xyz").read_text().splitlines()[1 :: len(packings[0]) + 2]
     assert [float(re.search(r" fx=(\S+)", head)[1]) for head in heads] == [each.fx for each in packings]

@@ -226,9 +226,9 @@ def test_the_picture_counts_the_scenes_without_an_onset():
 
 
 @pytest.mark.slow
-def test_the_dry_run_counts_and_computes_nothing(faultgouge, tmp_path):
+def test_the_dry_run_counts_and_computes_nothing(faultgouge_here, tmp_path):
     (tmp_path / "sweep.toml").write_text(TOML)
-    done = faultgouge("sweep", "sweep.toml", "-o", "out", "--dry-run")
+    done = faultgouge_here("sweep", "sweep.toml", "-o", "out", "--dry-run")
     assert "8 scenes to compute, 4 packings to settle" in done.stdout
     assert "4 points make no scene" in done.stdout
     assert not (tmp_path / "out").exists()

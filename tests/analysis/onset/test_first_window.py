@@ -170,10 +170,10 @@ def test_first_window_of_hundreds_of_disks(path):
 
     Masses make the copies of a packing differ.
     """
-    mass = np.random.default_rng(3).uniform(0.7, 1.3, 500)
+    mass = np.random.default_rng(3).uniform(0.7, 1.3, 300)
 
     def operator(fx):
-        return full_operator(replace(tiled(path(fx), 5), mass=mass))
+        return full_operator(replace(tiled(path(fx), 3), mass=mass))
 
     window, _ = searched(operator, path.grid)
     assert window.kind == "coalescence"

@@ -1,0 +1,81 @@
+"""What a LAMMPS instance says of itself: its ranks, its styles, its log, and why it has stopped."""
+
+import ctypes
+import os
+import re
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from mpi4py import MPI
+
+
+def communicator(lmp: Any) -> MPI.Comm:
+    """The ranks of an instance."""
+    if lmp.extract_setting("world_size") == 1:
+        return MPI.COMM_SELF
+    return getattr(lmp, "comm", None) or MPI.COMM_WORLD
+
+
+def styles_of(lmp: Any) -> tuple[str, dict[str, str], str, str]:
+    """Pair style, styles of the fixes by ID, units and atom style, as LAMMPS's `info` says them."""
+    world = communicator(lmp)
+    with TemporaryDirectory(prefix="faultgouge") as folder:
+        path = world.bcast(f"{folder}/info", root=0)
+        lmp.command(f'info fixes system out overwrite "{path}"')
+        said = world.bcast(Path(path).read_text() if world.rank == 0 else None, root=0)
+        world.barrier()
+    fixes, values = {}, {"Pair style": "none", "Units": "lj", "Atom style": ""}
+    for line in said.splitlines():
+        left, _, right = line.partition("=")
+        if left.strip() in values:
+            values[left.strip()] = right.strip()
+        if left.strip() == "Atoms":  # Atoms = N, types = T, style = that of the pairs
+            values["Pair style"] = line.rpartition("style =")[2].strip()
+        if line.strip().startswith("Fix["):
+            # Fix[  0]: NAME,  style = STYLE,  group = GROUP
+            name, style, *_ = (part.strip() for part in line.partition("]:")[2].split(","))
+            fixes[name] = style.partition("=")[2].strip()
+    return values["Pair style"], fixes, values["Units"], values["Atom style"]
+
+
+def explain_error(error: Exception) -> str:
+    """A sentence of an error that LAMMPS has raised."""
+    lines = [line.strip().removeprefix("ERROR: ") for line in str(error).splitlines() if line.strip()]
+    reason = re.sub(r" \(\S+:\d+\)", "", "; ".join(lines) or type(error).__name__)
+    return f"LAMMPS stopped: {reason.rstrip('.')}."
+
+
+def log_path(lmp: Any) -> Path | None:
+    """An instance's log, which is closed by the question; None without a log."""
+    before = _open_logs()
+    lmp.command("log none")
+    closed = [path for descriptor, path in before.items() if descriptor not in _open_logs()]
+    return Path(closed[0]) if len(closed) == 1 else None
+
+
+def log_of(lmp: Any) -> list[str] | None:
+    """The lines of an instance's log, which is closed by the question; None without a log."""
+    path = log_path(lmp)
+    return None if path is None else path.read_text(errors="replace").splitlines()
+
+
+def only_log() -> list[str] | None:
+    """The lines of the only open log of this process; None if there is none, or there are several."""
+    found = set(_open_logs().values())
+    return Path(found.pop()).read_text(errors="replace").splitlines() if len(found) == 1 else None
+
+
+def _open_logs() -> dict[str, str]:
+    """Open files that begin as a log of LAMMPS does, by their descriptors."""
+    ctypes.CDLL(None).fflush(None)
+    found, listed = {}, Path("/proc/self/fd")
+    for each in listed.iterdir() if listed.is_dir() else ():
+        try:
+            path = os.readlink(each)
+            with open(path, "rb") as stream:
+                if path.startswith("/") and os.path.isfile(path) and stream.read(8) == b"LAMMPS (":
+                    found[each.name] = path
+        except OSError:
+            continue
+    return found

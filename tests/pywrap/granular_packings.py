@@ -1,0 +1,116 @@
+"""Packings of LAMMPS's own granular styles, and of ours, as a user's script sets them up."""
+
+import numpy as np
+
+LAWS = {
+    "gran/hooke/history": ("gran/hooke/history 5e2 2e2 {g} {g} 3.0 1", ["* *"], "hooke/history 5e2 2e2 {w} {w} 3.0 1"),
+    "gran/hertz/history": ("gran/hertz/history 3e3 NULL {g} {g} 3.0 1", ["* *"], "hertz/history 3e3 9e2 {w} {w} 3.0 1"),
+    "linear_history": (
+        "granular", ["* * hooke 5e2 {g} tangential linear_history 2e2 1.0 3.0 damping mass_velocity"],
+        "granular hooke 5e2 {w} tangential linear_history 2e2 1.0 3.0 damping velocity",
+    ),
+    "mindlin": (
+        "granular",
+        ["1 1 hertz 3e3 {g} tangential mindlin 9e2 1.0 3.0", "2 2 hertz 5e3 {g} tangential mindlin 2e3 1.0 3.0"],
+        "granular hertz 3e3 {w} tangential mindlin 9e2 1.0 3.0",
+    ),
+    "mindlin/force": (
+        "granular", ["* * hertz/material 3e3 {g} 0.3 tangential mindlin/force NULL 1.0 3.0 damping viscoelastic"],
+        "granular hertz/material 5e3 {w} 0.2 tangential mindlin/force NULL 1.0 3.0",
+    ),
+    "mindlin_rescale": (
+        "granular", ["* * hertz 3e3 {g} tangential mindlin_rescale 9e2 1.0 3.0"],
+        "granular hertz 3e3 {w} tangential mindlin_rescale 9e2 1.0 3.0",
+    ),
+    "mindlin_rescale/force": (
+        "granular", ["* * hertz 3e3 {g} tangential mindlin_rescale/force 9e2 1.0 3.0"],
+        "granular hertz 3e3 {w} tangential mindlin_rescale/force 9e2 1.0 3.0",
+    ),
+    "tsuji": (
+        "granular", ["* * hertz 3e3 {e} tangential mindlin/force 9e2 1.0 3.0 damping tsuji"],
+        "granular hertz/material 3e3 {e} 0.3 tangential mindlin/force 9e2 0.5 3.0 damping coeff_restitution",
+    ),
+}  # fmt: skip
+"""Pair style, coefficients and wall, with dashpots g and w, or a restitution e.
+
+The coefficient of friction is 3, so that no contact comes to rest at Coulomb's bound. They are soft: overlaps are a
+hundredth of a radius, so that velocities of 1e-5 are small beside them and large beside rounding."""
+
+RESCALED = ("mindlin_rescale", "mindlin_rescale/force")
+SMOOTH = {kind: f"3e3 9e2 0.5{{}} history {kind} damping 40 40" for kind in ("total", "rescaled", "coulomb")}
+"""What follows the name of mindlin/smooth, for pairs and, with a floor, for the fix."""
+ALMOST_NONE = "1e-12"
+"""A dashpot: LAMMPS's walls have forces that are no numbers with one of 0."""
+
+
+def instance(*arguments: str):
+    """LAMMPS on the ranks of this process, with the plugin."""
+    from faultgouge.pywrap import Engine  # loads what is needed, in order
+
+    assert Engine
+    from mpi4py import MPI
+
+    from faultgouge.pywrap.lammps.instance import lammps_instance
+
+    return lammps_instance(MPI.COMM_WORLD, *arguments or (None,))
+
+
+def command(lmp, lines: str) -> None:
+    for line in lines.strip().splitlines():
+        lmp.command(line)
+
+
+def start(lmp, d: int, count: int) -> None:
+    """Particles of two sizes above a floor, in a sheared box of spheres, or one of disks."""
+    rng = np.random.default_rng(5)
+    width = 3.0 if d == 3 else 4.4
+    box = "prism 0 3 0 3 0 40 0.5 0 0" if d == 3 else "block 0 4.4 0 40 -0.5 0.5"
+    command(lmp, f"""
+units lj
+dimension {d}
+atom_style sphere
+atom_modify map array
+boundary {"p p f" if d == 3 else "p f p"}
+newton off
+comm_modify vel yes
+processors {"* * 1" if d == 3 else "* 1 *"}
+region box {box} units box
+create_box 2 box
+neighbor 0.2 bin
+neigh_modify every 1 delay 0 check yes
+""")  # fmt: skip
+    across = int(width // 1.05)
+    layer = across ** (d - 1)
+    for k in range(count):
+        a, b = k % layer % across, k % layer // across
+        x, y = (np.array([a, b]) + 0.5) * width / across + rng.uniform(-0.1, 0.1, 2)
+        height = 0.55 + 1.02 * (k // layer)
+        place = (x, y, height) if d == 3 else (x, height, 0.0)
+        lmp.command(f"create_atoms {1 + k % 2} single {' '.join(f'{p:.17g}' for p in place)} units box")
+    command(lmp, "set type 1 diameter 0.8\nset type 2 diameter 1.0\nset group all density 1.5")
+
+
+def with_law(lmp, law: str, d: int, g: str, w: str, e: tuple[str, str], mu: str = "3.0") -> None:
+    own = {name: (f"mindlin/smooth {words.format('')}", ["* *"], "") for name, words in SMOOTH.items()}
+    style, coefficients, wall = (LAWS | own)[law]
+    style, wall, *coefficients = (each.replace(" 3.0", f" {mu}") for each in (style, wall, *coefficients))
+    lmp.command(f"pair_style {style.format(g=g)}")
+    for each in coefficients:
+        lmp.command(f"pair_coeff {each.format(g=g, e=e[0])}")
+    plane = "zplane" if d == 3 else "yplane"
+    if law in SMOOTH:
+        lmp.command(f"fix floor all wall/mindlin/smooth {SMOOTH[law].format(' ylo 0')}")
+    elif w:
+        lmp.command(f"fix floor all wall/gran {wall.format(w=w, e=e[1])} {plane} 0 NULL contacts")
+
+
+def state(lmp, world=None) -> np.ndarray:
+    """All that moves, in the order of the IDs, of one rank or of all."""
+    count = lmp.extract_setting("nlocal")
+    names = ("x", "v", "omega", "f", "torque")
+    rows = np.zeros((0, 16))
+    if count:
+        ids = np.array(lmp.numpy.extract_atom("id")[:count], dtype=float)[:, None]
+        rows = np.hstack([ids, *(lmp.numpy.extract_atom(name)[:count] for name in names)])
+    every = rows if world is None else np.concatenate(world.allgather(rows))
+    return every[np.argsort(every[:, 0])]
