@@ -16,7 +16,7 @@ from .lammps_arrays import owned_array, remove_computes
 
 Found = TypeVar("Found")
 
-KEPT = ("x", "image", "v", "omega", "f", "torque")
+ATOM_ARRAYS = ("x", "image", "v", "omega", "f", "torque")
 """What is given back after zero steps of the instance itself, which round the coordinates in a sheared box and wrap
 those that have left the box."""
 
@@ -24,7 +24,7 @@ those that have left the box."""
 def in_place(lmp: Any, work: Callable[[], Found], groups: dict[str, str]) -> Found:
     """What some work finds in the instance itself; what moves, and histories, are given back, and its computes go."""
     load_plugin(lmp)
-    kept = {name: np.array(owned_array(lmp, name)) for name in ("id", *KEPT)}
+    kept = {name: np.array(owned_array(lmp, name)) for name in ("id", *ATOM_ARRAYS)}
     world = communicator(lmp)
     whole = {name: np.concatenate(world.allgather(values)) for name, values in kept.items()}
     order = np.argsort(whole["id"])
@@ -33,7 +33,7 @@ def in_place(lmp: Any, work: Callable[[], Found], groups: dict[str, str]) -> Fou
         return work()
     finally:
         place = order[np.searchsorted(whole["id"][order], owned_array(lmp, "id"))] if len(order) else order
-        for name in KEPT:
+        for name in ATOM_ARRAYS:
             owned_array(lmp, name)[:] = whole[name][place]
         lmp.command("fix_modify faultgouge_h restore")
         lmp.command("unfix faultgouge_h")

@@ -145,7 +145,7 @@ def _rising_loads(rows: list[dict[str, Any]], rate: float, loss: float) -> dict[
 def text(
     found: dict[str, Any], packings: int, failed: int, loaded: list[dict[str, Any]], at_bound: list[dict[str, Any]]
 ) -> str:
-    """The page; `loaded` are the rows of layers that the standard law has loaded, `at_bound` runs of those that grow."""
+    """The page; `loaded` are the layers of the standard law, `at_bound` runs of those of them in which noise grows."""
     unrest = [share(each["unrest"], packings) for each in found["yields"]]
     names = {"packings": packings, "failed": failed, "unrest": unrest, "interval": interval, "percent": percent}
     names["standard"] = standard(loaded)
