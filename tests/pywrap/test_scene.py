@@ -306,6 +306,17 @@ def test_time_of_a_search(disks, fy, step, until, cn, measured):
     assert measured / 3 < search - settling < 3 * measured
 
 
+@pytest.mark.parametrize(
+    ("disks", "cn", "measured"), [(100, 5.0, 5.2), (100, 50.0, 21.8), (100, 171.0, 31.6), (300, 5.0, 36.7)]
+)
+def test_time_of_the_first_window_with_strong_dashpots(disks, cn, measured):
+    """Against processor time of seed 2, whose onset lies at up to twice the load that is assumed: a factor of three."""
+    packing, ramp = {"disks": disks, "width": 1.192 * disks**0.5, "seed": 2}, {"step": 1e-3, "until": 0.1}
+    scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": ramp, "damping": {"cn": cn}}
+    seconds = estimate_work(Scene.from_mapping(scene), "onset").seconds
+    assert measured / 3 < seconds < 3 * measured
+
+
 @pytest.mark.parametrize(("disks", "measured"), [(3000, 1.7e9), (10_000, 0.9e9), (30_000, 1.7e9), (100_000, 5.2e9)])
 def test_memory_of_a_search_in_slices(disks, measured):
     """Against peaks of the whole process in two threads, within a factor of two."""

@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from test_found import PASSING, cut_off
 from test_slicing import FEW, on_ranks
 
+from faultgouge.analysis import NoEquilibriumError
 from faultgouge.analysis.damped_onset.first_window import SlicedGrowthSearch, first_growing
 from faultgouge.analysis.damped_onset.imaginary_axis import growing_modes
 from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil, find_growing_near, nearest_mode
@@ -144,6 +145,29 @@ def test_where_dashpots_couple_all_modes_what_grows_is_followed_back_to_its_onse
     assert fastest(window.fx_onset * (1 - 1e-6)) < 0 < fastest(window.fx_onset * (1 + 1e-6))
     # where all motions are too many to be looked for, all loads before the window are in doubt
     assert first_growing(dashpot_on_all, loads, limits=replace(LIMITS, axis=0))[1] == ((0.5, 0.575),)
+
+
+@pytest.mark.slow
+def test_what_cannot_be_followed_back_is_in_doubt_and_ends_the_search():
+    """Two motions grow at the last load; one of them at the load before, too, beyond loads without an equilibrium."""
+    asked = []
+
+    def with_a_gap(fx):
+        if 0.55 < fx < 0.62:
+            asked.append(fx)
+            assert len(asked) < 10, "the same motion is followed back again and again"
+            raise NoEquilibriumError("a gap", beyond=0.55)
+        place = dashpot_on_all(fx)
+        second = csr_array(([24.0 * fx, -24.0 * fx], ([30, 90], [90, 30])), place.stiffness.shape)
+        return replace(place, stiffness=place.stiffness + second)
+
+    def growing(fx):
+        return int(np.sum(np.linalg.eigvals(with_a_gap(fx).system.matrix).real > 0)) // 2
+
+    window, doubtful = first_growing(with_a_gap, np.array([0.5, 0.55, 0.62, 0.65]))
+    assert [growing(window.fx_onset * (1 + share)) for share in (-1e-6, 1e-6)] == [1, 2]
+    assert doubtful == ((0.55, 0.65), (0.55, 0.62))
+    assert asked
 
 
 @pytest.mark.slow
