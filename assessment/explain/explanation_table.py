@@ -9,7 +9,7 @@ from .explain import Explanation
 
 
 def in_words(explanation: Explanation) -> str:
-    """What is in and what is out, and what leaving it out saves, in two sentences.
+    """Two sentences: which parts the scene has, which it leaves out, and how much time that saves.
 
     What is saved is told for parts that a step would take longer with, by more than their quartiles leave open: what
     they would cost one at a time.

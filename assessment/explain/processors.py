@@ -19,7 +19,7 @@ DENSE = 400
 
 
 def ranks(run: UndampedRun, steps: int, folder: Path) -> Part:
-    """The same run on one rank and on two, in a process of its own."""
+    """Compare a run on one rank with the run on two ranks, in a separate process."""
     size = MPI.COMM_WORLD.size
     reason = f"{size} rank{'s' * (size > 1)}"
     adds = ("messages between ranks",)

@@ -31,7 +31,7 @@ UNREACHABLE_VELOCITY = 1e6
 
 @dataclass(frozen=True)
 class InstanceContents:
-    """What a LAMMPS instance holds.
+    """The contents of a LAMMPS instance.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class InstanceContents:
         return *(f"{kind} {name}" for kind, names in kinds.items() for name in getattr(self, names)), *self.settings
 
     def beyond(self, other: InstanceContents) -> tuple[str, ...]:
-        """What is here and not there."""
+        """The contents of this instance that another one does not have."""
         return tuple(each for each in self.everything if each not in other.everything)
 
 
@@ -125,7 +125,7 @@ class UndampedRun:
             yield engine, dynamics
 
     def of(self, **changes: Any) -> UndampedRun:
-        """The same run of a packing that differs in these arguments."""
+        """The run of a packing that differs in these arguments."""
         return replace(self, packing=replace(self.packing, **changes))
 
     def moved_by(self, *names: str, otherwise: dict[str, Any]) -> tuple[dict[str, Any], ArrayLike]:
@@ -210,7 +210,7 @@ def _of_damping(bare: UndampedRun) -> Iterator[Feature]:
 
 
 def _of_motion(run: UndampedRun, bare: UndampedRun) -> Iterator[Feature]:
-    """What pushes the disks."""
+    """The forces that push the disks."""
     push, pushed = run.moved_by("amplitude", "omega", otherwise={"amplitude": 1e-9, "omega": 0.01})
     reason = f"amplitude {push['amplitude']:g}" if "amplitude" in run.motion else "no amplitude in [perturb]"
     yield Feature("perturbation", reason, bare, replace(bare, motion=push), pushed)

@@ -1,4 +1,4 @@
-"""Error against run time: the work-precision studies run one after the other, and written as they end.
+"""Run the work-precision studies (error against run time) one after the other, and write each as it ends.
 
 Every study is written as soon as it is done. One that fails says so in one sentence, and the others go on.
 """
@@ -55,7 +55,7 @@ SCENE = Path(str(files("faultgouge") / "scenes" / "report.toml"))
 
 
 class ReportError(FaultgougeError):
-    """Studies that failed, in one sentence."""
+    """Some studies have failed; one sentence names them."""
 
 
 def report(
@@ -72,11 +72,11 @@ def report(
     output : Path
         The folder, made if need be.
     quick : bool
-        Fewer points, a minute instead of ten.
+        Whether to compute fewer points, in a minute instead of ten.
     say : callable
-        Takes a line of progress.
+        Called with each line of progress.
     progress : callable
-        Takes the name of a list of runs, and the list; wraps it to show how far it is.
+        Called with the name of a list of runs and the list; returns an iterable that shows how far it is.
     studies : dict
         Name to function.
 
@@ -124,7 +124,7 @@ def report(
 
 
 def stem(name: str) -> str:
-    """A study's name as that of a file, and of its heading's anchor."""
+    """The name of a study as a file name, which is also the anchor of its heading."""
     return re.sub("[^a-z ]", "", name.lower()).replace(" ", "-")
 
 
@@ -149,7 +149,7 @@ def machine() -> dict[str, Any]:
 
 
 def _write_report(output: Path, quick: bool, done: list[Study], failed: dict[str, str]) -> dict[str, Any]:
-    """report.json and report.md with what there is."""
+    """Write report.json and report.md with the studies that are done so far."""
     where = machine()
     result = {
         "machine": where,

@@ -1,4 +1,4 @@
-"""The figures of a study: error over wall time and over what no machine changes, and stated over true errors."""
+"""The figures of a study: error over wall time, error over machine-independent work, and stated over true error."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .methods.work_precision_study import Point, StatedError, Study
 MARKERS = "osD^vP"
 DASHES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
 LARGEST, SMALLEST = 6.5, 3.0
-"""Sizes of the first and of the last method's signs, points."""
+"""Sizes of the markers of the first and of the last method, points."""
 
 ZERO_ABOVE = 0.25
 """Decades above the lower edge at which errors of zero stand."""
@@ -34,8 +34,8 @@ def figure_of(study: Study) -> Figure:
 
     A method in compensated arithmetic has the colour of the plain one, hollow and broken. Methods with a parameter are
     lines through their points, where the error falls steadily; where the second panel is over the parameter, the
-    others are horizontal lines there. Signs become smaller from method to method, so that none hides another. Theory
-    is grey; what lies in the shade is below the reference's own error. Errors of zero stand on a line of their own.
+    others are horizontal lines there. Markers become smaller from method to method, so that none hides another. Theory
+    is grey. Errors in the shade are below the reference's own error. Errors of zero stand on a line of their own.
     """
     figure = Figure(figsize=(6.8, 3.5), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
@@ -68,7 +68,7 @@ def figure_of(study: Study) -> Figure:
 
 
 def _draw_theory(left: Axes, right: Axes, study: Study) -> None:
-    """Grey lines: over the parameter on the right, or horizontal in both panels."""
+    """Draw theory as grey lines: over the parameter on the right, or horizontal in both panels."""
     for number, line in enumerate(study.theory):
         grey: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": DASHES[number], "zorder": 4}
         if line.parameter:
@@ -79,7 +79,7 @@ def _draw_theory(left: Axes, right: Axes, study: Study) -> None:
 
 
 def _draw_floor(left: Axes, right: Axes, study: Study, bottom: float, zero: float) -> None:
-    """The shade below the reference's own error, and the line of errors of zero."""
+    """Draw the shade below the reference's own error, and the line for errors of zero."""
     if study.reference_error > bottom:
         for axes in (left, right):
             axes.axhspan(bottom, study.reference_error, color=SHADE, linewidth=0, zorder=0)
@@ -130,7 +130,7 @@ def _limits(study: Study) -> tuple[float, float]:
 
 
 def _label(text: str, width: int = 44) -> str:
-    """The label of an axis: in two lines where it is long, with symbols for their names."""
+    """The label of an axis: in two lines if it is long, with symbols in place of their names."""
     if len(text) > width:
         cut = text.rfind(" ", 0, width)
         text = text[:cut] + "\n" + text[cut + 1 :]
@@ -141,7 +141,7 @@ def _label(text: str, width: int = 44) -> str:
 
 @styled
 def coverage_figure(cases: Sequence[StatedError]) -> Figure:
-    """Stated over true errors, doubly logarithmic, a colour an arithmetic; the line is where they are equal.
+    """Stated over true errors, doubly logarithmic, with a colour for each arithmetic and a line where both are equal.
 
     A true error of zero stands at the left edge.
     """
@@ -162,7 +162,7 @@ def coverage_figure(cases: Sequence[StatedError]) -> Figure:
 
 @styled
 def changing_figure(cases: Sequence[CoverageCase]) -> Figure:
-    """The same of scenes in which contacts change before the onset, a colour a kind of onset.
+    """Stated over true errors where contacts change before the onset, with a colour for each kind of onset.
 
     Scenes that were drawn after the rule of the stated errors was made are open markers.
     """
@@ -182,7 +182,7 @@ def changing_figure(cases: Sequence[CoverageCase]) -> Figure:
 
 
 def _frame_axes(axes: Axes, errors: Sequence[tuple[float, float]]) -> float:
-    """The line of equal errors, what is covered in shade, and axes that hold all; the smallest value on them."""
+    """Draw the line of equal errors and shade the covered side; return the smallest value on the axes."""
     smallest = 0.3 * min(each for pair in errors for each in pair if each > 0)
     largest = 3 * max(each for pair in errors for each in pair)
     axes.plot([smallest, largest], [smallest, largest], color=INK, linewidth=0.8)

@@ -18,7 +18,7 @@ from mpi4py import MPI
 from .case import Outcome, refusal
 
 SECONDS = 60.0
-"""What a program may take for a handful of disks; more is a hang."""
+"""Longest time that a program may take for a handful of disks, s; more is a hang."""
 
 PLACE = re.compile(r" \([^ ()]*:\d+\)$")
 """File and line of LAMMPS's errors."""

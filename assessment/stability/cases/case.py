@@ -12,7 +12,7 @@ Status = Literal["holds", "refused", "fails"]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a case.
+    """The outcome of a case.
 
     Attributes
     ----------

@@ -33,7 +33,7 @@ DRIFT = 1e-5
 """Relative change of energy that counts as none: what is left of its oscillation after 40 samples."""
 
 AMPLITUDE = 1e-4
-"""Of a mode, in units of the smallest overlap: it moves as that of a frozen K up to this relative change of K."""
+"""Amplitude of a mode in units of the smallest overlap: it moves as that of a frozen K up to this relative change of K."""
 
 SHAKEN = 0.1
 """Of the motion whose energy is followed: contacts stay closed."""
@@ -90,7 +90,7 @@ def _over_the_limit() -> Outcome:
 
 
 def _limit_is_sharp() -> Outcome:
-    """What the refusal prevents: the growth of theory."""
+    """Beyond the limit that the refusal protects, motion grows as theory predicts."""
     steps = np.array([10, 30])
     first, last = np.abs(_excite_mode(1.01, 1e-8, steps))
     kappa = np.arccosh(2 * 1.01**2 - 1)

@@ -46,10 +46,10 @@ DISTANCES = np.array([1e-4, 1e-6, 1e-8])
 """From that onset, in units of it."""
 
 CURVATURE = 10.0
-"""Of D(F_x), relative to its slope over F_x^c; 3.4 is measured."""
+"""Curvature of D(F_x), relative to its slope over F_x^c; 3.4 was measured."""
 
 ROUNDINGS = 10.0
-"""Of D in units of 4 d u |A|: LAPACK's backward error is a few u |A|."""
+"""Error of D in units of 4 d u |A|: LAPACK's backward error is a few u |A|."""
 
 
 def _near_defective(eps: float, sign: int) -> Outcome:

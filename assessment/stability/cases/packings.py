@@ -96,7 +96,7 @@ def with_slips(packing: Packing, shares: Sequence[float]) -> Packing:
 
 
 def with_low_parts(packing: Packing) -> Packing:
-    """The same packing in compensated arithmetic."""
+    """The packing in compensated arithmetic."""
     if packing.compensated:
         return packing
     contacts = packing.contacts.slipped(packing.contacts.slip, np.zeros(len(packing.contacts)))

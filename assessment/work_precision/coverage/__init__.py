@@ -1,1 +1,1 @@
-"""Whether the error that an onset states covers the one that it has."""
+"""Does the stated error of an onset cover its true error?"""

@@ -3,11 +3,12 @@
     python -m faultgouge.assessment.work_precision.coverage.stated_errors [--rows table.jsonl] [--scenes 60] [--restate]
 
 Scenes are drawn at random: seeds, numbers of disks, friction, stiffness and exponent of the law, dashpots, increments,
-both arithmetics. Those count that have an onset on their ramp and contacts that change before it. The truth is the
-onset on a ramp whose increments are `FINER` times smaller; one with twice these increments tells how good the truth is.
-Windows are looked for in each of these small increments: between loads farther apart a window that a change of contacts
-ends may be missed. The rule of the stated errors was made on the first draws of the table; those that say `fresh` were
-drawn afterwards. Each draw is a row, written as it is known; the same command goes on where it was cut off.
+both arithmetics. A scene counts if its ramp has an onset and contacts change before the onset. The true onset is that
+of a ramp whose increments are `FINER` times smaller. A ramp with twice these increments shows how accurate the true
+onset is. The search looks for windows in each of these small increments, because between loads farther apart it may
+miss a window that a change of contacts ends. The rule for the stated errors was chosen with the first draws of the
+table; draws marked `fresh` came later. Each draw becomes a row as soon as it is computed, and the same command resumes
+an interrupted run.
 """
 
 from __future__ import annotations
@@ -58,16 +59,16 @@ FIRST_SCENES = {
 
 @dataclass(frozen=True)
 class CoverageCase:
-    """A scene, what its onset states, and what the limit of small increments is.
+    """A scene, its onset with the stated error, and the onset in the limit of small increments.
 
     Attributes
     ----------
     kind : {"undamped", "damped"}
-        Which onset.
+        Whether it is the onset without or with dissipation.
     number : int
-        Of the draw.
+        Number of the draw.
     disks : int
-        In the packing.
+        Disks in the packing.
     mu : float
         Friction coefficient.
     precision : str
@@ -75,13 +76,13 @@ class CoverageCase:
     increment : float
         Of the ramp, force.
     changes : int
-        Increments before the onset in which contacts changed; 0 of a scene that does not count.
+        Increments before the onset in which contacts changed; 0 for a scene that does not count.
     fx_c, stated : float or None
-        The onset and the error that it states, force; None where there is none.
+        The onset and its stated error, force; None if the scene has no onset.
     limit, uncertain : float or None
         The onset on the finest ramp and its difference from the one with increments twice as large, force.
     fresh : bool
-        Whether the scene was drawn after the rule was made by which errors are stated.
+        Whether the scene was drawn after the rule for the stated error was chosen.
     """
 
     kind: Kind
@@ -99,12 +100,12 @@ class CoverageCase:
 
     @property
     def counts(self) -> bool:
-        """Whether there is something to compare."""
+        """Whether the case has an onset to compare, before which contacts change."""
         return self.limit is not None
 
     @property
     def true(self) -> float:
-        """The error that the onset has, force."""
+        """True error of the onset, force."""
         assert self.fx_c is not None
         assert self.limit is not None
         return abs(self.fx_c - self.limit)
@@ -122,7 +123,7 @@ class CoverageCase:
 
 
 def draw_scene(number: int) -> Scene:
-    """The scene of a draw, with dashpots; without them it is that of the undamped onset."""
+    """The scene of a draw, with dashpots; without the dashpots the same scene gives the undamped onset."""
     if number == 0:
         return Scene.from_mapping(FIRST_SCENES)
     chance = np.random.default_rng(number)
@@ -151,7 +152,7 @@ class FirstOnset:
     Parameters
     ----------
     scene : Scene
-        With a section [ramp]; damped if it has a section [damping].
+        The scene, with a section [ramp]; the onset is damped if there is a section [damping].
     engine : Engine
         LAMMPS with its packing.
     start : Equilibrium
@@ -166,7 +167,7 @@ class FirstOnset:
     def first_window(self, finer: int = 1, beyond: float = 0.0) -> tuple[EquilibriumPath, Window | DampedWindow] | None:
         """The ramp with increments so many times smaller, and the first window on it, without the error of the path.
 
-        None where there is none before the ramp's end or that of the equilibria, or none beyond a load.
+        None if there is no window beyond a given load and before the end of the ramp, or of the equilibria.
         """
         path = EquilibriumPath(self._engine, self._start, self._scene, onward=True)
         for first in range(0, len(self._wanted) - 1, AT_ONCE):
@@ -251,9 +252,9 @@ def _compare_case(onset: FirstOnset, case: CoverageCase) -> CoverageCase:
 
 
 def restate_case(case: CoverageCase) -> CoverageCase:
-    """The case with the onset, and the error, that are stated today; the limit stays what it is.
+    """The case with the onset and the stated error of the present code; the limit is not computed again.
 
-    The onset is looked for from some increments before on, which saves most of the time.
+    The search begins a few increments before the onset that is known, which saves most of the time.
     """
     assert case.fx_c is not None
     scene = draw_scene(case.number)
@@ -275,7 +276,7 @@ def read(path: Path = TABLE) -> list[CoverageCase]:
 
 
 def cases(path: Path, scenes: int) -> Iterator[CoverageCase]:
-    """Cases until there are so many scenes of either kind that count; those of the file first, the others into it."""
+    """Yield cases until enough scenes of either kind count: first those of the file, then new ones, which it adds."""
     known = read(path)
     counts = dict.fromkeys(get_args(Kind), 0)
     number = 0

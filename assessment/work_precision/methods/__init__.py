@@ -1,2 +1,2 @@
-"""Work-precision studies: one file a study, each a function from `Settings` to a `Study`; `report` puts them
-together."""
+"""Work-precision studies: each file has one study, a function from `Settings` to a `Study`; `report` puts
+them together."""

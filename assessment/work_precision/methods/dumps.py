@@ -3,7 +3,7 @@ r"""What the eigenvalues lose on the way through a file.
 An overlap is a small difference of coordinates: an error :math:`\Delta x` of these changes the stiffness
 :math:`\tfrac32 k_n \delta^{1/2}` of a contact by the share :math:`\Delta x/(2\delta)`, and the overlaps of a packing
 under load are 1e-5 to 1e-3 of a radius. So text with the six digits of ``%g``, and the float32 of a trajectory, lose
-most of the stiffness of the weakest contacts, and contacts open that were closed. A trajectory has no slips besides.
+most of the stiffness of the weakest contacts, and contacts open that were closed. Besides, a trajectory has no slips.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def loss(found: Packing, exact: Complexes) -> float:
 
 
 def through_text(stem: Path, digits: int, folder: Path) -> tuple[Packing, int]:
-    """The deck's dumps with another number of digits, read back, and their bytes.
+    """Write the deck's dumps with another number of digits and read them back; also their size in bytes.
 
     A format of LAMMPS's and one of Python's write the same digits.
     """
@@ -57,7 +57,7 @@ def through_text(stem: Path, digits: int, folder: Path) -> tuple[Packing, int]:
 
 
 def through_hdf5(packing: Packing, folder: Path) -> tuple[Packing, int]:
-    """run.h5 and back, and its bytes."""
+    """Write run.h5 and read it back; also its size in bytes."""
     path = folder / "run.h5"
     with RunFile.create(path, packing) as file:
         file.append(packing)
@@ -66,7 +66,7 @@ def through_hdf5(packing: Packing, folder: Path) -> tuple[Packing, int]:
 
 
 def through_trajectory(packing: Packing) -> tuple[Packing, int]:
-    """Positions in float32, as MDAnalysis hands them out; angles and slips from elsewhere, new contacts have none."""
+    """Positions in float32, as MDAnalysis reads them. Angles and slips come from elsewhere; new contacts have none."""
     positions = np.column_stack([packing.position, np.zeros(len(packing))]).astype(np.float32)
     position, known = positions[:, :2].astype(np.float64), packing.contacts
     found = touching(position, packing.radius, packing.box_length)
@@ -76,7 +76,7 @@ def through_trajectory(packing: Packing) -> tuple[Packing, int]:
 
 
 def without_slips(packing: Packing) -> tuple[Packing, int]:
-    """Positions to the bit; contacts from these alone."""
+    """The exact positions, with contacts that are found from positions alone and so have no slips."""
     contacts = touching(packing.position, packing.radius, packing.box_length)
     return replace(packing, contacts=contacts), packing.position.nbytes
 

@@ -2,10 +2,10 @@ r"""Error of eigenvalues over the time that they take, far from an exceptional p
 
 The dense solver is backward stable: it returns the eigenvalues of :math:`A + E`, :math:`|E| \sim u |A|_F`, and so errs
 by about :math:`u |A|_F \kappa`, with the condition :math:`\kappa = 1/|y^H x|`, which grows without bound towards an
-exceptional point. Shift-invert Arnoldi finds the few eigenvalues nearest to a shift, to a tolerance, and with less
-rounding the nearer they are. More digits than the coordinates have are of no use: how far their rounding alone moves
-the eigenvalues is measured. The mean of the two eigenvalues of a pair and their discriminant have no such condition;
-that is what the onset is solved with.
+exceptional point. Shift-invert Arnoldi finds the few eigenvalues nearest to a shift, to a tolerance. The nearer they
+are, the smaller is their rounding error. More digits than the coordinates have are of no use, so the study measures how
+far the rounding of the coordinates alone moves the eigenvalues. The mean of the two eigenvalues of a pair and their
+discriminant do not suffer from this condition, and the search for the onset uses them.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ class Target:
     exact : ndarray of complex, shape (COUNT,)
         The eigenvalues nearest to it, in extended precision, 1 / time^2.
     error : float
-        Largest relative error of these.
+        Largest relative error of these eigenvalues.
     condition : float
-        Largest kappa of these.
+        Largest kappa of these eigenvalues.
     rounding : float
         u |A|_F, 1 / time^2.
     """
@@ -77,8 +77,8 @@ class Target:
 
     @property
     def coordinates(self) -> tuple[float, float]:
-        """What one unit in the last place of each coordinate, up or down, changes: the eigenvalues, and the mean of the
-        pair, relative."""
+        """Relative changes of the eigenvalues, and of the mean of the pair, when each coordinate changes by one unit
+        in the last place, up or down."""
         sign = np.random.default_rng(0).choice([-1.0, 1.0], self.packing.position.shape)
         position = np.nextafter(self.packing.position, sign * np.inf)
         moved = Target.of(replace(self.packing, position=position), self.shift)
@@ -106,7 +106,7 @@ class Target:
         return found.values, found.solves
 
     def refine(self) -> tuple[Complexes, int | None]:
-        """The same from LAPACK and Newton's method in extended precision, and the number of steps."""
+        """The nearest few by LAPACK and then Newton's method in extended precision, and the number of steps."""
         found, *_ = refined_near(self.packing, self.shift, COUNT)
         return np.array([complex(each.value) for each in found]), sum(each.steps for each in found)
 
@@ -119,7 +119,7 @@ def far(settings: Settings) -> Study:
 
 
 def near(settings: Settings) -> Study:
-    """The same just below the onset."""
+    """The eigenvalues about the same pair just below the onset."""
     return _study("near", settings, *_near(settings))
 
 

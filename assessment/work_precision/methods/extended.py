@@ -7,8 +7,8 @@ For :math:`A x = \lambda x`, :math:`w^H x = 1` a step solves the bordered system
     \begin{pmatrix} A - \lambda & -x \\ w^H & 0 \end{pmatrix} \begin{pmatrix} \Delta x \\ \Delta\lambda
     \end{pmatrix} = \begin{pmatrix} \lambda x - A x \\ 0 \end{pmatrix}
 
-in doubles, with the right-hand side and the sums in ``numpy.longdouble``: iterative refinement. What is left is the
-last step, and the rounding of extended precision, :math:`\epsilon |A|_F \kappa`, with the condition :math:`\kappa =
+in doubles, with the right-hand side and the sums in ``numpy.longdouble``: iterative refinement. The remaining error is
+the last step, and the rounding of extended precision, :math:`\epsilon |A|_F \kappa`, with the condition :math:`\kappa =
 1/|y^H x|` of the eigenvalue.
 """
 
@@ -24,7 +24,8 @@ from ....analysis.packing.packing import Floats
 from ....analysis.spectrum.spectrum import Complexes, unit_rounding
 
 ITERATIONS = 30
-"""At the most. Near an exceptional point the bordered system is nearly singular and a step gains only a few digits."""
+"""Newton steps at the most. Near an exceptional point the bordered system is nearly singular and a step gains only a
+few digits."""
 
 
 class RefinedEigenvalue(NamedTuple):
@@ -35,9 +36,9 @@ class RefinedEigenvalue(NamedTuple):
     value : numpy.clongdouble
         The eigenvalue.
     error : float
-        Of it.
+        Its error.
     steps : int
-        Of Newton's method.
+        Steps of Newton's method.
     """
 
     value: np.clongdouble

@@ -8,9 +8,9 @@ and at equal intervals h obeys
 
 with complex :math:`\Omega` if the eigenvalue is complex: least squares give :math:`\cos\Omega h`.
 
-What velocity Verlet makes of a frequency is known exactly,
+The frequency that velocity Verlet gives is known exactly,
 :math:`\sin\tfrac12\Omega\,\Delta t = \tfrac12\omega\,\Delta t`: the error is
-:math:`\omega^3 \Delta t^2/24`, and it can be taken out of what was measured.
+:math:`\omega^3 \Delta t^2/24`, and it can be subtracted from the measured frequency.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SHARES = (0.8, 0.4, 0.2, 0.1, 0.05, 0.025)
 
 RUN, CORRECTED, SPECTRUM = "run", "run, dispersion taken out", "eigenvalue of K, no run"
 CAREFUL = ", compensated"
-"""Ends the name of a method in compensated arithmetic."""
+"""Suffix of the name of a method in compensated arithmetic."""
 
 CAREFUL_AMPLITUDE, AMPLITUDE = 1e-12, 1e-8
 """Length by which the disk that moves most is displaced: far above what a coordinate is known to, 1e-23 or 2e-15, and
@@ -56,7 +56,7 @@ class FastestMode:
     eigenvalue : complex
         Refined in extended precision, 1 / time^2.
     error : float
-        What the rounding of the operator's entries amounts to, 1 / time^2.
+        Uncertainty from the rounding of the operator's entries, 1 / time^2.
     limit : float
         2 / omega_max, time.
     """
@@ -71,7 +71,7 @@ class FastestMode:
 
     @classmethod
     def of(cls, packing: Packing, growing: bool) -> FastestMode:
-        """Solve the eigenproblem of a packing and choose."""
+        """Solve the eigenproblem of a packing and choose the mode."""
         sparse, active = dynamical_matrix(packing)
         matrix = sparse.toarray()
         values, left, right = eig(matrix, left=True, right=True)
@@ -85,7 +85,7 @@ class FastestMode:
         return cls(packing, growing, spread[0], spread[1], complex(exact.value), error, limit)
 
     def quantity(self, frequency: complex) -> float:
-        """What is studied: the growth rate of D, or the frequency, 1 / time."""
+        """The quantity of the study: the growth rate of D, or the frequency, 1 / time."""
         return float(2 * abs(frequency.imag) if self.growing else abs(frequency.real))
 
     @property
@@ -149,7 +149,7 @@ def growth(settings: Settings) -> Study:
 def _study(
     name: str, settings: Settings, equilibrium: Equilibrium, mode: FastestMode, length: float, time: float
 ) -> Study:
-    """Runs of a time, which is called a length in the words, over the time step."""
+    """Study runs of a given duration (the words call it a length) over the time step."""
     steps = mode.limit * np.array(SHARES[: len(SHARES) - settings.quick])
     fine_mode = FastestMode.of(compensate(equilibrium).packing, mode.growing)
     points = _points(settings, mode, fine_mode, steps, time)
@@ -211,7 +211,7 @@ def _relative_error(mode: FastestMode, quantity: float) -> float:
 
 
 def _dispersion(mode: FastestMode, steps: Floats) -> Theory:
-    """What velocity Verlet makes of a mode of a frozen K."""
+    """Error of velocity Verlet for a mode of a frozen K."""
     fine = np.geomspace(steps[-1], steps[0], 60).tolist()
     predicted = [abs(mode.quantity(complex(discrete_frequency(mode.eigenvalue, dt))) / mode.exact - 1) for dt in fine]
     return Theory("velocity Verlet on a frozen K", tuple(map(float, predicted)), tuple(fine))

@@ -48,7 +48,8 @@ def net_force(packing: Packing, displacement: Numbers) -> Numbers:
     Returns
     -------
     ndarray, shape (3N, m)
-        Forces (Fx.., Fy.., T/R..) of the contacts of the packing; one that opens exerts nothing, none forms.
+        Forces (Fx.., Fy.., T/R..) of the contacts of the packing. A contact that opens exerts no force, and no new
+        contact forms.
     """
     n, m = len(packing), displacement.shape[1]
     real = displacement.real.dtype
@@ -144,7 +145,7 @@ def jacobian(settings: Settings) -> Study:
 
 
 def _runs(engine: Engine, packing: Packing, steps: Floats) -> list[Run[Floats]]:
-    """What computes K, by steps of differences."""
+    """The methods that compute K, with the step of their differences."""
     size = 3 * len(packing)
     return [
         (ANALYTIC, None, partial(_count_calls, 1, lambda: stiffness_matrix(packing).toarray())),

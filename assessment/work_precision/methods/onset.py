@@ -1,13 +1,13 @@
 r"""Error of the onset F_x^c over the time that it takes to find it.
 
-Three ways: a *scan*, the spectrum at each increment of a ramp, the onset in the middle between the last real and the
-first complex one; a *bisection* of the increment in which it lies; and the *root of the discriminant* of the two
-eigenvalues (:mod:`~faultgouge.analysis.onset`). The paper's scan waits for overdamped dynamics at each increment, the
-others take Newton's method.
+There are three methods. A *scan* computes the spectrum at each increment of a ramp, and takes the middle between the
+last real and the first complex spectrum. A *bisection* divides the increment in which the onset lies. The third method
+solves for the *root of the discriminant* of the two eigenvalues (:mod:`~faultgouge.analysis.onset`). The paper's scan
+waits for overdamped dynamics at each increment; the other methods use Newton's method.
 
-A scan errs by half an increment at the most. A bisection ends where a complex pair is no longer told from rounding,
-see `believable`: the imaginary part and the overlap :math:`|y^H x|` both vanish as :math:`(F_x - F_x^c)^{1/2}`, their
-product linearly, and the pair is believed from :math:`50\, u |A|_F` on.
+A scan errs by half an increment at the most. A bisection ends where a complex pair can no longer be distinguished from
+rounding, see `believable`: the imaginary part and the overlap :math:`|y^H x|` both vanish as
+:math:`(F_x - F_x^c)^{1/2}`, their product linearly, and the pair is believed from :math:`50\, u |A|_F` on.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ BEYOND = 1e-5
 """Distance beyond the onset, force, at which the pair's imaginary part and overlap are measured for the floor."""
 
 INCREMENTS = (2e-3, 1e-3, 5e-4, 2.5e-4)
-"""Of the ramps whose stated errors are compared with the true ones."""
+"""Increments of the ramps whose stated errors are compared with the true ones."""
 
 SMALL = 20
 """Disks of the scenes with contacts that change which are computed anew: each takes a second or two."""
 
 
 class OnsetMethods:
-    """The ways from one settled packing to its onset.
+    """The methods that find the onset of one settled packing.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class OnsetMethods:
     start : Equilibrium
         The packing at F_x = 0.
     scene : Scene
-        Of the ramp.
+        Scene of the ramp.
     """
 
     def __init__(self, engine: Engine, start: Equilibrium, scene: Scene) -> None:
@@ -78,7 +78,7 @@ class OnsetMethods:
         return found.fx_c, computed
 
     def solve(self, increment: float, beyond: float) -> tuple[Onset, EquilibriumPath, int]:
-        """The same with the error that it states, and the path."""
+        """The onset as in `root`, with its stated error, and the path."""
         path, asked = self._path("newton"), list[float]()
 
         def equilibrium(fx: float) -> Packing:
@@ -89,12 +89,12 @@ class OnsetMethods:
         return found, path, len(asked)
 
     def whole(self, increment: float, beyond: float) -> Onset:
-        """The same with the error of the path in it."""
+        """The onset and its stated error, which includes the error of the path."""
         found, path, _ = self.solve(increment, beyond)
         return with_path_error(found, path)
 
     def beyond(self, onset: float) -> tuple[float, float]:
-        """The error that a bisection ends at, and |y^H x| at `BEYOND` beyond the onset."""
+        """The error at which a bisection ends, and |y^H x| at the distance `BEYOND` above the onset."""
         path, _ = self._up(1e-3, "newton")
         found = spectrum(path(onset + BEYOND))
         pair = max(found.pairs, key=lambda each: each.overlap * each.eigenvalue.imag)
@@ -114,7 +114,7 @@ class OnsetMethods:
 
 
 def onset(settings: Settings) -> Study:
-    """The study: four ways to the onset of the ramp."""
+    """The study: four methods for the onset of the ramp."""
     start = settings.ramp[0]
     exact_start = compensate(start)
     with Engine(start.packing) as engine, Engine(exact_start.packing) as exact_engine:
@@ -161,7 +161,7 @@ def _study(settings: Settings, ways: OnsetMethods, reference: OnsetMethods) -> S
 
 
 def _runs(ways: OnsetMethods, quick: bool, exact: float) -> list[Run[float]]:
-    """What finds the onset, by increments."""
+    """The methods that find the onset, with their increments."""
     coarse = (4e-3,) if quick else (4e-3, 2e-3, 1e-3)
     fine = (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4)
     halvings = (5, 25) if quick else (2, 5, 10, 20, 30)

@@ -1,13 +1,12 @@
 r"""Distance to an equilibrium over the time that it takes to get there.
 
-The load of a packing in equilibrium is raised by one increment. Four ways lead to the next equilibrium: overdamped
-dynamics :math:`\mathbf v = \mathbf F/\gamma`, the paper's; velocity Verlet with viscous drag; FIRE; and Newton's
-method.
+The load of a packing in equilibrium is raised by one increment. Four methods lead to the next equilibrium: the paper's
+overdamped dynamics :math:`\mathbf v = \mathbf F/\gamma`, velocity Verlet with viscous drag, FIRE, and Newton's method.
 
 Friction remembers the path, and a minimizer's path is no motion. FIRE (Bitzek et al., Phys. Rev. Lett. 97, 170201,
-2006) is made right here in the way that Newton's method is: its unknown is the displacement q from the last
-equilibrium, slips advance along the straight path from there, and never from an iterate, so that F(q) is a function
-and its root the same for both. F has no energy, but K is nearly symmetric, and FIRE needs no more than the sign of the
+2006) is set up like Newton's method: its unknown is the displacement q from the last
+equilibrium, and slips advance along the straight path from there, never from an iterate. So F(q) is a function, and
+both methods have the same root. F has no energy, but K is nearly symmetric, and FIRE needs no more than the sign of the
 power :math:`F \cdot v`. LAMMPS's own minimizers advance no slips and are refused by the pair style.
 """
 
@@ -59,7 +58,7 @@ class Increment:
     end: Packing
 
     def distance(self, packing: Packing) -> float:
-        """Largest difference of a coordinate (x, y, R theta) of a disk that is held, length."""
+        """Largest difference of a coordinate (x, y, R theta) of a disk with contacts, length."""
         apart = packing.position - self.end.position + (_low(packing) - _low(self.end))
         turned = packing.scaled_angle - self.end.scaled_angle
         return float(np.abs(np.delete(np.column_stack([apart, turned]), self.end.rattlers, axis=0)).max())
@@ -114,7 +113,7 @@ def fire(
     tolerance : float
         Largest component of F to end at.
     most : int
-        Evaluations after which it ends in any case.
+        Largest number of evaluations.
 
     Returns
     -------
@@ -143,7 +142,7 @@ def _low(packing: Packing) -> Floats:
 
 
 def relaxation(settings: Settings) -> Study:
-    """The four ways, each to several accuracies, three of them in both arithmetics."""
+    """The study: four methods, each with several accuracies, and three of them in both arithmetics."""
     plain = settings.at(FROM)
     careful = compensate(plain)
     with Engine(plain.packing) as engine, Engine(careful.packing) as careful_engine:
@@ -173,7 +172,7 @@ def relaxation(settings: Settings) -> Study:
 def _runs(
     plain: Increment, careful: Increment, dynamics: tuple[float, float, float], quick: bool
 ) -> list[Run[Packing]]:
-    """What finds the equilibrium; `dynamics` are the steps of dynamics and of Verlet, and its drag."""
+    """The methods that find the equilibrium; `dynamics` are the steps of dynamics and of Verlet, and its drag."""
     relax_step, verlet_step, drag = dynamics
     forces = np.logspace(-3, -9, 4 if quick else 7).tolist()
     most = (1e-1, 1e-4, 1e-7, 0.0)

@@ -8,7 +8,7 @@ Velocity Verlet is of second order as long as the slip increment is. The force i
 Coulomb's bound and the clamp is applied at the end of the step, so that passing the bound costs no order. A contact
 that *forms* during the run would: its slip begins with zero at the end of a step.
 
-The same in NumPy, written to be read, is the reference for what the pair style integrates. A step moves the disks by
+A readable version in NumPy is the reference for the motion that the pair style integrates. A step moves the disks by
 :math:`\mathbf v\,\Delta t` with the velocities of the half step, advances each slip by
 
 .. math:: \Delta s = \boldsymbol\tau \cdot \Delta(\mathbf r_i - \mathbf r_j) - (\Delta u_i + \Delta u_j)
@@ -85,7 +85,7 @@ def verlet(packing: Packing, tangent: Tangent, dt: float, steps: int) -> Floats:
 
 
 def _reference(engine: Engine, packing: Packing, finest: int) -> tuple[Floats, float]:
-    """Richardson's extrapolation of LAMMPS's runs with `finest` and half as many steps, and the error of it."""
+    """Richardson's extrapolation of LAMMPS's runs with `finest` and half as many steps, and its error."""
     runs = [in_lammps(engine, packing, steps) for steps in (finest // 4, finest // 2, finest)]
     coarse, fine = ((4 * runs[k + 1] - runs[k]) / 3 for k in (0, 1))
     return fine, float(np.abs(fine - coarse).max())

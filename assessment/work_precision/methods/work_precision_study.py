@@ -25,7 +25,7 @@ else:
     import tomli as tomllib
 
 WORDS = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
-"""What is said of each study."""
+"""The texts of each study."""
 
 T = TypeVar("T")
 
@@ -35,12 +35,12 @@ Run = tuple[str, float | None, Callable[[], tuple[T, int | None]]]
 
 @dataclass(frozen=True)
 class Settings:
-    """What a study is given.
+    """The settings of a study.
 
     Attributes
     ----------
     scene : Scene
-        Of the ramp, with its section [ramp].
+        Scene of the ramp, with a section [ramp].
     ramp : tuple of Equilibrium
         Its equilibria by increasing F_x, from 0 to beyond the onset.
     quick : bool
@@ -48,7 +48,7 @@ class Settings:
     repeats : int
         Runs of which the median of the times is taken.
     progress : callable
-        Wraps what a study goes through, to show how far it is.
+        Wraps the list of runs of a study, to show how far it is.
     """
 
     scene: Scene
@@ -71,13 +71,13 @@ class Point:
     method : str
         Which.
     parameter : float or None
-        What the method's accuracy is set by; None if nothing sets it.
+        The parameter that sets the method's accuracy; None if there is none.
     error : float
-        Against the study's reference.
+        Difference from the study's reference.
     seconds : float
         Wall time, the median of several.
     evaluations : int or None
-        Work that does not depend on the machine; None where there is nothing to count.
+        Work that does not depend on the machine; None if there is nothing to count.
     """
 
     method: str
@@ -100,7 +100,7 @@ class Order:
     error : float
         Standard error of the slope.
     expected : float
-        What theory says.
+        The order that theory predicts.
     points : int
         How many points were fitted.
     """
@@ -114,12 +114,12 @@ class Order:
 
 @dataclass(frozen=True)
 class Theory:
-    """What theory says of the error, a line in the figure.
+    """A theoretical error, drawn as a line in the figure.
 
     Attributes
     ----------
     label : str
-        What it is.
+        Label of the line.
     error : tuple of float
         One value, a floor for all; or values at `parameter`.
     parameter : tuple of float
@@ -133,7 +133,7 @@ class Theory:
 
 @dataclass(frozen=True)
 class StatedError:
-    """The error that an onset states, and the one that it has.
+    """The stated and the true error of an onset.
 
     Attributes
     ----------
@@ -158,38 +158,38 @@ class StatedError:
 
 @dataclass(frozen=True)
 class Study:
-    """Error against cost for several ways to one result.
+    """Error against cost for several methods that give one result.
 
     Attributes
     ----------
     name : str
         Of the study.
     question : str
-        What is computed, a sentence or two.
+        A sentence or two that say what is computed.
     error, parameter, evaluations : str
         What the numbers of the points are, with their units.
     abscissa : {"evaluations", "parameter"}
         What the second panel of the figure has on its x axis.
     reference : str
-        What the errors are taken against.
+        The reference from which errors are differences.
     reference_error : float
         The reference's own error, in the unit of `error`.
     points : tuple of Point
         By method.
     advice : tuple of str
-        Two sentences: what to take when.
+        Two sentences that say when to use which method.
     orders : tuple of Order
         Those that theory predicts.
     theory : tuple of Theory
         Floors and curves to compare with.
     remarks : tuple of str
-        What else the reader has to know, one sentence each.
+        Further remarks for the reader, one sentence each.
     covered : tuple of StatedError
-        Stated against true errors, where the result states one.
+        Stated and true errors, if the result has a stated error.
     changing : tuple of CoverageCase
-        The same of many scenes in which contacts change before the onset.
+        Stated and true errors of many scenes in which contacts change before the onset.
     again : tuple of CoverageCase
-        Some of these, computed anew.
+        Some of these cases, computed anew.
     """
 
     name: str
@@ -238,7 +238,7 @@ def study_of(
     orders: tuple[Order, ...] = (),
     **results: Any,
 ) -> Study:
-    """A study with its words.
+    """Make a study from its results and from the texts of words.toml.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def study_of(
     points, orders, **results
         As of `Study`.
     numbers : mapping
-        What the words name; `orders` and the `best` of the points are known to them.
+        Numbers that the texts use; the texts also have `orders` and the `best` of the points.
     """
     known = {"orders": orders, "best": best_of(points), **numbers}
     words = {name: text for section in sections for name, text in WORDS[section].items()}
