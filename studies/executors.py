@@ -18,10 +18,10 @@ from ..analysis.onset.ranks import cores
 from ..parent_death import end_with
 
 Say = Callable[[str], None]
-"""Takes a line of words."""
+"""A function that prints a line of text."""
 
 Progress = Callable[[Iterable[Any], int], Iterable[Any]]
-"""Takes results as they end and their number, and hands them on."""
+"""A function that takes results as they come, with their number, and passes them on."""
 
 Share = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 """`map`, whose results may come in any order."""

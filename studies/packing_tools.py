@@ -18,7 +18,7 @@ Start = Callable[[float], Equilibrium]
 
 
 def with_seed(scene: Scene, seed: int) -> Scene:
-    """The same scene with another packing."""
+    """The scene with another packing."""
     return scene.model_copy(update={"packing": scene.packing.model_copy(update={"seed": seed})})
 
 

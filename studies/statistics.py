@@ -112,7 +112,7 @@ def distribution(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def course(reach: ArrayLike, found: ArrayLike) -> tuple[Floats, Floats]:
-    """The same distribution from zero to the largest F_x that was seen, as a curve of steps."""
+    """The distribution as a step curve, from zero to the largest F_x in the data."""
     fx, probability = distribution(reach, found)
     levels = np.concatenate([[0.0], probability])
     return np.concatenate([[0.0], fx, [np.max(reach)]]), np.append(levels, levels[-1])

@@ -26,7 +26,7 @@ from .result_rows import Rows
 Result = dict[str, Any]
 
 Figures = Mapping[str, Callable[[], Figure]]
-"""What draws each picture, by the name of its file."""
+"""Functions that draw the pictures, by file name."""
 
 
 def leave(
@@ -71,7 +71,7 @@ def save_png(figure: Figure, stem: Path) -> None:
 
 
 class Work(NamedTuple):
-    """What the computing part of a study is given beside the scene: what is known, and how to share and to speak."""
+    """Inputs of a study besides the scene: known rows, workers, and the output of messages."""
 
     rows: Rows
     share: Share

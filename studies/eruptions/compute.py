@@ -137,7 +137,7 @@ def erupt(start: Start) -> dict[str, Any]:
 
 
 def growth_rate(packing: Packing) -> float:
-    """Of D, from K or, with dissipation, from K, C and M, 1 / time; 0 of a stable packing."""
+    """Growth rate of D, 1 / time, from K or, with dissipation, from K, C and M; 0 for a stable packing."""
     if not packing.damped:
         return spectrum(packing).growth_rate()
     return 2 * float(unstable_rates(packing).real.max(initial=0.0))
@@ -171,7 +171,7 @@ def _flows(looks: list[Look], packing: Packing) -> bool:
 
 
 class _Watch:
-    """What has become of disks and contacts since the start."""
+    """Changes of disks and contacts since the start."""
 
     def __init__(self, start: Start) -> None:
         self._start, self._position = start, start.packing.position

@@ -110,7 +110,7 @@ class PairCounts:
 
     @classmethod
     def of(cls, values: Complexes) -> PairCounts:
-        """Those of some eigenvalues, of which all with positive imaginary part count."""
+        """Pairs of some eigenvalues: all with a positive imaginary part count."""
         omega = np.sqrt(values[values.imag > 0])
         return cls(omega[np.argsort(-omega.imag)], len(values))
 
@@ -208,7 +208,7 @@ def modes(scene: Scene, start: Start) -> dict[str, Any]:
 
 
 def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
-    """What there is to see of the packing at each load of [modes] that it bears.
+    """The row of the packing at each load of [modes] that it bears.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def _climb_to(path: EquilibriumPath, fx: float, step: float) -> Packing:
 
 
 def _load(packing: Packing) -> dict[str, Any]:
-    """What is told of one load."""
+    """The numbers of one load."""
     found = count_pairs(packing)
     row = found.as_dict() | {
         "modes": found.modes,

@@ -41,7 +41,7 @@ class Table:
         return sorted({load["fx_over_fy"] for row in self.rows for load in row.get("loads", ())})
 
     def borne(self, fx_over_fy: float) -> list[dict[str, Any]]:
-        """What there is of a load, of every packing that has borne it."""
+        """The rows of a load, for every packing that has borne it."""
         return [load for row in self.rows for load in row.get("loads", ()) if load["fx_over_fy"] == fx_over_fy]
 
     def at(self, fx_over_fy: float, key: str) -> Floats:

@@ -60,7 +60,7 @@ def _is_earlier(one: Onset, other: Onset) -> bool | None:
 
 
 def _triggering_numbers(found: Triggering) -> dict[str, Any]:
-    """What the section on triggering needs beside the runs."""
+    """Numbers of the section on triggering, besides the runs."""
     numbers = summary(found)
     jump = numbers["jump"]
     return {
@@ -73,7 +73,7 @@ def _triggering_numbers(found: Triggering) -> dict[str, Any]:
 
 
 def _in_si(scene: Scene, growth: GrowthRun, wave: Triggering | None) -> dict[str, Any]:
-    """What the column in SI needs; `real` is None if the scene has no units."""
+    """Numbers of the column in SI; `real` is None if the scene has no units."""
     real, units = real_units(scene), scene.units
     if real is None or units is None:
         return {"real": None}

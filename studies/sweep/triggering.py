@@ -80,7 +80,7 @@ def triggering(scene: Scene, start: Start) -> Row:
 
 
 def _examination(scene: Scene, start: Start) -> Iterator[Row]:
-    """What is found in each stage, so that a stage that fails takes nothing along."""
+    """The results of each stage, so that a stage that fails loses none of the earlier ones."""
     ramps: list[Row] = []
     paths: list[tuple[Equilibrium, ...]] = []
     for mu in frictions(scene):
@@ -108,7 +108,7 @@ def frictions(scene: Scene) -> tuple[float, ...]:
 
 
 def first_onset(scene: Scene, mu: float, start: Start) -> tuple[Row, tuple[Equilibrium, ...]]:
-    """What the ramp of a scene meets first for one friction coefficient, and its equilibria up to there.
+    """How the ramp of a scene ends for one friction coefficient, with its equilibria up to there.
 
     Returns
     -------

@@ -64,7 +64,7 @@ def summary(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def in_words(numbers: dict[str, Any]) -> list[str]:
-    """The same as lines for a terminal."""
+    """The summary as lines for a terminal."""
     return lines(__package__ or "", "triggering.j2", result=numbers)
 
 

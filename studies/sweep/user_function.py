@@ -152,7 +152,7 @@ def _parameters(function: Callable[..., Any]) -> int:
 
 
 def _as_row(row: Any, name: str) -> dict[str, Any]:
-    """What a function has returned as JSON holds it."""
+    """The result of a function as JSON stores it."""
     if not isinstance(row, dict):
         raise UserFunctionError(f"{name} returned {type(row).__name__}: return a dict of numbers, words and lists")
     try:

@@ -34,7 +34,7 @@ TRIES = 3
 """Deaths of workers, without a point that ends in between, after which a point and not an accident is to blame."""
 
 FAILURES = (FaultgougeError, ValueError, ArithmeticError, ArpackError, MemoryError)
-"""What may go wrong with one scene: of the package, of LAPACK, of ARPACK, and of a packing that is too large."""
+"""Errors of a single scene: those of the package, of LAPACK, of ARPACK, and of a packing that is too large."""
 
 
 class WorkerError(FaultgougeError):

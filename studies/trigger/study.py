@@ -43,7 +43,7 @@ def _compute(scene: Scene, work: Work) -> Result:
 
 
 def _summary(scene: Scene, onset: Row, predicted: list[Row], measured: list[Row]) -> Result:
-    """What trigger.json holds beside the scene."""
+    """The contents of trigger.json besides the scene."""
     runs = {(each["fx"], each["omega"]): each for each in measured}
     real = real_units(scene)
     rows: list[Row] = []

@@ -68,14 +68,14 @@ errors. The spectrum is that of the start; after the jump the disks lie elsewher
 changes by some ten percent."""
 
 ABOVE_NOISE = 1e3
-"""How much stronger the perturbation is that is compared with the linear response: a million times in D."""
+"""Factor of the perturbation that is compared with the linear response: a million times in D."""
 
 COMPARED_TIME = 50.0
 """Length of that run, in `unit_of_time`: a few hundred periods of the pair."""
 
 
 Series = dict[str, Floats]
-"""What a run yields, one array a field of `Sample`, shape (T,)."""
+"""The samples of a run, with one array of shape (T,) for each field of `Sample`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ class Sensitivity:
 
 
 def series_of(samples: Iterable[Sample]) -> Series:
-    """What a run yields, as arrays of shape (T,)."""
+    """The samples of a run as arrays of shape (T,)."""
     rows = [vars(sample) for sample in samples]
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
@@ -191,7 +191,7 @@ Verdict = Literal["does not weaken", "too short", "jump alone", "grows", "unexpl
 
 @dataclass(frozen=True)
 class TriggeringOutcome:
-    """What a run with mu(v) shows.
+    """The outcome of a run with mu(v).
 
     Attributes
     ----------
