@@ -157,6 +157,22 @@ def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves
 
 
 @pytest.mark.slow
+def test_spectrum_says_that_contacts_at_the_bound_stick(faultgouge_here, tmp_path):
+    """With the standard law, whose contacts slide on or stick there; the smoothed law has one derivative."""
+    scene = SMALL | {"law": {"kn": 2e5, "mu": 0.4}, "ramp": {"step": 5e-2, "until": 0.6}}
+    for history in ("coulomb", "total"):
+        (tmp_path / f"{history}.toml").write_text(toml(scene | {"law": scene["law"] | {"history": history}}))
+        faultgouge_here("ramp", f"{history}.toml", "-o", f"{history}.h5")
+        with RunFile(tmp_path / f"{history}.h5") as file:
+            packing = file.packing()
+        done = faultgouge_here("spectrum", f"{history}.h5")
+        bound = int(packing.sliding.sum())
+        sentence = f"{bound} of {len(packing.contacts)} contacts are at Coulomb's bound; they stick here"
+        assert (sentence in done.stdout + done.stderr) is (history == "coulomb" and bound > 0)
+        assert bound > 0 or history == "total"
+
+
+@pytest.mark.slow
 def test_spectrum_calls_no_packing_stable_that_buckles_or_moves(faultgouge_here, tmp_path):
     """Two disks on top of each other, in balance and pressed together too far; side by side they are stable."""
     law = MindlinLaw(2e5, 2e5 * 2 / 7, 1.0)

@@ -121,6 +121,12 @@ def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[st
             say(f"{bound} of {len(packing.contacts)} contacts are at Coulomb's bound; they {acts} here")
     else:
         fraction = f"; volume fraction {solid_fraction(packing):.4f}"
+        if packing.law.coulomb and packing.sliding.any():
+            bound = int(packing.sliding.sum())
+            say(
+                f"{bound} of {len(packing.contacts)} contacts are at Coulomb's bound; they stick here, and a motion "
+                "that grows because they slide on is not in the spectrum"
+            )
     span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ", as no particle touches another"
     print(f"{what}: {len(real)} eigenvalues{span}, {len(result.rattlers)} rattlers left out{fraction}")
     if not _in_balance(packing):
