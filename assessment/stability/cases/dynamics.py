@@ -33,7 +33,8 @@ DRIFT = 1e-5
 """Relative change of energy that counts as none: what is left of its oscillation after 40 samples."""
 
 AMPLITUDE = 1e-4
-"""Amplitude of a mode in units of the smallest overlap: it moves as that of a frozen K up to this relative change of K."""
+"""Amplitude of a mode in units of the smallest overlap: it moves as that of a frozen K up to this relative change of
+K."""
 
 SHAKEN = 0.1
 """Of the motion whose energy is followed: contacts stay closed."""
