@@ -38,7 +38,7 @@ class Stopwatch:
         self.seconds = 0.0
 
     def __call__(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The same function, timed."""
+        """The function with a clock around it."""
 
         def time_call(*arguments: Any, **keywords: Any) -> Any:
             begin = time.process_time()

@@ -42,7 +42,7 @@ BENCHMARKS = {
     "increment": Benchmark("python benchmarks/increment.py", "python benchmarks/increment.py"),
     "size": Benchmark("python benchmarks/scale.py", None),
 }
-"""By their names in the template."""
+"""Commands by their names in the template."""
 
 
 def output_of(command: str) -> str:

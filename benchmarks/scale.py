@@ -53,7 +53,7 @@ PART, FROM = 600, 0.6
 lies below, whatever the size."""
 
 INCREMENTS = 50
-"""Of 2/N each: the first onset falls somewhat faster than that with N, and contacts change as often in an increment."""
+"""Increments in units of 2/N: the first onset falls somewhat faster than that with N, and contacts change as often in an increment."""
 
 
 def scene(disks: int, seed: int) -> Scene:
@@ -90,7 +90,7 @@ def peak() -> float:
 
 
 def measured_crystal(disks: int) -> Row:
-    """The same without settling and onset, of a square crystal."""
+    """Measure a square crystal, without settling and onset."""
     columns = round(math.sqrt(disks))
     packing = crystal(columns, columns)
     with Engine(packing) as engine:
@@ -130,7 +130,7 @@ def increments(engine: Engine, start: Equilibrium) -> Row:
 
 
 def size_in_file(packing: Packing) -> float:
-    """Of one equilibrium in run.h5, MB."""
+    """Size of one equilibrium in run.h5, MB."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "run.h5"
         with RunFile.create(path, packing) as file:
@@ -186,7 +186,7 @@ def main() -> None:
 
 
 COLUMNS = ("disks", "settle", "newton", "assembly", "solve", "largest", "undamped", "file", "memory", "part", "onset")
-"""Of the table; beside them, memory in all, and the onsets."""
+"""Columns of the table, besides the whole memory and the onsets."""
 
 
 def table(title: str, sizes: list[int], arguments: list[str]) -> None:

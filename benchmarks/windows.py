@@ -91,7 +91,7 @@ def search_windows(scene: Scene, mu: float, first: bool) -> Row:
 
 
 def differences(here: Row, there: Row) -> list[str]:
-    """What is not the same in two rows, in words."""
+    """Differences of two rows, in words."""
     counts = [f"{row['ends']} with {len(row['windows'])} windows" for row in (there, here)]
     if counts[0] != counts[1]:
         return [" has become ".join(counts)]

@@ -117,7 +117,7 @@ def _closest(packing: Packing | Snapshot, modes: Modes) -> Pair:
 
 
 def _earliest(packings: Sequence[Packing | Snapshot]) -> dict[int, Pair]:
-    """Of the pairs that are complex at the last load that which was the first to be, at each load."""
+    """Of the pairs that are complex at the last load, the one that became complex first, at each load."""
     last = len(packings) - 1
     modes = Modes.of(packings[last].fx, full_operator(packings[last]))
     growing = sorted(modes.complex_pairs, key=lambda each: -growth_rate(modes.values[each[0]]))[:CANDIDATES]
@@ -151,7 +151,7 @@ def _way(packings: Sequence[Packing | Snapshot], loads: range, pair: Pair) -> di
 
 
 def _next(pair: Pair, packing: Packing | Snapshot) -> Pair | None:
-    """What the pair is in a neighbouring equilibrium; None if it is not recognised."""
+    """The pair in a neighbouring equilibrium; None if it is not recognised."""
     matrix = full_operator(packing)
     image = continue_pair(pair, packing.fx, matrix)
     if image is None and len(packing) <= LARGE:

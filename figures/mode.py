@@ -81,7 +81,7 @@ class Mode:
 
     @property
     def plain(self) -> str:
-        """The same as `words`, for a terminal."""
+        """The text of `words` for a terminal."""
         sign = f" +- {abs(self.eigenvalue.imag):.6g} i" if self.is_complex else ""
         return (
             f"mode {self.number}: lambda = {self.eigenvalue.real:.8g}{sign}, participation ratio "

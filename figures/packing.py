@@ -136,7 +136,7 @@ class Wall:
     place: float
 
     def corners(self, view: View) -> Floats:
-        """What a picture shows of the wall, shape (4, 2), length."""
+        """Corners of the part of the wall in the picture, shape (4, 2), length."""
         low, high = np.array([view.left, view.bottom]), np.array([view.right, view.ceiling])
         (high if self.sign > 0 else low)[self.axis] = self.place
         return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
@@ -375,7 +375,7 @@ def in_words(packing: Packing | Snapshot) -> str:
 
 
 def _add_key(figure: Figure, artist: PackingArtist) -> None:
-    """What yellow, hollow and wide mean."""
+    """Add a key: the meaning of yellow, hollow and wide."""
     packing, handles = artist.packing, []
     if packing.top.any():
         handles.append(Patch(facecolor=UPPER, edgecolor=EDGE, linewidth=0.6, label="upper layer"))

@@ -15,11 +15,11 @@ WIDTH = 118
 """Characters of a line of prose."""
 
 LAID_OUT = re.compile(r"[|#<$!]|```| {4}")
-"""What a line begins with that is no prose: tables, headings, tags, formulas, pictures, code."""
+"""Beginnings of lines that are no prose: tables, headings, tags, formulas, pictures, code."""
 
 
 ITEM = re.compile(r"- |\d+\. ")
-"""What an item of a list begins with."""
+"""The beginning of an item of a list."""
 
 NO_BEGINNING = re.compile(r" (?=(?:[-+*>#=]|\d+[.)]) )")
 """The blank before a word that would make a list, a quotation or a heading of the line that begins with it."""

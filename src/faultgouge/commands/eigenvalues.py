@@ -282,7 +282,7 @@ def _search_folder(slices: Path | None, output: Path | None) -> Path | None:
 
 
 Tell = Callable[[str], None]
-"""Where results go: to standard output, or beside the JSON to standard error."""
+"""The stream of the results: standard output, or standard error if there is JSON on standard output."""
 
 
 def _undamped_onset(

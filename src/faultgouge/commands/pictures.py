@@ -32,7 +32,7 @@ app = typer.Typer()
 
 
 class Colour(str, Enum):
-    """What the colour of a contact shows."""
+    """Quantity that the colour of a contact shows."""
 
     MOBILISED = "mobilised"
     SLIP = "slip"

@@ -77,7 +77,7 @@ def merge(
 
 
 def _summarise(task: str, rows: list[dict[str, Any]], output: Path) -> None:
-    """Of the task "triggering", shares over all scenes: in words, and summary.json."""
+    """Print the shares over all scenes of the task "triggering", and write summary.json."""
     if task != "triggering":
         return
     from faultgouge.analysis.files.atomic_write import write_json

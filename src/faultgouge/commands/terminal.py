@@ -174,7 +174,7 @@ def say(message: str) -> None:
 
 
 def report_fallback(equilibrium: Equilibrium) -> None:
-    """Of an equilibrium that was not reached by halved increments, how it was."""
+    """Say how an equilibrium was reached, if halved increments did not reach it."""
     if equilibrium.way is not None:
         say(
             f"F_x = {equilibrium.fx:.10g} was reached by {equilibrium.way}, after smaller increments had failed: the "
