@@ -53,7 +53,8 @@ PART, FROM = 600, 0.6
 lies below, whatever the size."""
 
 INCREMENTS = 50
-"""Increments in units of 2/N: the first onset falls somewhat faster than that with N, and contacts change as often in an increment."""
+"""Number of increments, each of 2/N: the first onset falls somewhat faster than 2/N, and contacts change as often in an
+increment."""
 
 
 def scene(disks: int, seed: int) -> Scene:
@@ -186,7 +187,7 @@ def main() -> None:
 
 
 COLUMNS = ("disks", "settle", "newton", "assembly", "solve", "largest", "undamped", "file", "memory", "part", "onset")
-"""Columns of the table, besides the whole memory and the onsets."""
+"""Columns of the table; beside them stand the memory in all and the onsets."""
 
 
 def table(title: str, sizes: list[int], arguments: list[str]) -> None:

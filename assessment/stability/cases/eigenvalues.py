@@ -43,13 +43,13 @@ FX_C = 0.021833056408
 """Onset of the reference packing, by an independent code."""
 
 DISTANCES = np.array([1e-4, 1e-6, 1e-8])
-"""From that onset, in units of it."""
+"""Distances from that onset, in units of it."""
 
 CURVATURE = 10.0
 """Curvature of D(F_x), relative to its slope over F_x^c; 3.4 was measured."""
 
 ROUNDINGS = 10.0
-"""Error of D in units of 4 d u |A|: LAPACK's backward error is a few u |A|."""
+"""Rounding of D in units of 4 d u |A|: LAPACK's backward error is a few u |A|."""
 
 
 def _near_defective(eps: float, sign: int) -> Outcome:

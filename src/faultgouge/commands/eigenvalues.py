@@ -282,7 +282,7 @@ def _search_folder(slices: Path | None, output: Path | None) -> Path | None:
 
 
 Tell = Callable[[str], None]
-"""The stream of the results: standard output, or standard error if there is JSON on standard output."""
+"""A function that prints results to standard output, or to standard error beside the JSON."""
 
 
 def _undamped_onset(
