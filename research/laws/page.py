@@ -17,7 +17,7 @@ from research.laws.both_laws import BRANCHES, RESTITUTIONS
 from research.laws.sets import sets as all_sets
 from research.modes.loss import GROWS
 from research.modes.page import finite, part
-from research.yielding.page import UNREST, read_standard, rows_of
+from research.yielding.page import SEEN_GROWTH, UNREST, read_standard, rows_of
 
 Row = dict[str, Any]
 
@@ -173,6 +173,9 @@ def yields(rows: Sequence[Row]) -> dict[str, Any]:
         runs = [[run for run in row["dynamic"] if run["restitution"] == loss] for row in rows]
         found[name] = {kind: count_true(any(run["ends"] == kind for run in each) for each in runs) for kind in UNREST}
         found[name]["grows"] = count_true(any(run["rate"] > 2 * GROWS for run in each) for each in runs)
+        found[name]["moves"] = count_true(
+            any(run["rate"] <= 2 * GROWS and run["largest_D"] > SEEN_GROWTH for run in each) for each in runs
+        )
     return found
 
 

@@ -33,7 +33,7 @@ QUIET = 1e-18
 """Kinetic energy at the end, force length, below which nothing moves: noise of 1e-12 begins with some 1e-20."""
 
 SEEN_GROWTH = 1e-15
-"""D in a run beyond which noise has grown. Contacts at the bound that yield to noise move by 1e-18 and less in all."""
+"""D in a run beyond which the layer has moved by itself. Contacts that yield to noise and rest move by up to 1e-16."""
 
 ROUNDED_RATE = 2 * GROWS
 """Rate of D, 1 / time, below which the spectrum has no growth but a rounded eigenvalue of zero: a disk that rolls."""
@@ -149,11 +149,22 @@ def text(
     unrest = [share(each["unrest"], packings) for each in found["yields"]]
     names = {"packings": packings, "failed": failed, "unrest": unrest, "interval": interval, "percent": percent}
     names["standard"] = standard(loaded)
-    grows = {(row["seed"], row["share"]) for row in at_bound if row["largest_D"] > SEEN_GROWTH}
-    names["sliding"] = [row for row in at_bound if (row["seed"], row["share"]) in grows]
-    names["bound_slips"] = [abs(row["slip"]) for row in at_bound if row["largest_D"] > SEEN_GROWTH]
+    names |= from_the_bound(at_bound)
     names["slow"] = [row for row in found["loading"] if row["rate"] == CONTROLLED_RATE]
     return render("research.yielding", "README.md.j2", **found, **names)
+
+
+def from_the_bound(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Layers that move from Coulomb's bound: their runs, and the seeds of those that more loss stops, or does not."""
+    moving = [row for row in rows if row["largest_D"] > SEEN_GROWTH]
+    states = {(row["seed"], row["share"]) for row in moving}
+    lossy = {row["seed"] for row in moving if row["restitution"] < max(each["restitution"] for each in rows)}
+    return {
+        "sliding": [row for row in rows if (row["seed"], row["share"]) in states],
+        "bound_slips": [abs(row["slip"]) for row in moving],
+        "creeping": sorted(lossy),
+        "vibrating": sorted({seed for seed, _ in states} - lossy),
+    }
 
 
 def percent(part: dict[str, Any]) -> str:

@@ -49,8 +49,8 @@ def test_the_standard_law_loads_the_same_packings_and_lossy_layers_rest():
             assert len(runs) == (1 if runs[0]["ends"] == "stable" else 3)
 
 
-def test_growth_at_the_bound_needs_contacts_there():
-    """A lossy layer whose spectrum is stable grows while contacts slide on, and not with a little more friction."""
+def test_motion_from_the_bound_needs_contacts_there():
+    """A lossy layer whose spectrum is stable moves while contacts slide on, and not with a little more friction."""
     found = standard(STANDARD)["at_bound"]
     assert found
     assert {seed for seed, _ in found} == {row["seed"] for row in AT_BOUND}
