@@ -26,7 +26,7 @@ def block(step, what, columns, rows):
     )
 
 
-def written(packing, step=0):
+def dump_text(packing, step=0):
     """Both snapshots of a packing: rows shuffled, partners swapped, and a pair that does not touch."""
     rng = np.random.default_rng(step)
     c, n = packing.contacts, len(packing)
@@ -43,9 +43,9 @@ def written(packing, step=0):
 
 
 @pytest.fixture
-def dumped(tmp_path, cluster):
+def dump_path(tmp_path, cluster):
     """The cluster's dumps, with its sidecar file; returns the path of the disks' dump."""
-    disks, contacts = written(cluster)
+    disks, contacts = dump_text(cluster)
     (tmp_path / "bed.disks").write_text(disks)
     (tmp_path / "bed.contacts").write_text(contacts)
     law = cluster.law
@@ -60,32 +60,32 @@ def edit(path, old, new):
     path.write_text(path.read_text().replace(old, new))
 
 
-def test_damping_of_the_sidecar_over_which_the_caller_wins(dumped, cluster):
-    with dumped.with_suffix(".params").open("a") as file:
+def test_damping_of_the_sidecar_over_which_the_caller_wins(dump_path, cluster):
+    with dump_path.with_suffix(".params").open("a") as file:
         file.write("cn 1.5\nct 0.25\ntau 30\n")
     law = replace(cluster.law, cn=1.5, ct=0.25)
-    packing = read_dump(dumped, fx=0.7, inertia_factor=1.0)
+    packing = read_dump(dump_path, fx=0.7, inertia_factor=1.0)
     assert packing == replace(cluster, law=law, drag_time=30.0, fx=0.7, inertia_factor=1.0)
 
 
-def test_frames_are_matched_by_step_and_read_to_the_bit(dumped, cluster):
+def test_frames_are_matched_by_step_and_read_to_the_bit(dump_path, cluster):
     states = [cluster, replace(cluster, angle=cluster.angle + 1), replace(cluster, angle=cluster.angle + 2)]
-    snapshots = [written(state, 10 * k) for k, state in enumerate(states)]
-    dumped.write_text("".join(disks for disks, _ in snapshots))
-    dumped.with_suffix(".contacts").write_text("".join(contacts for _, contacts in snapshots[::-1]))
+    snapshots = [dump_text(state, 10 * k) for k, state in enumerate(states)]
+    dump_path.write_text("".join(disks for disks, _ in snapshots))
+    dump_path.with_suffix(".contacts").write_text("".join(contacts for _, contacts in snapshots[::-1]))
     for frame, state in ((0, 0), (1, 1), (2, 2), (-1, 2), (-3, 0)):
-        assert read_dump(dumped, frame=frame) == states[state]
-    assert [frame.step for frame in dump_frames(dumped)] == [0, 10, 20]
+        assert read_dump(dump_path, frame=frame) == states[state]
+    assert [frame.step for frame in dump_frames(dump_path)] == [0, 10, 20]
     for frame in (3, -4):
         with pytest.raises(PackingFileError, match=f"no snapshot {frame}"):
-            read_dump(dumped, frame=frame)
+            read_dump(dump_path, frame=frame)
 
 
-def test_names_as_lammps_has_them(dumped, cluster):
+def test_names_as_lammps_has_them(dump_path, cluster):
     names = "c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]"
-    edit(dumped.with_suffix(".contacts"), CONTACT_COLUMNS, names)
-    edit(dumped, "floor_slip", "f_floor[3]")
-    assert read_dump(dumped) == cluster
+    edit(dump_path.with_suffix(".contacts"), CONTACT_COLUMNS, names)
+    edit(dump_path, "floor_slip", "f_floor[3]")
+    assert read_dump(dump_path) == cluster
 
 
 @pytest.mark.parametrize(
@@ -102,23 +102,23 @@ def test_names_as_lammps_has_them(dumped, cluster):
         (".disks", "\n4 2 ", "\n4 2 nan ", "not a complete"),
     ],
 )
-def test_spoiled_dumps(dumped, suffix, old, new, says):
-    edit(dumped.with_suffix(suffix), old, new)
+def test_spoiled_dumps(dump_path, suffix, old, new, says):
+    edit(dump_path.with_suffix(suffix), old, new)
     with pytest.raises(PackingFileError, match=says):
-        read_dump(dumped)
+        read_dump(dump_path)
 
 
 @pytest.mark.parametrize("suffix", [".disks", ".contacts"])
-def test_missing_and_cut_off_dumps(dumped, suffix):
-    path = dumped.with_suffix(suffix)
+def test_missing_and_cut_off_dumps(dump_path, suffix):
+    path = dump_path.with_suffix(suffix)
     text = path.read_text()
     for size in (10, 60, 200, len(text) // 2):
         path.write_text(text[:size])
         with pytest.raises(PackingFileError, match=f"bed.{suffix[1:]}"):
-            read_dump(dumped)
+            read_dump(dump_path)
     path.unlink()
     with pytest.raises(PackingFileError, match="cannot be read"):
-        read_dump(dumped)
+        read_dump(dump_path)
 
 
 def test_packing_from_json(tmp_path, reference, reference_packing, cluster):

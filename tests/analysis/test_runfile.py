@@ -171,20 +171,20 @@ def test_every_flipped_byte_is_noticed(sound):
         assert len(run) == 4
 
 
-def unsealed(path):
+def without_checksum(path):
     """The file as version 0.1.0 wrote it: HDF5 alone."""
     path.write_bytes(path.read_bytes()[512:])
 
 
 def test_a_file_without_a_checksum_is_read_and_not_continued(sound, states):
-    unsealed(sound)
+    without_checksum(sound)
     with RunFile(sound) as run:
         assert run.packing(1) == states[1]
     with pytest.raises(PackingFileError, match="has no checksum"):
         RunFile(sound, "a")
 
 
-def put(name, value, place=None):
+def replace_dataset(name, value, place=None):
     """Another dataset in place of one, or another number in it."""
 
     def edit(file):
@@ -207,30 +207,30 @@ def put(name, value, place=None):
         lambda file: file["particles/disks/box"].attrs.__delitem__("boundary"),
         lambda file: file["particles/disks/box"].attrs.__setitem__("boundary", 3.0),
         lambda file: file["particles/disks/position/step"].resize(7, axis=0),
-        put("parameters/mass", np.ones(5)),
-        put("parameters/kn", np.inf),
-        put("parameters/kn", "2e5"),
-        put("parameters/kn", -1.0),
-        put("parameters/top", np.ones(6)),
-        put("observables/fx/value", np.zeros((4, 2))),
-        put("observables/angle", 1.0),
-        put("observables/contacts/value", np.zeros((4, 3))),
-        put("particles/disks/position/value", np.zeros((4, 6, 2))),
-        put("particles/disks/position/value", np.zeros((4, 6, 3), np.float32)),
-        put("particles/disks/position/step", np.array([0, 1, 1, 3])),
-        put("particles/disks/position/value", np.nan, (2, 3, 1)),
-        put("particles/disks/position/value", 1.0, (2, 3, 2)),
-        put("observables/contacts/value", 1e300, (0, 0, 1)),
-        put("observables/contacts/value", 1.5, (0, 0, 0)),
-        put("observables/contacts/value", np.nan, (0, 0, 2)),
-        put("faultgouge/undamped/msd", np.inf, 3),
+        replace_dataset("parameters/mass", np.ones(5)),
+        replace_dataset("parameters/kn", np.inf),
+        replace_dataset("parameters/kn", "2e5"),
+        replace_dataset("parameters/kn", -1.0),
+        replace_dataset("parameters/top", np.ones(6)),
+        replace_dataset("observables/fx/value", np.zeros((4, 2))),
+        replace_dataset("observables/angle", 1.0),
+        replace_dataset("observables/contacts/value", np.zeros((4, 3))),
+        replace_dataset("particles/disks/position/value", np.zeros((4, 6, 2))),
+        replace_dataset("particles/disks/position/value", np.zeros((4, 6, 3), np.float32)),
+        replace_dataset("particles/disks/position/step", np.array([0, 1, 1, 3])),
+        replace_dataset("particles/disks/position/value", np.nan, (2, 3, 1)),
+        replace_dataset("particles/disks/position/value", 1.0, (2, 3, 2)),
+        replace_dataset("observables/contacts/value", 1e300, (0, 0, 1)),
+        replace_dataset("observables/contacts/value", 1.5, (0, 0, 0)),
+        replace_dataset("observables/contacts/value", np.nan, (0, 0, 2)),
+        replace_dataset("faultgouge/undamped/msd", np.inf, 3),
         lambda file: file.create_dataset("faultgouge/undamped/huge", (10**13,), "f8", chunks=(1000,)),
         lambda file: file.create_dataset("faultgouge/undamped/empty", (5000,), "f8", chunks=(1000,)),
     ],
 )
 @pytest.mark.slow
 def test_what_is_not_as_it_should_be_is_refused(sound, edit):
-    unsealed(sound)
+    without_checksum(sound)
     with h5py.File(sound, "r+") as file:
         edit(file)
     with pytest.raises(PackingFileError, match=r"run\.h5"):
@@ -276,7 +276,7 @@ def test_a_file_that_cannot_be_written(tmp_path, states):
         RunFile.create(tmp_path / "nowhere" / "run.h5", states[0])
 
 
-def linked(file):
+def add_link(file):
     file["other"] = h5py.ExternalLink("other.h5", "/data")
 
 
@@ -290,7 +290,7 @@ def virtual(file):
     file.create_virtual_dataset("faultgouge/more/msd", layout)
 
 
-def packed(file):
+def add_compressed(file):
     chunk = 1 << 24
     item = file.create_dataset("faultgouge/more/msd", (1 << 40,), "f8", chunks=(chunk,), compression="gzip")
     for k in range(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // (8 * chunk) + 1):
@@ -300,10 +300,10 @@ def packed(file):
 @pytest.mark.parametrize(
     ("add", "says"),
     [
-        (linked, "is a link to another file"),
+        (add_link, "is a link to another file"),
         (stored_elsewhere, "has its numbers in another file"),
         (virtual, "has its numbers in another file"),
-        (packed, "more than this machine has memory"),
+        (add_compressed, "more than this machine has memory"),
     ],
 )
 def test_what_is_not_in_the_file_or_not_for_this_machine_is_refused(sound, add, says):

@@ -45,7 +45,7 @@ def elsewhere(file):
     file.create_dataset("snapshot/radius", (7,), "f8", external=[("raw", 0, 56)])
 
 
-def linked(file):
+def replace_by_link(file):
     del file["snapshot/radius"]
     file["snapshot/radius"] = h5py.ExternalLink("other.h5", "/radius")
 
@@ -59,7 +59,7 @@ def huge(file):
     ("change", "says"),
     [
         (elsewhere, "numbers in another file"),
-        (linked, "link to another file"),
+        (replace_by_link, "link to another file"),
         (huge, "more than its 0 bytes hold"),
     ],
 )

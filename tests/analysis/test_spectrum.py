@@ -7,7 +7,7 @@ import pytest
 from linearised import matrices
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, diags_array
-from tiling import tiled
+from tiling import tile
 
 from faultgouge.analysis import (
     Contacts,
@@ -63,7 +63,7 @@ def test_copies_of_a_packing_have_its_pairs_each_and_no_others(cluster):
     kept = np.arange(len(c)) != 2  # the contact across the box
     contacts = Contacts(c.i[kept], c.j[kept], c.slip[kept])
     single = replace(cluster, mass=None, inertia_factor=1.0, contacts=contacts)
-    one, three = spectrum(single), spectrum(tiled(single, 3))
+    one, three = spectrum(single), spectrum(tile(single, 3))
     assert one.pairs
     assert len(three.pairs) == 3 * len(one.pairs)
     # The overlaps of 1e-2 cost two digits of coordinates up to 11.
@@ -140,7 +140,7 @@ def test_the_fastest_motion_is_found_where_sums_of_rows_are_small(reference_pack
 @pytest.mark.parametrize("one_fast", [False, True], ids=["chain", "one fast coordinate"])
 def test_the_error_of_a_step_of_many_coordinates_covers_the_limit(reference_packing, dashpots, one_fast):
     """A chain of springs, most of whose modes are near the fastest one; and one coordinate that no other is tied to."""
-    packing = tiled(reference_packing(1.0), 40)
+    packing = tile(reference_packing(1.0), 40)
     n = packing.coordinates
     assert n > 10_000
     chain = 2.0 * np.ones(n)

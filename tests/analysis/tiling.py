@@ -7,7 +7,7 @@ import numpy as np
 from faultgouge.analysis import Contacts, Packing
 
 
-def tiled(cell: Packing, copies: int) -> Packing:
+def tile(cell: Packing, copies: int) -> Packing:
     """Copies side by side, in balance as the packing itself is."""
     n, contacts = len(cell), cell.contacts
     index = np.arange(copies)[:, None]

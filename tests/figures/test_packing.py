@@ -35,26 +35,26 @@ def packing(reference_packing) -> Packing:
     return replace(bare, contacts=Contacts(bare.contacts.i, bare.contacts.j, slip))
 
 
-def labelled(figure, kind, label):
+def find_labelled(figure, kind, label):
     (found,) = [artist for artist in figure.axes[0].findobj(kind) if artist.get_label() == label]
     return found
 
 
 def test_disks_that_the_box_cuts_are_there_twice_and_rattlers_are_hollow(packing):
-    disks = labelled(draw_packing(packing), EllipseCollection, "disks")
+    disks = find_labelled(draw_packing(packing), EllipseCollection, "disks")
     x = packing.position[:, 0] % packing.box_length
     copies = 1 + ((x < packing.radius) | (x > packing.box_length - packing.radius))
     assert len(disks.get_offsets()) == copies.sum() > len(packing)
     assert disks.get_facecolor().tolist().count(list(to_rgba("white"))) == copies[packing.rattlers].sum()
     alone = replace(packing, box_length=None, contacts=touching(packing.position, packing.radius))
     given, other = Figure().subplots(1, 2)
-    drawn = labelled(draw_packing(alone, given), EllipseCollection, "disks")
+    drawn = find_labelled(draw_packing(alone, given), EllipseCollection, "disks")
     assert not other.collections
     np.testing.assert_array_equal(drawn.get_offsets(), packing.position)
 
 
 def test_bars_are_as_wide_as_their_force(packing):
-    chains = labelled(draw_packing(packing), LineCollection, "contacts")
+    chains = find_labelled(draw_packing(packing), LineCollection, "contacts")
     widths = np.array(chains.get_linewidths())
     ends = np.array(chains.get_segments())
     assert len(widths) >= len(packing.contacts)
@@ -70,10 +70,10 @@ def test_a_snapshot_is_drawn_as_its_packing(packing):
     """Disks, bars and their colours are the same, whether slips or forces are known."""
     snapshot = Snapshot.of_packing(packing)
     one, other = draw_packing(packing), draw_packing(snapshot)
-    disks, drawn = (labelled(each, EllipseCollection, "disks") for each in (one, other))
+    disks, drawn = (find_labelled(each, EllipseCollection, "disks") for each in (one, other))
     assert drawn.get_offsets() == pytest.approx(disks.get_offsets(), abs=1e-14)
     assert np.isin(packing.rattlers, snapshot.rattlers).all()
-    bars, seen = (labelled(each, LineCollection, "contacts") for each in (one, other))
+    bars, seen = (find_labelled(each, LineCollection, "contacts") for each in (one, other))
     assert np.array(seen.get_segments()) == pytest.approx(np.array(bars.get_segments()), abs=1e-13)
     assert np.array(seen.get_array()) == pytest.approx(np.array(bars.get_array()), rel=1e-12)
 
@@ -108,7 +108,7 @@ SHOWN = {
 
 @pytest.mark.parametrize("color", SHOWN)
 def test_what_colour_shows(packing, color):
-    chains = labelled(draw_packing(packing, color=color), LineCollection, "contacts")
+    chains = find_labelled(draw_packing(packing, color=color), LineCollection, "contacts")
     drawn = np.unique(np.asarray(chains.get_array()))
     np.testing.assert_allclose(drawn, np.unique(SHOWN[color](packing)), rtol=1e-12)  # roundings
 
@@ -127,7 +127,7 @@ def test_without_slips_there_is_no_scale_of_colours(packing, without):
     }[without]
     figure = draw_packing(replace(packing, **change))
     assert len(figure.axes) == 1
-    assert labelled(figure, LineCollection, "contacts").get_array() is None
+    assert find_labelled(figure, LineCollection, "contacts").get_array() is None
 
 
 def test_arrows_show_the_load_on_the_upper_layer(packing):

@@ -63,7 +63,7 @@ arithmetics = pytest.mark.parametrize("compensated", ["", "compensated"], ids=["
 
 
 @pytest.fixture
-def seen(lmp, tmp_path):
+def watch_script(lmp, tmp_path):
     """Runs a script, and gives what was seen of pairs and of disks, the tables of a dump, one a step."""
 
     def run(script, **settings):
@@ -87,22 +87,22 @@ def tangential_energy(slip, overlap):
 
 def balance(pairs, disks):
     """(work of the load, energy gained, energy dissipated, what overlaps gave to stuck contacts) of a run."""
-    seen = [contacts(*both) for both in zip(pairs, disks, strict=True)]
+    looks = [contacts(*both) for both in zip(pairs, disks, strict=True)]
 
     def energy(k):
         # I = I_0 m R^2 with I_0 = m = 1 and R = 1/2
         kinetic = 0.5 * np.sum(disks[k][:, 4:6] ** 2) + 0.125 * np.sum(disks[k][:, 6] ** 2)
-        return kinetic + sum(0.4 * KN * d**2.5 + tangential_energy(s, d) for s, d, _ in seen[k].values())
+        return kinetic + sum(0.4 * KN * d**2.5 + tangential_energy(s, d) for s, d, _ in looks[k].values())
 
     # the tangential force of this law has no potential: its stiffness changes with the overlap, at no cost
     given, ended = 0.0, 0.0
-    for old, new in itertools.pairwise(seen):
+    for old, new in itertools.pairwise(looks):
         ended += sum(old[each][2] for each in old.keys() - new.keys())
         for each in old.keys() & new.keys():
             (s, d, _), (t, e, _) = old[each], new[each]
             given += tangential_energy((s + t) / 2, e) - tangential_energy((s + t) / 2, d)
     way = disks[-1][2, 2:4] - disks[0][2, 2:4]
-    return way @ [FX, -FY], energy(-1) - energy(0), ended + sum(row[2] for row in seen[-1].values()), given
+    return way @ [FX, -FY], energy(-1) - energy(0), ended + sum(row[2] for row in looks[-1].values()), given
 
 
 @pytest.mark.slow
@@ -111,11 +111,11 @@ def balance(pairs, disks):
     [("20.0 10.0", ""), ("0 0", ""), ("20.0 10.0", "compensated")],
     ids=["sliding and dashpots", "sliding", "compensated"],
 )
-def test_work_of_the_load_is_stored_moves_or_is_dissipated(seen, dashpots, compensated):
+def test_work_of_the_load_is_stored_moves_or_is_dissipated(watch_script, dashpots, compensated):
     """What is missing is of first order in the time step: the power at the end of a step stands for the whole step."""
     missing, settings = [], {"dashpots": dashpots, "compensated": compensated, "column": 8 + bool(compensated)}
     for steps in (2000, 4000):
-        found = seen(MODEL + LOOK + f"run {steps}\n", dt=0.2 / steps, every=1, **settings)
+        found = watch_script(MODEL + LOOK + f"run {steps}\n", dt=0.2 / steps, every=1, **settings)
         work, gained, dissipated, given = balance(*found)
         missing.append(work + given - gained - dissipated)
     assert dissipated > 0.05 * work
@@ -127,10 +127,10 @@ def test_work_of_the_load_is_stored_moves_or_is_dissipated(seen, dashpots, compe
 @arithmetics
 @pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_energies_go_through_a_restart(seen, compensated, ranks):
+def test_energies_go_through_a_restart(watch_script, compensated, ranks):
     def end(middle, ranks=1):
         settings = {"every": 500, "compensated": compensated, "column": 8 + bool(compensated)}
-        pairs, disks = seen(f"{MODEL}run 500\n{middle}{LOOK}run 500\n", ranks=ranks, **settings)
+        pairs, disks = watch_script(f"{MODEL}run 500\n{middle}{LOOK}run 500\n", ranks=ranks, **settings)
         return contacts(pairs[-1], disks[-1])
 
     straight, again = end(""), end(AGAIN + LAW, ranks)
@@ -141,14 +141,14 @@ def test_energies_go_through_a_restart(seen, compensated, ranks):
 
 @arithmetics
 @pytest.mark.parametrize(("first", "second"), [("yes", "no"), ("no", "yes")])
-def test_counting_changes_nothing_else_also_where_a_restart_begins_or_ends_it(seen, first, second, compensated):
+def test_counting_changes_nothing_else_also_where_a_restart_begins_or_ends_it(watch_script, first, second, compensated):
     """Energies begin at zero then, or are left out; a wall without them has no column for them."""
     begin, end, column = f"{MODEL}run 500\n", f"{LOOK}run 0\n", 7 + bool(compensated)
     again, settings = AGAIN + LAW.replace("${energy}", f"energy {second}"), {"every": 500, "compensated": compensated}
-    (pairs,), (disks,) = seen(
+    (pairs,), (disks,) = watch_script(
         begin + again + end, energy=f"energy {first}", column=column + (second == "yes"), **settings
     )
-    (bare_pairs,), (bare_disks,) = seen(begin + end, energy="", column=column, **settings)
+    (bare_pairs,), (bare_disks,) = watch_script(begin + end, energy="", column=column, **settings)
     assert np.array_equal(pairs, bare_pairs)
     assert np.array_equal(disks[:, :9], bare_disks[:, :9])
     assert not pairs[:, 4].any()

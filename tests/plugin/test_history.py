@@ -25,7 +25,7 @@ def on(other, overlap, slip, compensated=False, law=LAW):
     return Packing(position=position, radius=radius, contacts=contact, law=law, position_low=low)
 
 
-def moved(packing, closer=0.0, turned=0.0):
+def slip_displacement(packing, closer=0.0, turned=0.0):
     """The displacement that presses a contact, and has it slip by turning the last disk."""
     displacement = np.zeros((3, len(packing)))
     displacement[1:, -1] = -closer, turned
@@ -39,7 +39,7 @@ def moved(packing, closer=0.0, turned=0.0):
 def test_slip_is_rescaled_while_the_overlap_grows(other, closer, compensated, law):
     packing = on(other, 1e-3, 2e-4, compensated=compensated, law=law)
     with Engine(packing) as engine:
-        after = engine.displace(packing, moved(packing, closer))
+        after = engine.displace(packing, slip_displacement(packing, closer))
         again = engine.displace(packing, np.zeros(3 * len(packing)))
         force = engine.net_force
     before, now = packing.geometry.overlap[0], after.geometry.overlap[0]
@@ -57,7 +57,7 @@ def test_slipping_and_pressing_at_once_is_second_order_in_the_step(other):
         packing = on(other, 1e-3, 0.0)
         with Engine(packing) as engine:
             for _ in range(steps):
-                packing = engine.displace(packing, moved(packing, 3e-3 / steps, 1e-4 / steps))
+                packing = engine.displace(packing, slip_displacement(packing, 3e-3 / steps, 1e-4 / steps))
         # s delta^(1/2) = c (integral of delta^(1/2) over the slip) with delta from 1e-3 to 4e-3
         exact = -1e-4 * (2 / 3) * (4e-3**1.5 - 1e-3**1.5) / 3e-3 / np.sqrt(4e-3)
         errors.append(abs(packing.contacts.slip[0] - exact))
@@ -68,9 +68,9 @@ def test_slipping_and_pressing_at_once_is_second_order_in_the_step(other):
 def test_a_slider_keeps_its_force_while_pressed_and_loses_it_in_proportion_while_parted():
     packing = on(1, 1e-3, 2e-4, law=SLIDER)
     with Engine(packing) as engine:
-        pressed = engine.displace(packing, moved(packing, 3e-3))
-        parted = engine.displace(pressed, moved(pressed, -1.75e-3))
-        bound = engine.displace(parted, moved(parted, -2.24e-3))
+        pressed = engine.displace(packing, slip_displacement(packing, 3e-3))
+        parted = engine.displace(pressed, slip_displacement(pressed, -1.75e-3))
+        bound = engine.displace(parted, slip_displacement(parted, -2.24e-3))
     forces = [float(each.tangential_force[0]) for each in (packing, pressed, parted, bound)]
     assert forces[0] == pytest.approx(-KT * np.sqrt(1e-3) * 2e-4, rel=1e-12)
     assert forces[1] == pytest.approx(forces[0], rel=1e-12)

@@ -19,7 +19,7 @@ from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
 from faultgouge.pywrap.runs.undamped import time_step
 
 
-def pushed(packing, direction, size):
+def displace(packing, direction, size):
     """The packing displaced by `size` in the norm of (x, y, u), slips advanced."""
     with Engine(packing) as engine:
         return engine.displace(packing, size * direction / np.linalg.norm(direction))
@@ -54,7 +54,7 @@ def test_growth_rate_and_frequency_are_those_of_the_spectrum(loaded):
     modes = Modes.of(packing.fx, full_operator(packing))
     mode = modes.right[:, np.argmin(np.abs(modes.values - pair.eigenvalue))].real
     # from far above the noise of 1e-25 to far below the square of the slip limits
-    time, msd, velocity = run(pushed(packing, mode, 1e-8), packing, 540.0, 12000, dt)
+    time, msd, velocity = run(displace(packing, mode, 1e-8), packing, 540.0, 12000, dt)
     growth = fit_growth(time, msd, lower=1e-18, upper=3e-12)
     assert growth.decades > 5.8  # of 6: the ends are means over stretches
     assert growth.rate == pytest.approx(spectrum(packing).growth_rate(dt), rel=5e-3)
@@ -88,7 +88,7 @@ def test_the_worst_start_grows_as_predicted(loaded):
     packing = loaded(0.0205, 0.0205 / 20)
     predicted = transient_gain(packing)
     steps = int(np.ceil(predicted.time / (0.2 * time_step(packing))))
-    start = pushed(packing, predicted.start, 1e-8)
+    start = displace(packing, predicted.start, 1e-8)
     with Engine(start) as engine, engine.undamped(predicted.time / steps) as dynamics:
         dynamics.advance(steps)
         end = engine.packing
@@ -126,7 +126,7 @@ def test_growth_with_dashpots_is_that_of_the_eigenvalue(path, fx, cn, unstable):
     largest = (mode.right * np.exp(-0.5j * np.angle(np.sum(mode.right**2)))).real
     start = largest / np.sqrt(np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass]))
     # Above the noise of 1e-25. So close to a coalescence the rate depends on the amplitude: by a tenth at D = 1e-12.
-    time, msd, _ = run(pushed(packing, start, 1e-10), packing, 19.5 / rate, 8000, dt)
+    time, msd, _ = run(displace(packing, start, 1e-10), packing, 19.5 / rate, 8000, dt)
     growth = fit_growth(time, msd, lower=1e-21, upper=1e-14)
     assert growth.decades > 6  # of 7: the ends are means over stretches
     assert growth.rate == pytest.approx(rate, rel=5e-3)

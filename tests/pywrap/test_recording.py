@@ -53,32 +53,32 @@ def equilibria(reference_packing):
     return [Equilibrium(replace(packing, fx=k / 8), 0.0, 1e-12, 1) for k in range(3)]
 
 
-def opened(path, said):
-    return Record(path, Scene.from_mapping(SCENE), saved=lambda says, path: said.append(says))
+def open_record(path, messages):
+    return Record(path, Scene.from_mapping(SCENE), saved=lambda says, path: messages.append(says))
 
 
 @pytest.fixture(scope="module")
-def begun(tmp_path_factory, equilibria):
+def file_with_one_equilibrium(tmp_path_factory, equilibria):
     """The bytes of a file with the first equilibrium."""
     path = tmp_path_factory.mktemp("begun") / "run.h5"
-    with opened(path, []) as record:
+    with open_record(path, []) as record:
         record.append(equilibria[0])
     return path.read_bytes()
 
 
 @pytest.mark.parametrize("share", [1e-9, math.inf], ids=["saved at the end", "saved at once"])
 @pytest.mark.long
-def test_what_is_said_is_what_is_stored(tmp_path, monkeypatch, begun, equilibria, share):
+def test_what_is_said_is_what_is_stored(tmp_path, monkeypatch, file_with_one_equilibrium, equilibria, share):
     monkeypatch.setattr(checksummed_file, "SHARE_OF_SAVING", share)
     path, counts, number, interrupted = tmp_path / "run.h5", set(), 0, True
     while interrupted:
-        path.write_bytes(begun)
-        said = []
-        with opened(path, said) as record:
+        path.write_bytes(file_with_one_equilibrium)
+        messages = []
+        with open_record(path, messages) as record:
             record.append(equilibria[1])
             interrupted = interrupted_at(number, lambda: record.append(equilibria[2]))
         with RunFile(path) as run:
-            assert f"holds {len(run)} equilibria, the last at F_x = {run.fx[-1]:g}; " in said[-1], number
+            assert f"holds {len(run)} equilibria, the last at F_x = {run.fx[-1]:g}; " in messages[-1], number
             counts.add(len(run))
         number += 1
     assert number > 60
@@ -95,7 +95,7 @@ FORCED = {
 }
 
 
-def forced(kind):
+def perturbed_scene(kind):
     damping = {"damping": {"cn": 30.0, "ct": 20.0, "tau": 0.2}} if "damped" in kind else {}
     return Scene.from_mapping(
         SCENE
@@ -113,7 +113,7 @@ def forced(kind):
 @pytest.mark.slow
 def test_it_goes_on_to_the_bit(kind, tmp_path, monkeypatch):
     monkeypatch.setattr(undamped, "SHORTEST_PART", 300)  # in place of 10,000 steps
-    wanted = forced(kind)
+    wanted = perturbed_scene(kind)
     *_, start = reach(wanted, wanted.perturb.fx)
     weakening = weakening_of(wanted.friction, wanted.friction.v0)
     kept = []
@@ -143,7 +143,7 @@ def test_it_goes_on_to_the_bit(kind, tmp_path, monkeypatch):
 
 
 def test_a_file_of_another_task_is_not_continued(tmp_path):
-    wanted = forced("cosine")
+    wanted = perturbed_scene("cosine")
     *_, start = reach(wanted, wanted.perturb.fx)
     with Record(tmp_path / "run.h5", wanted) as record:
         record.append(start)

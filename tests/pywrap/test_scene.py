@@ -48,7 +48,7 @@ NEEDED = {"ramp": {"until": 1.0}, "perturb": {"fx": 0.1, "time": 1.0}}
 """What a section needs that a scene may leave out."""
 
 
-def merged(changes: dict) -> dict:
+def merge_changes(changes: dict) -> dict:
     """The least scene with sections, or keys as in "law.mu", added or replaced; None takes a section away."""
     scene = deepcopy(LEAST)
     for name, value in changes.items():
@@ -69,7 +69,7 @@ DAMPED = {"damping": {"cn": 1.5, "ct": 0.5, "tau": 100.0}}
     ("changes", "top"), [(FULL, 5), (DAMPED, 10), ({"packing.disks": 1000, "packing.width": 37.7}, 100)]
 )
 def test_every_key_reaches_the_scene_and_the_resolved_scene_gives_the_same(changes, top):
-    scene = Scene.from_mapping(merged(changes))
+    scene = Scene.from_mapping(merge_changes(changes))
     resolved = json.loads(json.dumps(scene.resolved()))
     sections = {name: section for name, section in changes.items() if "." not in name}
     assert resolved == resolved | sections
@@ -82,13 +82,13 @@ def test_every_key_reaches_the_scene_and_the_resolved_scene_gives_the_same(chang
     [("2/7 kn", 57142.857142857145), ("0.5 kn", 1e5), ("1e-1 kn", 2e4), ("kn", 2e5), (0, 0.0), (57000, 57000.0)],
 )
 def test_kt_is_a_number_or_a_share_of_kn(kt, number):
-    assert Scene.from_mapping(merged({"law.kt": kt})).law.kt == number
+    assert Scene.from_mapping(merge_changes({"law.kt": kt})).law.kt == number
     assert Scene.from_mapping(LEAST).law.kt == 57142.857142857145
 
 
 @pytest.mark.parametrize(("v_ss", "scale"), [("10 v0", 2e-10), ("1e4 v0", 2e-7), ("v0", 2e-11), (3e-9, 3e-9)])
 def test_velocity_scale_is_a_number_or_a_multiple_of_the_threshold(v_ss, scale):
-    friction = Scene.from_mapping(merged({"friction.v_ss": v_ss})).friction
+    friction = Scene.from_mapping(merge_changes({"friction.v_ss": v_ss})).friction
     assert friction.velocity_scale(2e-11) == pytest.approx(scale, rel=1e-15)  # one product: one rounding
 
 
@@ -201,7 +201,7 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
     ids=lambda value: str(value)[:60],
 )
 def test_what_cannot_be_run_is_refused_in_one_sentence(refused_scene, changes, says):
-    assert says in refused_scene(merged(changes))
+    assert says in refused_scene(merge_changes(changes))
 
 
 def test_a_list_is_no_scene(refused_scene):
@@ -223,13 +223,13 @@ def test_a_list_is_no_scene(refused_scene):
 def test_a_packing_file_is_looked_at_before_any_work(refused_scene, tmp_path, name, content, says):
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    sentence = refused_scene(merged({"packing": {"file": name}}), tmp_path)
+    sentence = refused_scene(merge_changes({"packing": {"file": name}}), tmp_path)
     assert re.search(rf'scene: packing.file = ".*{name}" .*{says}', sentence)
 
 
 def test_a_loop_of_links_is_refused(refused_scene, tmp_path):
     (tmp_path / "a.json").symlink_to("a.json")
-    assert "a.json" in refused_scene(merged({"packing": {"file": "a.json"}}), tmp_path)
+    assert "a.json" in refused_scene(merge_changes({"packing": {"file": "a.json"}}), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -345,24 +345,24 @@ def test_what_a_command_does_not_read_is_checked_for_its_keys_alone(command):
     perturb = {"fx": 0.01, "time": 1.0, "inertia_factor": 0.5}
     enough = FULL | {"eruptions": {"load": [0.01]}, "ramp": {"until": 0.02}, "perturb": perturb}
     read = {name: enough[name] for name in needs}
-    scene = Scene.from_mapping(merged(read | unread), command=command)
+    scene = Scene.from_mapping(merge_changes(read | unread), command=command)
     assert all(getattr(scene, name) is None for name in unread.keys() - {"relax"})
     assert scene.inertia_factor == (1.0 if command in ("reproduce", "triggering") else 0.5)
     assert Scene.from_mapping(scene.resolved(), command=command) == scene
     for name in unread:
         with pytest.raises(SceneError, match=rf"{name}\.wrong is no key of \[{name}\]"):
-            Scene.from_mapping(merged(read | unread | {f"{name}.wrong": 1}), command=command)
+            Scene.from_mapping(merge_changes(read | unread | {f"{name}.wrong": 1}), command=command)
     for name in needs:
         with pytest.raises(SceneError, match=rf"has no section \[{name}\]"):
-            Scene.from_mapping(merged({each: read[each] for each in needs if each != name}), command=command)
+            Scene.from_mapping(merge_changes({each: read[each] for each in needs if each != name}), command=command)
 
 
 def test_a_key_that_a_command_reads_of_a_section_that_it_does_not_read_is_checked():
     with pytest.raises(SceneError, match=r"perturb\.inertia_factor = -1"):
-        Scene.from_mapping(merged({"perturb": {"inertia_factor": -1.0}}), command="settle")
+        Scene.from_mapping(merge_changes({"perturb": {"inertia_factor": -1.0}}), command="settle")
 
 
 def test_a_target_beyond_the_disks_of_a_file_is_refused_with_the_scene(tmp_path):
     section = {"fx": 0.0, "time": 1.0, "target": [100]}
     with pytest.raises(SceneError, match="names disk 100: name disks from 0 to 99"):
-        Scene.from_mapping(merged({"packing": {"file": str(REFERENCE)}, "perturb": section}), command="perturb")
+        Scene.from_mapping(merge_changes({"packing": {"file": str(REFERENCE)}, "perturb": section}), command="perturb")

@@ -23,7 +23,7 @@ def no_pictures(monkeypatch):
 
 
 @pytest.fixture
-def said():
+def messages():
     return []
 
 
@@ -45,10 +45,10 @@ def test_tables_pictures_code_and_formulas_stay():
     assert fill_paragraphs(page) == page
 
 
-def test_an_interrupt_is_no_failed_picture(said):
-    with pytest.raises(KeyboardInterrupt), report_failure("x.png", said.append):
+def test_an_interrupt_is_no_failed_picture(messages):
+    with pytest.raises(KeyboardInterrupt), report_failure("x.png", messages.append):
         raise KeyboardInterrupt
-    assert said == []
+    assert messages == []
 
 
 def test_a_spectrum_keeps_its_eigenvalues_and_draw_its_words(
@@ -68,10 +68,10 @@ def test_a_spectrum_keeps_its_eigenvalues_and_draw_its_words(
     assert "100 disks" in faultgouge_here("draw", "run.h5", code=1).stdout
 
 
-def test_a_sweep_keeps_its_rows(tmp_path, no_pictures, said):
+def test_a_sweep_keeps_its_rows(tmp_path, no_pictures, messages):
     row = {"values": {"packing.seed": 1}, "result": {"ramps": [{"mu": 1.0, "reach": 0.01, "ends": "onset"}]}}
-    assert draw_sweep([row], tmp_path, said.append) == ""
-    assert "results.png was not drawn (RuntimeError" in said[0]
+    assert draw_sweep([row], tmp_path, messages.append) == ""
+    assert "results.png was not drawn (RuntimeError" in messages[0]
 
 
 def test_disks_that_carry_nothing_have_no_part_in_d(reference_packing):

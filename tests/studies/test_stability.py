@@ -77,11 +77,11 @@ def test_the_command_counts_what_holds_was_refused_and_failed(faultgouge_here, m
 
 
 def test_results_are_written_as_they_come(tmp_path):
-    def killed():
+    def interrupt():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        stability(tmp_path, cases=[TROUBLE[0], Case("a", "killed", killed)])
+        stability(tmp_path, cases=[TROUBLE[0], Case("a", "killed", interrupt)])
     (case,) = json.loads((tmp_path / "stability.json").read_text())["cases"]
     assert (case["name"], case["status"], case["figure"], case["says"]) == ("good", "holds", 0.5, "half of it")
 

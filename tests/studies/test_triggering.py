@@ -33,7 +33,7 @@ def noise(exponent=2.0):
     return 1e-24 * (TIME / LENGTH) ** exponent
 
 
-def jumped(height, at, then=0.0):
+def msd_with_jump(height, at, then=0.0):
     """D that jumps at a time, and grows on from a thousandth of its jump at a rate."""
     later = np.maximum(TIME - at, 0.0)
     return noise() + (at <= TIME) * height * (np.sin(later) ** 2 + 1e-3 * np.exp(then * later))
@@ -43,15 +43,25 @@ STABLE, UNSTABLE = Forecast(1.55e-12, 0.0, 1.2, 0.0), Forecast(1e-16, 9.0, 5.0, 
 QUIET = Forecast(1e-16, 0.0, 5.0, 0.0)
 CASES = {
     # the whole jump, after the first twentieth of the run: it was called 13.6 decades of growth
-    "late jump": (run_of(jumped(1.5e-12, 265.0), 265.0), STABLE, "jump alone", "shows the jump alone"),
+    "late jump": (run_of(msd_with_jump(1.5e-12, 265.0), 265.0), STABLE, "jump alone", "shows the jump alone"),
     # nothing but rounding: the first twentieth has a smaller D than the rest
     "noise": (run_of(noise(), None), STABLE, "does not weaken", "friction does not weaken"),
-    "at the end": (run_of(jumped(1e-12, 390.0), 390.0), STABLE, "too short", "a longer perturb.time"),
-    "grows": (run_of(jumped(1e-16, 50.0, 0.1), 50.0), UNSTABLE, "grows", "an instability, and not the jump alone"),
-    "faster": (run_of(jumped(1e-16, 50.0, 0.16), 50.0), UNSTABLE, "unexplained", "not the spectrum's below"),
-    "nothing grows": (run_of(jumped(1e-16, 50.0, 0.1), 50.0), QUIET, "unexplained", "has nothing that grows"),
+    "at the end": (run_of(msd_with_jump(1e-12, 390.0), 390.0), STABLE, "too short", "a longer perturb.time"),
+    "grows": (
+        run_of(msd_with_jump(1e-16, 50.0, 0.1), 50.0),
+        UNSTABLE,
+        "grows",
+        "an instability, and not the jump alone",
+    ),
+    "faster": (run_of(msd_with_jump(1e-16, 50.0, 0.16), 50.0), UNSTABLE, "unexplained", "not the spectrum's below"),
+    "nothing grows": (run_of(msd_with_jump(1e-16, 50.0, 0.1), 50.0), QUIET, "unexplained", "has nothing that grows"),
     # beyond the jump of its first moments, but not beyond the one that is foreseen
-    "foreseen": (run_of(jumped(1e-16, 50.0, 0.02), 50.0), Forecast(1e-15, 0.1, 1.2, 0.1), "jump alone", "jump alone"),
+    "foreseen": (
+        run_of(msd_with_jump(1e-16, 50.0, 0.02), 50.0),
+        Forecast(1e-15, 0.1, 1.2, 0.1),
+        "jump alone",
+        "jump alone",
+    ),
 }
 
 

@@ -7,7 +7,7 @@ import pytest
 from families import DIGITS, crossing, normal_form
 from scipy.linalg import eigvals
 from scipy.sparse import csr_array
-from tiling import tiled
+from tiling import tile
 
 from faultgouge.analysis import FaultgougeError, NoEquilibriumError, OnsetError, complex_windows, find_onset
 from faultgouge.analysis.onset import LIMITS, Family, Limits, full_operator
@@ -173,7 +173,7 @@ def test_first_window_of_hundreds_of_disks(path):
     mass = np.random.default_rng(3).uniform(0.7, 1.3, 300)
 
     def operator(fx):
-        return full_operator(replace(tiled(path(fx), 3), mass=mass))
+        return full_operator(replace(tile(path(fx), 3), mass=mass))
 
     window, _ = searched(operator, path.grid)
     assert window.kind == "coalescence"

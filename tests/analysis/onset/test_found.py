@@ -181,11 +181,11 @@ def test_an_error_that_ends_all_ranks_does_not_wait_for_them():
         Ranks(0, 2, gathered.append).together(work)
     assert gathered == []
 
-    def met():
+    def raise_error():
         raise FaultgougeError("of this rank")
 
     with pytest.raises(FaultgougeError, match="of this rank"):
-        Ranks(0, 2, lambda mine: [mine, (None, None)]).together(met)
+        Ranks(0, 2, lambda mine: [mine, (None, None)]).together(raise_error)
 
 
 def numbers(found):

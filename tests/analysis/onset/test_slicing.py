@@ -54,11 +54,11 @@ def test_part_of_the_spectrum(modes):
     """The eigenvalues of these numbers, with shifts about them alone."""
     shifts = []
 
-    def watched(matrix, shift):
+    def record_shift(matrix, shift):
         shifts.append(shift)
         return factor_shifted(matrix, shift)
 
-    kinds = {"limits": Limits(coarse=60), "factorise": watched}
+    kinds = {"limits": Limits(coarse=60), "factorise": record_shift}
     matrix = network(34, 4)
     expected = np.linalg.eigvalsh(matrix.toarray())
     parts = list(slices(matrix, 20, modes=modes, **kinds))
@@ -116,13 +116,13 @@ def next_to_an_eigenvalue(distance):
     values = np.linspace(1.0, 2.0, 301)
     shifts = []
 
-    def watched(matrix, shift):
+    def record_shift(matrix, shift):
         shifts.append(shift)
         return factor_shifted(matrix, shift)
 
     for _ in range(30):  # the eigenvalue moves the shift a little
         shifts.clear()
-        list(slices(csc_array(np.diag(values)), 10, limits=FEW, factorise=watched))
+        list(slices(csc_array(np.diag(values)), 10, limits=FEW, factorise=record_shift))
         nearest = np.argmin(np.abs(values - shifts[-3]))
         if abs(values[nearest] - shifts[-3]) < 2 * abs(distance):
             return values

@@ -176,11 +176,11 @@ def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
     path, decomposed, decompose = ramp(mu, 1e-3, 22), [], Modes.of
     family = Family(lambda fx: full_operator(path(fx)), 2.2e-9)
 
-    def counted(fx, matrix):
+    def count_decompositions(fx, matrix):
         decomposed.append(fx)
         return decompose(fx, matrix)
 
-    monkeypatch.setattr(Modes, "of", counted)
+    monkeypatch.setattr(Modes, "of", count_decompositions)
     quick = all_windows(family, path.grid)
     few, decomposed[:] = len(decomposed), []
     every = all_windows(family, path.grid, no_few)
