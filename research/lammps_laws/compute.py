@@ -76,8 +76,8 @@ CELLS = (
     Cell(50, MU, 20),
     Cell(50, 0.3, 20, HERTZ),
     Cell(50, 0.9, 20, HERTZ),
-    Cell(200, MU, 20, HERTZ),
-    Cell(400, MU, 6, HERTZ),
+    Cell(200, MU, 12, HERTZ),
+    Cell(400, MU, 3, HERTZ),
 )
 """All cells, each of the seeds 1, 2, ..., M, in two and three dimensions. The first rounds had fewer seeds; M grew by
 what a packing costs, and not by what came out."""
