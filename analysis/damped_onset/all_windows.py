@@ -56,7 +56,7 @@ Announcement = Course | float | None
 class AllGrowth:
     """The oracle of growing motion; it is sure of the course of an increment."""
 
-    is_finished = False
+    finished = False
 
     def __init__(self, pencil: Callable[[float], Pencil], narrowest: float, screen: GrowthScreen | None) -> None:
         self.at, self.narrowest, self.screen = pencil, narrowest, screen

@@ -122,9 +122,9 @@ class SlicedGrowthSearch(SliceSearch[Pencil, DampedWindow]):
     _passing = False  # whether bases are not kept
 
     @property
-    def is_finished(self) -> bool:
+    def finished(self) -> bool:
         """Whether the first window has been found, or all motions are to be looked for without clusters."""
-        return super().is_finished or (self.crowded and self._few_enough(self._passed[-1]))
+        return super().finished or (self.crowded and self._few_enough(self._passed[-1]))
 
     def _few_enough(self, place: Pencil) -> bool:
         """Whether all motions that grow at a load can be looked for."""

@@ -62,7 +62,7 @@ class AllPairs:
         self._known: list[Pair] = []  # the few pairs at the load reached so far
 
     @property
-    def is_finished(self) -> bool:
+    def finished(self) -> bool:
         """Whether the first window has been found, and is all that is sought."""
         return self._first and bool(self._open or self._closed)
 
@@ -436,8 +436,8 @@ def _march_along_ramp(oracle: AllPairs, loads: Floats) -> Iterator[tuple[float, 
         for there in steps:
             march(oracle, [here, there])
             here = there
-            if oracle.is_finished:
+            if oracle.finished:
                 break
         yield float(load), oracle.windows()
-        if oracle.is_finished:
+        if oracle.finished:
             return

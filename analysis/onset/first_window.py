@@ -103,7 +103,7 @@ class SliceSearch(ABC, Generic[P, W]):
         """
 
     @property
-    def is_finished(self) -> bool:
+    def finished(self) -> bool:
         """Whether the first window has been found."""
         return self.first is not None
 
@@ -336,7 +336,7 @@ def search_along(oracle: SliceSearch[P, W], loads: Floats) -> tuple[W | None, In
     """
     here = oracle.at(float(loads[0]))
     done = 1
-    while done < len(loads) and not oracle.is_finished:
+    while done < len(loads) and not oracle.finished:
         ahead = 1 if oracle.bases.keeps(here.matrices[0]) else oracle.ahead(done)
         places = [here, *_reach_loads(oracle.at, loads[done : done + ahead])]
         march(oracle, places)

@@ -29,7 +29,7 @@ class Oracle(Protocol[At, Announcement, Sure]):
     """Who can tell what happens between two loads."""
 
     @property
-    def is_finished(self) -> bool:
+    def finished(self) -> bool:
         """Whether all that is sought has been found."""
 
     def candidates(self, places: Sequence[At], depth: int) -> Iterable[Announcement]:
@@ -53,7 +53,7 @@ def march(oracle: Oracle[At, Announcement, Sure], places: Sequence[At], depth: i
             march(oracle, [here, *between, there], depth + 1)
         if sure is not None:
             oracle.record(sure)
-        if oracle.is_finished:
+        if oracle.finished:
             return
 
 

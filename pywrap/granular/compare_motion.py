@@ -30,7 +30,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
 from scipy.sparse import block_array, csr_array, diags_array
 from scipy.sparse.linalg import expm_multiply
 
@@ -128,6 +127,8 @@ def _velocity(snapshot: Snapshot, stiffness: csr_array, active: Indices, start: 
     if not forces.data.any():
         system = csr_array(block_array([[None, omega * diags_array(np.ones(len(start)))], [-a / omega, -g]]))
         return np.asarray(expm_multiply(time * system, np.concatenate([np.zeros_like(start), start])))[len(start) :]
+    from scipy.integrate import solve_ivp
+
     weight = diags_array(1.0 / np.sqrt(snapshot.coordinate_mass[active]))
     rates, forces = csr_array(rates[:, active] @ weight), csr_array(weight @ forces[active])
 

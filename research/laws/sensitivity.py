@@ -1,0 +1,57 @@
+"""How the response grows just below the first onset, with either law: the rows of sensitivity.jsonl.
+
+The pair that is about to coalesce is started across its common eigenvector, with the K of the law: the largest
+displacement grows as a power of the distance 1 - F_x/F_x^c, with the exponent -1/2 at an exceptional point.
+
+python -m research.laws.sensitivity FOLDER [SEED ...]    minutes; from the folder of the repository
+"""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from faultgouge.analysis import NoEquilibriumError, OnsetError
+from faultgouge.pywrap import Scene
+from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.studies.result_rows import append_row
+from faultgouge.studies.triggering.compute import sensitivity
+from research.laws.sets import ONSETS, sets
+
+NEAR = -np.geomspace(1e-3, 1e-6, 10)
+"""Distances of the equilibria from the onset, in units of F_y."""
+
+
+def rows(seed: int) -> Iterator[dict[str, Any]]:
+    """A packing with either law: its onset, and exponent and largest amplitude of the response below it."""
+    for history in ("total", "coulomb"):
+        scene = Scene.from_mapping(with_seed(history, seed))
+        known = {"seed": seed, "history": history}
+        try:
+            run = onset_run(scene, scene.law.mus[0], near_onset=NEAR * scene.load.fy, first=True)
+        except (OnsetError, NoEquilibriumError):
+            continue  # no window up to the end of the ramp
+        found = sensitivity(run)
+        if len(found.distance) > 2:
+            yield known | {
+                "fx_c": run.onset.fx_c,
+                "exponent": found.fit.exponent,
+                "error": found.fit.error,
+                "distances": [float(found.distance.min()), float(found.distance.max())],
+                "amplitudes": [float(found.amplitude.min()), float(found.amplitude.max())],
+            }
+
+
+def with_seed(history: str, seed: int) -> dict[str, Any]:
+    """The scene of the sweep "onset" of a law, as one mapping."""
+    scene = sets()[f"onset {history}"].scene
+    return scene | {"packing": scene["packing"] | {"seed": seed}}
+
+
+if __name__ == "__main__":
+    folder, *seeds = sys.argv[1:]
+    for each in map(int, seeds or range(1, ONSETS + 1)):
+        for row in rows(each):
+            append_row(Path(folder) / "sensitivity.jsonl", row)
