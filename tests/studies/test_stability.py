@@ -61,7 +61,7 @@ def test_failures_are_told_and_the_others_go_on(tmp_path, monkeypatch):
     assert told[2] == "b, crash: ZeroDivisionError: in the middle of it"
     assert json.loads((tmp_path / "out" / "stability.json").read_text()) == result
     page = (tmp_path / "out" / "stability.md").read_text()
-    assert "9 cases: 2 hold, 1 refused" in page
+    assert "9 cases: 2 hold, 1 are refused" in page
     assert "| too large | fails | 2 | 1 | twice |" in page
     assert "stability.png was not drawn (RuntimeError: no font at all)" in told[-1]
     with pytest.raises(StabilityError, match=r"6 of 9 cases failed: too large; no number; crash"):

@@ -117,7 +117,7 @@ def test_the_page_of_eruptions_says_which_sizes_are_noise():
         result = {"runs": [run | more], "scene": {"load": {"fy": 3.0}}}
         page = render("faultgouge.studies.eruptions", "eruptions.md.j2", units=None, **eruptions.page(result))
         words[name] = " ".join(page.split())
-    assert "1 did not leave it in their time: their sizes are those of the noise" in words["noise"]
+    assert "1 did not leave this noise in their time, and their sizes are those of the noise" in words["noise"]
     assert "All sizes stand above it" in words["grown"]
 
 
