@@ -60,7 +60,7 @@ class SymmetricFactors:
 
     @classmethod
     def of(cls, matrix: csc_array, library: ctypes.CDLL) -> "SymmetricFactors | None":
-        """Those of a matrix that is symmetric to the bit, in the order of elimination; None if a pivot is zero.
+        """The factors of a matrix that is symmetric to the bit, in the order of elimination; None if a pivot is zero.
 
         Raises
         ------

@@ -55,7 +55,7 @@ class Factors(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SuperLUFactors:
-    """Those of SuperLU."""
+    """The factors of SuperLU."""
 
     lu: SuperLU
 
@@ -142,7 +142,7 @@ _LOCK = RLock()
 
 
 class MumpsFactors:
-    """Those of MUMPS, see :class:`Factors`.
+    """The factors of MUMPS, see :class:`Factors`.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ class Propagator:
 
     @property
     def frequency(self) -> Floats:
-        """Of each mode, radian / time."""
+        """Frequency of each mode, radian / time."""
         values = self.modes.values
         return np.abs(np.sqrt(values).real) if self.modes.reach is second_order else np.abs(values.imag)
 

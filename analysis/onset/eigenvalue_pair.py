@@ -138,7 +138,7 @@ class Pair:
         return bool(min(right[-1], left[-1]) > 0.5)
 
     def closest(self, others: "Iterable[Pair]") -> "Pair | None":
-        """Of the others with the same planes, that with the closest eigenvalues."""
+        """The pair with the closest eigenvalues among the others with the same planes."""
         same = [other for other in others if self.same_planes(other)]
         return min(same, key=lambda other: abs(other.mean - self.mean), default=None)
 
@@ -176,7 +176,7 @@ def inverse_of(matrix: csr_array, shift: complex, limits: Limits = LIMITS) -> In
 
 
 def continue_pair(pair: Pair, fx: float, matrix: csr_array, limits: Limits = LIMITS) -> Pair | None:
-    """What a pair, or a guess of one, has become in a neighbouring operator; None if no iteration ends there."""
+    """Continue a pair, or a guess of one, to a neighbouring operator; None if no iteration converges."""
     for planes, inverse, most in _iterations(pair, replace(pair, fx=fx, matrix=matrix), limits):
         found = _invariant(matrix, planes, most, limits)
         if found is not None:

@@ -49,7 +49,7 @@ class DamagedSliceError(BadInputError):
 
 
 class Border(NamedTuple):
-    """What neighbouring slices must agree on.
+    """The eigenvalues at the border of a slice, on which neighbouring slices must agree.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Slice:
 
     @property
     def border(self) -> Border:
-        """What its neighbours must agree on."""
+        """The border, on which its neighbours must agree."""
         return Border.of(self.first, self.values, self.own)
 
 
@@ -141,7 +141,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class SliceResult:
-    """What a search has found in a slice.
+    """The result of the search in a slice.
 
     Attributes
     ----------
@@ -163,7 +163,7 @@ class SliceResult:
 
 @dataclass(frozen=True)
 class SlicePass:
-    """What is known of a pass, on all ranks, and the folder in which more is kept; none by default.
+    """The results of a pass so far, on all ranks, and the folder that stores them; none by default.
 
     Attributes
     ----------
@@ -181,7 +181,7 @@ class SlicePass:
 
     @classmethod
     def read(cls, folder: Path) -> "SlicePass":
-        """What a folder has, if it is there; a DamagedSliceError if a file is not one of these."""
+        """Read the results in a folder, if it exists; DamagedSliceError if a file has another format."""
         found = sorted((_read_candidates(path) for path in folder.glob("*-*.npz")), key=lambda each: each.border.modes)
         shifts = folder / SHIFTS
         return cls(folder, found, _shifts(shifts) if shifts.exists() else ())
@@ -244,7 +244,7 @@ class SlicePass:
 
 
 NEW_PASS = SlicePass()
-"""Of which nothing is known, nor kept."""
+"""A pass without results and without a folder."""
 
 
 def pass_folder(parent: Path, places: Sequence[OperatorAtLoad], modes: tuple[int, int], limits: Limits) -> Path:

@@ -57,12 +57,12 @@ class Edge:
 
     @classmethod
     def start(cls, pair: Pair) -> "Edge":
-        """Of a pair that is complex at the smallest load."""
+        """The edge of a pair that is complex at the smallest load."""
         return cls(pair.fx, 0.0, pair.mean, pair.overlap, "start")
 
     @classmethod
     def between(cls, one: float, other: float, *pairs: Pair) -> "Edge":
-        """Of a pair where the equilibrium jumps, or that is not recognised, between two loads: uncertain by half."""
+        """The edge between two loads where the equilibrium jumps or a pair is not recognised: uncertain by half."""
         half, overlap = 0.5 * abs(other - one), min(pair.overlap for pair in pairs)
         return cls(0.5 * (one + other), half, pairs[-1].mean, overlap, "contact change")
 
