@@ -46,7 +46,7 @@ ATTEMPTS = (
     "smaller increments, more iterations, increments of other sizes, a larger increment and back, and overdamped "
     "dynamics from the last equilibrium"
 )
-"""What is tried before a packing is said to flow, in words."""
+"""The methods that are tried before a packing is said to flow, in words."""
 
 
 @dataclass(frozen=True)

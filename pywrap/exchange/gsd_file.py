@@ -88,7 +88,7 @@ def write_gsd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
 
 
 def _forces(packing: Packing) -> dict[str, np.ndarray]:
-    """What follows from slips, and these."""
+    """The slips, and the forces that follow from them."""
     # gsd has no empty arrays: a row of zeros stands for no contact
     rows = export_quantities.contact_rows(packing)
     return {

@@ -18,7 +18,7 @@ from .text_columns import choose_frame
 
 
 def read_deck_dump(path: Path, frame: int | None = None) -> Disks:
-    """What write.in wrote, with its .contacts and .params."""
+    """Read a dump of write.in, with its .contacts and .params."""
     packing = read_dump(path, frame=-1 if frame is None else frame)
     return Disks(
         str(path),

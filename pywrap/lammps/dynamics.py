@@ -47,7 +47,7 @@ class Motion(NamedTuple):
     friction: float
 
     def kinetic_energy(self, packing: Packing) -> float:
-        """Of translation and rotation of a packing's disks, mass length^2 / time^2."""
+        """Kinetic energy of translation and rotation of a packing's disks, mass length^2 / time^2."""
         inertia = packing.inertia_factor * packing.mass * packing.radius**2
         return float(0.5 * (packing.mass @ np.sum(self.velocity**2, axis=1) + inertia @ self.spin**2))
 

@@ -157,7 +157,7 @@ class LammpsState:
             self._known = trial.packing, trial.arrays
 
     def _arrays_of(self, packing: Packing) -> Arrays:
-        """What LAMMPS is given of a packing, by the names it has there."""
+        """The arrays of a packing that LAMMPS receives, by their names in LAMMPS."""
         state = np.zeros((len(packing), STATE_COLUMNS))
         state[:, POSITION], state[:, ANGLE] = packing.position, packing.angle
         arrays = {"f_move": state}
@@ -287,7 +287,7 @@ class LammpsState:
         return {name: self._gather(name, columns) for name, columns in self._checkpoint_columns().items()}
 
     def write_checkpoint(self, arrays: Mapping[str, Floats]) -> None:
-        """What `checkpoint` gave, back into LAMMPS."""
+        """Write the result of `checkpoint` back into LAMMPS."""
         for name, values in arrays.items():
             if name == "f_slips":
                 values = self._of_width(values, self._checkpoint_columns()[name])

@@ -145,7 +145,7 @@ class Trial:
 
     @cached_property
     def coordinate_rounding(self) -> float:
-        """As that of a :class:`~faultgouge.analysis.Packing`, length."""
+        """Rounding of the coordinates, as in a :class:`~faultgouge.analysis.Packing`, length."""
         if self.position_low is not None:
             return self.packing.coordinate_rounding
         return EPSILON * float(np.abs(self.position).max())
@@ -161,7 +161,7 @@ class Trial:
 
 
 def rounding(stiffness: Floats, graph: ContactGraph, unit: float) -> float:
-    """What an error of one unit in every overlap does to the force on a disk, as independent errors; the largest.
+    """Largest error of the force on a disk if every overlap has an independent error of one unit.
 
     Parameters
     ----------

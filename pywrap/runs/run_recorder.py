@@ -247,12 +247,12 @@ class Record:
 
 
 def fallbacks(file: RunFile) -> dict[int, str]:
-    """Of equilibria that were reached by another way than halved increments, their number and that way."""
+    """Numbers of the equilibria that were not reached by halved increments, and the fallback of each."""
     return {int(number): way for number, way in json.loads(file.attributes.get("ways", "{}")).items()}
 
 
 def raise_on_all_ranks(communicator: MPI.Comm, work: Callable[[], T]) -> T:
-    """What rank 0 finds, on all ranks; an error that it meets is met by all."""
+    """The result of rank 0, on all ranks; an error on rank 0 is raised on all ranks."""
     result: tuple[T | None, Exception | None] = (None, None)
     if communicator.rank == 0:
         try:
@@ -288,6 +288,6 @@ def _difference(stored: dict[str, Any], wanted: dict[str, Any], task: Task) -> s
 
 
 def _default(section: str, key: str) -> Any:
-    """What a key is that a file does not have, because it was written before there was such a key."""
+    """Value of a key that a file does not have because the file is older than the key."""
     fields = (model.model_fields[key] for model in SECTIONS.get(section, ()) if key in model.model_fields)
     return next((field.default for field in fields if not field.is_required()), None)

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from typing import Any
 
 BED = ("precision", "packing", "law", "load", "damping", "units", "perturb.inertia_factor")
-"""What decides the settled packing and its masses, read by every command. Of [perturb] that is one key."""
+"""Sections that determine the settled packing and its masses. Every command reads them, and of [perturb] one key."""
 PATH = (*BED, "relax", "ramp")
-"""What decides the equilibria along F_x."""
+"""Sections that determine the equilibria along F_x."""
 RUN = (*PATH, "perturb", "friction")
-"""What decides undamped runs."""
+"""Sections that determine undamped runs."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """What a command takes from a scene.
+    """The sections of a scene that a command reads.
 
     Attributes
     ----------

@@ -45,11 +45,11 @@ with k_n = 2e5 and 2e6 and harmonic with 2e4."""
 OVERDAMPED_STEPS = 16_000
 """Steps of the default length in one increment of overdamped dynamics."""
 SECONDS_A_STEP = 2e-6, 1.7e-7
-"""Of LAMMPS: of a step, and of a step for each disk."""
+"""Time of LAMMPS: for a step, and for a step and disk."""
 SECONDS_AN_INCREMENT = 1e-3, 1e-4
-"""Of Newton's method: of an increment, and for each disk."""
+"""Time of Newton's method: for an increment, and for an increment and disk."""
 SECONDS_A_SEARCH = 4e-9, 3e-7
-"""Of the search for complex pairs up to `DENSE` disks, for each disk cubed: of an increment, and of a window."""
+"""Time of the search for complex pairs up to `DENSE` disks, for each disk cubed: for an increment, and for a window."""
 WINDOWS = 14.0, 4.0
 """Windows a and b of a packing up to the load u, in units of F_y/N, as a u^2 / (u + b): 1 to 3 up to 0.7, 5 to 11 up to
 2, 78 up to 4 where they are most, 474 up to 35."""
@@ -58,9 +58,9 @@ DAMPED_SEARCH_COST = 2.5
 DENSE = 300
 """Disks up to which the search takes all eigenvalues, and beyond which it ends at the first window."""
 SECONDS_A_PASS = 6e-3, 2.2e-6
-"""Of a pass over all slices of the spectrum: for each disk, and for each disk squared."""
+"""Time of a pass over all slices of the spectrum: for each disk, and for each disk squared."""
 DAMPED_PASS = 1.5
-"""Of a pass for growing motion, in units of one for complex pairs."""
+"""Time of a pass for growing motion, in units of a pass for complex pairs."""
 FIRST = 1.0
 """Load of the first window without dissipation, in units of F_y/N."""
 DASHPOTS = 0.013, 1.5e-3
@@ -76,9 +76,9 @@ SECONDS_OF_ALL_MODES = 2e-7
 """Of all modes at the load of an increment, which such dashpots ask for up to `DENSE` disks, for each disk cubed:
 1.7e-7 for 300 disks, 2.9e-7 for 100."""
 SECONDS_OF_LOOKS = 3e-5
-"""Of the three looks at all motions that grow, with such dashpots, for each disk squared."""
+"""Time of the three searches for all growing motions, with such dashpots, for each disk squared."""
 AGAIN = 0.05
-"""Of an increment with bases that are kept, in units of a pass."""
+"""Time of an increment whose bases are in memory, in units of a pass."""
 GROWTH = 300_000
 """Steps of the undamped run in which reproduce measures a growth rate; a tenth or three times as many."""
 TRIGGERING_RUNS = 4
@@ -86,13 +86,13 @@ TRIGGERING_RUNS = 4
 BYTES_KEPT = 600
 """Memory of one equilibrium that is kept, for each disk: positions, contacts, and what is computed of them once."""
 BYTES_SEARCHED = 50_000
-"""Of the search in slices of the spectrum, for each disk, in two threads: 5.0 to 5.4 GB for 100,000 disks."""
+"""Memory of the search in slices of the spectrum, for each disk, in two threads: 5.0 to 5.4 GB for 100,000 disks."""
 BYTES_OF_BASES = 150, 3.6e9
-"""Of eigenvectors that are kept, for each disk squared; and the most of them, beyond which they are not kept."""
+"""Memory of the eigenvectors for each disk squared, and the limit beyond which they are not kept."""
 BYTES_WRITTEN = 150
-"""Of one equilibrium in run.h5, for each disk."""
+"""Size of one equilibrium in run.h5, for each disk."""
 BYTES_AT_ALL = 4000
-"""Of LAMMPS, the matrices and their factors, for each disk."""
+"""Memory of LAMMPS, of the matrices and of their factors, for each disk."""
 
 # Refusals, each where nothing else could be meant.
 STEPS_TO_REST = 10_000_000
@@ -146,7 +146,7 @@ class Estimate:
 
 
 def estimate_work(scene: SceneKeys, task: Task) -> Estimate:
-    """What a command does for a scene.
+    """Estimate the work of a command for a scene.
 
     Parameters
     ----------

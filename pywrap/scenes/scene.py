@@ -152,7 +152,7 @@ class Scene(SceneKeys):
 
 
 class _Part(Section):
-    """What is read of a section [perturb] by a command that does not read the section."""
+    """The keys of [perturb] that a command reads if it does not read the whole section."""
 
     perturb: Inertia
 

@@ -18,7 +18,7 @@ NUMBER = r"\d+(?:\.\d*)?(?:[eE][-+]?\d+)?"
 """A number without a sign, in text."""
 
 EQUILIBRIA = 10_000_000
-"""Of a ramp: half a day and 150 GB for 100 disks."""
+"""Increments of a ramp: half a day and 150 GB for 100 disks."""
 
 
 class Law(Section):
@@ -207,7 +207,7 @@ class Ramp(Section):
 
     @property
     def length(self) -> float:
-        """Of the whole way of F_x, force."""
+        """Length of the whole path of F_x, force."""
         return sum(abs(there - here) for here, there in pairwise((0.0, *self.turning_points)))
 
 

@@ -50,7 +50,7 @@ MISMATCH = 0.01
 
 @dataclass(frozen=True)
 class RealUnits:
-    """What one unit of a scene is in SI, and what follows from it.
+    """The units of a scene in SI, and the quantities that follow from them.
 
     Attributes
     ----------

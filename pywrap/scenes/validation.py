@@ -46,7 +46,7 @@ KEYS = {
     "friction": "v0, the velocity at which friction weakens",
     "eruptions": "load, a list of F_x",
 }
-"""What a section needs at least."""
+"""Keys that a section must have."""
 
 
 MISSING_KEY_ADVICE = {"friction.v_ss": ', and the paper gives no value: give a velocity, or a multiple such as "10 v0"'}

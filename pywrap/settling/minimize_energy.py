@@ -199,7 +199,7 @@ def _stiffest(packing: Packing) -> float:
 
 
 def contact_rounding(packing: Packing) -> float:
-    """What one unit in the last place of a coordinate is to the force of a contact that carries F_y."""
+    """Change of the force of a contact that carries F_y when a coordinate changes by one unit in the last place."""
     return _stiffest(packing) * float(np.finfo(float).eps * _width(packing))
 
 
@@ -208,7 +208,7 @@ def _width(packing: Packing) -> float:
 
 
 def _height(packing: Packing) -> float:
-    """Of the disks at the area fraction to which they are gathered."""
+    """Height of the disks at the area fraction to which they are gathered."""
     return float(np.pi * np.sum(packing.radius**2) / (_width(packing) * DENSITY))
 
 

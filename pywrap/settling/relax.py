@@ -66,7 +66,7 @@ def bring_to_rest(packing: Packing, watch: Watch | None = None) -> tuple[Equilib
 
 
 def _what_moved(before: Packing, found: Equilibrium) -> str:
-    """What coming to rest has done to a packing, in words."""
+    """Say in words how a packing has changed on its way to rest."""
     after = found.packing
     moved = np.hypot(*nearest_image(after.position - before.position, after.box_length).T)
     far = int(np.sum(moved > MOTION_LIMIT * after.radius))

@@ -100,7 +100,7 @@ def settle(
 
 
 def _cure(scene: Scene, packing: Packing) -> str:
-    """What to do about a packing that has no equilibrium near where it is."""
+    """Advice for a packing that has no equilibrium nearby."""
     if 0 < packing.law.mu < SLIPPERY:
         return f"friction of mu = {packing.law.mu:g} holds next to nothing; take a larger law.mu, or 0 for no friction"
     if isinstance(scene.packing, GeneratedPacking):
@@ -142,7 +142,7 @@ def law_of(scene: Scene, mu: float) -> MindlinLaw:
 
 
 def load_of(scene: Scene) -> dict[str, Any]:
-    """What packings of the scene have beside disks and law."""
+    """Load and other properties of the packings of a scene, besides disks and law."""
     drag_time = scene.damping.tau if scene.damping else None
     return {"fy": scene.load.fy, "inertia_factor": scene.inertia_factor, "drag_time": drag_time}
 
