@@ -116,7 +116,7 @@ class Modes:
         return max(candidates, key=lambda members: float(weight[list(members)].sum()))
 
     def about(self, eigenvalue: float, among: Sequence[Members] = ()) -> Members:
-        """The pair among some with the closest eigenvalue; without such pairs, the two modes closest to a real number."""
+        """The pair among some with the closest eigenvalue; without pairs, the two modes closest to a real number."""
         if among:
             return min(among, key=lambda members: abs(self.values[members[0]].real - eigenvalue))
         first, second = np.argsort(np.abs(self.values - eigenvalue))[:2]
