@@ -325,7 +325,7 @@ class Packing:
 
     @property
     def smallest_overlap(self) -> float:
-        """Smallest overlap of contacts that carry more than the packing's imbalance, length; infinite without contacts."""
+        """Smallest overlap of contacts that carry more than the imbalance, length; infinite without contacts."""
         return float(self.loaded(self.residual).geometry.overlap.min(initial=np.inf))
 
     @property
