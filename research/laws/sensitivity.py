@@ -33,15 +33,18 @@ def rows(seed: int) -> Iterator[dict[str, Any]]:
             run = onset_run(scene, scene.law.mus[0], near_onset=NEAR * scene.load.fy, first=True)
         except (OnsetError, NoEquilibriumError):
             continue  # no window up to the end of the ramp
-        found = sensitivity(run)
-        if len(found.distance) > 2:
-            yield known | {
-                "fx_c": run.onset.fx_c,
-                "exponent": found.fit.exponent,
-                "error": found.fit.error,
-                "distances": [float(found.distance.min()), float(found.distance.max())],
-                "amplitudes": [float(found.amplitude.min()), float(found.amplitude.max())],
-            }
+        known |= {"fx_c": run.onset.fx_c, "fx_c_error": run.onset.windows[0].error}
+        try:
+            found = sensitivity(run)
+        except ValueError:  # the onset is not known well enough for three distances
+            yield known | {"exponent": None}
+            continue
+        yield known | {
+            "exponent": found.fit.exponent,
+            "error": found.fit.error,
+            "distances": [float(found.distance.min()), float(found.distance.max())],
+            "amplitudes": [float(found.amplitude.min()), float(found.amplitude.max())],
+        }
 
 
 def with_seed(history: str, seed: int) -> dict[str, Any]:
