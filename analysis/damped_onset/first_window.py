@@ -12,8 +12,9 @@ slice is not looked at again.
 **Strong dashpots** couple more modes than a cluster can have, and clusters may miss a motion. From the load on at which
 that is so, all motions that grow are looked for with the operator itself
 (:mod:`~faultgouge.analysis.damped_onset.imaginary_axis`), at loads whose numbers on the ramp grow by `FARTHER`. Those
-that grow are followed back to where they begin to, and all are looked for again at the last load of the ramp before the
-first onset, until none grows there. A window that lies between two of these loads is not excluded. Of more than
+that grow are followed back to where they begin to, and all are looked for again right below the first onset and at the
+last load of the ramp before, until none grows there. So no other window is open at the first onset. A window that opens
+and ends between two of these loads is not excluded. Of more than
 `Limits.axis` coordinates clusters alone are searched, and all loads before the window are named as in doubt.
 """
 
@@ -59,6 +60,9 @@ NEAREST = 12
 
 FARTHER = 2
 """Ratio of the numbers of two loads at which all motions are looked for: a look takes as long as two passes or more."""
+
+BESIDE = 1e-6
+"""Distance below an onset at which all other motions are looked for, in units of the way from the last load without."""
 
 SETTLED_SHIFT = 0.02
 """Share of an increment by which the place of the largest growth may still move."""
@@ -215,15 +219,31 @@ class SlicedGrowthSearch(SliceSearch[Pencil, DampedWindow]):
             if self._passed[-1].fx >= loads[-1]:
                 return None, doubtful
             known = self._passed[-1].fx
-        first: DampedWindow | None = None
-        while growing:
-            earlier = self._earliest_of(growing, first, known)
+        first = self._earliest_of(growing, None, known)
+        while first is not None:
+            earlier = self._earlier_than(first, known)
             if earlier is first:  # nothing that grows there was followed back: the increments are named as in doubt
                 break
             first = earlier
-            below = [each for each in self._passed if first is not None and known < each.fx < first.fx_onset]
-            growing = self._all_growing(below[-1]) if below else []
         return first, (*doubtful, *self.doubtful)
+
+    def _earlier_than(self, first: DampedWindow, known: float) -> DampedWindow:
+        """A window that opens before the first one so far, by motions that grow where this one opens; else the same.
+
+        They are looked for right below its onset and, if none is followed back from there, at the last load before.
+        """
+        below = [each for each in self._passed if known < each.fx < first.fx_onset]
+        beside = first.fx_onset - max(BESIDE * (first.fx_onset - known), 10 * first.error)
+        try:
+            places = [self.at(beside)] if beside > known else []
+        except NoEquilibriumError:
+            places = []
+        for place in [*places, *below[-1:]]:
+            growing = self._all_growing(place)
+            earlier = self._earliest_of(growing, first, known) if growing else first
+            if earlier is not None and earlier is not first:
+                return earlier
+        return first
 
     def _pass_loads(self, loads: Floats) -> NoEquilibriumError | None:
         """Take the operators at some loads to those that were passed, up to one without an equilibrium."""

@@ -2,12 +2,14 @@
 
 python -m research.lammps_laws.make compute    what the tables lack of all cells, on one core, resumable; hours
 python -m research.lammps_laws.make growth     the packings that are let go without loss; minutes
+python -m research.lammps_laws.make negative   packings with a negative eigenvalue, balanced further; a minute
 python -m research.lammps_laws.make page       README.md from the tables
 python -m research.lammps_laws.make check      the first packings of 50 particles of each law once more, compared
 
 From the folder of the repository.
 """
 
+import json
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -19,12 +21,24 @@ import numpy as np
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.pages import render
 from faultgouge.studies.statistics import median, share
-from research.lammps_laws.compute import CELLS, LAWS, MU, TILTS, TO, Cell, compute, compute_growth, let_go, read
+from research.lammps_laws.compute import (
+    CELLS,
+    LAWS,
+    MU,
+    TILTS,
+    TO,
+    Cell,
+    balance_further,
+    compute,
+    compute_growth,
+    let_go,
+    read,
+)
 from research.lammps_laws.energy_cycle import energy_cycle
 
 HERE = Path(__file__).parent
 TABLES = HERE / "tables"
-PACKINGS, GROWTH = "packings.jsonl", "growth.jsonl"
+PACKINGS, GROWTH, NEGATIVE = "packings.jsonl", "growth.jsonl", "negative.jsonl"
 
 USUAL = (50, MU)
 """Particles and friction of the packings of which most is known."""
@@ -88,11 +102,16 @@ def numbers(tables: Path = TABLES) -> dict[str, Any]:
         "seeds": full_seeds(rows),
         "rows": len(every),
         "restless": sum(not row["rests"] for row in every),
-        "negative": [row for row in every if row["rests"] and row["negative"]],
+        "negative": read(tables / NEGATIVE),
         "pushed": growth(read(tables / GROWTH)),
         "cycles": [energy_cycle(law) for law in LAWS],
         "wall": wall_alone(),
     }
+
+
+def with_negative(tables: Path = TABLES) -> list[dict[str, Any]]:
+    """Packings at rest that have a negative eigenvalue."""
+    return [row for row in read(tables / PACKINGS) if row["rests"] and row["negative"]]
 
 
 def full_seeds(rows: list[dict[str, Any]]) -> int:
@@ -218,6 +237,9 @@ if __name__ == "__main__":
             compute(TABLES / PACKINGS)
         case ["growth"]:
             compute_growth(TABLES / GROWTH)
+        case ["negative"]:
+            rows = [json.dumps(balance_further(row)) + "\n" for row in with_negative()]
+            write_text(TABLES / NEGATIVE, "".join(rows))
         case ["page"]:
             print(write_page())
         case ["check"]:

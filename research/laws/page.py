@@ -48,6 +48,7 @@ def write_page(tables: Path, folder: Path) -> Path:
         {path.stem: [row for row in read_rows(path) if row["says"] is None] for path in tables.glob("*.jsonl")}
     )
     found["stock"] = stock(read_rows(HERE / "stock_lammps.jsonl"))
+    found["response"] = responses(read_rows(HERE / "sensitivity.jsonl"))
     found["yielding"] = yields(read_standard(YIELDING))
     smoothed, _ = rows_of(YIELDING / "quartz_100.jsonl")
     found["yielding"]["smoothed"] = yields(smoothed)
@@ -176,6 +177,22 @@ def yields(rows: Sequence[Row]) -> dict[str, Any]:
         found[name]["moves"] = count_true(
             any(run["rate"] <= 2 * GROWS and run["largest_D"] > SEEN_GROWTH for run in each) for each in runs
         )
+    return found
+
+
+def responses(rows: Sequence[Row]) -> dict[str, Any]:
+    """By law: packings with an onset, those with a fitted exponent, its median, and the largest amplitude's median."""
+    found = {}
+    for history in ("total", "coulomb"):
+        onsets = [row for row in rows if row["history"] == history]
+        fits = [row for row in onsets if row["exponent"] is not None]
+        found[history] = {
+            "onsets": len(onsets),
+            "fits": len(fits),
+            "exponent": median([row["exponent"] for row in fits]),
+            "furthest": max((row["exponent"] for row in fits), key=lambda each: abs(each + 0.5)),
+            "amplitude": float(np.median([row["amplitudes"][1] for row in fits])),
+        }
     return found
 
 

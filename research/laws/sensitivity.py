@@ -28,7 +28,7 @@ def rows(seed: int) -> Iterator[dict[str, Any]]:
     """A packing with either law: its onset, and exponent and largest amplitude of the response below it."""
     for history in ("total", "coulomb"):
         scene = Scene.from_mapping(with_seed(history, seed))
-        known = {"seed": seed, "history": history}
+        known: dict[str, Any] = {"seed": seed, "history": history}
         try:
             run = onset_run(scene, scene.law.mus[0], near_onset=NEAR * scene.load.fy, first=True)
         except (OnsetError, NoEquilibriumError):

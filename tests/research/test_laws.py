@@ -53,6 +53,16 @@ def test_lammps_grows_where_the_pencil_does_and_nowhere_else():
                 assert run["ever"]["count"] == 0
 
 
+def test_the_response_below_the_onset_has_the_power_of_an_exceptional_point():
+    """-1/2 at the onset; terms of higher order change the power that is fitted where distances are large."""
+    for law in FOUND["response"].values():
+        middle, low, high = law["exponent"]
+        assert middle == pytest.approx(-0.5, abs=0.005)
+        assert high - low < 0.02
+        assert law["fits"] >= 15
+        assert law["amplitude"] > 10
+
+
 def test_stock_lammps_does_as_the_standard_law_and_not_as_the_smoothed_one():
     stock = FOUND["stock"]
     assert len({each["packings"] for each in stock.values()}) == 1
