@@ -13,8 +13,8 @@ slice is not looked at again.
 that is so, all motions that grow are looked for with the operator itself
 (:mod:`~faultgouge.analysis.damped_onset.imaginary_axis`), at loads whose numbers on the ramp grow by `FARTHER`. Those
 that grow are followed back to where they begin to, and all are looked for again right below the first onset and at the
-last load of the ramp before, until none grows there. So no other window is open at the first onset. A window that opens
-and ends between two of these loads is not excluded. Of more than
+last load of the ramp before, until none grows there. So no other window is open at the first onset, unless increments
+before it are in doubt. A window that opens and ends between two of these loads is not excluded. Of more than
 `Limits.axis` coordinates clusters alone are searched, and all loads before the window are named as in doubt.
 """
 
@@ -234,10 +234,12 @@ class SlicedGrowthSearch(SliceSearch[Pencil, DampedWindow]):
         """
         below = [each for each in self._passed if known < each.fx < first.fx_onset]
         beside = first.fx_onset - max(BESIDE * (first.fx_onset - known), 10 * first.error)
-        try:
-            places = [self.at(beside)] if beside > known else []
-        except NoEquilibriumError:
-            places = []
+        places = []
+        if beside > known:
+            try:
+                places.append(self.at(beside))
+            except NoEquilibriumError:  # nobody has looked there
+                self.doubtful.append((known, first.fx_onset))
         for place in [*places, *below[-1:]]:
             growing = self._all_growing(place)
             earlier = self._earliest_of(growing, first, known) if growing else first

@@ -41,7 +41,7 @@ from .granular_commands import SnapshotError
 from .look_in_a_copy import can_copy, in_a_copy, quieten
 
 ACCURACY = 1e-10
-"""Of the motion with two derivatives, as a share of the largest velocity."""
+"""Error of a step in the motion with two derivatives, as a share of the largest velocity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,33 +118,38 @@ def compare_motion(
 
 
 def _velocity(snapshot: Snapshot, stiffness: csr_array, active: Indices, start: Floats, time: float) -> Floats:
-    """Velocities after some time from those at the start, all times the root of the masses."""
+    """Velocities after some time; these and `start` are multiplied by the root of the masses."""
     a = stiffness[active][:, active]
     g = mass_weighted(damping_matrix(snapshot), snapshot)[active][:, active]
-    # displacements and forces in units of 1/omega and omega, so that both halves weigh as much
+    # displacements or forces over omega, so that both halves weigh as much
     omega = float(np.sqrt(np.abs(a).sum(axis=1).max()))
     rates, forces = rescaling_operators(snapshot)
-    if not forces.data.any():
-        system = csr_array(block_array([[None, omega * diags_array(np.ones(len(start)))], [-a / omega, -g]]))
-        return np.asarray(expm_multiply(time * system, np.concatenate([np.zeros_like(start), start])))[len(start) :]
-    from scipy.integrate import solve_ivp
+    if forces.data.any():
+        weight = diags_array(1.0 / np.sqrt(snapshot.coordinate_mass[active]))
+        n, b = csr_array(rates[:, active] @ weight), csr_array(weight @ forces[active])
+        there, back = (_piecewise_velocity(a, g, n, b, omega, sign * start, time) for sign in (1, -1))
+        return np.asarray(0.5 * (there - back))
+    system = csr_array(block_array([[None, omega * diags_array(np.ones(len(start)))], [-a / omega, -g]]))
+    return np.asarray(expm_multiply(time * system, np.concatenate([np.zeros_like(start), start])))[len(start) :]
 
-    weight = diags_array(1.0 / np.sqrt(snapshot.coordinate_mass[active]))
-    rates, forces = csr_array(rates[:, active] @ weight), csr_array(weight @ forces[active])
+
+def _piecewise_velocity(
+    a: csr_array, g: csr_array, n: csr_array, b: csr_array, omega: float, start: Floats, time: float
+) -> Floats:
+    """Velocities of v' = F - G v, F' = -A v + B |N v| from F = 0, each contact with its own derivative."""
+    from scipy.integrate import solve_ivp
 
     def slope(_: float, state: Floats) -> Floats:
         force, velocity = np.split(state, 2)
-        change = forces @ np.abs(rates @ velocity) - a @ velocity
-        return np.concatenate([change / omega, omega * force - g @ velocity])
+        return np.concatenate([(b @ np.abs(n @ velocity) - a @ velocity) / omega, omega * force - g @ velocity])
 
-    there, back = (
-        solve_ivp(
-            slope, (0, time), np.concatenate([np.zeros_like(start), sign * start]), method="DOP853",
-            t_eval=[time], rtol=ACCURACY, atol=ACCURACY * np.abs(start).max(),
-        ).y[len(start) :, 0]
-        for sign in (1, -1)
+    found = solve_ivp(
+        slope, (0, time), np.concatenate([np.zeros_like(start), start]), method="DOP853", t_eval=[time],
+        rtol=ACCURACY, atol=ACCURACY * np.abs(start).max(),
     )  # fmt: skip
-    return np.asarray(0.5 * (there - back))
+    if not found.success:
+        raise SnapshotError(f"The predicted motion was not found: {found.message} Compare over a shorter time.")
+    return np.asarray(found.y[len(start) :, 0])
 
 
 def _run(lmp: Any, snapshot: Snapshot, velocity: Floats, step: float, steps: int) -> Floats:

@@ -16,7 +16,7 @@ OWN = "mindlin/smooth"
 
 COHESIVE = ("jkr", "dmt", "mdr")
 SUFFIXES = ("/omp", "/kk", "/intel", "/gpu", "/opt")
-UNSUPPORTED_FRICTION = {"twisting": "twisting friction", "rolling": "rolling friction", "heat": "heat conduction"}
+UNSUPPORTED_SUBMODELS = {"twisting": "twisting friction", "rolling": "rolling friction", "heat": "heat conduction"}
 TANGENTIAL = (
     "linear_history", "linear_history_classic", "mindlin", "mindlin_classic", "mindlin/force", "mindlin_rescale",
     "mindlin_rescale/force",
@@ -142,7 +142,7 @@ def _check_model(words: list[str], line: str) -> None:
     for word in words:
         if word in COHESIVE:
             raise SnapshotError(f"{line!r}: {word} is cohesive; use hooke, hertz or hertz/material.")
-    for keyword, name in UNSUPPORTED_FRICTION.items():
+    for keyword, name in UNSUPPORTED_SUBMODELS.items():
         if keyword in words and words[words.index(keyword) + 1 :][:1] != ["none"]:
             raise SnapshotError(f"{line!r} has {name}, which is not linearised here: leave {keyword} out.")
     model = (words[words.index("tangential") + 1 :] if "tangential" in words else ["none"])[:1]
