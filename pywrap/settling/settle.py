@@ -28,11 +28,13 @@ OUT_OF_BALANCE = 1e-3
 """Residual of a stored packing, in units of F_y, above which it counts as not settled: the packing would
 rearrange rather than relax."""
 
-STIFFNESS = 2e5
-"""k_n while a packing settles: the paper's, so that its scenes settle in their own units."""
+STIFFNESS = {1.5: 2e5, 1.0: 7e3}
+"""k_n while a packing settles, by the exponent of the law: the paper's, and of harmonic disks the stiffness 3/2 k_n
+delta^(1/2) that a contact of the paper's law has under the paper's load."""
 
 DIGITS = 12
-"""Decimal digits of the numbers that settle: more than anybody gives, and fewer than a change of units leaves right."""
+"""Decimal digits of numbers that are converted: more than anybody gives, and fewer than a change of units leaves
+right."""
 
 SLIPPERY = 1e-3
 """Friction coefficient below which friction bears no packing: contacts are at their bound at slips of a thousandth of
@@ -178,8 +180,9 @@ def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[Ge
     """What a scene settles, in the units of a packing: its smallest diameter is the length, and k_n is `STIFFNESS`.
 
     Settling is chaotic, and amplifies the last digit of any number. A seed is one packing all the same, whatever units
-    the scene has: radii, width and F_y are rounded here to `DIGITS`, so that two scenes that differ in their units
-    alone settle the same numbers.
+    the scene has: radii, width and F_y are rounded to `DIGITS` when they are converted, so that two scenes that differ
+    in their units alone settle the same numbers. A scene that has these units already settles its numbers as they are.
+    Numbers of more than `DIGITS` digits, such as a width of sqrt(2), therefore settle otherwise in other units.
 
     Parameters
     ----------
@@ -195,15 +198,18 @@ def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[Ge
     GeneratedPacking, MindlinLaw, float
         The same in the packing's units. Dashpots are left out: settling has a damping of its own.
     """
-    length = 2 * min(packing.radii)
+    length, stiffness = 2 * min(packing.radii), STIFFNESS[law.exponent]
+    undamped = replace(law, cn=0.0, ct=0.0)
+    if length == 1.0 and law.kn == stiffness:
+        return packing, undamped, fy
     radii = tuple(_round_numbers(radius / length) for radius in packing.radii)
     section = packing.model_copy(update={"radii": radii, "width": _round_numbers(packing.width / length)})
     tangential = Fraction(law.kt / law.kn).limit_denominator(1000)  # a share such as 2/7, to the bit
-    kt = tangential.numerator * STIFFNESS / tangential.denominator
-    if not np.isclose(kt, law.kt / law.kn * STIFFNESS, rtol=10.0**-DIGITS, atol=0.0):
-        kt = _round_numbers(law.kt / law.kn * STIFFNESS)
-    own = MindlinLaw(STIFFNESS, kt, law.mu, law.exponent, rescaled=law.rescaled)
-    return section, own, _round_numbers(fy / (law.kn * length**law.exponent) * STIFFNESS)
+    kt = tangential.numerator * stiffness / tangential.denominator
+    if not np.isclose(kt, law.kt / law.kn * stiffness, rtol=10.0**-DIGITS, atol=0.0):
+        kt = _round_numbers(law.kt / law.kn * stiffness)
+    own_fy = _round_numbers(fy / (law.kn * length**law.exponent) * stiffness)
+    return section, replace(undamped, kn=stiffness, kt=kt), own_fy
 
 
 def _round_numbers(number: float) -> float:

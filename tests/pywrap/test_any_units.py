@@ -64,6 +64,18 @@ def test_scenes_that_differ_in_units_settle_the_same_numbers(length, force):
     assert (mine[0].radii, mine[0].width) == (yours[0].radii, yours[0].width) == ((0.5, 0.7), 4.1)
 
 
+@pytest.mark.parametrize(("exponent", "kn"), [(1.5, 2e5), (1.0, 7e3)])
+def test_a_scene_in_the_units_of_a_packing_settles_its_numbers_as_they_are(exponent, kn):
+    packing, law = scene(width=4.1 * 2**0.5).packing, MindlinLaw(kn, 0.3 * kn, 1.0, exponent, coulomb=True)
+    assert own_units(packing, law, 3 * 2**0.5) == (packing, law, 3 * 2**0.5)
+
+
+def test_harmonic_disks_settle_the_same_numbers_in_any_units():
+    packing, small = scene().packing, scene(length=1e-6).packing
+    law, scaled = MindlinLaw(7e3, 2e3, 1.0, exponent=1.0), MindlinLaw(7e3 * 1e-3 / 1e-6, 2e3 * 1e-3 / 1e-6, 1.0, 1.0)
+    assert own_units(small, scaled, 3e-3)[1:] == own_units(packing, law, 3.0)[1:] == (law, 3.0)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("precision", ["double", "compensated"])
 @settings(max_examples=3, deadline=None)
