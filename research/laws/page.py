@@ -17,7 +17,7 @@ from research.laws.both_laws import BRANCHES, RESTITUTIONS
 from research.laws.sets import sets as all_sets
 from research.modes.loss import GROWS
 from research.modes.page import finite, part
-from research.yielding.page import SEEN_GROWTH, UNREST, read_standard, rows_of
+from research.yielding.page import SEEN_GROWTH, UNREST, rows_of
 
 Row = dict[str, Any]
 
@@ -49,7 +49,7 @@ def write_page(tables: Path, folder: Path) -> Path:
     )
     found["stock"] = stock(read_rows(HERE / "stock_lammps.jsonl"))
     found["response"] = responses(read_rows(HERE / "sensitivity.jsonl"))
-    found["yielding"] = yields(read_standard(YIELDING))
+    found["yielding"] = yields(read_rows(YIELDING / "standard_100.jsonl"))
     smoothed, _ = rows_of(YIELDING / "quartz_100.jsonl")
     found["yielding"]["smoothed"] = yields(smoothed)
     write_json(folder / "laws.json", finite(found))

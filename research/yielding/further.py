@@ -4,7 +4,6 @@ python -m research.yielding.further rest FOLDER [SEED ...]      rows of lasting.
 python -m research.yielding.further draws FOLDER [SEED ...]     rows of draws.jsonl: further draws, and the standard law
 python -m research.yielding.further large FOLDER [SEED ...]     rows of quartz_400.jsonl, as those of the task "yield"
 python -m research.yielding.further standard FOLDER [SEED ...]  rows of standard_100.jsonl, loaded by the standard law
-python -m research.yielding.further bound FOLDER [SEED ...]     rows of bound_100.jsonl: all lossy ones of these
 python -m research.yielding.further sliding FOLDER [SEED ...]   rows of sliding_100.jsonl: what their growth needs
 """
 
@@ -33,10 +32,10 @@ TIME, WINDOW = 300, 50
 DRAWS = 3
 """Draws of noise of a layer, where a run decides."""
 
-STANDARD_LOSSES = (1.0, 0.9)
-"""Restitutions of the runs with the standard law."""
+RESTITUTION = 0.9
+"""Of the lossy runs with the standard law, and of further draws."""
 
-FRICTION, RESTITUTIONS = (1.0, 1.01), (0.9, 0.7)
+FRICTION, RESTITUTIONS = (1.0, 1.01), (RESTITUTION, 0.7)
 """Friction over that of the law, and restitutions, of the runs of `growth_at_bound`."""
 
 LARGE = {"disks": 400, "width": 23.8, "top": 20}
@@ -104,29 +103,25 @@ def draws(seed: int) -> Iterator[dict[str, Any]]:
     here = path.borne(0.97 * path.equilibria[-1].fx)
     if here is None:
         return
-    cn = dashpots(given, 0.9)
+    cn = dashpots(given, RESTITUTION)
     for history, first in (("total", 1), ("coulomb", 0)):
         start = with_history(here, history)
         known = {"seed": seed, "share": 0.97, "fx_over_fy": here.fx / given.load.fy, "history": history}
         for draw in range(first, DRAWS):
-            yield known | {"restitution": 0.9, "draw": draw} | left_alone(start, cn, noise_seed(seed, draw))
+            yield known | {"restitution": RESTITUTION, "draw": draw} | left_alone(start, cn, noise_seed(seed, draw))
 
 
 def standard(seed: int) -> Iterator[dict[str, Any]]:
-    """Static yield and dynamic runs of 100 disks that the standard law has loaded."""
-    given, path = with_slider(seed)
-    known = {"seed": seed, "newton": path.newton / given.load.fy, "static": path.equilibria[-1].fx / given.load.fy}
-    yield known | {"dynamic": list(dynamic_runs(given, path, STANDARD_LOSSES, DRAWS))}
+    """Static yield and dynamic runs of 100 disks that the standard law has loaded.
 
-
-def all_lossy_runs(seed: int) -> Iterator[dict[str, Any]]:
-    """Runs of lossy layers that the standard law has loaded, whatever the spectrum says.
-
-    A contact at Coulomb's bound sticks in the spectrum. It slides on while a growing motion exceeds its last peak.
+    Lossy layers run whatever the spectrum says. A contact at Coulomb's bound sticks in the spectrum. It slides on while
+    a growing motion exceeds its last peak.
     """
     given, path = with_slider(seed)
-    known = {"seed": seed, "static": path.equilibria[-1].fx / given.load.fy}
-    yield known | {"dynamic": list(dynamic_runs(given, path, (0.9,), DRAWS, all_layers=True))}
+    known = {"seed": seed, "newton": path.newton / given.load.fy, "static": path.equilibria[-1].fx / given.load.fy}
+    undamped = dynamic_runs(given, path, (1.0,), DRAWS)
+    lossy = dynamic_runs(given, path, (RESTITUTION,), DRAWS, all_layers=True)
+    yield known | {"dynamic": [*undamped, *lossy]}
 
 
 def growth_at_bound(seed: int) -> Iterator[dict[str, Any]]:
@@ -169,7 +164,6 @@ if __name__ == "__main__":
         "draws": (draws, "draws"),
         "large": (large, "quartz_400"),
         "standard": (standard, "standard_100"),
-        "bound": (all_lossy_runs, "bound_100"),
         "sliding": (growth_at_bound, "sliding_100"),
     }[kind]
     for seed in map(int, seeds or range(1, 21)):

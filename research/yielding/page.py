@@ -177,8 +177,8 @@ def percent(part: dict[str, Any]) -> str:
 @styled
 def figure(found: dict[str, Any]) -> Figure:
     """Static and dynamic yield over loss, of either size; share of layers of 100 disks without rest over the load."""
-    drawn = Figure(figsize=(7, 3), layout="constrained")
-    left, axes = drawn.subplots(1, 2)
+    picture = Figure(figsize=(7, 3), layout="constrained")
+    left, axes = picture.subplots(1, 2)
     for k, (disks, (static, least)) in enumerate(found["sizes"].items()):
         middle, low, high = static
         place, colour = np.arange(len(LOSSES)) + 0.16 * (k - 0.5), (INK, "C4")[k]
@@ -202,7 +202,7 @@ def figure(found: dict[str, Any]) -> Figure:
     axes.axvline(1.0, color="black", linestyle="--", label="static yield")
     axes.set(xlabel="$F_x$ over static yield", ylabel="share of packings that do not rest", ylim=(-0.02, 1.02))
     axes.legend(loc="upper left")
-    return drawn
+    return picture
 
 
 def write_page(folder: Path) -> Path:
@@ -215,16 +215,12 @@ def write_page(folder: Path) -> Path:
     save(figure(found), folder / "pictures" / "yield")
     page = folder / "README.md"
     tables = folder / "tables"
-    page.write_text(text(found, len(rows), failed, read_standard(tables), read_rows(tables / "sliding_100.jsonl")))
+    page.write_text(
+        text(
+            found, len(rows), failed, read_rows(tables / "standard_100.jsonl"), read_rows(tables / "sliding_100.jsonl")
+        )
+    )
     return page
-
-
-def read_standard(tables: Path) -> list[dict[str, Any]]:
-    """Rows of layers of the standard law; all lossy layers have runs, whatever their spectrum says."""
-    runs = {row["seed"]: row["dynamic"] for row in read_rows(tables / "bound_100.jsonl")}
-    rows = read_rows(tables / "standard_100.jsonl")
-    undamped = ([run for run in row["dynamic"] if run["restitution"] == 1] for row in rows)
-    return [row | {"dynamic": each + runs[row["seed"]]} for row, each in zip(rows, undamped, strict=True)]
 
 
 def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -276,7 +272,7 @@ def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return found | {"at_bound": sorted(at_bound)}
 
 
-def drawn_again(lasting: list[dict[str, Any]], further: list[dict[str, Any]]) -> dict[str, Any] | None:
+def count_vibrating_draws(lasting: list[dict[str, Any]], further: list[dict[str, Any]]) -> dict[str, Any] | None:
     """Lossy layers with three draws of noise: how many vibrate on in how many draws, by history; None without rows.
 
     Of the seeds whose draws have all been computed.
@@ -308,8 +304,8 @@ def write_lasting(folder: Path) -> Path:
         "further.md.j2",
         percent=percent,
         lossy=lossy,
-        again=drawn_again(rows, read_rows(further) if further.exists() else []),
-        standard=standard(read_standard(tables)),
+        again=count_vibrating_draws(rows, read_rows(further) if further.exists() else []),
+        standard=standard(read_rows(tables / "standard_100.jsonl")),
         **_count_lasting(lossy),
         free=_without_loss(rows, tables / "quartz_100.jsonl"),
         large=[of_runs(large, load, loss) for load in SHARES for loss in LOSSES],

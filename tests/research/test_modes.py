@@ -48,7 +48,10 @@ def test_a_seed_is_the_packing_of_the_table(name, tmp_path):
     fy = sweep.scene["load"]["fy"]
     scene = sweep.scene | {"modes": {"fx_over_fy": first}, "ramp": {"step": 1e-3 * fy, "until": first[-1] * fy}}
     seeds = {"packing.seed": [1]}
-    run_sweep(Sweep.from_mapping({"task": sweep.task, "sweep": seeds, "scene": scene}, TASKS), tmp_path / name.replace(" ", "_"))
+    run_sweep(
+        Sweep.from_mapping({"task": sweep.task, "sweep": seeds, "scene": scene}, TASKS),
+        tmp_path / name.replace(" ", "_"),
+    )
     condense(tmp_path, tmp_path)
     loads, table = (read_known(each, name)[1]["loads"] for each in (tmp_path, DOCS / "tables"))
     assert different(loads, table[:3]) == []

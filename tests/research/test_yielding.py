@@ -8,9 +8,8 @@ from research.yielding.compute import CONTROLLED_RATE
 from research.yielding.page import (
     SEEN_GROWTH,
     UNREST,
-    drawn_again,
+    count_vibrating_draws,
     numbers,
-    read_standard,
     rows_of,
     standard,
     text,
@@ -20,7 +19,7 @@ from research.yielding.page import (
 
 YIELDING = Path(__file__).parents[2] / "research" / "yielding"
 ROWS, FAILED = rows_of(YIELDING / "tables" / "quartz_100.jsonl")
-STANDARD = read_standard(YIELDING / "tables")
+STANDARD = read_rows(YIELDING / "tables" / "standard_100.jsonl")
 AT_BOUND = read_rows(YIELDING / "tables" / "sliding_100.jsonl")
 
 
@@ -70,11 +69,11 @@ def test_draws_are_counted_by_layer():
         for history, lates in (("total", {1: 1.0, 2: 0.1}), ("coulomb", {0: 0.1, 1: 0.1, 2: 0.2}))
         for draw, late in lates.items()
     ]
-    found = drawn_again(lasting, further)
+    found = count_vibrating_draws(lasting, further)
     assert found["seeds"] == [1]  # seed 2 has one draw alone
     assert found["counts"] == {"total": [0, 0, 1, 0], "coulomb": [1, 0, 0, 0]}
     assert found["late"] == 0.2
-    assert drawn_again(lasting, []) is None
+    assert count_vibrating_draws(lasting, []) is None
 
 
 def test_layers_without_loss_do_not_rest_below_their_static_yield_and_lossy_ones_do():
