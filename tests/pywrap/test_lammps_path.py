@@ -2,35 +2,41 @@
 
 import numpy as np
 import pytest
+from granular_packings import instance
 
 from faultgouge.analysis import NoEquilibriumError, find_onset, spectrum, stiffness_matrix
 
 LAW = "hertz/history 1e5 3e4 40 20 0.5 1"
 
 
-def layer(tmp_path, count: int = 20):
-    """Disks of two sizes at rest on a floor in LAMMPS, and its log."""
-    from faultgouge.pywrap import Engine  # loads what is needed, in order
-
-    assert Engine
-    from mpi4py import MPI
-
-    from faultgouge.pywrap.lammps.instance import lammps_instance
-
-    rng = np.random.default_rng(2)
-    places = [(1.05 * (k % 5 + 0.5) + rng.uniform(-0.1, 0.1), 0.6 + 1.05 * (k // 5)) for k in range(count)]
-    lmp = lammps_instance(MPI.COMM_SELF, tmp_path / "log.lammps")
+def slope(tmp_path, places, box, extra=()):
+    """Particles of two sizes at rest on a floor in LAMMPS, and its log."""
+    d = np.shape(places)[1]
+    x = np.zeros((len(places), 3))
+    x[:, :d] = places
+    lmp = instance(tmp_path / "log.lammps")
     for line in [
-        "units lj", "dimension 2", "atom_style sphere", "boundary p f p", "newton off", "comm_modify vel yes",
-        "region box block 0 5.25 0 40 -0.5 0.5", "create_box 2 box",
-        *(f"create_atoms {1 + k % 2} single {x:.17g} {y:.17g} 0" for k, (x, y) in enumerate(places)),
-        "set type 1 diameter 0.8", "set type 2 diameter 1.0", "set group all density/disc 1.0",
-        f"pair_style gran/{LAW}", "pair_coeff * *", f"fix floor all wall/gran {LAW} yplane 0 NULL contacts",
-        "group top id 16:20", "variable slope equal 0.0", "variable push internal 0.0",
-        "fix load all gravity 1.0 vector v_slope -1 0", "fix pull top addforce v_push 0 0",
-        "fix move all nve/sphere disc", "fix drag all viscous 1.0", "timestep 1e-3", "run 30000 post no", "unfix drag",
+        "units lj", f"dimension {d}", "atom_style sphere", f"boundary {'p f p' if d == 2 else 'p p f'}", "newton off",
+        "comm_modify vel yes", f"region box block {box}", "create_box 2 box",
+        *(f"create_atoms {1 + k % 2} single " + " ".join(f"{c:.17g}" for c in each) for k, each in enumerate(x)),
+        "set type 1 diameter 0.8", "set type 2 diameter 1.0", f"set group all density{'/disc' if d == 2 else ''} 1.0",
+        f"pair_style gran/{LAW}", "pair_coeff * *",
+        f"fix floor all wall/gran {LAW} {'yplane' if d == 2 else 'zplane'} 0 NULL contacts",
+        "variable slope equal 0.0", f"fix load all gravity 1.0 vector v_slope {'-1 0' if d == 2 else '0 -1'}", *extra,
+        f"fix move all nve/sphere {'disc' if d == 2 else ''}", "fix drag all viscous 1.0", "timestep 1e-3",
+        "run 40000 post no",
     ]:  # fmt: skip
         lmp.command(line)
+    return lmp
+
+
+def layer(tmp_path, count: int = 20):
+    """Disks, of which five are pushed."""
+    rng = np.random.default_rng(2)
+    places = [(1.05 * (k % 5 + 0.5) + rng.uniform(-0.1, 0.1), 0.6 + 1.05 * (k // 5)) for k in range(count)]
+    pushed = ("group top id 16:20", "variable push internal 0.0", "fix pull top addforce v_push 0 0")
+    lmp = slope(tmp_path, places, "0 5.25 0 40 -0.5 0.5", pushed)
+    lmp.command("unfix drag")
     return lmp
 
 
@@ -63,29 +69,10 @@ def test_tilt_of_a_slope(tmp_path):
 
 
 def spheres(tmp_path):
-    """Spheres of two sizes at rest on a floor in LAMMPS."""
-    from faultgouge.pywrap import Engine  # loads what is needed, in order
-
-    assert Engine
-    from mpi4py import MPI
-
-    from faultgouge.pywrap.lammps.instance import lammps_instance
-
     rng = np.random.default_rng(3)
     corner = 1.05 * np.array([(k % 2, k // 2 % 2, k // 4) for k in range(16)])
     places = corner + np.column_stack([rng.uniform(0.4, 0.6, (16, 2)), np.full(16, 0.6)])
-    lmp = lammps_instance(MPI.COMM_SELF, tmp_path / "log.lammps")
-    for line in [
-        "units lj", "atom_style sphere", "boundary p p f", "newton off", "comm_modify vel yes",
-        "region box block 0 2.1 0 2.1 0 40", "create_box 2 box",
-        *(f"create_atoms {1 + k % 2} single {x:.17g} {y:.17g} {z:.17g}" for k, (x, y, z) in enumerate(places)),
-        "set type 1 diameter 0.8", "set type 2 diameter 1.0", "set group all density 1.0",
-        f"pair_style gran/{LAW}", "pair_coeff * *", f"fix floor all wall/gran {LAW} zplane 0 NULL contacts",
-        "variable slope equal 0.0", "fix load all gravity 1.0 vector v_slope 0 -1",
-        "fix move all nve/sphere", "fix drag all viscous 1.0", "timestep 1e-3", "run 40000 post no",
-    ]:  # fmt: skip
-        lmp.command(line)
-    return lmp
+    return slope(tmp_path, places, "0 2.1 0 2.1 0 40")
 
 
 @pytest.mark.slow
