@@ -66,7 +66,10 @@ def across(at: dict[str, Any], name: str, told: Callable[[Any], str] = str, rest
 
 
 def numbers(tables: dict[str, list[Row]]) -> dict[str, Any]:
-    """What the page says: sets of equilibria by name and load, runs by state and restitution, first windows by law."""
+    """What the page says: sets of equilibria by name and load, runs by state and restitution, first windows by law.
+
+    "exceptions" are the sets and loads in which motion grows with the standard law, own ramp, in spite of `LOSS`.
+    """
     sets = {
         name.replace("_", " "): by_load(rows)
         for name, rows in sorted(tables.items())
@@ -75,7 +78,20 @@ def numbers(tables: dict[str, list[Row]]) -> dict[str, Any]:
     growth = tables.get("growth_100", [])
     onsets = {name.split("_")[1]: first_windows(rows) for name, rows in tables.items() if name.startswith("onset_")}
     packings = {name.replace("_", " "): len(rows) for name, rows in tables.items()}
-    return {"sets": sets, "packings": packings, "runs": runs(growth), "grown": len(growth), "onsets": onsets}
+    exceptions = [
+        {"set": name, "load": load, "grows": at["loaded"]["grows"][LOSS], "rate": at["loaded"]["fastest_lossy"]}
+        for name, loads in sets.items()
+        for load, at in loads.items()
+        if at["loaded"]["grows"][LOSS]["count"]
+    ]
+    return {
+        "sets": sets,
+        "exceptions": exceptions,
+        "packings": packings,
+        "runs": runs(growth),
+        "grown": len(growth),
+        "onsets": onsets,
+    }
 
 
 def by_load(rows: Sequence[Row]) -> dict[float, dict[str, Any]]:
@@ -99,6 +115,7 @@ def describe_states(states: Sequence[Row]) -> dict[str, Any]:
     found["lowest_q"] = min((each["least_q"] for each in states if each["least_q"] is not None), default=None)
     damped = [dict(map(tuple, each["damped"])) for each in states]
     found["grows"] = {e: count_true(each[e] > GROWS for each in damped if e in each) for e in RESTITUTIONS}
+    found["fastest_lossy"] = 2 * max((each[LOSS] for each in damped if LOSS in each), default=0.0)
     found["beyond_drag"] = sum(each["drag_rate"] > DRAG for each in states)
     alone = [each["normal_dashpots"] for each in states if "normal_dashpots" in each]
     found["fastest_normal_alone"] = 2 * max(alone, default=0.0)

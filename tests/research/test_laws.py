@@ -104,6 +104,9 @@ def test_pages_have_the_counts_of_the_tables():
     paper = (ROOT / "docs" / "paper.md").read_text()
     cells = " | ".join(f"{each['0.2']} / {each['0.3']}" for each in counts.values())
     assert f"| motion grows with the restitution 0.9 | {cells} |" in paper
+    [one] = FOUND["exceptions"]
+    disks = one["set"].removeprefix("force ")
+    assert f"{one['grows']['count']} of {one['grows']['of']} of {disks} disks at {one['load']}, slowly |" in paper
     units = " ".join((ROOT / "docs" / "units.md").read_text().split())
     for depth, lead in (("10 MPa", "with the smoothed law, and in 0 of 7"), ("1 MPa", "and in 0 of 9")):
         at = FOUND["sets"][f"quartz {depth}"]
