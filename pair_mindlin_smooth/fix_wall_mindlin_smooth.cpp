@@ -14,6 +14,7 @@
 #include "fix_weaken_friction.h"
 #include "force.h"
 #include "input.h"
+#include "law_keywords.h"
 #include "modify.h"
 #include "run_styles.h"
 #include "update.h"
@@ -31,6 +32,12 @@ using faultgouge::leading;
 using faultgouge::MindlinLaw;
 using faultgouge::value;
 
+namespace {
+
+constexpr const char *COMMAND = "fix wall/mindlin/smooth";
+
+}    // namespace
+
 FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : FixDiskColumns(lmp, narg, arg)
 {
   if (narg < 8)
@@ -45,7 +52,10 @@ FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : 
     error->all(FLERR, "fix wall/mindlin/smooth knows a floor only: use ylo COORD instead of {}", arg[6]);
   height = utils::numeric(FLERR, arg[7], false, lmp);
   if (!std::isfinite(height)) error->all(FLERR, "fix wall/mindlin/smooth: ylo must be finite, not {}", arg[7]);
-  read_keywords(narg, arg);
+  const LawKeywords keywords = LawReader(lmp, COMMAND, law).read(8, narg, arg);
+  compensated = keywords.compensated;
+  damping = keywords.damping;
+  dissipating = keywords.energy;
 
   if (!atom->radius_flag || !atom->omega_flag || !atom->torque_flag)
     error->all(FLERR, "fix wall/mindlin/smooth needs disks with radius and spin: use atom_style sphere");
@@ -55,46 +65,6 @@ FixWallMindlinSmooth::FixWallMindlinSmooth(LAMMPS *lmp, int narg, char **arg) : 
   extscalar = 1;
   energy_global_flag = 1;
   make_columns(OVERLAP + 1 + compensated + dissipating);
-}
-
-void FixWallMindlinSmooth::read_keywords(int narg, char **arg)
-{
-  for (int k = 8; k < narg; k++) {
-    if (strcmp(arg[k], "compensated") == 0) {
-      compensated = true;
-    } else if (strcmp(arg[k], "exponent") == 0) {
-      if (++k >= narg || !law.set_exponent(utils::numeric(FLERR, arg[k], false, lmp)))
-        error->all(FLERR, "fix wall/mindlin/smooth: exponent must be 1.5 or 1, not {}", k < narg ? arg[k] : "left out");
-    } else if (strcmp(arg[k], "history") == 0) {
-      if (++k >= narg || !law.set_history(arg[k]))
-        error->all(FLERR, "fix wall/mindlin/smooth: history must be total, rescaled or coulomb, not {}",
-                   k < narg ? arg[k] : "left out");
-    } else if (strcmp(arg[k], "damping") == 0) {
-      if (k + 2 >= narg) error->all(FLERR, "fix wall/mindlin/smooth: damping takes two numbers, CN CT");
-      set_damping(arg[k + 1], arg[k + 2]);
-      k += 2;
-    } else if (strcmp(arg[k], "energy") == 0) {
-      if (++k >= narg) error->all(FLERR, "fix wall/mindlin/smooth: energy must be yes or no");
-      dissipating = utils::logical(FLERR, arg[k], false, lmp);
-    } else {
-      error->all(
-          FLERR,
-          "fix wall/mindlin/smooth knows the keywords exponent, history, damping, energy and compensated, but not {}",
-          arg[k]);
-    }
-  }
-  if (!law.valid_history())
-    error->all(FLERR, "fix wall/mindlin/smooth: history rescaled needs exponent 1.5, since the stiffness of harmonic "
-                      "disks does not depend on the overlap");
-}
-
-void FixWallMindlinSmooth::set_damping(const char *cn, const char *ct)
-{
-  law.cn = utils::numeric(FLERR, cn, false, lmp);
-  law.ct = utils::numeric(FLERR, ct, false, lmp);
-  if (!law.valid_dashpots())
-    error->all(FLERR, "fix wall/mindlin/smooth: damping CN CT must be finite and not negative (got {} {})", cn, ct);
-  damping = true;
 }
 
 int FixWallMindlinSmooth::setmask()
@@ -174,7 +144,8 @@ int FixWallMindlinSmooth::modify_param(int narg, char **arg)
       return 2;
     }
     if (narg < 3) error->all(FLERR, "fix_modify {} damping takes two numbers, CN CT, or no", id);
-    set_damping(arg[1], arg[2]);
+    LawReader(lmp, COMMAND, law).read_dashpots(arg[1], arg[2]);
+    damping = true;
     return 3;
   }
   if (strcmp(arg[0], "mu") != 0) return 0;

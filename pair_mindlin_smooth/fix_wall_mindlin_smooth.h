@@ -52,8 +52,6 @@ private:
   std::string mu_variable;    // empty where mu is a number
   int mu_index = -1;          // of that variable
 
-  void read_keywords(int, char **);
-  void set_damping(const char *, const char *);
   void find_dashpots();
   void set_mu(const char *);
   void update_mu();

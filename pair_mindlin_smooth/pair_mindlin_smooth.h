@@ -74,7 +74,6 @@ private:
   std::vector<double> felt;    // v_x, v_y, omega that dashpots feel, of owned and ghost disks
 
   void allocate();
-  void read_keywords(int, char **);
   void make_fixes();
   void make_dashpots();
   void check_disks() const;

@@ -15,6 +15,7 @@
 #include "fix_disc_integrators.h"
 #include "fix_weaken_friction.h"
 #include "force.h"
+#include "law_keywords.h"
 #include "memory.h"
 #include "modify.h"
 #include "neighbor.h"
@@ -88,44 +89,10 @@ void PairMindlinSmooth::settings(int narg, char **arg)
     error->all(FLERR,
                "pair_style mindlin/smooth: KN must be positive, KT and MU not negative, all finite (got {} {} {})",
                arg[0], arg[1], arg[2]);
-  read_keywords(narg, arg);
-}
-
-void PairMindlinSmooth::read_keywords(int narg, char **arg)
-{
-  compensated = damping = energy = false;
-  for (int k = 3; k < narg; k++) {
-    if (strcmp(arg[k], "compensated") == 0) {
-      compensated = true;
-    } else if (strcmp(arg[k], "exponent") == 0) {
-      if (++k >= narg || !law.set_exponent(utils::numeric(FLERR, arg[k], false, lmp)))
-        error->all(FLERR, "pair_style mindlin/smooth: exponent must be 1.5 or 1, not {}",
-                   k < narg ? arg[k] : "left out");
-    } else if (strcmp(arg[k], "history") == 0) {
-      if (++k >= narg || !law.set_history(arg[k]))
-        error->all(FLERR, "pair_style mindlin/smooth: history must be total, rescaled or coulomb, not {}",
-                   k < narg ? arg[k] : "left out");
-    } else if (strcmp(arg[k], "damping") == 0) {
-      if (k + 2 >= narg) error->all(FLERR, "pair_style mindlin/smooth: damping takes two numbers, CN CT");
-      law.cn = utils::numeric(FLERR, arg[++k], false, lmp);
-      law.ct = utils::numeric(FLERR, arg[++k], false, lmp);
-      if (!law.valid_dashpots())
-        error->all(FLERR, "pair_style mindlin/smooth: damping CN CT must be finite and not negative (got {} {})",
-                   arg[k - 1], arg[k]);
-      damping = true;
-    } else if (strcmp(arg[k], "energy") == 0) {
-      if (++k >= narg) error->all(FLERR, "pair_style mindlin/smooth: energy must be yes or no");
-      energy = utils::logical(FLERR, arg[k], false, lmp);
-    } else {
-      error->all(
-          FLERR,
-          "pair_style mindlin/smooth knows the keywords exponent, history, damping, energy and compensated, but not {}",
-          arg[k]);
-    }
-  }
-  if (!law.valid_history())
-    error->all(FLERR, "pair_style mindlin/smooth: history rescaled needs exponent 1.5, since the stiffness of harmonic "
-                      "disks does not depend on the overlap");
+  const LawKeywords keywords = LawReader(lmp, "pair_style mindlin/smooth", law).read(3, narg, arg);
+  compensated = keywords.compensated;
+  damping = keywords.damping;
+  energy = keywords.energy;
 }
 
 void PairMindlinSmooth::coeff(int narg, char **arg)

@@ -1,0 +1,55 @@
+// Copyright (C) 2026 The faultgouge developers
+// SPDX-License-Identifier: GPL-2.0-only
+//
+// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+
+#include "law_keywords.h"
+
+#include "error.h"
+#include "utils.h"
+
+#include <cstring>
+
+using namespace LAMMPS_NS;
+
+LawKeywords LawReader::read(int first, int narg, char **arg)
+{
+  LawKeywords found;
+  for (int k = first; k < narg; k++) {
+    if (strcmp(arg[k], "compensated") == 0) {
+      found.compensated = true;
+    } else if (strcmp(arg[k], "exponent") == 0) {
+      if (++k >= narg || !law.set_exponent(utils::numeric(FLERR, arg[k], false, lmp)))
+        error->all(FLERR, "{}: exponent must be 1.5 or 1, not {}", command, k < narg ? arg[k] : "left out");
+    } else if (strcmp(arg[k], "history") == 0) {
+      if (++k >= narg || !law.set_history(arg[k]))
+        error->all(FLERR, "{}: history must be total, rescaled or coulomb, not {}", command,
+                   k < narg ? arg[k] : "left out");
+    } else if (strcmp(arg[k], "damping") == 0) {
+      if (k + 2 >= narg) error->all(FLERR, "{}: damping takes two numbers, CN CT", command);
+      read_dashpots(arg[k + 1], arg[k + 2]);
+      found.damping = true;
+      k += 2;
+    } else if (strcmp(arg[k], "energy") == 0) {
+      if (++k >= narg) error->all(FLERR, "{}: energy must be yes or no", command);
+      found.energy = utils::logical(FLERR, arg[k], false, lmp);
+    } else {
+      error->all(FLERR, "{} knows the keywords exponent, history, damping, energy and compensated, but not {}", command,
+                 arg[k]);
+    }
+  }
+  if (!law.valid_history())
+    error->all(FLERR,
+               "{}: history rescaled needs exponent 1.5, since the stiffness of harmonic disks does not depend on the "
+               "overlap",
+               command);
+  return found;
+}
+
+void LawReader::read_dashpots(const char *cn, const char *ct)
+{
+  law.cn = utils::numeric(FLERR, cn, false, lmp);
+  law.ct = utils::numeric(FLERR, ct, false, lmp);
+  if (!law.valid_dashpots())
+    error->all(FLERR, "{}: damping CN CT must be finite and not negative (got {} {})", command, cn, ct);
+}
