@@ -29,8 +29,8 @@ OUT_OF_BALANCE = 1e-3
 rearrange rather than relax."""
 
 STIFFNESS = {1.5: 2e5, 1.0: 7e3}
-"""k_n while a packing settles, by the exponent of the law: the paper's, and of harmonic disks the stiffness 3/2 k_n
-delta^(1/2) that a contact of the paper's law has under the paper's load."""
+"""k_n while a packing settles, by the exponent of the law (of others that of 3/2): the paper's, and of harmonic disks
+the stiffness 3/2 k_n delta^(1/2) that a contact of the paper's law has under the paper's load."""
 
 DIGITS = 12
 """Decimal digits of numbers that are converted: more than anybody gives, and fewer than a change of units leaves
@@ -198,7 +198,7 @@ def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[Ge
     GeneratedPacking, MindlinLaw, float
         The same in the packing's units. Dashpots are left out: settling has a damping of its own.
     """
-    length, stiffness = 2 * min(packing.radii), STIFFNESS[law.exponent]
+    length, stiffness = 2 * min(packing.radii), STIFFNESS.get(law.exponent, STIFFNESS[1.5])
     undamped = replace(law, cn=0.0, ct=0.0)
     if length == 1.0 and law.kn == stiffness:
         return packing, undamped, fy
