@@ -75,7 +75,7 @@ def spheres(tmp_path):
     return slope(tmp_path, places, "0 2.1 0 2.1 0 40")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_windows_of_spheres_are_those_of_all_eigenvalues(tmp_path):
     """At loads between, right below and right above all edges LAPACK has as many complex pairs as there are windows."""
     from faultgouge.pywrap import lammps_path
