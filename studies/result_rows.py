@@ -57,7 +57,8 @@ def row_columns(rows: Sequence[Mapping[str, Any]], *names: str) -> Floats:
 
 
 def append_row(path: Path, row: Mapping[str, Any]) -> None:
-    """Write a row; it is in the file when this returns."""
+    """Write a row; it is in the file when this returns. A folder that is missing is made."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a") as file:
         file.write(json.dumps(row) + "\n")
 
