@@ -26,9 +26,11 @@ elastic, so that it sticks by default.
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...analysis import LinearisedContacts, MindlinLaw, Snapshot
 from ...analysis.packing.arrays import Floats, Indices
@@ -182,10 +184,38 @@ def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: Arrays) -> Sn
     order = np.argsort(found["id"], kind="stable")
     per_atom = [name for name in found if name not in ("contacts", "partners")]
     found = found | {name: found[name][order] for name in per_atom}
-    count, fixes = len(order), styles[1]
+    count, dimension = len(order), lmp.extract_setting("dimension")
     if count == 0:
         raise SnapshotError("This LAMMPS has no particles.")
-    dimension = lmp.extract_setting("dimension")
+    free, frozen, factor = _mobility(styles[1], commands, found)
+    mass = found["rmass"]
+    low, high, xy, yz, xz, periodic, _ = lmp.extract_box()
+    size = np.subtract(high, low)
+    made = Snapshot(
+        dimension=dimension,
+        position=found["x"][:, :dimension],
+        radius=found["radius"],
+        mass=mass,
+        inertia=factor * mass * found["radius"] ** 2,
+        contacts=_Contacts(found, commands, styles, lmp.extract_setting("ntypes"), frozen).all(),
+        box=np.array([[size[0], 0, 0], [xy, size[1], 0], [xz, yz, size[2]]]),
+        origin=np.array(low),
+        periodic=np.array(periodic, dtype=bool),
+        load=np.zeros((count, 2, 3)),
+        free=free,
+        ids=found["id"].astype(np.int64),
+        kind=found["type"].astype(np.int64),
+    )
+    total = np.stack([found["f"], found["torque"]], axis=1)
+    load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
+    return made.loaded_by(load)
+
+
+def _mobility(
+    fixes: dict[str, str], commands: Commands, found: Arrays
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
+    """Which particles are free, which are frozen, and I/(m R^2) of each."""
+    count = len(found["id"])
     frozen, free, factor = np.zeros(count, bool), np.zeros(count, bool), np.full(count, 0.4)
     for number, (name, style) in enumerate(fixes.items()):
         plain, words = without_suffix(style), commands.fixes.get(name, "").split()
@@ -203,35 +233,15 @@ def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: Arrays) -> Sn
             "Nothing moves the particles: give the line of fix nve/sphere, or set it up, so that it is known which of "
             "them are free and what their moments of inertia are."
         )
-    mass = found["rmass"]
-    contacts = _Contacts(found, commands, styles, lmp.extract_setting("ntypes"), frozen)
-    joined = contacts.all()
-    low, high, xy, yz, xz, periodic, _ = lmp.extract_box()
-    size = np.subtract(high, low)
-    made = Snapshot(
-        dimension=dimension,
-        position=found["x"][:, :dimension],
-        radius=found["radius"],
-        mass=mass,
-        inertia=factor * mass * found["radius"] ** 2,
-        contacts=joined,
-        box=np.array([[size[0], 0, 0], [xy, size[1], 0], [xz, yz, size[2]]]),
-        origin=np.array(low),
-        periodic=np.array(periodic, dtype=bool),
-        load=np.zeros((count, 2, 3)),
-        free=free,
-        ids=found["id"].astype(np.int64),
-        kind=found["type"].astype(np.int64),
-    )
-    total = np.stack([found["f"], found["torque"]], axis=1)
-    load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
-    return made.loaded_by(load)
+    return free, frozen, factor
 
 
 class _Contacts:
     """The contacts of a look, with the laws that LAMMPS has for them."""
 
-    def __init__(self, found: Arrays, commands: Commands, styles: Styles, types: int, frozen: Indices) -> None:
+    def __init__(
+        self, found: Arrays, commands: Commands, styles: Styles, types: int, frozen: NDArray[np.bool_]
+    ) -> None:
         self.found, self.commands, self.types, self.units = found, commands, types, styles[2]
         self.radius, self.mass = found["radius"], np.where(frozen, np.inf, found["rmass"])
         self.kind = found["type"].astype(np.int64)
@@ -271,72 +281,69 @@ class _Contacts:
         return i, normal, self.radius[i] - np.abs(distance), rows[i, 1:4]
 
     def _linearise_by_measured_laws(self) -> list[LinearisedContacts]:
+        pairs, walls = self._pairs_by_types(), self._walls()
+        laws = measure_laws(
+            self.commands,
+            self.units,
+            self.types,
+            {types: each.median_state() for types, each in pairs.items()},
+            [(name, each.median_state()) for name, each in walls.items()],
+        )
+        groups: dict[Any, _OneLaw] = {**pairs, **walls}
+        return [_by_law(laws[key], group) for key, group in groups.items()] or [_none()]
+
+    def _pairs_by_types(self) -> dict[tuple[int, int], "_OneLaw"]:
+        """Contacts between particles by their two types, the smaller first."""
         i, j, normal, distance, overlap, rows = self._pairs()
-        a, b = np.minimum(self.kind[i], self.kind[j]), np.maximum(self.kind[i], self.kind[j])
-        kinds = np.unique(np.stack([a, b], axis=1), axis=0)
-        walls = {name: self._wall(each) for name, each in self.walls.items()}
-        states, which = {}, {}
-        for first, second in kinds:
-            chosen = np.flatnonzero((a == first) & (b == second))
-            k = chosen[np.argsort(overlap[chosen])[len(chosen) // 2]]
-            turn = self.kind[i[k]] != first
-            p, q = (j[k], i[k]) if turn else (i[k], j[k])
-            real = self.found["rmass"]
-            states[int(first), int(second)] = State((self.radius[p], self.radius[q]), (real[p], real[q]), overlap[k])
-            which[int(first), int(second)] = chosen
-        at_walls = []
-        for name, (touching, _, depth, _) in walls.items():
-            if len(touching):
-                k = np.argsort(depth)[len(depth) // 2]
-                at_walls.append(
-                    (name, State((self.radius[touching[k]], 0.0), (self.found["rmass"][touching[k]], np.inf), depth[k]))
-                )
-        laws = measure_laws(self.commands, self.units, self.types, states, at_walls)
-        parts = []
-        for key, chosen in which.items():
+        types = np.sort(np.stack([self.kind[i], self.kind[j]], axis=1), axis=1)
+        found = {}
+        for first, second in np.unique(types, axis=0).tolist():
+            chosen = np.flatnonzero(np.all(types == (first, second), axis=1))
             p, q = i[chosen], j[chosen]
-            reduced = self.radius[p] * self.radius[q] / (self.radius[p] + self.radius[q])
             with np.errstate(divide="ignore"):
                 effective = 1 / (1 / self.mass[p] + 1 / self.mass[q])
-            # LAMMPS's meff of two frozen particles matters to nobody
-            effective = np.where(np.isfinite(effective), effective, 0.0)
-            parts.append(
-                _by_law(
-                    laws[key],
-                    p,
-                    q,
-                    normal[chosen],
-                    distance[chosen],
-                    overlap[chosen],
-                    rows[chosen, 0],
-                    rows[chosen, 1:4],
-                    np.column_stack([self.radius[p], self.radius[q]]),
-                    reduced,
-                    effective,
-                    f"contacts of types {key[0]} and {key[1]}",
-                )
+            found[first, second] = _OneLaw(
+                f"contacts of types {first} and {second}",
+                i=p,
+                j=q,
+                normal=normal[chosen],
+                distance=distance[chosen],
+                overlap=overlap[chosen],
+                normal_force=rows[chosen, 0],
+                tangential_force=rows[chosen, 1:4],
+                radii=np.column_stack([self.radius[p], self.radius[q]]),
+                masses=np.column_stack([self.found["rmass"][p], self.found["rmass"][q]]),
+                radius=self.radius[p] * self.radius[q] / (self.radius[p] + self.radius[q]),
+                # LAMMPS's meff of two frozen particles matters to nobody
+                mass=np.where(np.isfinite(effective), effective, 0.0),
+                turned=self.kind[p] != first,
             )
-        for name, _ in at_walls:
-            p, n, depth, force = walls[name]
-            fn = np.einsum("ca,ca->c", force, n)
-            none = np.zeros(len(p))
-            parts.append(
-                _by_law(
-                    laws[name],
-                    p,
-                    np.full(len(p), WALL),
-                    n,
-                    np.full(len(p), np.inf),
-                    depth,
-                    fn,
-                    force - fn[:, None] * n,
-                    np.column_stack([self.radius[p], none]),
-                    self.radius[p],
-                    self.found["rmass"][p],
-                    f"fix {name}",
-                )
+        return found
+
+    def _walls(self) -> dict[str, "_OneLaw"]:
+        """Contacts with each wall that particles touch."""
+        found = {}
+        for name, rows in self.walls.items():
+            i, normal, depth, force = self._wall(rows)
+            if not len(i):
+                continue
+            along, mass = np.einsum("ca,ca->c", force, normal), self.found["rmass"][i]
+            found[name] = _OneLaw(
+                f"fix {name}",
+                i=i,
+                j=np.full(len(i), WALL),
+                normal=normal,
+                distance=np.full(len(i), np.inf),
+                overlap=depth,
+                normal_force=along,
+                tangential_force=force - along[:, None] * normal,
+                radii=np.column_stack([self.radius[i], np.zeros(len(i))]),
+                masses=np.column_stack([mass, np.full(len(i), np.inf)]),
+                radius=self.radius[i],
+                mass=mass,
+                turned=np.zeros(len(i), dtype=bool),
             )
-        return parts or [_none()]
+        return found
 
     def _own_law(self, words: list[str]) -> MindlinLaw:
         """The smooth law of a line, whose first three words are kn, kt and mu."""
@@ -405,41 +412,59 @@ def _agree(computed: Floats, said: Floats, rounding: Floats | float, who: str) -
         )
 
 
-def _by_law(
-    law: MeasuredLaw,
-    i: Indices,
-    j: Indices,
-    normal: Floats,
-    distance: Floats,
-    overlap: Floats,
-    normal_force: Floats,
-    tangential_force: Floats,
-    arms: Floats,
-    reduced: Floats,
-    effective: Floats,
-    who: str,
-) -> LinearisedContacts:
+@dataclass(frozen=True)
+class _OneLaw:
+    """Contacts that have one law, as LAMMPS says them: of two types, or with one wall.
+
+    `radius` and `mass` are the effective ones. `turned` contacts have the particle of the second type first.
+    """
+
+    who: str
+    i: Indices
+    j: Indices
+    normal: Floats
+    distance: Floats
+    overlap: Floats
+    normal_force: Floats
+    tangential_force: Floats
+    radii: Floats
+    masses: Floats
+    radius: Floats
+    mass: Floats
+    turned: NDArray[np.bool_]
+
+    def median_state(self) -> State:
+        """The contact of the median overlap."""
+        k = np.argsort(self.overlap)[len(self.overlap) // 2]
+        order = slice(None, None, -1 if self.turned[k] else 1)
+        (a, b), (m, n) = self.radii[k][order], self.masses[k][order]
+        return State((a, b), (m, n), self.overlap[k])
+
+
+def _by_law(law: MeasuredLaw, contacts: _OneLaw) -> LinearisedContacts:
     """Contacts of a law that has been measured."""
-    stiffness = law.exponent * normal_force / overlap
-    _agree(law.stiffness.at(reduced, overlap) * overlap, normal_force, ROUNDING * stiffness * arms.sum(axis=1), who)
-    per_overlap = tangential_force / overlap[:, None]
+    overlap, arms = contacts.overlap, contacts.radii
+    stiffness = law.exponent * contacts.normal_force / overlap
+    computed = law.stiffness.at(contacts.radius, overlap) * overlap
+    _agree(computed, contacts.normal_force, ROUNDING * stiffness * arms.sum(axis=1), contacts.who)
+    per_overlap = contacts.tangential_force / overlap[:, None]
     return LinearisedContacts(
-        i=i,
-        j=j,
-        normal=normal,
-        distance=distance,
+        i=contacts.i,
+        j=contacts.j,
+        normal=contacts.normal,
+        distance=contacts.distance,
         overlap=overlap,
         slip_arm=arms,
         lever_arm=np.where(arms > 0, arms - law.lever * overlap[:, None], 0.0),
-        lever_slope=np.full(len(i), law.lever),
-        normal_force=normal_force,
-        tangential_force=tangential_force,
+        lever_slope=np.full(len(overlap), law.lever),
+        normal_force=contacts.normal_force,
+        tangential_force=contacts.tangential_force,
         normal_stiffness=stiffness,
-        tangential_stiffness=law.tangential.at(reduced, overlap),
+        tangential_stiffness=law.tangential.at(contacts.radius, overlap),
         closing=law.closing * per_overlap,
         parting=law.parting * per_overlap,
-        friction=law.mu * normal_force,
-        sliding=np.zeros(len(i), dtype=bool),
-        normal_dashpot=law.normal_dashpot.at(reduced, overlap, effective),
-        tangential_dashpot=law.tangential_dashpot.at(reduced, overlap, effective),
+        friction=law.mu * contacts.normal_force,
+        sliding=np.zeros(len(overlap), dtype=bool),
+        normal_dashpot=law.normal_dashpot.at(contacts.radius, overlap, contacts.mass),
+        tangential_dashpot=law.tangential_dashpot.at(contacts.radius, overlap, contacts.mass),
     )
