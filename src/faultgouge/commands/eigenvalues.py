@@ -109,50 +109,21 @@ def _values(packing: Packing | Snapshot, as_json: bool) -> None:
 
 
 def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[str, Any] | None) -> None:
-    from faultgouge.analysis import Snapshot, growth_rate, solid_fraction
+    from faultgouge.analysis import Snapshot
 
-    real = result.eigenvalues.real
-    what, fraction = f"F_x = {packing.fx:g}", ""
-    if isinstance(packing, Snapshot):
-        what = f"{len(packing)} {'spheres' if packing.dimension == 3 else 'disks'} as LAMMPS left them"
-        bound = int(packing.contacts.at_bound.sum())
-        if bound:
-            acts = "slide" if packing.contacts.sliding.any() else "stick"
-            say(f"{bound} of {len(packing.contacts)} contacts are at Coulomb's bound; they {acts} here")
-    else:
-        fraction = f"; volume fraction {solid_fraction(packing):.4f}"
-        if packing.law.coulomb and packing.sliding.any():
-            bound = int(packing.sliding.sum())
-            say(
-                f"{bound} of {len(packing.contacts)} contacts are at Coulomb's bound; they stick here, and a motion "
-                "that grows because they slide on is not in the spectrum"
-            )
-    span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ", as no particle touches another"
-    print(f"{what}: {len(real)} eigenvalues{span}, {len(result.rattlers)} rattlers left out{fraction}")
+    _print_size(packing, result)
     if not _in_balance(packing):
         print(
             f"not in equilibrium: the residual force on a disk is {packing.residual:.3g}, and the spectrum of a "
             "moving packing does not show whether it is stable"
         )
-    for value in result.negative:
-        print(f"negative eigenvalue {value:.10g}: D grows as exp({growth_rate(value):.6g} t), without oscillation")
-    for pair in result.pairs:
-        print(
-            f"complex pair {pair.eigenvalue.real:.10g} +- {pair.eigenvalue.imag:.10g} i: "
-            f"D grows as exp({pair.growth_rate:.6g} t), |y^H x| = {pair.overlap:.2g}"
-        )
-    if len(result.negative):
-        print(f"unstable, like a column that buckles: {len(result.negative)} negative eigenvalues")
-    if result.pairs:
-        print(
-            f"{len(result.pairs)} complex pairs; least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}"
-        )
+    _print_growing_motions(result)
     if result.is_stable and _in_balance(packing):
         free = result.free
         but = f", except for {free} eigenvalues of zero: no force opposes such a motion" if free else ""
         print(
             f"no complex pair and no negative eigenvalue: linearly stable{but}"
-            if len(real)
+            if len(result.eigenvalues)
             else "no disk touches another disk or the floor: stability is not defined"
         )
     if not isinstance(packing, Snapshot) and packing.damped:
@@ -166,6 +137,43 @@ def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[st
         )
     if result.noise_pairs:
         print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
+
+
+def _print_size(packing: Packing | Snapshot, result: Spectrum) -> None:
+    """The packing, the range of its eigenvalues, and its contacts at Coulomb's bound."""
+    from faultgouge.analysis import Snapshot, solid_fraction
+
+    real = result.eigenvalues.real
+    if isinstance(packing, Snapshot):
+        what, fraction = f"{len(packing)} {'spheres' if packing.dimension == 3 else 'disks'} as LAMMPS left them", ""
+        bound = int(packing.contacts.at_bound.sum())
+        acts = "slide here" if packing.contacts.sliding.any() else "stick here"
+    else:
+        what, fraction = f"F_x = {packing.fx:g}", f"; volume fraction {solid_fraction(packing):.4f}"
+        bound = int(packing.sliding.sum()) if packing.law.coulomb else 0
+        acts = "stick here, and a motion that grows because they slide on is not in the spectrum"
+    if bound:
+        say(f"{bound} of {len(packing.contacts)} contacts are at Coulomb's bound; they {acts}")
+    span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ", as no particle touches another"
+    print(f"{what}: {len(real)} eigenvalues{span}, {len(result.rattlers)} rattlers left out{fraction}")
+
+
+def _print_growing_motions(result: Spectrum) -> None:
+    from faultgouge.analysis import growth_rate
+
+    for value in result.negative:
+        print(f"negative eigenvalue {value:.10g}: D grows as exp({growth_rate(value):.6g} t), without oscillation")
+    for pair in result.pairs:
+        print(
+            f"complex pair {pair.eigenvalue.real:.10g} +- {pair.eigenvalue.imag:.10g} i: "
+            f"D grows as exp({pair.growth_rate:.6g} t), |y^H x| = {pair.overlap:.2g}"
+        )
+    if len(result.negative):
+        print(f"unstable, like a column that buckles: {len(result.negative)} negative eigenvalues")
+    if result.pairs:
+        print(
+            f"{len(result.pairs)} complex pairs; least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}"
+        )
 
 
 def _in_balance(packing: Packing | Snapshot) -> bool:
