@@ -20,6 +20,7 @@ their distance from the middle. Whatever comes as close to the axis as that is s
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, eye_array
@@ -27,7 +28,7 @@ from scipy.sparse.linalg import ArpackError, eigsh
 
 from ..errors import FaultgougeError
 from ..factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
-from ..packing.packing import Floats
+from ..packing.packing import Floats, Indices
 from ..spectrum.spectrum import Complexes, active_coordinates
 from .all_windows import drop_duplicates
 from .modes import DampedMode, Pencil, find_growing_near, refine_mode
@@ -132,6 +133,67 @@ class Disc:
         return np.flatnonzero(near & (self.values.imag > -RESIDUAL_LIMIT * distance)).tolist()
 
 
+@dataclass(frozen=True, eq=False)
+class _ScaledPencil:
+    """A pencil in units of its largest undamped frequency, without the coordinates that feel no force.
+
+    `stiffness` is A, `feed` is i times its antisymmetric part, `loss` is G. The lowest eigenvalue of the symmetric part
+    of A lies no farther below zero than `softening`.
+    """
+
+    pencil: Pencil
+    active: Indices
+    unit: float
+    stiffness: csr_array
+    feed: csr_array
+    loss: csr_array
+    softening: float
+
+    @classmethod
+    def of(cls, pencil: Pencil, active: Indices) -> "_ScaledPencil":
+        a, g = (csr_array(each[active][:, active]) for each in pencil.matrices)
+        unit = float(np.sqrt(_largest_eigenvalue(csr_array(0.5 * (a + a.T)))))  # no frequency is larger
+        softening = _largest_eigenvalue(csr_array(eye_array(len(active)) - 0.5 * (a + a.T) / unit**2)) - 1
+        feed = csr_array(0.5j * (a - a.T) / unit**2)
+        return cls(pencil, active, unit, csr_array(a / unit**2), feed, csr_array(g / unit), softening)
+
+    @cached_property
+    def single_precision(self) -> tuple[csr_array, csr_array]:
+        """A and G."""
+        return csr_array(self.stiffness.astype(np.float32)), csr_array(self.loss.astype(np.float32))
+
+    @property
+    def largest_frequency(self) -> float:
+        """Of motions that grow: the feed allows no more beyond the largest undamped one."""
+        return float(np.sqrt(1 + 0.25 * np.abs(self.feed).sum(axis=1).max() ** 2))
+
+    def fastest_growth(self, low: float, high: float) -> float:
+        """What Re s does not exceed between two frequencies."""
+        fastest = float(np.sqrt(high**2 + max(0.0, self.softening)))
+        if not low:
+            return fastest
+        most_taken = float(np.abs(self.loss).sum(axis=1).max())
+        form = csr_array(most_taken * eye_array(len(self.active)) - self.loss - self.feed / low)
+        return min(fastest, 0.5 * (_largest_eigenvalue(form) - most_taken))
+
+    def look(self, middle: complex) -> tuple[float, list[DampedMode]]:
+        """The radius about a point in which all that grows is found, and what is found."""
+        disc, pencil = Disc.about(middle, *self.single_precision), self.pencil
+        if disc.radius < SMALLEST:
+            raise UncoveredAxisError(f"motions at F_x = {pencil.fx:.10g} lie too close to be told from each other")
+        found = []
+        for k in disc.near_axis:
+            x = np.zeros(pencil.stiffness.shape[0], complex)
+            x[self.active] = disc.vectors[:, k] / np.linalg.norm(disc.vectors[:, k])
+            distance = abs(disc.values[k] - middle)
+            found += _solve(pencil, x, complex(disc.values[k]) * self.unit, distance * self.unit)
+        return disc.radius, found
+
+
+Rectangle = tuple[complex, complex]
+"""Lower left and upper right corners."""
+
+
 def growing_modes(pencil: Pencil) -> list[DampedMode]:
     """The motions that grow at a load, each once; see the module.
 
@@ -148,57 +210,36 @@ def growing_modes(pencil: Pencil) -> list[DampedMode]:
     active = active_coordinates(pencil.stiffness)
     if not len(active):
         return []
-    a, g = (csr_array(each[active][:, active]) for each in pencil.matrices)
-    unit = float(np.sqrt(_largest_eigenvalue(csr_array(0.5 * (a + a.T)))))  # no frequency is larger
-    feed, loss = csr_array(0.5j * (a - a.T) / unit**2), csr_array(g / unit)
-    most_taken = float(np.abs(loss).sum(axis=1).max())
+    scaled = _ScaledPencil.of(pencil, active)
+    found, beside = _cover_axis(scaled)
+    while beside:
+        low, high = beside.pop()
+        size = high - low
+        reach, more = scaled.look(0.5 * (low + high))
+        found += more
+        if reach < 0.5 * abs(size):
+            half = 0.5 * size.real if size.real > size.imag else 0.5j * size.imag
+            beside += [(low, high - half), (low + half, high)]
+    return drop_duplicates([mode for mode in found if mode.grows and mode.rate.imag >= 0])
 
-    one = eye_array(len(active))
-    softening = _largest_eigenvalue(csr_array(one - 0.5 * (a + a.T) / unit**2)) - 1  # less the lowest eigenvalue
 
-    def fastest_growth(low: float, high: float) -> float:
-        """What Re s does not exceed between two frequencies."""
-        fastest = float(np.sqrt(high**2 + max(0.0, softening)))
-        if not low:
-            return fastest
-        form = csr_array(most_taken * one - loss - feed / low)
-        return min(fastest, 0.5 * (_largest_eigenvalue(form) - most_taken))
-
-    rough = csr_array((a / unit**2).astype(np.float32)), csr_array((g / unit).astype(np.float32))
+def _cover_axis(scaled: _ScaledPencil) -> tuple[list[DampedMode], list[Rectangle]]:
+    """Modes in discs along the axis, and what of the right half-plane these discs leave uncovered."""
     found: list[DampedMode] = []
-
-    def look(middle: complex) -> float:
-        """The radius about a point in which all that grows is found."""
-        disc = Disc.about(middle, *rough)
-        if disc.radius < SMALLEST:
-            raise UncoveredAxisError(f"motions at F_x = {pencil.fx:.10g} lie too close to be told from each other")
-        for k in disc.near_axis:
-            x = np.zeros(pencil.stiffness.shape[0], complex)
-            x[active] = disc.vectors[:, k] / np.linalg.norm(disc.vectors[:, k])
-            found.extend(_solve(pencil, x, complex(disc.values[k]) * unit, abs(disc.values[k] - middle) * unit))
-        return disc.radius
-
-    # with Re s > 0 the frequency exceeds the largest undamped one by no more than what feeds the motion allows
-    end = float(np.sqrt(1 + 0.25 * np.abs(feed).sum(axis=1).max() ** 2))
+    beside: list[Rectangle] = []
     covered, radius = 0.0, 0.05
-    beside: list[tuple[complex, complex]] = []  # lower left and upper right corners
-    while covered < end:
+    while covered < scaled.largest_frequency:
         middle = covered + AHEAD * radius
-        reach = look(1j * middle)
+        reach, more = scaled.look(1j * middle)
+        found += more
         if middle - TOUCH * reach > covered:
             radius = min(reach, 0.8 * radius)
             continue
         begin, covered, radius = covered, middle + TOUCH * reach, min(reach, 1.0)
-        height, fastest = float(np.sqrt(1 - TOUCH**2) * reach), fastest_growth(begin, covered)
+        height, fastest = float(np.sqrt(1 - TOUCH**2) * reach), scaled.fastest_growth(begin, covered)
         if height < fastest:
             beside.append((complex(height, begin), complex(fastest, covered)))
-    while beside:
-        low, high = beside.pop()
-        size = high - low
-        if look(0.5 * (low + high)) < 0.5 * abs(size):
-            half = 0.5 * size.real if size.real > size.imag else 0.5j * size.imag
-            beside += [(low, high - half), (low + half, high)]
-    return drop_duplicates([mode for mode in found if mode.grows and mode.rate.imag >= 0])
+    return found, beside
 
 
 def _solve(pencil: Pencil, x: Complexes, s: complex, distance: float) -> list[DampedMode]:
