@@ -57,6 +57,11 @@ INTEGRATORS = {"nve/sphere": 0.4, "nve/disc": 1.0, "overdamped/disc": 1.0}
 """Fixes that move particles and turn them, with I/(m R^2)."""
 
 
+Styles = tuple[str, dict[str, str], str, str]
+KnownLaws = dict[tuple[Any, ...], MeasuredLaw]
+"""By their commands, and the two types or the ID of a wall's fix."""
+
+
 def from_lammps(
     lmp: Any, commands: Iterable[str] | None = None, *, slides: bool = False, balance: float = BALANCE
 ) -> Snapshot:
@@ -88,12 +93,19 @@ def from_lammps(
         If the packing cannot be taken: it moves, or has rolling or twisting friction, cohesion, no history, walls
         without contacts, moving or curved walls, or bodies; or the commands are not those of the instance.
     """
+    return take_snapshot(lmp, commands, {}, slides=slides, balance=balance)
+
+
+def take_snapshot(
+    lmp: Any, commands: Iterable[str] | None, laws: KnownLaws, *, slides: bool, balance: float
+) -> Snapshot:
+    """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
     given = None if commands is None else read_commands(commands)
     if can_copy(lmp):
         styles, read, found = in_a_copy(lambda: _look(lmp, given, copied=True))
     else:
         styles, read, found = _look(lmp, given, copied=False)
-    snapshot = _snapshot(lmp, styles, read, found)
+    snapshot = _snapshot(lmp, styles, read, found, laws)
     force = snapshot.contacts.normal_force.mean() if len(snapshot.contacts) else 0.0
     if snapshot.residual > balance * force:
         raise SnapshotError(
@@ -101,9 +113,6 @@ def from_lammps(
             f"{balance:g} is allowed; run on with drag (fix viscous) until it rests, or allow more by balance."
         )
     return snapshot.with_sliding() if slides else snapshot
-
-
-Styles = tuple[str, dict[str, str], str, str]
 
 
 def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Styles, Commands, Arrays]:
@@ -180,7 +189,7 @@ def _groups(fixes: dict[str, str], commands: Commands) -> dict[str, str]:
     return found
 
 
-def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: Arrays) -> Snapshot:
+def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: Arrays, laws: KnownLaws) -> Snapshot:
     order = np.argsort(found["id"], kind="stable")
     per_atom = [name for name in found if name not in ("contacts", "partners")]
     found = found | {name: found[name][order] for name in per_atom}
@@ -197,7 +206,7 @@ def _snapshot(lmp: Any, styles: Styles, commands: Commands, found: Arrays) -> Sn
         radius=found["radius"],
         mass=mass,
         inertia=factor * mass * found["radius"] ** 2,
-        contacts=_Contacts(found, commands, styles, lmp.extract_setting("ntypes"), frozen).all(),
+        contacts=_Contacts(found, commands, styles, lmp.extract_setting("ntypes"), frozen, laws).all(),
         box=np.array([[size[0], 0, 0], [xy, size[1], 0], [xz, yz, size[2]]]),
         origin=np.array(low),
         periodic=np.array(periodic, dtype=bool),
@@ -240,9 +249,15 @@ class _Contacts:
     """The contacts of a look, with the laws that LAMMPS has for them."""
 
     def __init__(
-        self, found: Arrays, commands: Commands, styles: Styles, types: int, frozen: NDArray[np.bool_]
+        self,
+        found: Arrays,
+        commands: Commands,
+        styles: Styles,
+        types: int,
+        frozen: NDArray[np.bool_],
+        laws: KnownLaws,
     ) -> None:
-        self.found, self.commands, self.types, self.units = found, commands, types, styles[2]
+        self.found, self.commands, self.types, self.units, self.laws = found, commands, types, styles[2], laws
         self.radius, self.mass = found["radius"], np.where(frozen, np.inf, found["rmass"])
         self.kind = found["type"].astype(np.int64)
         self.walls = {name.removeprefix("wall "): rows for name, rows in found.items() if name.startswith("wall ")}
@@ -282,15 +297,18 @@ class _Contacts:
 
     def _linearise_by_measured_laws(self) -> list[LinearisedContacts]:
         pairs, walls = self._pairs_by_types(), self._walls()
-        laws = measure_laws(
+        groups: dict[Any, _OneLaw] = {**pairs, **walls}
+        # a law is that of its commands, which a user may change
+        keys = {name: (*self.commands.pair, self.commands.fixes.get(name), name) for name in groups}
+        new = measure_laws(
             self.commands,
             self.units,
             self.types,
-            {types: each.median_state() for types, each in pairs.items()},
-            [(name, each.median_state()) for name, each in walls.items()],
+            {types: each.median_state() for types, each in pairs.items() if keys[types] not in self.laws},
+            [(name, each.median_state()) for name, each in walls.items() if keys[name] not in self.laws],
         )
-        groups: dict[Any, _OneLaw] = {**pairs, **walls}
-        return [_by_law(laws[key], group) for key, group in groups.items()] or [_none()]
+        self.laws.update({keys[name]: law for name, law in new.items()})
+        return [_by_law(self.laws[keys[name]], group) for name, group in groups.items()] or [_none()]
 
     def _pairs_by_types(self) -> dict[tuple[int, int], "_OneLaw"]:
         """Contacts between particles by their two types, the smaller first."""

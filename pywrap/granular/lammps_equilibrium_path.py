@@ -40,7 +40,7 @@ from ...analysis import NoEquilibriumError, Snapshot, negative_eigenvalues, stif
 from ...analysis.errors import FaultgougeError
 from ...analysis.factors.sparse_lu import general_lu
 from ...analysis.packing.arrays import Floats, derive_frozen
-from .from_lammps import INTEGRATORS, from_lammps
+from .from_lammps import INTEGRATORS, KnownLaws, take_snapshot
 from .granular_commands import SnapshotError, read_commands, without_suffix
 from .instance_queries import explain_error, log_of, log_path
 from .look_in_a_copy import can_copy, in_a_copy, quieten
@@ -228,6 +228,7 @@ class _Relaxation:
     ) -> None:
         self.lmp, self.apply, self.commands = lmp, apply, commands
         self.slides, self.balance, self.steps = slides, balance, steps
+        self.laws: KnownLaws = {}  # copies of this process have them, too
         self.found: Snapshot | None = None  # the equilibrium where LAMMPS stands
         self.rate = 0.01  # of the drag, per time step: critical for a mode of 1000 steps
 
@@ -257,7 +258,7 @@ class _Relaxation:
 
     def look(self) -> Snapshot:
         """The packing as it stands, moving or not."""
-        return from_lammps(self.lmp, self.commands, slides=self.slides, balance=np.inf)
+        return take_snapshot(self.lmp, self.commands, self.laws, slides=self.slides, balance=np.inf)
 
     def force_change(self, value: float) -> float:
         """Largest change of a force per value, of particles that stay where they are."""
