@@ -3,6 +3,7 @@
 python -m research.yielding.further rest FOLDER [SEED ...]      rows of lasting.jsonl
 python -m research.yielding.further draws FOLDER [SEED ...]     rows of draws.jsonl: further draws, and the standard law
 python -m research.yielding.further large FOLDER [SEED ...]     rows of quartz_400.jsonl, as those of the task "yield"
+python -m research.yielding.further flow FOLDER SEED ...        rows of flow_400.jsonl: those that flow, by each law
 python -m research.yielding.further standard FOLDER [SEED ...]  rows of standard_100.jsonl, loaded by the standard law
 python -m research.yielding.further sliding FOLDER [SEED ...]   rows of sliding_100.jsonl: what their growth needs
 """
@@ -23,7 +24,7 @@ from faultgouge.studies.result_rows import append_row
 from faultgouge.studies.sweep.sweep_plan import read_toml
 from research.laws.both_laws import as_slider
 from research.modes.loss import with_dashpots
-from research.yielding.compute import NOISE, SHARES, dashpots, dynamic, dynamic_runs, noise_seed
+from research.yielding.compute import INCREMENTS, NOISE, SHARES, dashpots, dynamic, dynamic_runs, noise_seed
 from research.yielding.static import Branch, branch, layer_slip
 
 SCENE = Path(__file__).parent / "yield.toml"
@@ -37,6 +38,9 @@ RESTITUTION = 0.9
 
 FRICTION, RESTITUTIONS = (1.0, 1.01), (RESTITUTION, 0.7)
 """Friction over that of the law, and restitutions, of the runs of `growth_at_bound`."""
+
+FLOW_SHARES = (0.9, 0.97)
+"""Shares of the static yield at which layers of 400 disks were seen to flow."""
 
 LARGE = {"disks": 400, "width": 23.8, "top": 20}
 
@@ -157,12 +161,31 @@ def large(seed: int) -> Iterator[dict[str, Any]]:
     yield known | {"dynamic": list(dynamic_runs(given, path))}
 
 
+def flow(seed: int) -> Iterator[dict[str, Any]]:
+    """Lossy runs of 400 disks from the same equilibria with each history, and the static yield by increment."""
+    given = scene(seed, **LARGE)
+    settled, fy = settle(given), given.load.fy
+    path = branch(settled)
+    last = path.equilibria[-1].fx
+    static = [last, *(branch(settled, step).equilibria[-1].fx for step in INCREMENTS)]
+    for share in FLOW_SHARES:
+        here = path.borne(share * last)
+        if here is None:
+            continue
+        for history, draw in product((*HISTORIES, "coulomb"), range(DRAWS)):
+            start = with_history(here, history)
+            known = {"seed": seed, "static": [fx / fy for fx in static], "share": share, "fx_over_fy": here.fx / fy}
+            known |= {"history": history, "restitution": RESTITUTION, "draw": draw}
+            yield known | dynamic(start, dashpots(given, RESTITUTION), noise_seed(seed, draw), all_layers=True)
+
+
 if __name__ == "__main__":
     kind, folder, *seeds = sys.argv[1:]
     compute, name = {
         "rest": (lasting_motion, "lasting"),
         "draws": (draws, "draws"),
         "large": (large, "quartz_400"),
+        "flow": (flow, "flow_400"),
         "standard": (standard, "standard_100"),
         "sliding": (growth_at_bound, "sliding_100"),
     }[kind]

@@ -6,6 +6,7 @@ history of the slip.
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -142,18 +143,6 @@ def _rising_loads(rows: list[dict[str, Any]], rate: float, loss: float) -> dict[
     }
 
 
-def text(
-    found: dict[str, Any], packings: int, failed: int, loaded: list[dict[str, Any]], at_bound: list[dict[str, Any]]
-) -> str:
-    """The page; `loaded` are the layers of the standard law, `at_bound` runs of those of them in which noise grows."""
-    unrest = [share(each["unrest"], packings) for each in found["yields"]]
-    names = {"packings": packings, "failed": failed, "unrest": unrest, "interval": interval, "percent": percent}
-    names["standard"] = standard(loaded)
-    names |= from_the_bound(at_bound)
-    names["slow"] = [row for row in found["loading"] if row["rate"] == CONTROLLED_RATE]
-    return render("research.yielding", "README.md.j2", **found, **names)
-
-
 def from_the_bound(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Layers that move from Coulomb's bound: their runs, and the seeds of those that more loss stops, or does not."""
     moving = [row for row in rows if row["largest_D"] > SEEN_GROWTH]
@@ -206,21 +195,30 @@ def figure(found: dict[str, Any]) -> Figure:
 
 
 def write_page(folder: Path) -> Path:
-    """The page and the picture of a folder with a table; the path of the page."""
-    rows, failed = rows_of(folder / "tables" / "quartz_100.jsonl")
+    """The page and the picture of a folder with tables; the path of the page."""
+    tables = folder / "tables"
+    rows, failed = rows_of(tables / "quartz_100.jsonl")
+    large = read_rows(tables / "quartz_400.jsonl")
     found = numbers(rows)
-    sizes = {100: rows, 400: read_rows(folder / "tables" / "quartz_400.jsonl")}
-    found["sizes"] = {disks: static_and_dynamic(each) for disks, each in sizes.items()}
+    found["sizes"] = {disks: static_and_dynamic(each) for disks, each in ((100, rows), (400, large))}
     (folder / "pictures").mkdir(exist_ok=True)
     save(figure(found), folder / "pictures" / "yield")
-    page = folder / "README.md"
-    tables = folder / "tables"
-    page.write_text(
-        text(
-            found, len(rows), failed, read_rows(tables / "standard_100.jsonl"), read_rows(tables / "sliding_100.jsonl")
-        )
+    page = render(
+        "research.yielding",
+        "README.md.j2",
+        **found,
+        packings=len(rows),
+        failed=failed,
+        unrest=[share(each["unrest"], len(rows)) for each in found["yields"]],
+        large_unrest=[_restless(large, loss) for loss in LOSSES],
+        slow=[row for row in found["loading"] if row["rate"] == CONTROLLED_RATE],
+        standard=standard(read_rows(tables / "standard_100.jsonl")),
+        **from_the_bound(read_rows(tables / "sliding_100.jsonl")),
+        interval=interval,
+        percent=percent,
     )
-    return page
+    (folder / "README.md").write_text(page)
+    return folder / "README.md"
 
 
 def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -308,6 +306,7 @@ def write_lasting(folder: Path) -> Path:
         standard=standard(read_rows(tables / "standard_100.jsonl")),
         **_count_lasting(lossy),
         free=_without_loss(rows, tables / "quartz_100.jsonl"),
+        flow=flowing(read_rows(tables / "flow_400.jsonl")),
         large=[of_runs(large, load, loss) for load in SHARES for loss in LOSSES],
         large_unrest=[_restless(large, loss) for loss in LOSSES],
         large_worst={kind: each["count"] for kind, each in worst_ends(large, 1.0)["counts"].items()},
@@ -334,11 +333,30 @@ def _count_lasting(lossy: list[dict[str, Any]]) -> dict[str, Any]:
         **{history: share(sum(found.values()), len(found)) for history, found in most.items()},
         "chance": binomtest(sum(differ), len(differ)).pvalue,
         "seeds": sorted({row["seed"] for row in vibrating}),
+        "strongly": [row for row in vibrating if row["restitution"] < LOSSES[1]],
         "energies": sorted(row["late"] for row in vibrating),
         "moves": max(row["moves"] for row in vibrating),
         "quiet": max(row["late"] for row in lossy if row["history"] == "rescaled"),
-        "slowest": max((row for row in lossy if not lasts(row)), key=lambda row: row["late"] / row["early"]),
+        "slowest": max(
+            (row for row in lossy if not lasts(row) and row["late"] > QUIET), key=lambda row: row["late"] / row["early"]
+        ),
     }
+
+
+LAWS = {"total": "total", "rescaled": "rescaled", "coulomb": "the standard law's"}
+"""Histories of the slip in words."""
+
+
+def flowing(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """How the runs of a layer that flows in spite of loss end, by load and history."""
+    found = []
+    for load, history in product(sorted({row["share"] for row in rows}), LAWS):
+        runs = [row for row in rows if (row["share"], row["history"]) == (load, history)]
+        slips = [abs(run["slip"]) for run in runs if run["ends"] == "rests"]
+        known = {name: runs[0][name] for name in ("seed", "share", "fx_over_fy", "static")}
+        ends = {kind: sum(run["ends"] == kind for run in runs) for kind in ("flows", "bursts", "rests")}
+        found.append(known | {"law": LAWS[history], "ends": ends, "slip": max(slips, default=None)})
+    return found
 
 
 def _without_loss(rows: list[dict[str, Any]], table: Path) -> dict[str, Any]:
