@@ -58,7 +58,7 @@ def run_sweep(
         Called with the rows as they end and their number; it passes the rows on.
     workers : int or None
         Number of processes; None: the number of cores that this process may use. Ranks of mpiexec replace these
-        processes.
+        processes. A script that asks for several makes this call below the line ``if __name__ == "__main__":``.
     executor : concurrent.futures.Executor, optional
         Replaces these processes, possibly on other machines. Its workers need faultgouge and one thread each: LAMMPS
         cannot run in several threads of a process.
