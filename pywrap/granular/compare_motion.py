@@ -12,8 +12,8 @@ velocity of the half step for them. That of the forces' cubic terms falls as the
 turns the history of `granular` only where it has left the contact's plane by 1e-10 of Coulomb's bound: forces are wrong
 by as much, and their share in the motion grows as the inverse of the amplitude. At the best amplitude the last two are
 together 1e-7 to 1e-5, more where overlaps are small. Two amplitudes and three time steps, extrapolated to zero, leave
-less than 1e-6 of the motion of all laws with one derivative (`tests/pywrap/test_from_lammps.py`): the cubic terms go,
-so that the amplitude can be as large as contacts bear that must not open.
+less than 1e-6 of the motion of all laws with one derivative (`tests/pywrap/granular/test_from_lammps.py`): the cubic
+terms go, so that the amplitude can be as large as contacts bear that must not open.
 
 Laws with two derivatives (mindlin_rescale) have other forces while a contact closes than while it parts. With the mean
 K of both, rates :math:`N \dot q` of the overlaps, and half of their difference B

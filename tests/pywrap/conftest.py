@@ -9,7 +9,7 @@ import pytest
 
 from faultgouge.analysis import Packing
 
-sys.path.insert(0, str(Path(__file__).parent))  # granular_packings
+sys.path.insert(0, str(Path(__file__).parent / "granular"))  # granular_packings
 
 
 @pytest.fixture(scope="session")
