@@ -227,8 +227,8 @@ def _cover_axis(scaled: _ScaledPencil) -> tuple[list[DampedMode], list[Rectangle
     """Modes in discs along the axis, and what of the right half-plane these discs leave uncovered."""
     found: list[DampedMode] = []
     beside: list[Rectangle] = []
-    covered, radius = 0.0, 0.05
-    while covered < scaled.largest_frequency:
+    covered, radius, end = 0.0, 0.05, scaled.largest_frequency
+    while covered < end:
         middle = covered + AHEAD * radius
         reach, more = scaled.look(1j * middle)
         found += more

@@ -101,8 +101,7 @@ class _Shared:
         """Hand out again what killed workers had in hand."""
         if deaths > TRIES or not isinstance(self._pool, Processes):
             raise WorkerError(
-                "a worker was killed, possibly for lack of memory: give fewer --workers; the same command continues "
-                '(a script that starts workers needs the line if __name__ == "__main__":)'
+                "a worker was killed, possibly for lack of memory: give fewer --workers; the same command continues"
             )
         self._pool.renew()
         lost, self._lost = self._lost, []
