@@ -142,3 +142,28 @@ def test_force_on_a_layer(tmp_path):
     with lammps_path(lmp, "tilt") as path, pytest.raises(SnapshotError, match=r"At 0\.1: LAMMPS stopped: .*tilt"):
         path(0.1)
     lmp.close()
+
+
+@pytest.mark.slow
+def test_a_law_that_the_load_changes_is_measured_again(tmp_path):
+    """The laws that a path knows are those of the commands: here the load is the tangential stiffness."""
+    from faultgouge.pywrap import lammps_path
+
+    def stiffen(lmp, share):
+        lmp.command(f"pair_style gran/hertz/history 1e5 {3e4 * (1 + share):.17g} 40 20 0.5 1")
+        lmp.command("pair_coeff * *")
+
+    lmp = layer(tmp_path)
+    lmp.command("fix drag all viscous 1.0")
+    with lammps_path(lmp, stiffen) as path:
+        found = [path(share).contacts for share in (0.0, 0.1)]
+    lmp.close()
+    factors = []
+    for contacts in found:
+        pairs = contacts.j >= 0
+        radii, overlap = contacts.slip_arm[pairs], contacts.overlap[pairs]
+        reduced = radii.prod(axis=1) / radii.sum(axis=1)
+        factors.append(contacts.tangential_stiffness[pairs] / np.sqrt(reduced * overlap))
+    # a force over a slip, at an overlap that is a difference and has lost some six digits
+    assert factors[0] == pytest.approx(3e4, rel=1e-9)
+    assert factors[1] == pytest.approx(3.3e4, rel=1e-9)
