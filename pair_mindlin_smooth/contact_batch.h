@@ -254,23 +254,22 @@ template <class V> FAULTGOUGE_INLINE void components(Batch<V> &batch, const Grid
   }
 }
 
-template <class V, bool ENERGY>
-FAULTGOUGE_INLINE void evaluate(Batch<V> &batch, const MindlinLaw law, double dt, const Grids &grids)
-{
-  normal_forces(batch, law);
-  if constexpr (ENERGY) unbounded_slips(batch);
-  if constexpr (V::FRICTION) tangential_forces(batch, law);
-  if constexpr (ENERGY) add_sliding(batch);
-  if constexpr (V::DAMPED) add_dashpots<V, ENERGY>(batch, law, dt);
-  components(batch, grids);
-}
-
 template <class V>
 FAULTGOUGE_INLINE void evaluate(Batch<V> &batch, const MindlinLaw law, double dt, const Grids &grids, bool energy)
 {
+  normal_forces(batch, law);
   if constexpr (V::ADVANCE)
-    if (energy) return evaluate<V, true>(batch, law, dt, grids);
-  evaluate<V, false>(batch, law, dt, grids);
+    if (energy) unbounded_slips(batch);
+  if constexpr (V::FRICTION) tangential_forces(batch, law);
+  if constexpr (V::ADVANCE)
+    if (energy) add_sliding(batch);
+  if constexpr (V::DAMPED) {
+    if (V::ADVANCE && energy)
+      add_dashpots<V, true>(batch, law, dt);
+    else
+      add_dashpots<V, false>(batch, law, dt);
+  }
+  components(batch, grids);
 }
 
 }    // namespace faultgouge

@@ -49,14 +49,13 @@ FAULTGOUGE_INLINE int flush_batch(Batch<V> &batch, ContactPairs &pairs, int owne
   return crushed;
 }
 
+// takes the contacts among the pairs from p on, until the batch is full; returns the pair to go on from
 template <class V>
-FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
-                                 double dt, bool energy, const Grids &grids)
+FAULTGOUGE_INLINE int fill_batch(Batch<V> &batch, ContactPairs &pairs, int p, const Disks &disks, const Period &box,
+                                 double dt, const Grids &grids)
 {
   using Number = typename V::Number;
-  Batch<V> batch;
-  int crushed = -1;
-  for (int p = 0, n = pairs.size(); p < n; p++) {
+  for (const int n = pairs.size(); p < n && batch.count < BATCH; p++) {
     const Branch<double> high = leading_branch(pairs, p, disks, box);
     const double rsq = high.x * high.x + high.y * high.y;
     const double reach =
@@ -72,12 +71,22 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
       r.y.low = low.y;
     }
     add(batch, pairs, p, r, disks, dt);
-    if (batch.count < BATCH) continue;
+  }
+  return p;
+}
+
+template <class V>
+FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
+                                 double dt, bool energy, const Grids &grids)
+{
+  Batch<V> batch;
+  int crushed = -1;
+  for (int p = 0, n = pairs.size(); p < n;) {
+    p = fill_batch(batch, pairs, p, disks, box, dt, grids);
     evaluate(batch, law, dt, grids, energy);
     crushed = flush_batch(batch, pairs, disks.owned, crushed, energy);
   }
-  evaluate(batch, law, dt, grids, energy);
-  return flush_batch(batch, pairs, disks.owned, crushed, energy);
+  return crushed;
 }
 
 template <class Number, Exponent P, bool DAMPED, class... Rest>
