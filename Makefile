@@ -1,5 +1,5 @@
 # make reproduce   sets everything up and runs the paper's protocol into results/
-# make test        sets everything up and runs the tests (five minutes on two cores)
+# make test        sets everything up and runs the tests (four minutes on two cores)
 # make long        runs the tests that take longest: kills, odd scenes, research tables, reproduce (a quarter of an hour)
 # make readers     reads exports by OVITO and VTK, in tests
 # make fuzz        a thousand odd scenes, 300 damaged files, 60 kills; says what went wrong (an hour)
@@ -34,10 +34,8 @@ reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
 
 # Tests and checks take Python from src, where links lead to the folders: an edit of Python needs no installation.
-# The tests of the analysis come first by themselves: what they import is found within two seconds
 test: $(VENV)/.test
-	$(PYTEST) -n 2 -m "not long" tests/analysis
-	$(PYTEST) -n 2 -m "not long" --ignore=tests/analysis
+	$(PYTEST) -n 2 -m "not long"
 
 long: $(VENV)/.test
 	$(PYTEST) -n 2 -m long

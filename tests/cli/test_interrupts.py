@@ -68,7 +68,7 @@ def equilibria(path):
     [("ramp", 1, 4, False), ("ramp", 2, 4, False), ("perturb", 1, 1, True)],
     ids=["one rank", "two ranks", "all processes, as a terminal does"],
 )
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 @pytest.mark.slow
 def test_a_run_says_what_is_kept(tmp_path, command, ranks, at, group, number):
     path = tmp_path / "run.h5"
@@ -285,7 +285,9 @@ def with_failing_engine(folder, ranks, script, *arguments):
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize(("ranks", "rank", "call"), [(1, -1, 1), (2, 1, 1), (2, -1, 30), (2, 0, 30)])
+@pytest.mark.parametrize(
+    ("ranks", "rank", "call"), [(1, -1, 1), (2, 1, 1), pytest.param(2, -1, 30, marks=pytest.mark.long), (2, 0, 30)]
+)
 @pytest.mark.slow
 def test_its_sentence_reaches_the_command(settled, ranks, rank, call):
     done = with_failing_engine(settled, ranks, ONCE, call, rank)

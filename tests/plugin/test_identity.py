@@ -94,7 +94,7 @@ def test_same_trajectory(trajectory, unchanged, changes):
         pytest.param(2, None, marks=pytest.mark.long),
         (1, "layer"),
         (1, "floor"),
-        (1, "weaken"),
+        pytest.param(1, "weaken", marks=pytest.mark.long),
         (2, "weaken"),
     ],
 )

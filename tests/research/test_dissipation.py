@@ -70,7 +70,7 @@ def test_the_table_of_weak_dashpots():
     assert max(abs(each["predicted"] / each["measured"] - 1) for each in rows) < 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp):
     far, dragged = over_distance(ramp, [1e-2], [(0.0, 0.0), (0.0, 0.1)])
     near, damped = over_distance(ramp, [1e-3], [(0.0, 0.0), (1.0, 0.0)])

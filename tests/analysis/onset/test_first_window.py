@@ -121,7 +121,7 @@ def test_pair_that_is_announced_and_not_found_is_told_of():
     assert searched(jumping, [0.0, 1.0]) == (None, ())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_doubtful_increments_come_with_the_onset(path):
     """Couplings so much enlarged that clusters announce pairs that stay real, and nobody looks at these."""
     limits = Limits(all_windows=50, excess=200.0, dips=0)
