@@ -39,6 +39,7 @@ BENCHMARKS = {
         "python benchmarks/time_per_step.py", "python benchmarks/time_per_step.py --ranks 1 --turns 3 --disks 100 1000"
     ),
     "parts": Benchmark("faultgouge explain scenes/paper.toml --json", "faultgouge explain scenes/paper.toml --json"),
+    "answer": Benchmark("python benchmarks/first_answer.py", "python benchmarks/first_answer.py --turns 3"),
     "increment": Benchmark("python benchmarks/increment.py", "python benchmarks/increment.py"),
     "size": Benchmark("python benchmarks/scale.py", None),
 }
