@@ -43,9 +43,14 @@ class Processes(Executor):
         pool = ProcessPoolExecutor(self._number, get_context("spawn"), initializer=end_with, initargs=(os.getpid(),))
         # Ctrl-C is for this process alone, with which the others end: they inherit that SIGINT is blocked
         before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-        pool.submit(os.getpid)
+        self._first = pool.submit(os.getpid)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         return pool
+
+    @property
+    def began(self) -> bool:
+        """Whether a process has come so far as to work, and has not ended as it started."""
+        return self._first.exception() is None
 
     def renew(self) -> None:
         """Start other processes in place of these, of which one has been killed."""

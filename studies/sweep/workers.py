@@ -38,7 +38,7 @@ FAILURES = (FaultgougeError, ValueError, ArithmeticError, ArpackError, MemoryErr
 
 
 class WorkerError(FaultgougeError):
-    """Workers are killed again and again."""
+    """Workers are killed again and again, or end as they start."""
 
 
 def compute_points(pool: Executor | None, task: str, points: Sequence[SweepPoint]) -> Generator[Row, None, None]:
@@ -99,6 +99,11 @@ class _Shared:
 
     def _again(self, deaths: int) -> None:
         """Hand out again what killed workers had in hand."""
+        if isinstance(self._pool, Processes) and not self._pool.began:
+            raise WorkerError(
+                "the workers end as they start, since each reads the script anew: a script calls run_sweep with several "
+                'workers below the line `if __name__ == "__main__":`'
+            )
         if deaths > TRIES or not isinstance(self._pool, Processes):
             raise WorkerError(
                 "a worker was killed, possibly for lack of memory: give fewer --workers; the same command continues"

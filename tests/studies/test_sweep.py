@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 import subprocess
+import sys
 import time
 
 import numpy as np
@@ -323,6 +324,28 @@ def test_a_point_that_kills_every_worker_is_not_tried_for_ever(sweep):
     with pytest.raises(WorkerError, match="fewer --workers"):
         list(compute_points(pool, sweep.task, sweep.points))
     pool.shutdown()
+
+
+WITHOUT_GUARD = """
+from pathlib import Path
+from faultgouge.studies.sweep.run_sweep import run_sweep
+from faultgouge.studies.sweep.sweep_plan import Sweep
+from faultgouge.studies.sweep.tasks import TASKS
+
+run_sweep(Sweep.from_toml("sweep.toml", TASKS), Path("out"), workers=2)
+"""
+
+
+@pytest.mark.slow
+def test_a_script_without_its_guard_is_told_of_it_once(tmp_path):
+    """And not of memory, after four rounds of workers that end as they start."""
+    (tmp_path / "sweep.toml").write_text(TOML)
+    (tmp_path / "script.py").write_text(WITHOUT_GUARD)
+    command = [sys.executable, "script.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    says = [line for line in done.stderr.splitlines() if "WorkerError" in line]
+    assert len(says) == 1
+    assert says[0].endswith('below the line `if __name__ == "__main__":`')
 
 
 @pytest.mark.long
