@@ -101,7 +101,7 @@ class _Shared:
         """Hand out again what killed workers had in hand."""
         if isinstance(self._pool, Processes) and not self._pool.began:
             raise WorkerError(
-                "the workers end as they start, since each reads the script anew: a script calls run_sweep with several "
+                "the workers end as they start, as each reads the script anew: a script calls run_sweep with several "
                 'workers below the line `if __name__ == "__main__":`'
             )
         if deaths > TRIES or not isinstance(self._pool, Processes):

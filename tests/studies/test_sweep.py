@@ -336,14 +336,14 @@ run_sweep(Sweep.from_toml("sweep.toml", TASKS), Path("out"), workers=2)
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_script_without_its_guard_is_told_of_it_once(tmp_path):
     """And not of memory, after four rounds of workers that end as they start."""
     (tmp_path / "sweep.toml").write_text(TOML)
     (tmp_path / "script.py").write_text(WITHOUT_GUARD)
     command = [sys.executable, "script.py"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
-    says = [line for line in done.stderr.splitlines() if "WorkerError" in line]
+    says = [line for line in done.stderr.splitlines() if "WorkerError: " in line]
     assert len(says) == 1
     assert says[0].endswith('below the line `if __name__ == "__main__":`')
 
