@@ -19,7 +19,7 @@ from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
 from ..packing.packing import Floats, Packing
 from ..packing.snapshot import Snapshot
 from .eigenpairs import eigenpairs
-from .spectrum import DENSE, SAFETY, dynamical_matrix, is_negative, spectrum, unit_rounding
+from .spectrum import DENSE, SAFETY, dynamical_matrix, is_negative, spectrum, unit_rounding, zero_uncertainty
 
 SPREAD = 4.0
 """Factor from one bound that is tried to the next: each costs factors, and a loose one more eigenvalues."""
@@ -29,7 +29,7 @@ FIRST = 16
 
 
 def negative_eigenvalues(packing: Packing | Snapshot) -> Floats:
-    """The real negative eigenvalues of a packing, beyond their rounding uncertainty.
+    """The real negative eigenvalues of a packing, beyond the uncertainty of rounding and of forces out of balance.
 
     If the symmetric part of the operator is positive definite, a sparse factorisation shows that there are none.
 
@@ -46,7 +46,7 @@ def negative_eigenvalues(packing: Packing | Snapshot) -> Floats:
     matrix, _ = dynamical_matrix(packing)
     size, rounding = matrix.shape[0], unit_rounding(matrix.data)
     symmetric = csc_array(0.5 * (matrix + matrix.T))
-    bound = SAFETY * rounding
+    bound = uncertainty = zero_uncertainty(packing, rounding)
     if _is_positive(symmetric, bound):
         return np.zeros(0)
     if size <= DENSE:
@@ -63,7 +63,7 @@ def negative_eigenvalues(packing: Packing | Snapshot) -> Floats:
         count *= 2
     # Arnoldi's real eigenvalues may carry an imaginary part of their own rounding
     values = np.where(np.abs(found.values.imag) * found.overlap > SAFETY * rounding, found.values, found.values.real)
-    return np.sort(values[is_negative(values, found.overlap, rounding)].real)
+    return np.sort(values[is_negative(values, found.overlap, uncertainty)].real)
 
 
 def _is_positive(symmetric: csc_array, shift: float) -> bool:

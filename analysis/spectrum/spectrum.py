@@ -59,6 +59,10 @@ over the 285 eigenvalues of a packing of 100 disks (measured, at five loads), an
 itself noise is uncertain by a factor of two or so.
 """
 
+IN_BALANCE = 1e-4
+"""Residual force over the largest normal force up to which a packing is in equilibrium. Dumps with few digits leave
+1e-6; a packing before it is brought to rest, 1e-2 and more."""
+
 DENSE = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
 
@@ -121,13 +125,15 @@ class Spectrum(TableDisplay):
     pairs : tuple of ComplexPair
         The complex pairs that exceed their own rounding uncertainty, fastest growing first.
     negative : ndarray, shape (B,)
-        The real negative eigenvalues beyond their own rounding uncertainty, the most negative first, 1 / time^2.
+        The real negative eigenvalues beyond their own uncertainty, the most negative first, 1 / time^2.
     noise_pairs : int
         Number of computed complex pairs that do not exceed their rounding uncertainty.
     rattlers : ndarray of int
         Disks that touch nothing.
     rounding : float
         u |A|_F, 1 / time^2: uncertainty of a perfectly conditioned eigenvalue.
+    uncertainty : float
+        That of an eigenvalue of zero, 1 / time^2, by rounding and by forces that are out of balance.
     """
 
     eigenvalues: Complexes
@@ -136,6 +142,7 @@ class Spectrum(TableDisplay):
     noise_pairs: int
     rattlers: Indices
     rounding: float
+    uncertainty: float
 
     def __repr__(self) -> str:
         real = self.eigenvalues.real
@@ -163,8 +170,8 @@ class Spectrum(TableDisplay):
 
     @property
     def free(self) -> int:
-        """Number of eigenvalues that are zero within rounding: no force opposes such a motion, which drifts."""
-        return int(np.count_nonzero(np.abs(self.eigenvalues) <= SAFETY * self.rounding))
+        """Number of eigenvalues that are zero within `uncertainty`: no force opposes such a motion, which drifts."""
+        return int(np.count_nonzero(np.abs(self.eigenvalues) <= self.uncertainty))
 
     @property
     def least_q(self) -> float:
@@ -326,10 +333,11 @@ def spectrum(packing: Packing | Snapshot, form: Form = "consistent") -> Spectrum
     values = eigvals(matrix) if len(matrix) and alone else np.zeros(0, complex)
     pairs: list[ComplexPair] = []
     noise, negative = 0, np.zeros(0)
-    if not alone or np.any(values.imag != 0) or values.real.min(initial=0.0) < -SAFETY * rounding:
+    uncertainty = zero_uncertainty(packing, rounding)
+    if not alone or np.any(values.imag != 0) or values.real.min(initial=0.0) < -uncertainty:
         values, left, right = eig(matrix, left=True, right=True)
         overlap = np.abs(np.sum(left.conj() * right, axis=0))
-        negative = np.sort(values[is_negative(values, overlap, rounding)].real)
+        negative = np.sort(values[is_negative(values, overlap, uncertainty)].real)
         for k in np.flatnonzero(values.imag > 0):
             vector = np.zeros((packing.coordinates, 1), dtype=np.complex128)
             vector[active, 0] = right[:, k]
@@ -350,6 +358,7 @@ def spectrum(packing: Packing | Snapshot, form: Form = "consistent") -> Spectrum
         noise_pairs=noise,
         rattlers=packing.rattlers,
         rounding=rounding,
+        uncertainty=uncertainty,
     )
 
 
@@ -406,9 +415,26 @@ def unit_rounding(matrix: Floats | Complexes) -> float:
     return float(0.5 * np.finfo(np.float64).eps * np.linalg.norm(matrix))
 
 
-def is_negative(values: Complexes, overlap: Floats, rounding: float) -> NDArray[np.bool_]:
-    """Which eigenvalues are real and below zero by more than SAFETY kappa u |A|, their own rounding uncertainty."""
-    return (values.imag == 0) & (-values.real * overlap > SAFETY * rounding)
+def in_balance(packing: Packing | Snapshot) -> bool:
+    """Whether what is left of the forces on a particle is rounding, of a dump's digits at most."""
+    return packing.residual <= IN_BALANCE * float(packing.normal_force.max(initial=0.0))
+
+
+def zero_uncertainty(packing: Packing | Snapshot, rounding: float) -> float:
+    """Uncertainty of an eigenvalue of zero that is perfectly conditioned, 1 / time^2.
+
+    A motion that stretches no contact has the eigenvalue zero as the forces F of the contacts cancel, whose parts in A
+    are F / (R m). Forces that are out of balance by r leave r / (R m). Of a packing that moves, A counts as it is.
+    """
+    imbalance = (
+        packing.residual / float(np.min(packing.radius * packing.mass, initial=np.inf)) if in_balance(packing) else 0.0
+    )
+    return SAFETY * rounding + imbalance
+
+
+def is_negative(values: Complexes, overlap: Floats, uncertainty: float) -> NDArray[np.bool_]:
+    """Which eigenvalues are real and below zero by more than kappa times the uncertainty of one of zero."""
+    return (values.imag == 0) & (-values.real * overlap > uncertainty)
 
 
 def exceeds_rounding(eigenvalue: complex, overlap: float | np.floating, rounding: float) -> bool:

@@ -2,14 +2,12 @@
 
 python -m research.lammps_laws.make compute    what the tables lack of all cells, on one core, resumable; hours
 python -m research.lammps_laws.make growth     the packings that are let go without loss; minutes
-python -m research.lammps_laws.make negative   packings with a negative eigenvalue, balanced further; a minute
 python -m research.lammps_laws.make page       README.md from the tables
 python -m research.lammps_laws.make check      the first packings of 50 particles of each law once more, compared
 
 From the folder of the repository.
 """
 
-import json
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -28,7 +26,6 @@ from research.lammps_laws.compute import (
     TILTS,
     TO,
     Cell,
-    balance_further,
     compute,
     compute_growth,
     let_go,
@@ -38,7 +35,7 @@ from research.lammps_laws.energy_cycle import energy_cycle
 
 HERE = Path(__file__).parent
 TABLES = HERE / "tables"
-PACKINGS, GROWTH, NEGATIVE = "packings.jsonl", "growth.jsonl", "negative.jsonl"
+PACKINGS, GROWTH = "packings.jsonl", "growth.jsonl"
 
 USUAL = (50, MU)
 """Particles and friction of the packings of which most is known."""
@@ -64,7 +61,6 @@ def cell(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "growth": median([row["growth_rate"] for row in good]) if good else None,
         "least_q": median(least) if len(least) > 1 else None,
         "bound": sum(row["at_bound"] > 0 for row in good),
-        "negative": sum(row["negative"] > 0 for row in good),
     }
 
 
@@ -102,16 +98,11 @@ def numbers(tables: Path = TABLES) -> dict[str, Any]:
         "seeds": full_seeds(rows),
         "rows": len(every),
         "restless": sum(not row["rests"] for row in every),
-        "negative": read(tables / NEGATIVE),
+        "negative": sum(row["negative"] > 0 for row in every if row["rests"]),
         "pushed": growth(read(tables / GROWTH)),
         "cycles": [energy_cycle(law) for law in LAWS],
         "wall": wall_alone(),
     }
-
-
-def with_negative(tables: Path = TABLES) -> list[dict[str, Any]]:
-    """Packings at rest that have a negative eigenvalue."""
-    return [row for row in read(tables / PACKINGS) if row["rests"] and row["negative"]]
 
 
 def full_seeds(rows: list[dict[str, Any]]) -> int:
@@ -237,9 +228,6 @@ if __name__ == "__main__":
             compute(TABLES / PACKINGS)
         case ["growth"]:
             compute_growth(TABLES / GROWTH)
-        case ["negative"]:
-            rows = [json.dumps(balance_further(row)) + "\n" for row in with_negative()]
-            write_text(TABLES / NEGATIVE, "".join(rows))
         case ["page"]:
             print(write_page())
         case ["check"]:

@@ -24,6 +24,7 @@ from faultgouge.analysis import (
     normal_modes,
     spectrum,
     stable_timestep,
+    touching,
 )
 from faultgouge.analysis.operators.damping import coordinate_mass
 
@@ -186,6 +187,28 @@ def test_negative_eigenvalues_grow():
     assert negative_eigenvalues(column) == pytest.approx(np.array([slope]), rel=1e-12)
     assert result.growth_rate() == pytest.approx(2 * np.sqrt(-slope), rel=1e-12)
     assert result.growth_rate(dt=1e-3) == pytest.approx(2 * abs(discrete_frequency(slope, 1e-3).imag), rel=1e-12)
+
+
+@pytest.mark.parametrize(("force", "negative"), [(3e-5, 0), (3e-3, 1)])
+def test_forces_out_of_balance_do_not_make_a_packing_unstable(force, negative):
+    """A disk on another, pressed by nothing, is out of balance by the force of its contact, which lets it buckle.
+
+    Where this force is a hundred-thousandth of the largest one it counts as balance that is not there, and the
+    eigenvalue as zero. Where it is a thousandth the packing moves, and its eigenvalues are those of its forces.
+    """
+    law = MindlinLaw(kn=2e5, kt=2e5 * 2 / 7, mu=1.0)
+    rests, touches = (3.0 / law.kn) ** (2 / 3), (force / law.kn) ** (2 / 3)
+    position, radius = np.array([[0.5, 0.5 - rests], [2.5, 0.5 - touches], [2.5, 1.5 - 2 * touches]]), np.full(3, 0.5)
+    packing = Packing(
+        position=position, radius=radius, top=[True, False, False], box_length=5.0, law=law, fy=3.0,
+        contacts=touching(position, radius, 5.0),
+    )  # fmt: skip
+    found = spectrum(packing)
+    assert packing.residual == pytest.approx(force, rel=1e-6)
+    assert found.eigenvalues.real[0] == pytest.approx(-0.5 * force, rel=1e-2)
+    assert len(found.negative) == len(negative_eigenvalues(packing)) == negative
+    assert found.is_stable == (not negative)
+    assert found.free == 3 - negative  # two rolling motions, and that of the disk above
 
 
 def test_negative_eigenvalues_of_more_disks_than_the_dense_solver_takes():

@@ -37,10 +37,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
-IN_BALANCE = 1e-4
-"""Force left on a disk, in units of the largest contact force, up to which a packing is in equilibrium. Dumps with few
-digits leave 1e-6; a packing before it is brought to rest, 1e-2 and more."""
-
 Slices = Annotated[
     Path | None,
     typer.Option(
@@ -63,6 +59,7 @@ def spectrum(
     """Compute the eigenvalues, complex pairs and rattlers of a stored packing."""
     from faultgouge.analysis import Snapshot, solid_fraction
     from faultgouge.analysis import spectrum as eigenvalues_of
+    from faultgouge.analysis.spectrum.spectrum import in_balance
 
     packing = stored_snapshot(file) or stored_packing(file, frame)
     if values:
@@ -84,7 +81,7 @@ def spectrum(
             "pair_count": len(result.pairs),
             "least_q": result.least_q if result.pairs else None,
             "negative": result.negative.tolist(),
-            "stable": result.is_stable if _in_balance(packing) else None,
+            "stable": result.is_stable if in_balance(packing) else None,
             "largest_growth_rate": result.growth_rate(),
             "rattlers": result.rattlers.tolist(),
             "fx": packing.fx,
@@ -110,15 +107,16 @@ def _values(packing: Packing | Snapshot, as_json: bool) -> None:
 
 def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[str, Any] | None) -> None:
     from faultgouge.analysis import Snapshot
+    from faultgouge.analysis.spectrum.spectrum import in_balance
 
     _print_size(packing, result)
-    if not _in_balance(packing):
+    if not in_balance(packing):
         print(
             f"not in equilibrium: the residual force on a disk is {packing.residual:.3g}, and the spectrum of a "
             "moving packing does not show whether it is stable"
         )
     _print_growing_motions(result)
-    if result.is_stable and _in_balance(packing):
+    if result.is_stable and in_balance(packing):
         free = result.free
         but = f", except for {free} eigenvalues of zero: no force opposes such a motion" if free else ""
         print(
@@ -174,11 +172,6 @@ def _print_growing_motions(result: Spectrum) -> None:
         print(
             f"{len(result.pairs)} complex pairs; least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}"
         )
-
-
-def _in_balance(packing: Packing | Snapshot) -> bool:
-    """Whether what is left of the forces on a disk is rounding, of a dump's digits at most."""
-    return packing.residual <= IN_BALANCE * float(packing.normal_force.max(initial=0.0))
 
 
 def _gain_of(packing: Packing | Snapshot) -> dict[str, Any] | None:
