@@ -4,21 +4,25 @@ The file is kept in memory. When it is saved, all of it replaces the stored file
 the time, so that a file that grows for a long time is not written too often.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-import h5py
 from numpy.typing import NDArray
 
 from ..errors import PackingFileError
 from .atomic_write import HEADER_SIZE, add_checksum, has_checksum, write_whole
 from .plain_file import read_plain
 from .runfile_validation import check
+
+if TYPE_CHECKING:
+    import h5py
 
 Self = TypeVar("Self", bound="SealedFile")
 
@@ -143,6 +147,8 @@ class SealedFile:
 
 def new_file() -> h5py.File:
     """An empty file in memory."""
+    import h5py
+
     return h5py.File("new", "w", driver="core", backing_store=False, block_size=MEMORY_BLOCK, libver=LIBVER)
 
 
@@ -155,6 +161,8 @@ def write(path: Path, file: h5py.File) -> None:
 
 def open_checksummed(path: Path) -> h5py.File:
     """The file for reading."""
+    import h5py
+
     try:
         return h5py.File(path, "r", locking=False)
     except OSError:
@@ -167,5 +175,7 @@ def open_checksummed(path: Path) -> h5py.File:
 
 def _image(path: Path) -> h5py.File:
     """The content of a sealed file in memory, for changes."""
+    import h5py
+
     image = read_plain(path)[HEADER_SIZE:]
     return h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW))

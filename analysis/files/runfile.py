@@ -32,12 +32,13 @@ Datasets depend on the scene alone. The circumstances of the run (resolved scene
 of the root. One file contains one set of disks and one law.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -48,6 +49,9 @@ from ..packing.packing import Floats, Packing
 from .checksummed_file import SealedFile, new_file, write
 from .runfile_header import CHECKSUM, COMPACT, LAW_DEFAULTS, parameters_of, write_header
 from .runfile_validation import equilibria
+
+if TYPE_CHECKING:
+    import h5py
 
 
 class RunFile(SealedFile):
@@ -76,7 +80,7 @@ class RunFile(SealedFile):
         path: str | PathLike[str],
         packing: Packing,
         attributes: Mapping[str, str | int | float] | None = None,
-    ) -> "RunFile":
+    ) -> RunFile:
         """Start a new file for runs of the disks of a packing; an existing file is replaced.
 
         Parameters

@@ -3,15 +3,19 @@
 The format is described in :mod:`~faultgouge.analysis.files.runfile`.
 """
 
+from __future__ import annotations
+
 from dataclasses import MISSING, fields
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 
 from ..packing.law import MindlinLaw
 from ..packing.packing import Packing
+
+if TYPE_CHECKING:
+    import h5py
 
 CREATOR = "faultgouge"
 

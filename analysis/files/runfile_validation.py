@@ -4,14 +4,19 @@
 fails.
 """
 
+from __future__ import annotations
+
 import math
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import h5py
 import numpy as np
 
 from ..errors import PackingFileError
+
+if TYPE_CHECKING:
+    import h5py
 
 BEST_COMPRESSION = 1100
 """More bytes than this a stored byte cannot stand for: deflate packs up to 1032 times. A shape beyond is damage, and
@@ -84,6 +89,8 @@ def dataset(file: h5py.Group, name: str, size: int, rows: int | None = None) -> 
 
     Behind the equilibria a trajectory has rows that nobody wrote, and that have no bytes.
     """
+    import h5py
+
     item = file.get(name)
     _require(isinstance(item, h5py.Dataset), f"the dataset {name} is missing")
     _require(item.dtype.kind in "fib", f"{item.name} is of type {item.dtype}, and not of numbers")
@@ -124,6 +131,8 @@ def _check_finite(item: h5py.Dataset, rows: int | None = None) -> None:
 
 def check_places(file: h5py.File) -> None:
     """Every number lies in the file itself, whose checksum covers it, and unpacks into the memory that there is."""
+    import h5py
+
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     unpacked, seen, groups = 0, set[int](), [file]
     while groups:

@@ -12,7 +12,6 @@ The file is sealed like every run.h5 (:mod:`.checksummed_file`), and is H5MD 1.1
 from collections.abc import Mapping
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from ..errors import PackingFileError
@@ -75,6 +74,8 @@ def write_snapshot(path: Path, snapshot: Snapshot, attributes: Mapping[str, str 
 
 def holds_snapshot(path: Path) -> bool:
     """Whether a file is an HDF5 file with a snapshot in it; false for whatever cannot be read."""
+    import h5py
+
     try:
         check_plain(path)
         with h5py.File(path, "r", locking=False) as file:

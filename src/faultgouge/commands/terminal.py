@@ -188,14 +188,13 @@ def status(what: str) -> Iterator[Callable[[str], None]]:
 
     Off a terminal it is a line of the log, every minute. A thread says it: work may be within one call for longer.
     """
-    from rich.console import Console
-
-    console = Console(stderr=True)
     if not is_root():
         yield lambda what: None
         return
-    if console.is_terminal:
-        with console.status(what) as line:
+    if sys.stderr.isatty():
+        from rich.console import Console
+
+        with Console(stderr=True).status(what) as line:
             yield line.update
         return
     latest, ended = deque([what], maxlen=1), Event()
@@ -215,12 +214,9 @@ def status(what: str) -> Iterator[Callable[[str], None]]:
 
 def progress(items: Iterable[T], what: str, total: int | None = None, done: int = 0) -> Iterator[T]:
     """The items, with a progress bar on a terminal; off a terminal with a line a minute. Both say how long is left."""
-    from rich.console import Console
-
-    console = Console(stderr=True)
     if total is None and isinstance(items, Sized):
         total = len(items)
-    if not console.is_terminal or not is_root():
+    if not sys.stderr.isatty() or not is_root():
         among = "" if total is None else f" of {total}"
         begin = time.monotonic()
         with status(f"{what}: {done}{among}") as show:
@@ -229,6 +225,7 @@ def progress(items: Iterable[T], what: str, total: int | None = None, done: int 
                 show(f"{what}: {number}{among}" + (f", about {left / 60:.0f} min left" if left > 60 else ""))
                 yield item
         return
+    from rich.console import Console
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -239,7 +236,7 @@ def progress(items: Iterable[T], what: str, total: int | None = None, done: int 
     )
 
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what, total=total, completed=done)
         for item in items:
             bar.advance(task)
