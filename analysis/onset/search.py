@@ -281,7 +281,12 @@ def find_onset(
 
     doubtful: Increments = ()
     all_modes: Spectrum | None = None
-    if takes_all:
+    # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
+    if modes is None and (not takes_all or (first and isinstance(start, Snapshot))):
+        all_modes = _complex_at_start(start, limits)
+    if all_modes is not None:
+        windows: tuple[Window, ...] = (_fastest(start, all_modes),)
+    elif takes_all:
         narrowest = _narrowest(loads, limits) if narrowest is None else narrowest
         try:
             found = all_windows(Family(operator, narrowest, limits, states.__getitem__), loads, first=first)
@@ -292,8 +297,6 @@ def find_onset(
                 raise
             windows = (_fastest(start, all_modes),)
         windows = windows[:1] if first else windows
-    elif modes is None and (all_modes := _complex_at_start(start, limits)):
-        windows = (_fastest(start, all_modes),)
     else:
         with show_progress(watch):
             one, doubtful = first_window(Family(operator, narrowest or 0.0, limits), loads, modes, ranks, folder)
