@@ -45,6 +45,9 @@ AGREES = 1e-6
 bit on one machine, and its rounding ends at the balance of forces, 1e-8."""
 
 
+STAYS = "granular hertz, mindlin/force"
+"""The law of the large packings whose tangential force at constant slip does not follow the overlap."""
+
 GROWTH_BOUND = TO / 10
 """D beyond which a packing that has been let go has grown: a decade below the end of a run, twelve above the push."""
 
@@ -95,6 +98,7 @@ def numbers(tables: Path = TABLES) -> dict[str, Any]:
         "cells": cells,
         "laws": by_law,
         "others": other_cells(every),
+        "rare": rare_pairs([row for row in every if row["law"] == STAYS and row["rests"]]),
         "seeds": full_seeds(rows),
         "rows": len(every),
         "restless": sum(not row["rests"] for row in every),
@@ -102,6 +106,20 @@ def numbers(tables: Path = TABLES) -> dict[str, Any]:
         "pushed": growth(read(tables / GROWTH)),
         "cycles": [energy_cycle(law) for law in LAWS],
         "wall": wall_alone(),
+    }
+
+
+def rare_pairs(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """How seldom a law has complex pairs, and how weak these are."""
+    large = [row for row in rows if row["count"] > USUAL[0]]
+    having = [row for row in rows if row["pairs"]]
+    return {
+        "rows": len(large),
+        "having": len(having),
+        "sizes": sorted({row["count"] for row in having}),
+        "most": max((row["pairs"] for row in having), default=0),
+        "growth": max((row["growth_rate"] for row in having), default=0.0),
+        "least_q": min((row["least_q"] for row in having), default=np.inf),
     }
 
 
