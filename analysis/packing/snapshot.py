@@ -409,15 +409,17 @@ class Snapshot:
         kept = self.contacts.normal_force > least
         return self if np.all(kept) else derive_frozen(self, contacts=self.contacts.chosen(kept))
 
-    def loaded_by(self, load: ArrayLike) -> "Snapshot":
-        """The snapshot with other forces and torques besides those of contacts, shape (N, 2, 3)."""
-        return derive_frozen(self, load=floats("load", load, self.load.shape))
+    def vectors(self, coordinates: NDArray) -> tuple[NDArray, NDArray]:
+        """Translations and rotations R theta, shape (N, 3) each, of values of the coordinates, shape (axes N,)."""
+        d, parts = self.dimension, coordinates.reshape(self.axes, -1)
+        translation, rotation = np.zeros((2, len(self), 3), dtype=parts.dtype)
+        translation[:, :d], rotation[:, d - self.axes :] = parts[:d].T, parts[d:].T
+        return translation, rotation
 
-    def with_sliding(self, sliding: ArrayLike | None = None) -> "Snapshot":
-        """The snapshot with other contacts that slide, by a mask, shape (C,); those at Coulomb's bound by default."""
-        c = self.contacts
-        which = np.array(c.at_bound) if sliding is None else booleans("sliding", sliding, len(c))
-        return derive_frozen(self, contacts=derive_frozen(c, sliding=which))
+    def join_vectors(self, translation: NDArray, rotation: NDArray) -> NDArray:
+        """The reverse of `vectors`."""
+        d = self.dimension
+        return np.concatenate([translation[:, :d].T.ravel(), rotation[:, d - self.axes :].T.ravel()])
 
 
 Configuration = TypeVar("Configuration", bound=Packing | Snapshot)

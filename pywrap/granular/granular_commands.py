@@ -14,6 +14,11 @@ HISTORY = ("gran/hooke/history", "gran/hertz/history", "granular")
 
 OWN = "mindlin/smooth"
 
+WALLS = ("wall/gran", "wall/mindlin/smooth")
+
+INTEGRATORS = ("nve/sphere", "nve/disc", "overdamped/disc")
+"""Fixes that move particles and turn them."""
+
 COHESIVE = ("jkr", "dmt", "mdr")
 SUFFIXES = ("/omp", "/kk", "/intel", "/gpu", "/opt")
 UNSUPPORTED_SUBMODELS = {"twisting": "twisting friction", "rolling": "rolling friction", "heat": "heat conduction"}
@@ -157,6 +162,8 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
     ----------
     styles : dict
         Styles of the fixes of the instance, by their IDs.
+    commands : Commands
+        Of the deck, with the lines of all fixes that matter.
     """
     refused = {
         "rigid": "holds particles together in bodies, whose modes are not those of particles: leave it out",
@@ -169,18 +176,21 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
     for name, style in styles.items():
         plain = without_suffix(style)
         for begin, says in refused.items():
-            if plain == begin or (begin in ("rigid", "poems", "wall/gran/region") and plain.startswith(begin)):
+            if plain.startswith(begin):
                 raise SnapshotError(f"fix {name} {style} {says}.")
-        if plain.startswith("wall/") and plain not in ("wall/gran", "wall/mindlin/smooth"):
+        if plain.startswith("wall/") and plain not in WALLS:
             raise SnapshotError(f"fix {name} {style} is no wall of contacts: use planes of fix wall/gran.")
-        if plain.startswith("wall/"):
-            line = commands.fixes.get(name)
-            if line is None or without_suffix(line.split()[3]) != plain:
-                raise SnapshotError(
-                    f"The commands have no line of fix {name} {style}: give the line that the deck has among commands."
-                )
-            if plain == "wall/gran":
-                _check_wall(name, line)
+        if plain.startswith(("nve", "nvt", "npt", "nph")) and plain not in INTEGRATORS:
+            raise SnapshotError(f"fix {name} {style} does not turn particles by their contacts: use fix nve/sphere.")
+        if plain not in (*WALLS, *INTEGRATORS, "freeze"):
+            continue
+        line = commands.fixes.get(name)
+        if line is None or without_suffix(line.split()[3]) != plain:
+            raise SnapshotError(
+                f"The commands have no line of fix {name} {style}: give the line that the deck has among commands."
+            )
+        if plain == "wall/gran":
+            _check_wall(name, line)
 
 
 def _check_wall(name: str, line: str) -> None:
@@ -200,11 +210,3 @@ def _check_wall(name: str, line: str) -> None:
         raise SnapshotError(f"fix {name} wall/gran hooke has no tangential history: use hooke/history.")
     if words[4] == "granular":
         _check_model(words[5:], line)
-
-
-def wall_plane(line: str) -> tuple[int, float | None, float | None]:
-    """Axis, lower and upper position of the planes of a fix wall/gran."""
-    words = line.split()
-    at = next(k for k, word in enumerate(words) if word in ("xplane", "yplane", "zplane"))
-    low, high = (None if word == "NULL" else float(word) for word in words[at + 1 : at + 3])
-    return "xyz".index(words[at][0]), low, high

@@ -8,19 +8,19 @@ from mpi4py import MPI
 
 from ...analysis import BadInputError, Snapshot
 from ..lammps.instance import lammps_instance
-from .from_lammps import BALANCE, from_lammps
+from .from_lammps import from_lammps
 from .granular_commands import SnapshotError, check_fixes, check_pair, read_commands
 from .instance_queries import explain_error
 
 
-def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE) -> Snapshot:
+def run_deck(path: Path, *, slides: bool = False) -> Snapshot:
     """Run a deck in its own folder, as `lmp -in` there, and take its last state.
 
     Parameters
     ----------
     path : Path
         The deck.
-    slides, balance
+    slides : bool
         As of :func:`~faultgouge.pywrap.from_lammps`.
 
     Raises
@@ -45,7 +45,7 @@ def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE) -> S
             raise SnapshotError(f"{path}: {explain_error(error)}") from error
         finally:
             os.chdir(here)
-        found = from_lammps(lmp, slides=slides, balance=balance)
+        found = from_lammps(lmp, slides=slides)
         lmp.close()
         world.barrier()
     return found
