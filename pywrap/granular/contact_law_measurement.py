@@ -74,10 +74,8 @@ class MeasuredLaw:
 
     Attributes
     ----------
-    exponent : float
-        p of f_n.
     stiffness, tangential, normal_dashpot, tangential_dashpot : PowerOfOverlap
-        f_n/delta, k_t', c_n and c_t.
+        f_n/delta, whose exponent is p - 1, k_t', c_n and c_t.
     closing, parting : float
         d ln f_t / d ln delta at constant slip.
     mu : float
@@ -86,7 +84,6 @@ class MeasuredLaw:
         l': 0, or 1/2 of an arm that ends in the middle of the overlap.
     """
 
-    exponent: float
     stiffness: PowerOfOverlap
     tangential: PowerOfOverlap
     normal_dashpot: PowerOfOverlap
@@ -241,13 +238,8 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
         factor = values[0] / (first.mass**by_mass * (first.radius * first.overlap) ** by_depth)
         return PowerOfOverlap(factor, by_depth, by_mass)
 
-    stiffness = power("stiffness")
     return MeasuredLaw(
-        exponent=1 + stiffness.overlap,
-        stiffness=stiffness,
-        tangential=power("tangential"),
-        normal_dashpot=power("normal_dashpot"),
-        tangential_dashpot=power("tangential_dashpot"),
+        **{name: power(name) for name in ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot")},
         closing=quarter(here.closing, f"tangential force of the {who}"),
         parting=quarter(here.parting, f"tangential force of the {who}"),
         mu=here.mu,

@@ -20,9 +20,8 @@ mindlin_rescale                        3/2    1/2    1/2            1
 mindlin_rescale/force                  3/2    1/2    0              1/2
 =====================================  =====  =====  =============  =============
 
-and hooke with a mindlin model, or hertz with linear_history, are as their parts. A contact at Coulomb's bound has two
-derivatives, that of slipping on and that of sticking on the way back. A small vibration shakes such a contact down to
-elastic, so that it sticks by default.
+and hooke with a mindlin model, or hertz with linear_history, are as their parts. A small vibration shakes a contact at
+Coulomb's bound down to elastic, so that it sticks by default.
 """
 
 from collections.abc import Iterable
@@ -369,7 +368,7 @@ def _linearise_measured(
     who, i, j, normal, distance, overlap, forces = contacts
     normal_force, tangential_force = forces[:, 0], forces[:, 1:]
     wall, radius, mass, arms = j == WALL, found["radius"], found["rmass"], _radii(contacts, found)
-    stiffness = law.exponent * normal_force / overlap
+    stiffness = (1 + law.stiffness.overlap) * normal_force / overlap
     reduced_radius = np.where(wall, radius[i], radius[i] * radius[j] / (radius[i] + radius[j]))
     # frozen particles weigh infinitely much in LAMMPS's dashpots, but not at walls; two frozen ones matter to nobody
     inverse = np.where(frozen, 0.0, 1 / mass)

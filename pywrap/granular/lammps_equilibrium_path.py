@@ -8,13 +8,12 @@ the user stays as it was.
 **Newton's method.** A step of the load in which no contact slides moves particles by :math:`K^{-1}` times what is out
 of balance. LAMMPS moves them in one long step, in which slips advance, and gives the forces; some iterations with the K
 of the last equilibrium do. All is tried in a copy, and done in earnest if nothing slides, nothing has a negative
-eigenvalue, and the balance is that of a relaxation. Loads of 50 and 200 spheres then take 0.6 and 0.7
-of the time, and stand where a relaxation leaves them to 1e-6 of their way.
+eigenvalue, and the balance is that of a relaxation.
 
 **Relaxation.** Otherwise the load jumps, and the drag takes what the jump sets free. Motion ends soonest at the
-critical damping of the slowest mode, where the force that is out of balance is half of the drag. Where it is more than
-twice the drag, the rate of the drag is doubled. Where it is less than a quarter, since the packing creeps or a loose
-sphere rolls away, it is halved.
+critical damping of the slowest mode, where the force that is out of balance is half of the drag: the rate of the drag
+is doubled where the force is more than twice the drag, and halved where it is less than a quarter, since the packing
+creeps or a loose sphere rolls away.
 
 The error of the path itself is not known: of increments half as large some contacts slide otherwise
 (:class:`~faultgouge.analysis.Onset` has None for it), and a second path with smaller increments tells it.
@@ -25,6 +24,7 @@ import shutil
 import weakref
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from dataclasses import dataclass, field
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from multiprocessing.reduction import recv_handle, send_handle
@@ -202,23 +202,19 @@ def _own_log(lmp: Any, folder: Path) -> None:
         lmp.command(f'log "{own}" append')
 
 
+@dataclass
 class _Relaxation:
-    """LAMMPS and how it comes to rest."""
+    """LAMMPS and how it comes to rest; fields as of `lammps_path`, and what copies of this process have, too."""
 
-    def __init__(
-        self,
-        lmp: Any,
-        apply: Callable[[Any, float], object] | str,
-        commands: list[str] | None,
-        slides: bool,
-        balance: float,
-        steps: int,
-    ) -> None:
-        self.lmp, self.apply, self.commands = lmp, apply, commands
-        self.slides, self.balance, self.steps = slides, balance, steps
-        self.laws: KnownLaws = {}  # copies of this process have them, too
-        self.found: Snapshot | None = None  # the equilibrium where LAMMPS stands
-        self.rate = 0.01  # of the drag, per time step: critical for a mode of 1000 steps
+    lmp: Any
+    apply: Callable[[Any, float], object] | str
+    commands: list[str] | None
+    slides: bool
+    balance: float
+    steps: int
+    laws: KnownLaws = field(default_factory=dict)
+    found: Snapshot | None = None  # the equilibrium where LAMMPS stands
+    rate: float = 0.01  # of the drag, per time step: critical for a mode of 1000 steps
 
     def result(self, value: float) -> Snapshot | FaultgougeError:
         """The equilibrium at a value, or why there is none."""
