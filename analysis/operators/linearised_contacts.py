@@ -72,7 +72,7 @@ def assembled_damping(snapshot: Snapshot) -> csr_array:
     c = snapshot.contacts
     none, still = np.zeros(len(c)), np.zeros((len(c), 3))
     # the direction in which a contact slides is that of its tangential force, which has no part in C but for this
-    sliding = np.divide(c.tangential_force, 1.0, out=still.copy(), where=c.sliding[:, None])
+    sliding = np.where(c.sliding[:, None], c.tangential_force, 0.0)
     dashpots = derive_frozen(
         c, normal_force=none, tangential_force=sliding, closing=still, parting=still, distance=np.full(len(c), np.inf),
         normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot, lever_slope=none,

@@ -95,19 +95,7 @@ class MeasuredLaw:
 
 
 class TwoParticleLammps:
-    """A LAMMPS with two particles, or one and a wall, that knows the pair styles and walls of a deck.
-
-    Parameters
-    ----------
-    lmp : lammps.lammps
-        The instance of the deck.
-    commands : Commands
-        Of the deck.
-    name : tuple of (int, int), or str
-        The types of the particles, or the ID of the wall's fix.
-    size : float
-        Radius of a particle, for the box.
-    """
+    """A LAMMPS with two particles of some types, or one and the wall of a fix, and the commands of a deck."""
 
     def __init__(self, lmp: Any, commands: Commands, name: tuple[int, int] | str, size: float) -> None:
         self.lammps = lammps_instance(MPI.COMM_SELF, None)
@@ -187,20 +175,7 @@ class TwoParticleLammps:
 
 
 def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state: State, who: str) -> MeasuredLaw:
-    """The law of a contact, from its own overlap, radii and masses, and from others.
-
-    Parameters
-    ----------
-    lmp : lammps.lammps
-        The instance of the deck.
-    commands : Commands
-        Of the deck.
-    name : tuple of (int, int), or str
-        The types of two particles, or the ID of a wall's fix.
-    state : State
-        A contact of the packing; its law is measured at an overlap that is neither minute nor large.
-    who : str
-        Whose law it is, for messages.
+    """The law of two types, or of the wall of a fix, from a contact of the packing and from others that are like it.
 
     Raises
     ------

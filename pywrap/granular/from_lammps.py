@@ -36,6 +36,7 @@ from ...analysis.packing.arrays import Floats, Indices, derive_frozen
 from ...analysis.packing.snapshot import PER_CONTACT, WALL, linearise_contacts
 from .contact_law_measurement import MeasuredLaw, State, measure_law
 from .granular_commands import (
+    GIVE_LINES,
     INTEGRATORS,
     OWN,
     WALLS,
@@ -127,10 +128,7 @@ def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Commands, 
     if given is None:
         lines = log_of(lmp) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
         if lines is None:
-            raise SnapshotError(
-                "This LAMMPS has no log to read its commands from: give the lines pair_style, pair_coeff, fix "
-                "wall/gran and fix nve/sphere of the deck as commands=[...]."
-            )
+            raise SnapshotError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
         given = read_commands(lines, log=True)
     elif copied:
         lmp.command("log none")
@@ -159,8 +157,7 @@ def _join_ranks(parts: list[Floats]) -> Floats:
 def _check(lmp: Any, styles: Styles, commands: Commands) -> None:
     if without_suffix(styles.pair) != commands.style:
         raise SnapshotError(
-            f"The commands have pair_style {commands.style}, and the instance has {styles.pair}: give the lines "
-            "pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck as commands=[...]."
+            f"The commands have pair_style {commands.style}, and the instance has {styles.pair}: {GIVE_LINES}."
         )
     if not lmp.extract_setting("radius_flag") or any(word in styles.atom for word in ("body", "ellipsoid", "bpm")):
         raise SnapshotError(f"atom_style {styles.atom} has no disks and spheres alone: use atom_style sphere.")
@@ -405,6 +402,5 @@ def _agree(computed: Floats, said: Floats, force_per_rounding: Floats, who: str)
     rounding = ROUNDING * force_per_rounding
     if len(said) and np.any(np.abs(computed - said) > AGREES * np.max(np.abs(said)) + rounding):
         raise SnapshotError(
-            f"The normal forces of the {who} are not those of the commands: give the lines pair_style, pair_coeff, fix "
-            "wall/gran and fix nve/sphere that hold now as commands=[...]."
+            f"The normal forces of the {who} are not those of the commands: {GIVE_LINES}, as they hold now."
         )

@@ -4,6 +4,7 @@ LAMMPS hands out neither kn, kt and mu of its granular styles nor the words of i
 variables filled in: a command with a $ stands there twice, as it was written and as LAMMPS understood it.
 """
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ WALLS = ("wall/gran", "wall/mindlin/smooth")
 
 INTEGRATORS = ("nve/sphere", "nve/disc", "overdamped/disc")
 """Fixes that move particles and turn them."""
+
+GIVE_LINES = "give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck as commands=[...]"
 
 COHESIVE = ("jkr", "dmt", "mdr")
 SUFFIXES = ("/omp", "/kk", "/intel", "/gpu", "/opt")
@@ -71,7 +74,8 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
     style = ""
     coefficients: list[str] = []
     fixes: dict[str, str] = {}
-    for line in _whole(lines):
+    whole = re.sub(r"&[ \t]*\n", " ", "\n".join(lines))
+    for line in whole.splitlines():
         words = line.split("#")[0].split()
         if not words:
             continue
@@ -93,35 +97,12 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
             fixes.pop(words[1], None)
     if not style:
         where = "The log of this LAMMPS has" if log else "The commands have"
-        raise SnapshotError(
-            f"{where} no pair_style: give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the "
-            "deck as commands=[...]."
-        )
+        raise SnapshotError(f"{where} no pair_style: {GIVE_LINES}.")
     return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes)
 
 
-def _whole(lines: Iterable[str]) -> Iterable[str]:
-    """Lines with those joined that end with an &."""
-    begun = ""
-    for line in lines:
-        part = line.rstrip()
-        if part.endswith("&"):
-            begun += part[:-1] + " "
-            continue
-        yield begun + part
-        begun = ""
-
-
 def check_pair(commands: Commands, styles: Iterable[str]) -> None:
-    """Refuse pair styles and models of contacts that have no linearised contacts here.
-
-    Parameters
-    ----------
-    commands : Commands
-        Of the deck.
-    styles : iterable of str
-        All pair styles that this LAMMPS knows.
-    """
+    """Refuse pair styles and models without linearised contacts here; `styles` are all that this LAMMPS knows."""
     words, known = commands.pair[0].split(), set(styles)
     used = [without_suffix(words[1])]
     if used[0].startswith("hybrid"):
@@ -156,15 +137,7 @@ def _check_model(words: list[str], line: str) -> None:
 
 
 def check_fixes(styles: dict[str, str], commands: Commands) -> None:
-    """Refuse fixes that move or hold particles, walls or the box in ways that contacts do not tell.
-
-    Parameters
-    ----------
-    styles : dict
-        Styles of the fixes of the instance, by their IDs.
-    commands : Commands
-        Of the deck, with the lines of all fixes that matter.
-    """
+    """Refuse fixes, by ID and style, that move or hold particles, walls or the box as contacts do not tell."""
     refused = {
         "rigid": "holds particles together in bodies, whose modes are not those of particles: leave it out",
         "poems": "holds particles together in bodies, whose modes are not those of particles: leave it out",

@@ -48,17 +48,8 @@ def set_velocity(lmp: Any, snapshot: Snapshot, velocity: Floats) -> None:
 
 
 def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: list[str], columns: str) -> Arrays:
-    """Particles, forces and contacts of this rank after zero steps at rest.
-
-    Parameters
-    ----------
-    groups : dict
-        Groups of particles that are to be found, by the IDs of their fixes.
-    walls : list of str
-        Fixes whose contacts are handed out.
-    columns : str
-        What compute pair/local is to give.
-    """
+    """Particles, forces and contacts of this rank after zero steps at rest; who is in the groups of some fixes, and
+    contacts with the walls of others."""
     for name in ("v", "omega"):
         owned_array(lmp, name)[:] = 0.0
     try:

@@ -7,8 +7,8 @@ the user stays as it was.
 
 **Newton's method.** A step of the load in which no contact slides moves particles by :math:`K^{-1}` times what is out
 of balance. LAMMPS moves them in one long step, in which slips advance, and gives the forces; some iterations with the K
-of the last equilibrium do. All is tried in a copy, and done in earnest if nothing slides, nothing has a negative
-eigenvalue, and the balance is that of a relaxation.
+of the last equilibrium do. The copy that has done so is kept if nothing slides, nothing has a negative eigenvalue, and
+the balance is that of a relaxation. Else another copy relaxes.
 
 **Relaxation.** Otherwise the load jumps, and the drag takes what the jump sets free. Motion ends soonest at the
 critical damping of the slowest mode, where the force that is out of balance is half of the drag: the rate of the drag
@@ -38,7 +38,7 @@ from scipy.sparse import csc_array, eye_array
 from ...analysis import NoEquilibriumError, Snapshot, negative_eigenvalues, stiffness_matrix
 from ...analysis.errors import FaultgougeError
 from ...analysis.factors.sparse_lu import general_lu
-from ...analysis.packing.arrays import Floats, derive_frozen
+from ...analysis.packing.arrays import derive_frozen
 from .from_lammps import KnownLaws, take_snapshot
 from .granular_commands import INTEGRATORS, SnapshotError, read_commands, without_suffix
 from .instance_queries import explain_error, log_of, log_path
@@ -129,14 +129,10 @@ class LammpsPath:
         below, there, snapshot = next(each for each in reversed(self._kept) if each[0] <= value or each[0] == -np.inf)
         if snapshot is not None and below == value:
             return snapshot
-        here, end = Pipe()
-        there.send(value)
-        send_handle(there, end.fileno(), 0)
-        end.close()
-        try:
-            found = here.recv()
-        except EOFError:
-            raise SnapshotError(f"LAMMPS ended without a word while it relaxed at {value:g}.") from None
+        here, found = _ask(there, value, relaxes=False)
+        if found is None:
+            here.close()
+            here, found = _ask(there, value, relaxes=True)
         if isinstance(found, FaultgougeError):
             here.close()
             try:
@@ -160,6 +156,18 @@ class LammpsPath:
         self.close()
 
 
+def _ask(there: Connection, value: float, *, relaxes: bool) -> tuple[Connection, Any]:
+    """Have a copy of the process copy itself and go to a load; the new copy, and what it finds."""
+    here, end = Pipe()
+    there.send((value, relaxes))
+    send_handle(there, end.fileno(), 0)
+    end.close()
+    try:
+        return here, here.recv()
+    except EOFError:
+        return here, SnapshotError(f"LAMMPS ended without a word while it relaxed at {value:g}.")
+
+
 def _end(kept: list[Kept], first: int, owner: int, folder: "TemporaryDirectory[str]") -> None:
     """End the copies of this process, which have this path, too, and must not end it."""
     if os.getpid() != owner:
@@ -178,13 +186,13 @@ def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path) 
     try:
         _own_log(relaxation.lmp, folder)
         quieten(relaxation.lmp)
-        while (value := there.recv()) is not None:
+        while (load := there.recv()) is not None:
             end = Connection(recv_handle(there))
             if silent_copy() == 0:
                 there.close()
                 there = end
                 _own_log(relaxation.lmp, folder)
-                there.send(relaxation.result(value))
+                there.send(relaxation.result(*load))
             else:
                 end.close()  # else nobody sees that the copy has died
     except (EOFError, OSError):  # the path is closed
@@ -216,22 +224,26 @@ class _Relaxation:
     found: Snapshot | None = None  # the equilibrium where LAMMPS stands
     rate: float = 0.01  # of the drag, per time step: critical for a mode of 1000 steps
 
-    def result(self, value: float) -> Snapshot | FaultgougeError:
-        """The equilibrium at a value, or why there is none."""
+    def result(self, value: float, relaxes: bool) -> Snapshot | FaultgougeError | None:
+        """The equilibrium at a value, or why there is none; None if Newton's method, when asked for, cannot serve."""
         try:
             self.set(value)
-            found = self.displace_to_balance() or self.relax(value)
+            found = self.relax(value) if relaxes else self.displace_to_balance()
+            if found is None:
+                return None
             self.found = found
             change = in_a_copy(lambda: self.force_change(value))
-            if change == 0.0:
-                return SnapshotError(
-                    f"No force changes with the load at {value:g}: does apply set it, or a fix read the variable?"
-                )
-            return derive_frozen(found, fx=value, load_error=found.residual / change)
-        except FaultgougeError as error:
-            return error
         except Exception as error:  # LAMMPS, and a user's function, raise what they choose
-            return SnapshotError(f"At {value:g}: {explain_error(error)}")
+            if not relaxes:
+                return None  # particles that nothing holds fly off: the relaxation has its own words for it
+            return (
+                error if isinstance(error, FaultgougeError) else SnapshotError(f"At {value:g}: {explain_error(error)}")
+            )
+        if change == 0.0:
+            return SnapshotError(
+                f"No force changes with the load at {value:g}: does apply set it, or a fix read the variable?"
+            )
+        return derive_frozen(found, fx=value, load_error=found.residual / change)
 
     def set(self, value: float) -> None:
         """Set the load."""
@@ -257,55 +269,16 @@ class _Relaxation:
         return change / step if change > 1e-11 * np.abs(forces[0]).max() else 0.0
 
     def displace_to_balance(self) -> Snapshot | None:
-        """Newton's method from the equilibrium where LAMMPS stands; None, with nothing changed, if it cannot serve."""
-        start = self.found
+        """Newton's method from the equilibrium where LAMMPS stands; None if it cannot serve."""
+        start, lmp = self.found, self.lmp
         if start is None or start.contacts.at_bound.any():
             return None
         if not np.array_equal(start.contacts.closing, start.contacts.parting):
             return None
-
-        def attempt() -> tuple[list[Floats], Snapshot | None]:
-            with TemporaryDirectory(prefix="faultgouge") as folder:
-                _own_log(self.lmp, Path(folder))
-                return self._newton(start)
-
-        try:
-            moves, found = in_a_copy(attempt)
-        except SnapshotError:  # particles that nothing holds fly off: the relaxation has its own words for it
-            return None
-        if found is not None:
-            again = iter(moves)
-            self._displace(start, lambda _: next(again, None))
-        return found
-
-    def _newton(self, start: Snapshot) -> tuple[list[Floats], Snapshot | None]:
-        """Displacements to the balance, and the packing there, if it is an equilibrium like that of a relaxation."""
         stiffness = stiffness_matrix(start)
         # what no contact feels has zero rows, and stays where it is
         solver = general_lu(csc_array(stiffness + 1e-9 * abs(stiffness).max() * eye_array(start.coordinates)))
         allowed = self.balance * float(start.contacts.normal_force.mean())
-        moves: list[Floats] = []
-        sizes: list[float] = []
-
-        def next_move(forces: Floats) -> Floats | None:
-            sizes.append(float(np.linalg.norm(forces.reshape(start.axes, -1), axis=0).max()))
-            slow = len(sizes) > 1 and sizes[-1] > 0.5 * sizes[-2]
-            if sizes[-1] <= 1e-4 * allowed or slow or len(sizes) > ITERATIONS:
-                return None
-            moves.append(np.asarray(solver.solve(forces)))
-            return moves[-1]
-
-        self._displace(start, next_move)
-        if sizes[-1] > allowed:
-            return moves, None
-        found = self.look()
-        good = found.residual <= self.balance * found.contacts.normal_force.mean()
-        good = good and not found.contacts.at_bound.any() and len(negative_eigenvalues(found)) == 0
-        return moves, found if good else None
-
-    def _displace(self, start: Snapshot, next_move: Callable[[Floats], Floats | None]) -> None:
-        """Displace particles as the forces on those that are free say, with slips that advance, until none is said."""
-        lmp, step, free = self.lmp, float(self.lmp.extract_global("dt")), np.tile(start.free, start.axes)
         given = self.commands or in_a_copy(lambda: log_of(lmp)) or []
         fixes = read_commands(given, log=self.commands is None).fixes
         moving = [line for line in fixes.values() if without_suffix(line.split()[3]) in INTEGRATORS]
@@ -313,22 +286,31 @@ class _Relaxation:
         for line in lines:
             lmp.command(f"unfix {line.split()[1]}")
         lmp.command("fix faultgouge_moves all nve/noforce")
+        step = float(lmp.extract_global("dt"))
         lmp.command(f"timestep {LONG * step:.17g}")
+        sizes: list[float] = []
         while True:
             set_velocity(lmp, start, np.zeros(start.coordinates))
             lmp.command("run 0 post no")
             rows = rows_of(lmp, start)
             torque = owned_array(lmp, "torque")[rows] / start.radius[:, None]
-            forces = start.join_vectors(owned_array(lmp, "f")[rows], torque)
-            moved = next_move(np.where(free, forces, 0.0))
-            if moved is None:
+            forces = np.where(
+                np.tile(start.free, start.axes), start.join_vectors(owned_array(lmp, "f")[rows], torque), 0.0
+            )
+            sizes.append(float(np.linalg.norm(forces.reshape(start.axes, -1), axis=0).max()))
+            slow = len(sizes) > 1 and sizes[-1] > 0.5 * sizes[-2]
+            if sizes[-1] <= 1e-4 * allowed or slow or len(sizes) > ITERATIONS:
                 break
-            set_velocity(lmp, start, moved / (LONG * step))
+            set_velocity(lmp, start, np.asarray(solver.solve(forces)) / (LONG * step))
             lmp.command("run 1 post no")
-        lmp.command("unfix faultgouge_moves")
-        for line in lines:
+        for line in ("unfix faultgouge_moves", *lines, f"timestep {step:.17g}"):
             lmp.command(line)
-        lmp.command(f"timestep {step:.17g}")
+        if sizes[-1] > allowed:
+            return None
+        found = self.look()
+        good = found.residual <= self.balance * found.contacts.normal_force.mean()
+        good = good and not found.contacts.at_bound.any() and len(negative_eigenvalues(found)) == 0
+        return found if good else None
 
     def relax(self, value: float) -> Snapshot:
         """Run with drag until the packing rests."""
