@@ -9,9 +9,9 @@ particles, and :mod:`~faultgouge.analysis.operators.linearised_contacts` assembl
 have three components; those of disks lie in the plane, and disks turn about z.
 
 **Two derivatives.** For some laws (LAMMPS's mindlin_rescale) the derivative :math:`b = \partial \mathbf f_t / \partial
-\delta` differs between a growing and a falling overlap. Both are stored; every operator takes the weight of opening
-contacts (:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks if the motion reverses, and
-slides if the motion continues. `sliding` chooses.
+\delta` differs between a growing and a falling overlap; every operator takes the weight of opening contacts
+(:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks if the motion reverses, and slides if the
+motion continues: `sliding` chooses.
 """
 
 from dataclasses import dataclass

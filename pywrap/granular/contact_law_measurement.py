@@ -119,7 +119,7 @@ class TwoParticleLammps:
             "neigh_modify every 1 delay 0 check no", f"region box block {edges} units box",
             f"create_box {lmp.extract_setting('ntypes')} box", "thermo_modify lost ignore norm no",
             *[create] * (1 if self.wall else 2), f"set group all diameter {2 * size:.17g}", "set group all density 1",
-            "run_style verlet", *commands.pair,
+            "run_style verlet", "group one id 1", *commands.pair,
         )  # fmt: skip
         if self.wall:
             self.run(" ".join([*words[:2], "all", *words[3:]]))
@@ -271,8 +271,7 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, _Values]:
         x = bench.array("x")[0, bench.axis]
         velocity = ["0", "0", "0"]
         velocity[bench.axis] = f"{-bench.sign * direction * 0.1 * delta / step:.17g}"
-        bench.run("group one id 1", f"fix go one move linear {' '.join(velocity)} units box")
-        bench.run("run 1 post no", "unfix go", "group one delete")
+        bench.run(f"fix go one move linear {' '.join(velocity)} units box", "run 1 post no", "unfix go")
         bench.rest()
         forces.append(bench.force()[1])
         overlaps.append(overlaps[-1] + bench.sign * (x - bench.array("x")[0, bench.axis]))

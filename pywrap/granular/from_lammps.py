@@ -224,15 +224,12 @@ def _mobility(commands: Commands, found: Arrays) -> tuple[NDArray[np.bool_], NDA
 class _OneLaw(NamedTuple):
     """Contacts that have one law, as LAMMPS says them: between particles of two types, or with one wall.
 
-    `forces` has f_n and the vector f_t of LAMMPS's own styles, shape (C, 4), or f_n and the slip of ours, (C, 2).
+    `geometry` has the fields of LinearisedContacts that no law enters. `forces` has f_n and the vector f_t of LAMMPS's
+    own styles, shape (C, 4), or f_n and the slip of ours, shape (C, 2).
     """
 
     who: str
-    i: Indices
-    j: Indices
-    normal: Floats
-    distance: Floats
-    overlap: Floats
+    geometry: dict[str, Any]
     forces: Floats
 
 
@@ -243,15 +240,15 @@ def _contacts(
     pairs, walls = _pairs(found), [name.removeprefix("wall ") for name in found if name.startswith("wall ")]
     parts: list[LinearisedContacts] = []
     if commands.style == OWN:
-        parts.append(_linearise_smooth(_smooth_law(commands.pair[0].split()[2:]), pairs, found))
+        parts.append(_linearise_smooth(_smooth_law(commands.pair[0].split()[2:]), pairs))
         for name in walls:
             words = commands.fixes[name].split()
             law = _smooth_law(words[4:7] + words[9:])
-            parts.append(_linearise_smooth(law, _floor(found, name, float(words[8])), found))
+            parts.append(_linearise_smooth(law, _floor(found, name, float(words[8]))))
     else:
         groups: dict[Any, _OneLaw] = _by_types(pairs, found["type"]) | {name: _wall(found, name) for name in walls}
         for name, group in groups.items():
-            if len(group.i) == 0:
+            if len(group.forces) == 0:
                 continue
             # a law is that of its commands, which a user may change
             key = (*commands.pair, commands.fixes.get(name), name)
@@ -266,6 +263,13 @@ def _contacts(
     return LinearisedContacts(**{name: np.concatenate([getattr(each, name) for each in parts]) for name in PER_CONTACT})
 
 
+def _geometry(
+    found: Arrays, i: Indices, j: Indices, normal: Floats, distance: Floats, overlap: Floats
+) -> dict[str, Any]:
+    arms = np.column_stack([found["radius"][i], np.where(j == WALL, 0.0, found["radius"][j])])
+    return {"i": i, "j": j, "normal": normal, "distance": distance, "overlap": overlap, "slip_arm": arms}
+
+
 def _pairs(found: Arrays) -> _OneLaw:
     """All contacts between particles, of whatever types."""
     rows, partners = found["contacts"], found["partners"]
@@ -278,19 +282,24 @@ def _pairs(found: Arrays) -> _OneLaw:
         )
     distance = np.linalg.norm(rows[:, :3], axis=1)
     overlap = found["radius"][i] + found["radius"][j] - distance
-    return _OneLaw("contacts of mindlin/smooth", i, j, rows[:, :3] / distance[:, None], distance, overlap, rows[:, 3:])
+    geometry = _geometry(found, i, j, rows[:, :3] / distance[:, None], distance, overlap)
+    return _OneLaw("contacts of mindlin/smooth", geometry, rows[:, 3:])
 
 
 def _by_types(pairs: _OneLaw, kind: Indices) -> dict[Any, _OneLaw]:
     """Contacts between particles by their two types, the smaller first."""
-    types, found = np.sort(np.column_stack([kind[pairs.i], kind[pairs.j]]), axis=1), {}
+    types = np.sort(np.column_stack([kind[pairs.geometry["i"]], kind[pairs.geometry["j"]]]), axis=1)
+    found = {}
     for first, second in np.unique(types, axis=0).tolist():
-        which, (_, i, j, normal, distance, overlap, forces) = np.all(types == (first, second), axis=1), pairs
-        found[first, second] = _OneLaw(
-            f"contacts of types {first} and {second}",
-            i[which], j[which], normal[which], distance[which], overlap[which], forces[which],
-        )  # fmt: skip
+        which = np.all(types == (first, second), axis=1)
+        geometry = {name: values[which] for name, values in pairs.geometry.items()}
+        found[first, second] = _OneLaw(f"contacts of types {first} and {second}", geometry, pairs.forces[which])
     return found
+
+
+def _at_wall(found: Arrays, name: str, i: Indices, normal: Floats, overlap: Floats, forces: Floats) -> _OneLaw:
+    geometry = _geometry(found, i, np.full(len(i), WALL), normal, np.full(len(i), np.inf), overlap)
+    return _OneLaw(f"contacts of fix {name}", geometry, forces)
 
 
 def _wall(found: Arrays, name: str) -> _OneLaw:
@@ -303,10 +312,7 @@ def _wall(found: Arrays, name: str) -> _OneLaw:
     normal[every, axis] = np.sign(distance)
     along = np.einsum("ca,ca->c", force, normal)[:, None]
     forces = np.hstack([along, force - along * normal])
-    overlap = found["radius"][i] - np.abs(distance)
-    return _OneLaw(
-        f"contacts of fix {name}", i, np.full(len(i), WALL), normal, np.full(len(i), np.inf), overlap, forces
-    )
+    return _at_wall(found, name, i, normal, found["radius"][i] - np.abs(distance), forces)
 
 
 def _floor(found: Arrays, name: str, height: float) -> _OneLaw:
@@ -314,24 +320,18 @@ def _floor(found: Arrays, name: str, height: float) -> _OneLaw:
     overlap = found["radius"] - (found["x"][:, 1] - height)
     i = np.flatnonzero(overlap > 0)
     normal, forces = np.tile([0.0, 1.0, 0.0], (len(i), 1)), found[f"wall {name}"][i][:, [0, 2]]
-    who = f"contacts of fix {name}"
-    return _OneLaw(who, i, np.full(len(i), WALL), normal, np.full(len(i), np.inf), overlap[i], forces)
-
-
-def _radii(contacts: _OneLaw, found: Arrays) -> Floats:
-    """Radii of both partners, shape (C, 2); zero of a wall."""
-    radius = found["radius"]
-    return np.column_stack([radius[contacts.i], np.where(contacts.j == WALL, 0.0, radius[contacts.j])])
+    return _at_wall(found, name, i, normal, overlap[i], forces)
 
 
 def _median_state(contacts: _OneLaw, found: Arrays) -> State:
     """The contact of the median overlap, its partner of the smaller type first."""
-    k = np.argsort(contacts.overlap)[len(contacts.i) // 2]
-    i, j, overlap, radius, mass = contacts.i[k], contacts.j[k], contacts.overlap[k], found["radius"], found["rmass"]
-    if j == WALL:
-        return State((radius[i], 0.0), (mass[i], np.inf), overlap)
-    i, j = sorted((i, j), key=lambda each: found["type"][each])
-    return State((radius[i], radius[j]), (mass[i], mass[j]), overlap)
+    i, j, overlap = (contacts.geometry[name] for name in ("i", "j", "overlap"))
+    k = np.argsort(overlap)[len(overlap) // 2]
+    radius, mass = found["radius"], found["rmass"]
+    if j[k] == WALL:
+        return State((radius[i[k]], 0.0), (mass[i[k]], np.inf), overlap[k])
+    first, second = sorted((i[k], j[k]), key=lambda each: found["type"][each])
+    return State((radius[first], radius[second]), (mass[first], mass[second]), overlap[k])
 
 
 def _smooth_law(words: list[str]) -> MindlinLaw:
@@ -347,14 +347,13 @@ def _smooth_law(words: list[str]) -> MindlinLaw:
     )
 
 
-def _linearise_smooth(law: MindlinLaw, contacts: _OneLaw, found: Arrays) -> LinearisedContacts:
+def _linearise_smooth(law: MindlinLaw, contacts: _OneLaw) -> LinearisedContacts:
     """Contacts of mindlin/smooth, along z x n."""
-    who, i, j, normal, distance, overlap, forces = contacts
-    tangent, arms = np.column_stack([-normal[:, 1], normal[:, 0], np.zeros(len(i))]), _radii(contacts, found)
-    made = linearise_contacts(
-        law, overlap, forces[:, -1], tangent, i=i, j=j, normal=normal, distance=distance, slip_arm=arms, lever_arm=arms
-    )
-    _agree(made.normal_force, forces[:, 0], made.normal_stiffness * arms.sum(axis=1), who)
+    normal, arms = contacts.geometry["normal"], contacts.geometry["slip_arm"]
+    tangent = np.column_stack([-normal[:, 1], normal[:, 0], np.zeros(len(normal))])
+    slip = contacts.forces[:, -1]
+    made = linearise_contacts(law, slip=slip, tangent=tangent, lever_arm=arms, **contacts.geometry)
+    _agree(made.normal_force, made.normal_stiffness, contacts)
     return made
 
 
@@ -362,9 +361,9 @@ def _linearise_measured(
     law: MeasuredLaw, contacts: _OneLaw, found: Arrays, frozen: NDArray[np.bool_]
 ) -> LinearisedContacts:
     """Contacts of a law that has been measured."""
-    who, i, j, normal, distance, overlap, forces = contacts
-    normal_force, tangential_force = forces[:, 0], forces[:, 1:]
-    wall, radius, mass, arms = j == WALL, found["radius"], found["rmass"], _radii(contacts, found)
+    i, j, overlap, arms = (contacts.geometry[name] for name in ("i", "j", "overlap", "slip_arm"))
+    normal_force, tangential_force = contacts.forces[:, 0], contacts.forces[:, 1:]
+    wall, radius, mass = j == WALL, found["radius"], found["rmass"]
     stiffness = (1 + law.stiffness.overlap) * normal_force / overlap
     reduced_radius = np.where(wall, radius[i], radius[i] * radius[j] / (radius[i] + radius[j]))
     # frozen particles weigh infinitely much in LAMMPS's dashpots, but not at walls; two frozen ones matter to nobody
@@ -372,16 +371,10 @@ def _linearise_measured(
     inverse_mass = inverse[i] + inverse[j]
     reduced_mass = np.divide(1.0, inverse_mass, out=np.zeros(len(i)), where=inverse_mass > 0)
     reduced_mass = np.where(wall, mass[i], reduced_mass)
-    computed = law.stiffness.at(reduced_radius, overlap) * overlap
-    _agree(computed, normal_force, stiffness * arms.sum(axis=1), who)
+    _agree(law.stiffness.at(reduced_radius, overlap) * overlap, stiffness, contacts)
     per_overlap = tangential_force / overlap[:, None]
     return LinearisedContacts(
-        i=i,
-        j=j,
-        normal=normal,
-        distance=distance,
-        overlap=overlap,
-        slip_arm=arms,
+        **contacts.geometry,
         lever_arm=np.where(arms > 0, arms - law.lever * overlap[:, None], 0.0),
         lever_slope=np.full(len(i), law.lever),
         normal_force=normal_force,
@@ -397,10 +390,10 @@ def _linearise_measured(
     )
 
 
-def _agree(computed: Floats, said: Floats, force_per_rounding: Floats, who: str) -> None:
+def _agree(computed: Floats, stiffness: Floats, contacts: _OneLaw) -> None:
     """Refuse normal forces that are not those of the commands."""
-    rounding = ROUNDING * force_per_rounding
+    said, rounding = contacts.forces[:, 0], ROUNDING * stiffness * contacts.geometry["slip_arm"].sum(axis=1)
     if len(said) and np.any(np.abs(computed - said) > AGREES * np.max(np.abs(said)) + rounding):
         raise SnapshotError(
-            f"The normal forces of the {who} are not those of the commands: {GIVE_LINES}, as they hold now."
+            f"The normal forces of the {contacts.who} are not those of the commands: {GIVE_LINES}, as they hold now."
         )

@@ -37,15 +37,7 @@ class SnapshotError(FaultgougeError):
 
 @dataclass(frozen=True)
 class Commands:
-    """What a deck says of contacts and of motion.
-
-    Attributes
-    ----------
-    pair : tuple of str
-        The line of pair_style and those of pair_coeff that hold.
-    fixes : dict
-        Lines of all fixes by their IDs.
-    """
+    """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, and fixes by their IDs."""
 
     pair: tuple[str, ...]
     fixes: dict[str, str]

@@ -14,14 +14,7 @@ from .instance_queries import explain_error
 
 
 def run_deck(path: Path, *, slides: bool = False) -> Snapshot:
-    """Run a deck in its own folder, as `lmp -in` there, and take its last state.
-
-    Parameters
-    ----------
-    path : Path
-        The deck.
-    slides : bool
-        As of :func:`~faultgouge.pywrap.from_lammps`.
+    """Run a deck in its own folder, as `lmp -in` there, and take its last state as `from_lammps` does.
 
     Raises
     ------
