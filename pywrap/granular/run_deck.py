@@ -66,10 +66,9 @@ def _check_deck(path: Path) -> None:
     pairs = [line for line in words if line[:1] == ["pair_style"]]
     known = bool(pairs) and not any("$" in word for line in pairs for word in line)
     commands = read_commands(lines if known else ["pair_style none", *lines], log=True)
-    styles = {name: line.split()[3] for name, line in commands.fixes.items()}
     try:
         if known:
             check_pair(commands, [])
-        check_fixes({name: style for name, style in styles.items() if "$" not in style}, commands)
+        check_fixes({name: line.split()[3] for name, line in commands.fixes.items()}, commands)
     except SnapshotError as error:
         raise BadInputError(f"{path}: {error}") from error
