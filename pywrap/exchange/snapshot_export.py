@@ -26,15 +26,6 @@ class SnapshotMode:
     eigenvalue: complex
     vector: NDArray[np.complex128]
 
-    def fields(self, snapshot: Snapshot) -> dict[str, Floats]:
-        """Translations and rotations R theta, shape (N, 3), by the names that they have in a file."""
-        found: dict[str, Floats] = {}
-        for part, moved in (("", self.vector.real), ("_imag", self.vector.imag)):
-            if not part or np.any(moved):
-                translation, rotation = snapshot.vectors(moved)
-                found |= {f"{self.name}{part}": translation, f"{self.name}{part}_rotation": rotation}
-        return found
-
 
 def mode_of_snapshot(snapshot: Snapshot, which: str) -> SnapshotMode:
     """The fastest growing pair, or the mode of a number, counted by eigenvalue from 0.
@@ -136,7 +127,9 @@ def _of_particles(snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> dict[str
         "coordination": count.astype(np.float64),
     }
     for mode in modes:
-        values |= mode.fields(snapshot)
+        for name, moved in ((mode.name, mode.vector.real), (f"{mode.name}_imag", mode.vector.imag)):
+            if name == mode.name or np.any(moved):
+                values[name], values[f"{name}_rotation"] = snapshot.vectors(moved)
     return values
 
 

@@ -165,10 +165,6 @@ class TwoParticleLammps:
         f = self.array("f")[0]
         return float(self.sign * f[self.axis]), float(abs(f[self.across]))
 
-    def lever(self) -> float:
-        """Torque over tangential force of the first particle, length."""
-        return float(abs(self.array("torque")[0, self.about] / self.array("f")[0, self.across]))
-
     def close(self) -> None:
         """End LAMMPS."""
         self.lammps.close()
@@ -199,7 +195,7 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
 
     def power(name: str) -> PowerOfOverlap:
         what = f"{name.replace('_', ' ')} of the {who}"
-        values = [getattr(each, name) for each in found]
+        values = [each[name] for each in found]
         if not any(values):
             return PowerOfOverlap(0.0)
         if min(values) <= 0:
@@ -215,10 +211,10 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
 
     return MeasuredLaw(
         **{name: power(name) for name in ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot")},
-        closing=quarter(here.closing, f"tangential force of the {who}"),
-        parting=quarter(here.parting, f"tangential force of the {who}"),
-        mu=here.mu,
-        lever=quarter(here.lever, f"lever arm of the {who}"),
+        closing=quarter(here["closing"], f"tangential force of the {who}"),
+        parting=quarter(here["parting"], f"tangential force of the {who}"),
+        mu=here["mu"],
+        lever=quarter(here["lever"], f"lever arm of the {who}"),
     )
 
 
@@ -232,19 +228,8 @@ def quarter(value: float, what: str) -> float:
     return nearest
 
 
-class _Values(NamedTuple):
-    stiffness: float
-    tangential: float
-    normal_dashpot: float
-    tangential_dashpot: float
-    closing: float
-    parting: float
-    mu: float
-    lever: float
-
-
-def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, _Values]:
-    """Forces of one contact at rest and in motion."""
+def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, float]]:
+    """What one contact has of a MeasuredLaw's fields, by its forces at rest and in motion."""
     state = bench.place_at(wanted)
     fn, delta = bench.force()[0], state.overlap
     # a time step so long that dashpots are weak beside slips
@@ -256,7 +241,8 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, _Values]:
     bench.run("run 1 post no")
     mu = bench.force()[1] / fn  # while the contact slides: a dashpot has its share of it
     if mu == 0:
-        return state, _Values(fn / delta, 0.0, normal_dashpot, 0.0, 0.0, 0.0, 0.0, 0.0)
+        none = dict.fromkeys(("tangential", "tangential_dashpot", "closing", "parting", "mu", "lever"), 0.0)
+        return state, {"stiffness": fn / delta, "normal_dashpot": normal_dashpot} | none
     slip = 0.01 * min(mu, 1.0) * delta
     ft = _push_contact(bench, wanted, slip / step)
     if ft > 0.1 * mu * fn:  # a stiff spring: once more, with less
@@ -264,7 +250,8 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, _Values]:
         ft = _push_contact(bench, wanted, slip / step)
     if ft == 0:
         raise SnapshotError("A contact law has friction without a tangential stiffness: use one with a history.")
-    lever = (state.radii[0] - bench.lever()) / delta
+    arm = abs(bench.array("torque")[0, bench.about] / bench.array("f")[0, bench.across])
+    lever = float(state.radii[0] - arm) / delta
     # the exponents at constant slip, in steps of a tenth of the overlap
     forces, overlaps = [ft], [delta]
     for direction in (-1.0, 1.0):
@@ -278,7 +265,10 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, _Values]:
     parting, closing = np.log(np.array(forces[1:]) / forces[:-1]) / np.log(np.array(overlaps[1:]) / overlaps[:-1])
     bench.place_at(wanted)
     tangential_dashpot = _dashpot(bench, "slipping", mu * fn, slip / step)
-    return state, _Values(fn / delta, ft / slip, normal_dashpot, tangential_dashpot, closing, parting, mu, lever)
+    return state, {
+        "stiffness": fn / delta, "tangential": ft / slip, "normal_dashpot": normal_dashpot,
+        "tangential_dashpot": tangential_dashpot, "closing": closing, "parting": parting, "mu": mu, "lever": lever,
+    }  # fmt: skip
 
 
 def _push_contact(bench: TwoParticleLammps, state: State, speed: float) -> float:

@@ -200,18 +200,17 @@ def _mobility(commands: Commands, found: Arrays) -> tuple[NDArray[np.bool_], NDA
     count = len(found["id"])
     frozen, free, factor = np.zeros(count, bool), np.zeros(count, bool), np.full(count, 0.4)
     for name, line in commands.fixes.items():
-        members, words = found.get(f"group {name}"), line.split()
-        style = without_suffix(words[3])
-        if members is None:
+        if f"group {name}" not in found:
             continue
+        members, words = found[f"group {name}"], line.split()
+        style = without_suffix(words[3])
         if style == "freeze":
             frozen |= members
-            continue
-        free |= members
-        if style == "nve/sphere":
+        elif style == "nve/sphere":
             factor[members] = 0.5 if "disc" in words else 0.4
         else:
             factor[members] = float(words[4 if style == "nve/disc" else 5])
+        free |= members
     free &= ~frozen
     if not free.any():
         raise SnapshotError(

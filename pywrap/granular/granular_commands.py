@@ -23,7 +23,6 @@ INTEGRATORS = ("nve/sphere", "nve/disc", "overdamped/disc")
 GIVE_LINES = "give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck as commands=[...]"
 
 COHESIVE = ("jkr", "dmt", "mdr")
-SUFFIXES = ("/omp", "/kk", "/intel", "/gpu", "/opt")
 UNSUPPORTED_SUBMODELS = {"twisting": "twisting friction", "rolling": "rolling friction", "heat": "heat conduction"}
 TANGENTIAL = (
     "linear_history", "linear_history_classic", "mindlin", "mindlin_classic", "mindlin/force", "mindlin_rescale",
@@ -50,9 +49,7 @@ class Commands:
 
 def without_suffix(style: str) -> str:
     """A style as LAMMPS's manual names it."""
-    for suffix in SUFFIXES:
-        style = style.removesuffix(suffix)
-    return style
+    return re.sub("/(omp|kk|intel|gpu|opt)$", "", style)
 
 
 def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:

@@ -52,9 +52,9 @@ def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: list[str], columns: 
     contacts with the walls of others."""
     for name in ("v", "omega"):
         owned_array(lmp, name)[:] = 0.0
+    lmp.command(f"compute faultgouge_c all pair/local {columns} cutoff radius")
+    lmp.command("compute faultgouge_i all property/local patom1 patom2 cutoff radius")
     try:
-        lmp.command(f"compute faultgouge_c all pair/local {columns} cutoff radius")
-        lmp.command("compute faultgouge_i all property/local patom1 patom2 cutoff radius")
         lmp.command("run 0 post no")
         names = ("id", "type", "x", "f", "torque", "radius", "rmass")
         found: Arrays = {name: np.array(owned_array(lmp, name)) for name in names}
@@ -65,16 +65,14 @@ def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: list[str], columns: 
         for fix, group in groups.items():
             lmp.command(f"variable faultgouge_g atom gmask({group})")
             found[f"group {fix}"] = np.array(lmp.numpy.extract_variable("faultgouge_g", "all", 1))[:count] > 0
+            lmp.command("variable faultgouge_g delete")
         for wall in walls:
             rows = lmp.numpy.extract_fix(wall, 1, 2)
             found[f"wall {wall}"] = np.zeros((0, 8)) if count == 0 else np.array(rows)[:count]
         return found
     finally:
         for name in ("faultgouge_c", "faultgouge_i"):
-            if lmp.has_id("compute", name):
-                lmp.command(f"uncompute {name}")
-        if lmp.has_id("variable", "faultgouge_g"):
-            lmp.command("variable faultgouge_g delete")
+            lmp.command(f"uncompute {name}")
 
 
 @contextmanager

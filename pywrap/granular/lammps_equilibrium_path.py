@@ -281,10 +281,9 @@ class _Relaxation:
         allowed = self.balance * float(start.contacts.normal_force.mean())
         given = self.commands or in_a_copy(lambda: log_of(lmp)) or []
         fixes = read_commands(given, log=self.commands is None).fixes
-        moving = [line for line in fixes.values() if without_suffix(line.split()[3]) in INTEGRATORS]
-        lines = [line for line in moving if lmp.has_id("fix", line.split()[1])]
-        for line in lines:
-            lmp.command(f"unfix {line.split()[1]}")
+        moving = {name: line for name, line in fixes.items() if without_suffix(line.split()[3]) in INTEGRATORS}
+        for name in moving:
+            lmp.command(f"unfix {name}")
         lmp.command("fix faultgouge_moves all nve/noforce")
         step = float(lmp.extract_global("dt"))
         lmp.command(f"timestep {LONG * step:.17g}")
@@ -303,7 +302,7 @@ class _Relaxation:
                 break
             set_velocity(lmp, start, np.asarray(solver.solve(forces)) / (LONG * step))
             lmp.command("run 1 post no")
-        for line in ("unfix faultgouge_moves", *lines, f"timestep {step:.17g}"):
+        for line in ("unfix faultgouge_moves", *moving.values(), f"timestep {step:.17g}"):
             lmp.command(line)
         if sizes[-1] > allowed:
             return None
