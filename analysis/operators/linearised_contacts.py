@@ -63,54 +63,11 @@ def contact_derivatives(contacts: LinearisedContacts, parting: ArrayLike = 0.5) 
 
 
 def assembled_stiffness(snapshot: Snapshot, parting: ArrayLike = 0.5) -> csr_array:
-    """K = -dF/dq of a snapshot; see :func:`~faultgouge.analysis.stiffness_matrix`."""
-    return _assemble(snapshot, snapshot.contacts, parting)
+    """K = -dF/dq of a snapshot; see :func:`~faultgouge.analysis.stiffness_matrix`.
 
-
-def assembled_damping(snapshot: Snapshot) -> csr_array:
-    """C = -dF/d(dq/dt) of a snapshot; see :func:`~faultgouge.analysis.damping_matrix`."""
-    c = snapshot.contacts
-    none, still = np.zeros(len(c)), np.zeros((len(c), 3))
-    # the direction in which a contact slides is that of its tangential force, which has no part in C but for this
-    sliding = np.where(c.sliding[:, None], c.tangential_force, 0.0)
-    dashpots = derive_frozen(
-        c, normal_force=none, tangential_force=sliding, closing=still, parting=still, distance=np.full(len(c), np.inf),
-        normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot, lever_slope=none,
-    )  # fmt: skip
-    return _assemble(snapshot, dashpots, 0.5)
-
-
-def rescaling_operators(snapshot: Snapshot) -> tuple[csr_array, csr_array]:
-    r"""What K of the mean derivative lacks where a contact closes with another derivative than it parts with.
-
-    With :math:`\dot\delta = N \dot q` the forces change by :math:`-K \dot q + B\, |N \dot q|`.
-
-    Returns
-    -------
-    n : scipy.sparse.csr_array, shape (C, coordinates)
-        Rates of the overlaps by velocities.
-    b : scipy.sparse.csr_array, shape (coordinates, C)
-        Forces by absolute rates of the overlaps, half of the difference of both derivatives; force / length.
+    Rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact.
     """
-    c, count = snapshot.contacts, len(snapshot)
-    difference = 0.5 * (c.overlap_derivative(0.0) - c.overlap_derivative(1.0))
-    turn = np.cross(c.normal, difference)
-    in_plane = np.arange(6) if snapshot.dimension == 3 else np.array([0, 1, 5])
-    contact = np.tile(np.arange(len(c)), len(in_plane))
-    n, b = (csr_array((len(c), snapshot.coordinates)) for _ in range(2))
-    for partner, arm, sign in ((c.i, c.lever_arm[:, 0], 1.0), (c.j, c.lever_arm[:, 1], -1.0)):
-        moves = (partner >= 0) & snapshot.free[partner]
-        rate = np.hstack([-sign * c.normal, np.zeros_like(turn)]) * moves[:, None]
-        force = np.hstack([sign * difference, -(arm / snapshot.radius[partner])[:, None] * turn]) * moves[:, None]
-        coordinate = (np.arange(len(in_plane))[:, None] * count + np.where(moves, partner, 0)).ravel()
-        n = n + csr_array((rate.T[in_plane].ravel(), (contact, coordinate)), shape=n.shape)
-        b = b + csr_array((force.T[in_plane].ravel(), (contact, coordinate)), shape=b.shape)
-    return n, csr_array(b.T)
-
-
-def _assemble(snapshot: Snapshot, contacts: LinearisedContacts, parting: ArrayLike) -> csr_array:
-    """-dF/dq: rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact."""
-    count, c, pair = len(snapshot), contacts, ~contacts.wall
+    count, c, pair = len(snapshot), snapshot.contacts, ~snapshot.contacts.wall
     force, torque, growth = contact_derivatives(c, parting)
     partners = np.stack([c.i, np.where(pair, c.j, 0)])
     radius = snapshot.radius[partners]
@@ -144,6 +101,46 @@ def _assemble(snapshot: Snapshot, contacts: LinearisedContacts, parting: ArrayLi
     matrix = coo_array((values.ravel(), where), shape=(snapshot.coordinates, snapshot.coordinates)).tocsr()
     matrix.eliminate_zeros()
     return matrix
+
+
+def assembled_damping(snapshot: Snapshot) -> csr_array:
+    """C = -dF/d(dq/dt) of a snapshot; see :func:`~faultgouge.analysis.damping_matrix`."""
+    c = snapshot.contacts
+    none, still = np.zeros(len(c)), np.zeros((len(c), 3))
+    # where no normal rotates the tangential force is but the direction in which a contact slides
+    dashpots = derive_frozen(
+        c, normal_force=none, closing=still, parting=still, distance=np.full(len(c), np.inf), lever_slope=none,
+        normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot,
+    )  # fmt: skip
+    return assembled_stiffness(derive_frozen(snapshot, contacts=dashpots))
+
+
+def rescaling_operators(snapshot: Snapshot) -> tuple[csr_array, csr_array]:
+    r"""What K of the mean derivative lacks where a contact closes with another derivative than it parts with.
+
+    With :math:`\dot\delta = N \dot q` the forces change by :math:`-K \dot q + B\, |N \dot q|`.
+
+    Returns
+    -------
+    n : scipy.sparse.csr_array, shape (C, coordinates)
+        Rates of the overlaps by velocities.
+    b : scipy.sparse.csr_array, shape (coordinates, C)
+        Forces by absolute rates of the overlaps, half of the difference of both derivatives; force / length.
+    """
+    c, count = snapshot.contacts, len(snapshot)
+    difference = 0.5 * (c.overlap_derivative(0.0) - c.overlap_derivative(1.0))
+    turn = np.cross(c.normal, difference)
+    in_plane = np.arange(6) if snapshot.dimension == 3 else np.array([0, 1, 5])
+    contact = np.tile(np.arange(len(c)), len(in_plane))
+    n, b = (csr_array((len(c), snapshot.coordinates)) for _ in range(2))
+    for partner, arm, sign in ((c.i, c.lever_arm[:, 0], 1.0), (c.j, c.lever_arm[:, 1], -1.0)):
+        moves = (partner >= 0) & snapshot.free[partner]
+        rate = np.hstack([-sign * c.normal, np.zeros_like(turn)]) * moves[:, None]
+        force = np.hstack([sign * difference, -(arm / snapshot.radius[partner])[:, None] * turn]) * moves[:, None]
+        coordinate = (np.arange(len(in_plane))[:, None] * count + np.where(moves, partner, 0)).ravel()
+        n = n + csr_array((rate.T[in_plane].ravel(), (contact, coordinate)), shape=n.shape)
+        b = b + csr_array((force.T[in_plane].ravel(), (contact, coordinate)), shape=b.shape)
+    return n, csr_array(b.T)
 
 
 def _outer(a: Floats, b: Floats) -> Floats:

@@ -117,8 +117,8 @@ class LinearisedContacts:
     def __init__(self, **given: ArrayLike) -> None:
         if given.keys() != PER_CONTACT.keys():
             raise ValueError(f"Contacts need {', '.join(PER_CONTACT)}; these are {', '.join(given)}.")
-        count = len(np.atleast_1d(np.asarray(given["i"])))
         values: dict[str, NDArray] = {name: integers(name, given[name]) for name in ("i", "j")}
+        count = len(values["i"])
         values["sliding"] = booleans("sliding", given["sliding"], count)
         for name in ("distance", "friction"):  # may be infinite
             values[name] = np.array(given[name], dtype=np.float64)
@@ -369,10 +369,7 @@ class Snapshot:
     @cached_property
     def rattlers(self) -> Indices:
         """Indices of the particles that touch nothing."""
-        alone = np.ones(len(self), dtype=np.bool_)
-        alone[self.contacts.i] = False
-        alone[self.contacts.j[~self.contacts.wall]] = False
-        return frozen(np.flatnonzero(alone))
+        return frozen(np.setdiff1d(np.arange(len(self)), [self.contacts.i, self.contacts.j]))
 
     @cached_property
     def net_force(self) -> Floats:

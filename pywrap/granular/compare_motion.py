@@ -10,8 +10,7 @@ neither the motion of what was out of balance nor terms of second order in :math
 of the time step, of its second order, or with dashpots of its first, since LAMMPS takes the velocity of the half step
 for them; of the forces' cubic terms, of the second order of the amplitude; and of `granular`, which turns a history
 only where it has left the contact's plane by 1e-10 of Coulomb's bound. The last one grows as the inverse of the
-amplitude. At the best amplitude the last two are together 1e-7 to 1e-5, more where overlaps are small. Two amplitudes
-and three time steps, extrapolated to zero, leave less than 1e-6 of the motion.
+amplitude. At the best amplitude the last two are together 1e-7 to 1e-5, more where overlaps are small.
 
 Laws with two derivatives (mindlin_rescale) have other forces while a contact closes than while it parts. With the mean
 K of both, and N and B of :func:`~faultgouge.analysis.operators.linearised_contacts.rescaling_operators`, the motion is

@@ -26,6 +26,7 @@ Coulomb's bound down to elastic, so that it sticks by default.
 
 from collections.abc import Iterable
 from contextlib import nullcontext
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -105,11 +106,8 @@ def take_snapshot(
 ) -> Snapshot:
     """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
     given = None if commands is None else read_commands(commands)
-    if can_copy(lmp):
-        read, found = in_a_copy(lambda: _look(lmp, given, copied=True))
-    else:
-        read, found = _look(lmp, given, copied=False)
-    snapshot = _snapshot(lmp, read, found, laws)
+    look = partial(_look, lmp, given)
+    snapshot = _snapshot(lmp, *(in_a_copy(look) if can_copy(lmp) else look()), laws)
     contacts = snapshot.contacts
     force = contacts.normal_force.mean() if len(contacts) else 0.0
     if snapshot.residual > balance * force:
@@ -122,9 +120,9 @@ def take_snapshot(
     return snapshot
 
 
-def _look(lmp: Any, given: Commands | None, *, copied: bool) -> tuple[Commands, Arrays]:
-    """The commands, and the arrays of all ranks in the order of the particles' IDs."""
-    world = communicator(lmp)
+def _look(lmp: Any, given: Commands | None) -> tuple[Commands, Arrays]:
+    """The commands, and the arrays of all ranks in the order of the particles' IDs; in a copy if there can be one."""
+    world, copied = communicator(lmp), can_copy(lmp)
     if given is None:
         lines = log_of(lmp) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
         if lines is None:

@@ -14,9 +14,6 @@ the balance is that of a relaxation. Else another copy relaxes.
 critical damping of the slowest mode, where the force that is out of balance is half of the drag: the rate of the drag
 is doubled where the force is more than twice the drag, and halved where it is less than a quarter, since the packing
 creeps or a loose sphere rolls away.
-
-The error of the path itself is not known: of increments half as large some contacts slide otherwise
-(:class:`~faultgouge.analysis.Onset` has None for it), and a second path with smaller increments tells it.
 """
 
 import os

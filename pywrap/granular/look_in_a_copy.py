@@ -56,10 +56,8 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
     if child == 0:
         try:
             there.send(work())
-        except SnapshotError as error:
-            there.send(error)
         except Exception as error:  # whatever it is, the parent says it
-            there.send(SnapshotError(explain_error(error)))
+            there.send(error if isinstance(error, SnapshotError) else SnapshotError(explain_error(error)))
         finally:
             os._exit(0)
     there.close()

@@ -63,11 +63,10 @@ def _check_deck(path: Path) -> None:
             )
     if any(line[0] in BRANCHES for line in words if line):
         return
-    pairs = [line for line in words if line[:1] == ["pair_style"]]
-    known = bool(pairs) and not any("$" in word for line in pairs for word in line)
-    commands = read_commands(lines if known else ["pair_style none", *lines], log=True)
+    commands = read_commands(["pair_style none", *lines], log=True)
+    varies = any("$" in word for line in words if line[:1] == ["pair_style"] for word in line)
     try:
-        if known:
+        if commands.style != "none" and not varies:
             check_pair(commands, [])
         check_fixes({name: line.split()[3] for name, line in commands.fixes.items()}, commands)
     except SnapshotError as error:
